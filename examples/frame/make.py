@@ -1,5 +1,5 @@
-"""Makes frame.csv: two storeys on a shake table under random motion, exact between the samples of a
-sixteenfold rate, with an anti-aliasing filter and noise. Needs NumPy and SciPy.
+"""Makes frame.csv: two storeys on a shake table under random motion. The response is computed exactly at 16 times the
+sample rate, then filtered against aliasing and sampled; noise is added. Needs NumPy and SciPy.
 """
 
 from pathlib import Path
@@ -17,7 +17,8 @@ random = np.random.default_rng(7)
 count, rate = SAMPLES * OVER + 64 * OVER, RATE * OVER
 ground = sosfilt(butter(4, [0.5, 20], "bandpass", fs=rate, output="sos"), random.standard_normal(count))
 ground /= ground.std()  # m/s²
-# z = motion relative to the table: M z¨ + C z˙ + K z = −M 1 a, with a linear between its samples.
+# The displacement z relative to the table follows from M z¨ + C z˙ + K z = −M 1 a; the acceleration a of the table is linear
+# between samples.
 A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(MASS, K), -np.linalg.solve(MASS, C)]])
 B = np.r_[0, 0, -1, -1.0]
 big = np.zeros((6, 6))

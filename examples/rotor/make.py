@@ -1,4 +1,4 @@
-"""Makes the files beside it: the rotor of ROSS's first example (`rotor_example`) without its bearings, and
+"""Makes the other files of this folder: the rotor of ROSS's first example (`rotor_example`) without its bearings, and
 runs with trial weights on two oil-film bearings. Needs ross-rotordynamics 2.3.
 """
 

@@ -1,4 +1,5 @@
-//! How far the cases of a target come: a target that every input leaves at the door tests the door alone.
+//! Depth that the cases of a target reach. If the reader refuses every input, the target tests only
+//! the reader.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -7,23 +8,23 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub enum Depth {
     /// The reader refuses the input.
     Refused,
-    /// The input is read, and what is asked for does not exist in it.
+    /// The input is read, but lacks what the analysis needs.
     Read,
-    /// The work begins, and ends in an error.
+    /// The analysis begins, and ends with an error.
     Reached,
-    /// The work ends with a result.
+    /// The analysis ends with a result.
     Fitted,
 }
 
-/// Deepest depth of the case that is running.
+/// Greatest depth that the running case has reached.
 static CURRENT: AtomicU64 = AtomicU64::new(0);
 
-/// Says how far a case has come.
+/// Records the depth that the running case has reached.
 pub fn reached(depth: Depth) {
     CURRENT.fetch_max(depth as u64, Ordering::Relaxed);
 }
 
-/// Returns how far the last case came, and begins another one.
+/// Returns the depth that the last case reached, and resets it for the next case.
 pub(crate) fn taken() -> usize {
     CURRENT.swap(0, Ordering::Relaxed) as usize
 }

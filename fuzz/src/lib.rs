@@ -1,18 +1,19 @@
 //! Random and damaged input for every reader and public function of the workspace.
 //!
-//! A [`Target`] takes bytes and returns an error where a promise is broken; a panic, a hang and
-//! memory beyond a cap are errors, too. [`run`] gives it the files of its corpus (a folder of
-//! `corpus` in this package) and then mutations of them, or random bytes from which it draws the
-//! arguments of public functions; each follows from its seed and its number alone.
+//! A [`Target`] takes bytes and returns an error if the code breaks a promise; a panic, a hang and
+//! too much memory are errors, too. [`run`] calls it with the files of its corpus (a folder of
+//! `corpus` in this package) and then with mutations of them, or with random bytes; the target
+//! draws the arguments of public functions from random bytes. Each case is determined by the seed
+//! and its number.
 //!
 //! - `cargo test -p mechid-fuzz` runs some thousand cases of each target.
-//! - `cargo run --release -p mechid-fuzz -- --cases 10000000` runs many, of one target with
-//!   `--target NAME`; `--seed` chooses others, `--case` repeats one.
+//! - `cargo run --release -p mechid-fuzz -- --cases 10000000` runs many. `--target NAME` selects
+//!   one target, `--seed` other cases, and `--case` repeats a single case.
 //!
-//! An input that fails is written to `target/fuzz`. Once the defect is mended it goes to the corpus,
-//! so that it is tried on every run.
+//! An input that fails is written to `target/fuzz`. Once the defect is corrected, the input is
+//! added to the corpus, so that every run tests it.
 //!
-//! To add a target: a function in a file of `targets`, and a line in [`targets::all`].
+//! To add a target, write a function in a file of `targets` and add a line to [`targets::all`].
 
 pub mod depth;
 mod mutation;
@@ -30,11 +31,11 @@ use peak_alloc::PeakAlloc;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-/// The allocator of this package's programs, which counts.
+/// The allocator of this package's programs, which measures the memory.
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Powers of two below which the number of changes to an input is drawn.
+/// The number of changes to an input is less than 2 to this power.
 const MANY: u32 = 6;
 const FEW: u32 = 3;
 
@@ -45,58 +46,60 @@ fn last_panic() -> MutexGuard<'static, String> {
     LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Something that takes bytes.
+/// A function under test that takes bytes, with its inputs and limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
-    /// Its name.
+    /// Name of the target.
     pub name: &'static str,
-    /// Folder of its corpus.
+    /// Folder of the corpus.
     pub corpus: &'static str,
-    /// What its input is made of.
+    /// Kind of the inputs.
     pub input: Input,
-    /// Bytes of memory that a case may take, and as many more for each byte of its input.
+    /// Memory that a case may use, in bytes: a constant part and a part for each byte of the input.
     pub memory: [usize; 2],
     /// Runs a case; an error says which promise is broken.
     pub run: fn(&[u8]) -> Result<(), String>,
 }
 
-/// What the input of a target is made of.
+/// Kind of the inputs of a target.
 #[derive(Debug, Clone, Copy)]
 pub enum Input {
-    /// Files of its corpus with changes, some of which put in texts such as the words of a format.
+    /// Files of the corpus with changes; some changes insert one of these texts, such as words of a
+    /// format.
     Mutations(&'static [&'static str]),
-    /// The same with few changes, or with other numbers alone, so that most inputs pass the reader.
+    /// Files of the corpus with few changes, or only with other numbers, so that the reader accepts
+    /// most inputs.
     Few(&'static [&'static str]),
     /// Random bytes, from which a target draws arguments.
     Bytes,
 }
 
-/// Which cases to run.
+/// Choice of the cases to run.
 #[derive(Debug, Clone)]
 pub struct Cases {
-    /// Number of mutations beside the corpus.
+    /// Number of mutations, in addition to the corpus.
     pub count: u64,
-    /// Number of the first one.
+    /// Number of the first mutation.
     pub first: u64,
-    /// Seed of all of them.
+    /// Seed of all mutations.
     pub seed: u64,
     /// Time after which a case counts as a hang.
     pub time_limit: Duration,
-    /// Time after which no more cases are run.
+    /// Time after which no further case is started.
     pub total_time: Duration,
 }
 
-/// What a run has found.
+/// Result of a run without a failure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Summary {
     /// Number of cases run.
     pub cases: u64,
-    /// Largest memory that a case took, in bytes.
+    /// Largest memory that a case used, in bytes.
     pub peak: usize,
     /// Longest time that a case took.
     pub longest: Duration,
-    /// Number of cases that came as far as each [`Depth`](depth::Depth) and no farther: refused by the
-    /// reader, read, at work, with a result.
+    /// Number of cases that reached each [`Depth`](depth::Depth) and no greater one, in its order:
+    /// refused by the reader, read, analysis begun, with a result.
     pub depths: [u64; 4],
 }
 
@@ -120,9 +123,9 @@ pub struct Failure {
     pub target: &'static str,
     /// Number of the case, or name of the file of the corpus.
     pub case: String,
-    /// What went wrong.
+    /// Description of the failure.
     pub what: String,
-    /// Where the input was written.
+    /// Path to which the input was written.
     pub input: PathBuf,
 }
 
@@ -133,10 +136,10 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// The files of a corpus, by name.
+/// Returns the files of a corpus, sorted by name: their names and contents.
 ///
 /// # Errors
-/// Those of reading the folder.
+/// If the folder or a file cannot be read.
 pub fn corpus(target: &Target) -> io::Result<Vec<(String, Vec<u8>)>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target.corpus);
     let mut files = Vec::new();
@@ -151,11 +154,11 @@ pub fn corpus(target: &Target) -> io::Result<Vec<(String, Vec<u8>)>> {
 
 /// Runs the corpus of a target and mutations of it, until the first failure.
 ///
-/// Cases run in a thread of their own, so that one that hangs is reported; that thread is then left
-/// behind. The largest memory is that of the whole process: one run at a time.
+/// Cases run in a separate thread, so that a case that hangs can be reported; its thread keeps
+/// running. The memory is measured for the whole process, so only one run may be active.
 ///
 /// # Errors
-/// The first case that panics, breaks a promise, takes too long or too much memory.
+/// The first case that panics, breaks a promise, or needs too much time or memory.
 ///
 /// # Panics
 /// If the corpus cannot be read or is empty.
@@ -218,7 +221,7 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
         random.set_stream(case);
         let input = match target.input {
             Input::Mutations(words) => mutation::mutated(&inputs, words, &mut random, MANY),
-            // Every second one has a sound structure.
+            // Every second case keeps the structure of the file and changes only numbers.
             Input::Few(_) if case % 2 == 1 => mutation::renumbered(&inputs, &mut random),
             Input::Few(words) => mutation::mutated(&inputs, words, &mut random, FEW),
             Input::Bytes => mutation::bytes(&mut random),
@@ -228,7 +231,7 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
     Ok(summary)
 }
 
-/// Runs a case; returns its result, the memory and the time that it took, and its depth.
+/// Runs a case; returns its result, the memory and time that it used, and its depth.
 fn measured(target: &Target, input: &[u8]) -> (Result<(), String>, usize, Duration, usize) {
     depth::taken();
     MEMORY.reset_peak_usage();
@@ -238,9 +241,9 @@ fn measured(target: &Target, input: &[u8]) -> (Result<(), String>, usize, Durati
     (result, MEMORY.peak_usage().saturating_sub(before), begin.elapsed(), depth::taken())
 }
 
-/// Writes an input where it can be found again.
+/// Writes an input that failed to `target/fuzz`, and returns its path.
 fn kept(target: &Target, input: &[u8]) -> PathBuf {
-    // FNV-1a, which makes the same name of the same input.
+    // The FNV-1a hash gives the same input the same name.
     let hash = input.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
     });

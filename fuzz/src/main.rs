@@ -1,5 +1,5 @@
-//! A run as long as one likes: `cargo run --release -p mechid-fuzz -- --cases 10000000`.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "it talks to whoever runs it")]
+//! Runs a chosen number of cases: `cargo run --release -p mechid-fuzz -- --cases 10000000`.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "it prints for the user who runs it")]
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -8,8 +8,8 @@ use mechid_fuzz::{Cases, run, targets};
 
 const USAGE: &str = "\
 Options: --target NAME (default: all), --cases COUNT (default: 1000000 of each), --seed NUMBER (1),
---case NUMBER (that one alone), --seconds COUNT (of each target at most), --case-seconds COUNT (after which a
-case hangs: 10; more beside other work)";
+--case NUMBER (only this case), --seconds COUNT (at most, for each target), --case-seconds COUNT (after which a
+case counts as a hang: 10; more if other programs run)";
 
 fn main() -> ExitCode {
     match options() {
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Names of the targets, and the cases.
+/// Returns the names of the chosen targets, and the choice of the cases.
 fn options() -> Result<(Vec<String>, Cases), String> {
     let mut names = Vec::new();
     let mut cases = Cases {

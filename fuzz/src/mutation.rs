@@ -1,4 +1,4 @@
-//! Inputs made of other inputs.
+//! Random inputs, and mutations of existing inputs.
 
 use std::io::Write as _;
 
@@ -9,7 +9,7 @@ use rand::{Rng, RngExt as _};
 /// Longest input, in bytes.
 const LONGEST: usize = 1 << 16;
 
-/// Numbers where readers go wrong.
+/// Numbers on which readers often fail.
 const NUMBERS: [&str; 24] = [
     "0",
     "-0",
@@ -37,20 +37,21 @@ const NUMBERS: [&str; 24] = [
     "1_000",
 ];
 
-/// Bytes that mean something to some format.
+/// Bytes with a special meaning in at least one format.
 const BYTES: &[u8] = b"\0\t\n\r\x1b \"#'+,-.:;[]{}\x7f\x80\xff";
 
 /// Longest input of random bytes.
 const MOST_BYTES: usize = 1 << 10;
 
-/// Random bytes.
+/// Returns an input of random bytes.
 pub fn bytes(random: &mut impl Rng) -> Vec<u8> {
     let mut input = vec![0; random.random_range(0..=MOST_BYTES)];
     random.fill_bytes(&mut input);
     input
 }
 
-/// An input with other digits, and in a binary file other numbers: most of them pass the reader.
+/// Returns an input with other digits or, in a binary file, other bytes of numbers. The reader
+/// accepts most of these inputs.
 pub fn renumbered(corpus: &[Vec<u8>], random: &mut impl Rng) -> Vec<u8> {
     let mut input = corpus[random.random_range(0..corpus.len())].clone();
     let is_text = !input.iter().take(1 << 9).any(|byte| *byte == 0 || *byte >= 0x80);
@@ -61,7 +62,7 @@ pub fn renumbered(corpus: &[Vec<u8>], random: &mut impl Rng) -> Vec<u8> {
             Some(byte) if is_text && byte.is_ascii_digit() => {
                 *byte = b'0' + random.random_range(0..10_u8);
             }
-            // The end of a binary file is its numbers, mostly.
+            // The numbers of a binary file are mostly at its end.
             Some(byte) if !is_text && 2 * at > most => *byte = random.random(),
             _ => {}
         }
@@ -69,10 +70,10 @@ pub fn renumbered(corpus: &[Vec<u8>], random: &mut impl Rng) -> Vec<u8> {
     input
 }
 
-/// An input that follows from others and from random numbers, with fewer than 2^`most` changes.
+/// Returns an input of the corpus with random changes, fewer than 2^`most` in number.
 pub fn mutated(corpus: &[Vec<u8>], words: &[&str], random: &mut impl Rng, most: u32) -> Vec<u8> {
     let mut input = corpus[random.random_range(0..corpus.len())].clone();
-    // Mostly few changes, sometimes many.
+    // Usually the changes are few, sometimes many.
     let changes = 1 << random.random_range(0..most);
     for _ in 0..random.random_range(1..=changes) {
         change(&mut input, corpus, words, random);
@@ -98,7 +99,7 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
         }
         3 => replace(input, at, len, &[]),
         4 => {
-            // A piece of it once more, somewhere else.
+            // A piece of the input is repeated at another position.
             let piece = input[at..at + len].to_vec();
             let to = random.random_range(0..=input.len());
             replace(input, to, 0, &piece);
@@ -111,7 +112,7 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
         }
         6 => input.truncate(at),
         7 => {
-            // A number of a binary format.
+            // A binary number, such as a length or an offset, replaces one.
             let number: u64 = match random.random_range(0..5) {
                 0 => 0,
                 1 => 1 << random.random_range(0..64),
@@ -142,7 +143,7 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
             replace(input, at, if random.random() { len } else { 0 }, word.as_bytes());
         }
         12 => {
-            // A line away, twice, or in another place.
+            // A line is removed, moved or doubled.
             let mut lines: Vec<&[u8]> = input.split(|b| *b == b'\n').collect();
             let line = random.random_range(0..lines.len());
             let moved = lines.remove(line);
@@ -152,7 +153,7 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
             *input = lines.join(&b'\n');
         }
         _ => {
-            // Another delimiter or decimal sign throughout.
+            // A delimiter or decimal sign is replaced throughout.
             let marks = b",;\t .\n";
             let [from, to] = [0; 2].map(|_: i32| marks[random.random_range(0..marks.len())]);
             input.iter_mut().filter(|b| **b == from).for_each(|b| *b = to);
@@ -160,13 +161,13 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
     }
 }
 
-/// Replaces a piece, as far as there is one.
+/// Replaces `len` bytes from `at` on, or as many as the input still has.
 fn replace(input: &mut Vec<u8>, at: usize, len: usize, by: &[u8]) {
     let end = (at + len).min(input.len());
     input.splice(at..end, by.iter().copied());
 }
 
-/// The next place from `at` on at which a number may begin.
+/// Returns the position of the next digit from `at` on, or `at` if there is none.
 fn word_from(input: &[u8], at: usize) -> usize {
     let skipped = input[at..].iter().position(u8::is_ascii_digit);
     at + skipped.unwrap_or(0)
@@ -174,7 +175,7 @@ fn word_from(input: &[u8], at: usize) -> usize {
 
 fn packed(input: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-    // Into memory it does not fail.
+    // Writing to memory does not fail.
     let _ = encoder.write_all(input);
     encoder.finish().unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-"""Chromium without a window, driven over its debugging pipe with Python's standard library alone."""
+"""Chromium without a window, controlled through its debugging pipe with Python's standard library only."""
 
 import base64
 import json
@@ -14,12 +14,12 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 
 
 def find():
-    """Return the program, or None."""
+    """Return the path of Chromium, or None if it is not installed."""
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
 class Page:
-    """A tab: what it logs and asks for is kept in `complaints` and `requests`."""
+    """A tab of the browser; `complaints` has the messages of its console, `requests` the addresses that it loads."""
 
     def __init__(self, browser, width, height=900, dark=False, reduced=True):
         self.browser = browser
@@ -50,20 +50,20 @@ class Page:
         return self
 
     def run(self, script):
-        """Return the value of an expression, a promise's value if it is one."""
+        """Return the value of an expression of JavaScript; of a promise, the value that it resolves to."""
         answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in answer:
             raise AssertionError(f"{script}: {answer['exceptionDetails']}")
         return answer["result"].get("value")
 
     def settle(self, frames=3):
-        """Wait until as many frames have been painted."""
+        """Wait until the page has painted this number of frames."""
         step = "new Promise(done => requestAnimationFrame(() => setTimeout(done)))"
         for _ in range(frames):
             self.run(step)
 
     def everything(self):
-        """Scroll through the page, so that every figure answers, and return to its top."""
+        """Scroll through the page, so that every figure becomes interactive, and return to the top."""
         self.run(
             "(async () => { for (let y = 0; y < document.documentElement.scrollHeight; y += 400) {"
             " scrollTo(0, y); await new Promise(done => requestAnimationFrame(() => setTimeout(done, 20))); }"
@@ -94,7 +94,7 @@ class Page:
         Path(file).write_bytes(base64.b64decode(data))
 
     def print(self):
-        """Return the PDF of the page on A4."""
+        """Return the page as a PDF on A4 paper."""
         data = self.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)["data"]
         return base64.b64decode(data)
 
@@ -109,11 +109,11 @@ class Browser:
         flags = (
             "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
             "--disable-component-update --disable-sync --hide-scrollbars --remote-debugging-pipe "
-            # A tab in the background is painted as one in front.
+            # A tab in the background is painted, too.
             "--disable-backgrounding-occluded-windows --disable-renderer-backgrounding"
         ).split()
 
-        # The protocol's pipes are the file descriptors 3 and 4.
+        # The browser reads its commands from the file descriptor 3 and writes its answers to 4.
         script = 'exec 3<&"$1" 4>&"$2"; shift 2; exec "$@"'
         command = ["bash", "-c", script, "bash", str(to_read), str(to_write), find()]
         self.process = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""The pages that the browser looks at: made by the program from simulated and measured records."""
+"""The pages that are tested in the browser; the program makes them from simulated and measured records."""
 
 import json
 import math
@@ -16,7 +16,7 @@ def mechid(program, folder, *arguments):
 
 
 def three_masses(program, folder):
-    """Three records of a chain of three masses, each driven at one of them."""
+    """Write three records of a chain of three masses; in each record the force acts on another mass."""
     for driven in (1, 2, 3):
         experiment = {
             "system": {
@@ -36,7 +36,7 @@ def three_masses(program, folder):
 
 
 def trends(program, folder):
-    """Forty records of a mass whose stiffness steps by 4 % at the 25th; one record of another machine."""
+    """Write forty records of an oscillator; its stiffness rises by 4 % at the 25th, and the 12th is of another machine."""
     day = folder / "day"
     day.mkdir()
     for number in range(1, 41):
@@ -63,7 +63,7 @@ def trends(program, folder):
 
 
 def cubic(folder):
-    """Two periods of a mass on a spring and a cubic spring: the force that a motion of sines needs."""
+    """Write two periods of a mass on a linear and a cubic spring: a motion of sines, and the force that it needs."""
     m, c, k, cube = 2.0, 6.0, 800.0, 4e7
     rows = ["time,F,x,v,a"]
     for n in range(1024):
@@ -78,12 +78,12 @@ def cubic(folder):
     (folder / "cubic.csv").write_text("\n".join(rows) + "\n")
 
 
-# Mass (kg), damping (N·s/m), stiffness (N/m) and cubic stiffness (N/m³) of the decay whose frequency falls with its amplitude.
+# Mass (kg), damping (N·s/m), stiffness (N/m) and cubic stiffness (N/m³) of the free decay, whose frequency falls as it decays.
 HARDENING = (1.0, 1.2, (2 * math.pi * 10) ** 2, 4e8)
 
 
 def hardening(folder):
-    """A mass on a hardening spring, released at 2 mm: Runge-Kutta's steps of a 64th of a sample."""
+    """Write the free decay of a mass on a hardening spring from 2 mm, by Runge-Kutta with 64 steps per sample."""
     m, c, k, cube = HARDENING
 
     def rate(x, v):
@@ -103,7 +103,7 @@ def hardening(folder):
 
 
 def hardening_hz(amplitude):
-    """Frequency of the undamped oscillation: a complete elliptic integral, by the arithmetic-geometric mean."""
+    """Frequency (Hz) of the undamped oscillation: a complete elliptic integral, by the arithmetic-geometric mean."""
     m, _, k, cube = HARDENING
     a, b = math.sqrt((k + cube * amplitude**2) / m), math.sqrt((k + cube * amplitude**2 / 2) / m)
     while abs(a - b) > 1e-14 * a:
@@ -112,7 +112,7 @@ def hardening_hz(amplitude):
 
 
 def make(program, pages, folder):
-    """Write all pages into a folder; `pages` is the program of pages of known numbers."""
+    """Write all pages into a folder; `pages` is the example program that makes pages with known numbers."""
     subprocess.run([pages, folder], check=True)
     machine = ROOT / "examples" / "machine.csv"
     usual = ("--force", "force", "--displacement", "displacement", "--period", "256", "--quiet")

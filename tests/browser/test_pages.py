@@ -1,7 +1,8 @@
-"""What a browser shows of the pages, and does with them.
+"""Tests of the pages in a browser: what they show, and how they respond to the user.
 
 Usage: test_pages.py PROGRAM PAGES [--pictures FOLDER]: the program `mechid`, the example `pages`, and a folder for pictures at
-four widths. Without a browser on a user's machine it says so and ends well; in CI (`CI` is set) that is an error.
+four widths. If a user's computer has no browser, a message says so and the tests count as passed; in CI (`CI` is set) that is
+an error.
 """
 
 import argparse
@@ -23,7 +24,7 @@ WIDTHS = (390, 768, 1280, 1920)
 PAGES = ("response", "matrix", "shapes", "one", "single", "three", "force", "trends", "nonlinear", "bearing", "decay", "frf",
          "modes", "saved", "backbone")
 
-# Texts of figures whose boxes intersect: two of one drawing, of which neither holds the other.
+# Pairs of texts of one figure whose boxes overlap.
 OVERLAPS = """
 [...document.querySelectorAll('figure > svg')].flatMap(svg => {
     const texts = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim() && t.getBoundingClientRect().width);
@@ -37,18 +38,18 @@ OVERLAPS = """
 })
 """
 
-# Elements that reach beyond the window, other than what scrolls by itself.
+# Elements that extend beyond the window, except those inside a scrolling box or a drawing.
 BEYOND = """
 [...document.querySelectorAll('body *')].filter(e => e.getBoundingClientRect().right > innerWidth + 1
     && !e.closest('.scroll > *, svg *')).map(e => e.tagName + '.' + e.className)
 """
 
-# Panels whose ordinate has fewer than two numbers, which do not show a scale.
+# Number of panels whose ordinate has fewer than two numbers and so shows no scale.
 LONELY = """
 [...document.querySelectorAll('figure > svg g.panel')].filter(g => g.querySelectorAll('text[text-anchor=end]').length < 2).length
 """
 
-# Texts whose contrast is below that of WCAG AA: 4.5, of large ones 3.
+# Texts whose contrast is below the limit of WCAG AA: 4.5, or 3 for large text.
 FAINT = """
 (() => {
     const channel = c => { c /= 255; return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4; };
@@ -69,7 +70,7 @@ FAINT = """
 
 
 def box(page, figure, panel=0):
-    """Left, top, right, bottom of the frame of a panel, in px of the window; scrolls there."""
+    """Scroll to a figure; return left, top, right and bottom of the frame of a panel, in px of the window."""
     page.run(f"document.querySelector('{figure}').scrollIntoView()")
     page.settle(4)
     return page.run(
@@ -79,7 +80,7 @@ def box(page, figure, panel=0):
 
 
 def values(page, figure):
-    """Names and numbers that the cursor shows."""
+    """Return the names and numbers that the cursor shows."""
     rows = page.run(f"[...document.querySelectorAll('{figure} .values span')].map(s => s.textContent)")
     return [row.replace("−", "-") for row in rows]
 
@@ -92,7 +93,7 @@ def ticks(page, figure):
 
 
 def along(page, figure, value):
-    """Place of a value on the abscissa, from the outermost ticks."""
+    """Return the position (px) of a value on the abscissa, interpolated between the outermost ticks."""
     labels = page.run(
         f"[...document.querySelectorAll('{figure} text[text-anchor=middle]')].map(t => {{ const b = t.getBoundingClientRect();"
         " return [t.textContent, (b.left + b.right) / 2]; })"
@@ -103,7 +104,7 @@ def along(page, figure, value):
 
 
 def go_to(page, figure, hz, step):
-    """Move the cursor to a line, by the pointer near it and by the keys to the very line; return what it shows."""
+    """Move the cursor to a spectral line: with the pointer near it, with the keys exactly to it; return what it shows."""
     left, top, right, bottom = box(page, figure)
     page.mouse("mouseMoved", along(page, figure, hz), (top + bottom) / 2)
     seen = " ".join(values(page, figure))
@@ -137,9 +138,9 @@ class Tests:
         return Page(self.browser, width, **more).open(self.folder / f"{name}.html")
 
     def close(self, page, name):
-        self.check(page.complaints == [], f"{name}: the console says {page.complaints[:2]}")
+        self.check(page.complaints == [], f"{name}: the console shows {page.complaints[:2]}")
         own = (self.folder / f"{name}.html").resolve().as_uri()
-        self.check(set(page.requests) == {own}, f"{name}: it asks for {page.requests}")
+        self.check(set(page.requests) == {own}, f"{name}: the page loads {page.requests}")
 
     def cursor_and_zoom(self):
         page = self.page("response")
@@ -151,7 +152,7 @@ class Tests:
             row = next((row for row in seen if f"{known['quantity']}, measured" in row), "")
             number = re.search(r"measured ([-\d.e]+)", row)
             value = float(number.group(1)) if number else float("nan")
-            # Six digits are shown.
+            # The cursor shows six digits.
             self.check(abs(value / known["magnitude"] - 1) < 6e-6, f"{row} is not {known['magnitude']}")
         left, top, right, bottom = box(page, "figure")
         before = ticks(page, "figure")
@@ -163,13 +164,13 @@ class Tests:
         page.run("document.querySelector('.tools button').click()")
         page.settle()
         self.check(ticks(page, "figure") == before, "reset brings the first view back")
-        # Pan by the button.
+        # The second button of the tools switches to panning.
         page.run("document.querySelectorAll('.tools button')[1].click()")
         page.drag((left + 300, top + 50), (left + 200, top + 50))
         self.check(ticks(page, "figure") != before, "panning moves the axis")
         page.run("document.querySelectorAll('.tools button')[1].click(); document.querySelector('.tools button').click()")
         page.settle()
-        # Legend.
+        # The legend hides and shows a curve.
         count = lambda: page.run("document.querySelectorAll('figure .curve').length")
         curves = count()
         page.run("document.querySelector('.keys button').click()")
@@ -179,7 +180,7 @@ class Tests:
         page.run("document.querySelector('.keys button').click()")
         page.settle()
         self.check(count() == curves, "the legend shows it again")
-        # Every choice of every list draws something without a complaint.
+        # Every entry of every list draws something without an error in the console.
         for at in range(page.run("document.querySelectorAll('.tools select').length")):
             for option in range(page.run(f"document.querySelectorAll('.tools select')[{at}].options.length")):
                 page.run(
@@ -192,7 +193,7 @@ class Tests:
         self.close(page, "response")
 
     def quantities(self):
-        """Receptance is accelerance over (iω)²."""
+        """The page of responses converts accelerance to receptance: their ratio is (iω)²."""
         page = self.page("response")
         page.everything()
         read = {}
@@ -222,7 +223,7 @@ class Tests:
         page.run("document.querySelectorAll('.map button')[30].click()")
         page.settle()
         self.check(page.run(title) == "a3 / F2", f"the third of the second row is {page.run(title)}")
-        # Cursor: time of a frame in which the pointer moves.
+        # The time that a frame takes while the pointer moves.
         left, top, right, bottom = box(page, "figure")
         spent = page.run(
             f"""(async () => {{
@@ -239,7 +240,7 @@ class Tests:
             }})()"""
         )
         self.numbers["cursor: ms a frame, median and 95 %"] = [round(v, 1) for v in spent]
-        # Sixty frames a second take 17 ms each; the rest is for a machine that does other work.
+        # At 60 frames per second a frame takes 17 ms; the limit allows for other programs on the computer.
         self.check(spent[0] <= 30, f"cursor: {spent[0]} ms a frame")
         self.close(page, "matrix")
 
@@ -262,7 +263,7 @@ class Tests:
         page.run("document.querySelectorAll('svg.shape ~ .map button')[2].click()")
         page.settle()
         self.check("55.5 Hz" in page.run("document.querySelector('svg.shape ~ .values').textContent"), "third mode")
-        # Poles have words.
+        # The cursor names the poles in words.
         left, top, right, bottom = box(page, "figure")
         spots = page.run(
             "(() => { const p = [...document.querySelectorAll('figure .curve')].find(c => c.dataset.name === 'stable pole').querySelector('path');"
@@ -277,7 +278,7 @@ class Tests:
         still.everything()
         first = path(still, "svg.shape .moved")
         still.run("new Promise(done => setTimeout(done, 300))")
-        self.check(path(still, "svg.shape .moved") == first, "who wants less motion gets none")
+        self.check(path(still, "svg.shape .moved") == first, "a user who prefers reduced motion sees no animation")
 
     def tables(self):
         page = self.page("trends")
@@ -287,17 +288,17 @@ class Tests:
         order = page.run(column)
         self.check(order == sorted(order), f"sorted: {order}")
         page.run("document.querySelectorAll('#quantities thead button')[2].click()")
-        self.check(page.run(column) == sorted(order, reverse=True), "and the other way")
+        self.check(page.run(column) == sorted(order, reverse=True), "the same button sorts in descending order")
         shown = "[...document.querySelectorAll('#quantities figure')].filter(f => f.getBoundingClientRect().height).length"
         all_of = page.run(shown)
         page.run("(() => { const s = document.querySelector('#quantities .tools select'); s.selectedIndex = 1; s.onchange(); })()")
-        self.check(0 < page.run(shown) < all_of, "a category is shown alone")
+        self.check(0 < page.run(shown) < all_of, "the table shows a single category")
         text = page.run("document.querySelector('#changes')?.textContent ?? ''")
         self.check("run-025" in text and "step" in text, f"the step of the stiffness: {text}")
         self.close(page, "trends")
 
     def modes(self):
-        """All modes of the JSON are in the table, which sorts; warnings are above it; the saved result has the same numbers."""
+        """All modes of the JSON are in the table, which can be sorted; warnings are above it; the saved result agrees."""
         known = json.loads((self.folder / "modes.json").read_text())
         frequencies = [mode["natural_frequency_hz"]["value"] for mode in known["modes"]]
         column = "[...document.querySelector('table.sort tbody').rows].map(r => parseFloat(r.cells[1].textContent))"
@@ -320,7 +321,7 @@ class Tests:
         self.check("--force-at '1,2'" in page.run("document.querySelector('#repeat code').textContent"), "modes: command")
 
     def backbone(self):
-        """Judge: the elliptic integral of the undamped oscillator; the operator is in the head of the record."""
+        """The frequencies over the amplitude agree with the elliptic integral; the page shows the operator from the record."""
         page = self.page("backbone")
         page.everything()
         rows = page.run(
@@ -341,7 +342,7 @@ class Tests:
         self.check(page.run("document.scripts.length") == 1, "one script")
 
     def cursor_values(self):
-        """A band holds the curve in it at every place; a point elsewhere, and a touch, have their own values."""
+        """The curve lies within its band; far from the poles the cursor names none; a touch shows the values."""
         page = self.page("nonlinear")
         page.everything()
         figure = "#figure-restoring-force"
@@ -379,7 +380,7 @@ class Tests:
         self.check(any("measured" in row for row in values(page, "figure")), "a touch shows the values")
 
     def axes(self):
-        """In the plane the abscissa has its numbers and its name, with another panel below, too; a band is in every display."""
+        """In the Nyquist display the abscissa has its name even above another panel; every display shows the bands."""
         page = self.page("response")
         page.everything()
         choose = lambda value: page.run(
@@ -395,7 +396,7 @@ class Tests:
             self.check(bands > 0, f"{display}: {bands} bands")
 
     def print(self):
-        """Figures are whole, no page is empty, no heading ends a page. 3-DOF identifications have at most six pages."""
+        """On paper no figure is split, no page is empty, and no heading ends a page; a report has at most six pages."""
         most = {"single": 6, "three": 6, "one": 6, "matrix": 3, "modes": 4}
         has_text = shutil.which("pdftotext")
         self.check(has_text or not os.environ.get("CI"), "no pdftotext")
@@ -414,7 +415,7 @@ class Tests:
                 for number, text in enumerate(done.stdout.decode().split("\f")[:pages], 1):
                     lines = [line.strip() for line in text.splitlines() if line.strip()]
                     self.check(len(lines) > 4, f"{name}: page {number} of {pages} has only {lines}")
-                    # The last line is the number of the page.
+                    # The last line of a page is its number.
                     self.check(not lines[-2:-1] or lines[-2] not in headings, f"{name}: page {number} ends with {lines[-2:]}")
             page.resize(718)
             page.call("Emulation.setEmulatedMedia", media="print")
@@ -423,7 +424,7 @@ class Tests:
                 "[...document.querySelectorAll('figure > svg')].filter(e => e.getBoundingClientRect().height > 940"
                 " || getComputedStyle(e).breakInside !== 'avoid').map(e => e.closest('figure').id)"
             )
-            self.check(not split, f"{name}: figures that a page does not hold: {split}")
+            self.check(not split, f"{name}: figures that do not fit onto a page: {split}")
             self.browser.call("Target.closeTarget", targetId=page.target)
 
     def widths(self):
@@ -468,7 +469,7 @@ def main():
     parser.add_argument("--pictures", type=Path)
     arguments = parser.parse_args()
     if not find():
-        print("no Chromium on this machine: the pages are not tried in a browser")
+        print("no Chromium on this machine: the pages are not tested in a browser")
         return 1 if os.environ.get("CI") else 0
     if arguments.pictures:
         arguments.pictures.mkdir(parents=True, exist_ok=True)

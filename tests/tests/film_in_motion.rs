@@ -1,6 +1,6 @@
-//! A rig test simulated on the nonlinear film of a short bearing, with the truth known from the
-//! geometry: at small amplitudes the coefficients are those of the film, at large ones they are not. And a
-//! rotor on this film, which whirls above its threshold.
+//! A rig test simulated on the nonlinear film of a short bearing; the true coefficients follow from
+//! the geometry. At small amplitudes the test finds the coefficients of the linear film, at large
+//! amplitudes it does not. A rotor on this film whirls above its threshold.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -23,12 +23,13 @@ const LOAD: f64 = 16.0;
 const MASS: f64 = 2.0;
 const PERIOD: usize = 2048;
 
-/// Lines of 4 Hz from 8 to 100 Hz.
+/// All spectral lines from 8 to 100 Hz, 4 Hz apart.
 fn all() -> Vec<usize> {
     (2..=25).collect()
 }
 
-/// Odd ones alone: products of two of them are even.
+/// Odd spectral lines only: sums and differences of two of them are even, so quadratic distortion
+/// does not fall on them.
 fn odd() -> Vec<usize> {
     (3..=25).step_by(2).collect()
 }
@@ -37,7 +38,7 @@ fn sampling() -> Sampling {
     Sampling::from_rate_hz(8192.0, PERIOD).unwrap()
 }
 
-/// Coefficients from the geometry, and the place of rest.
+/// Coefficients of the film from the geometry, and the static equilibrium position of the journal.
 fn geometry() -> (OilFilm, [f64; 2]) {
     let bearing = ShortBearing::new(CONDITIONS.length_over_diameter().unwrap()).unwrap();
     let found = bearing.equilibrium(CONDITIONS.sommerfeld_number(LOAD).unwrap()).unwrap();
@@ -46,8 +47,8 @@ fn geometry() -> (OilFilm, [f64; 2]) {
     (film, found.position().map(|x| x * CONDITIONS.clearance))
 }
 
-/// A mass on the film, which carries the load: a floating housing on its shaft or, seen from the other
-/// side, a rigid rotor in its bearing.
+/// A mass on the film, which carries the static load: a floating housing on its shaft or,
+/// equivalently, a rigid rotor in its bearing.
 fn on_the_film(mass: &SecondOrderSystem) -> SystemWithForces<'_> {
     let film = ShortFilm::new(CONDITIONS).unwrap();
     let carried = ForceFunction::new(vec![0, 1], move |_, x: &[f64], v: &[f64], g: &mut [f64]| {
@@ -62,8 +63,8 @@ fn free(mass: f64) -> SecondOrderSystem {
     SecondOrderSystem::new(DMatrix::identity(2, 2) * mass, zero.clone(), zero).unwrap()
 }
 
-/// One period of the steady motion under a multisine in direction `along`, `amplitude` N a line: force,
-/// displacement and acceleration.
+/// One period of the steady motion under a multisine in direction `along` with `amplitude` newtons
+/// per line: force, displacement and acceleration.
 fn orbit(lines: &[usize], along: usize, amplitude: f64) -> [Record; 3] {
     let shaken = Multisine::flat(lines.to_vec(), amplitude, Phases::Schroeder).unwrap();
     let shaken = shaken.sample(sampling()).unwrap();
@@ -84,7 +85,8 @@ fn settings() -> IdentifyBearing {
     IdentifyBearing { stator_mass: MASS, coefficients, ..IdentifyBearing::default() }
 }
 
-/// What a linear test finds at an amplitude of so many N a line, with noise of a part of the motion.
+/// Bearing that a linear test finds at an amplitude in newtons per line; the noise is this part of
+/// the RMS of the motion.
 fn identified(lines: &[usize], amplitude: f64, part: f64) -> IdentifiedBearing {
     let test = |along: usize| {
         let repeats = if part > 0.0 { 8 } else { 1 };
@@ -105,7 +107,7 @@ fn identified(lines: &[usize], amplitude: f64, part: f64) -> IdentifiedBearing {
     identify_bearing(&data, None, &settings()).unwrap()
 }
 
-/// Largest errors of K and C over their largest entries.
+/// Largest errors of stiffness K and damping C, each divided by the largest entry of the matrix.
 fn errors(found: &IdentifiedBearing) -> [f64; 2] {
     let film = geometry().0;
     let k = Matrix2::new(film.kxx, film.kxy, film.kyx, film.kyy);
@@ -120,7 +122,7 @@ fn a_test_at_small_amplitude_finds_the_coefficients_of_the_geometry() {
     let truth = [kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy];
     assert!(found.summary().amplitude.unwrap().largest_displacement < 0.01 * CONDITIONS.clearance);
     for (row, exact) in found.summary().coefficients.iter().zip(truth) {
-        // Eight intervals of 99.9 %.
+        // A value may deviate by 3.3 standard errors: an interval of 99.9 % for each of the eight.
         let error = row.estimate.standard_error.unwrap();
         assert!((row.estimate.value - exact).abs() < 3.3 * error, "{row:?}, exactly {exact}");
         let largest = if row.name.starts_with('k') { kxy } else { cxx };
@@ -128,7 +130,8 @@ fn a_test_at_small_amplitude_finds_the_coefficients_of_the_geometry() {
     }
 }
 
-/// Amplitude over clearance, and the errors of K and C in per cent, of a test without noise.
+/// Amplitude divided by the clearance, and the errors of K and C in per cent, of a test without
+/// noise.
 fn bias(lines: &[usize], amplitude: f64) -> [f64; 3] {
     let found = identified(lines, amplitude, 0.0);
     let largest = found.summary().amplitude.unwrap().largest_displacement;
@@ -136,8 +139,8 @@ fn bias(lines: &[usize], amplitude: f64) -> [f64; 3] {
     [largest / CONDITIONS.clearance, 100.0 * k, 100.0 * c]
 }
 
-/// A picture of the book, `name` in the folder of `theory/bearing.md`, is the one drawn here, its numbers
-/// to half a pixel; `MECHID_BLESS=1` writes it.
+/// The picture `name` in the folder of `theory/bearing.md` is the one drawn here; its numbers agree
+/// to half a pixel. `MECHID_BLESS=1` writes it.
 fn is_in_the_book(name: &str, figure: &Figure) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../docs/book/src/theory/film_in_motion")
@@ -162,7 +165,7 @@ fn is_in_the_book(name: &str, figure: &Figure) {
     }
 }
 
-/// What a linear fit finds at larger amplitudes: the table and the figure of `theory/bearing.md`.
+/// Bias of a linear fit at larger amplitudes: the table and first figure of `theory/bearing.md`.
 #[test]
 fn the_bias_over_amplitude_is_what_the_book_says() {
     let page = include_str!("../../docs/book/src/theory/bearing.md");
@@ -172,7 +175,7 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
     );
     let [mut of_all, mut of_odd] = [(); 2].map(|()| Vec::<[f64; 3]>::new());
     for amplitude in [0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2] {
-        // Half as many lines of the same power.
+        // Half as many lines with the same total power.
         let (a, b) = (bias(&all(), amplitude), bias(&odd(), 2_f64.sqrt() * amplitude));
         let [[at, k, c], [odd_at, odd_k, odd_c]] = [a, b];
         table +=
@@ -181,7 +184,7 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
         of_odd.push(b);
     }
     assert!(page.contains(&table), "the page should have\n{table}");
-    // To first order in the amplitude with all lines, to second with odd ones.
+    // The bias grows with the amplitude with all lines, with its square with odd lines.
     let order = |from: [f64; 3], to: [f64; 3]| (to[1] / from[1]).ln() / (to[0] / from[0]).ln();
     let (first, second) = (order(of_all[1], of_all[3]), order(of_odd[1], of_odd[3]));
     assert!((first - 1.0).abs() < 0.1 && (second - 2.0).abs() < 0.3, "{first} {second}");
@@ -203,8 +206,8 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
     is_in_the_book("bias.svg", &Figure::new("Bias of linear identification").panel(panel));
 }
 
-/// The motion of a rotor of so many critical masses, let go beside its place of rest, with 200 steps per
-/// turn of the shaft.
+/// Motion of a rotor of this number of critical masses, released beside its equilibrium, with 200
+/// steps per turn of the shaft.
 fn let_go(masses: f64, beside: f64, turns: usize) -> Record {
     let rotor = free(masses * critical().0);
     let system = on_the_film(&rotor);
@@ -223,7 +226,8 @@ fn critical() -> (f64, f64) {
     (threshold.critical_mass().unwrap(), threshold.whirl_frequency_ratio().unwrap())
 }
 
-/// Growth of a small whirl of the nonlinear rotor, in 1/s, from two stretches of ten of its periods.
+/// Growth rate of a small whirl of the nonlinear rotor, in 1/s, from two successive sections of ten
+/// whirl periods each.
 fn growth(masses: f64) -> f64 {
     let x = let_go(masses, 1e-5, 60);
     let rest = geometry().1;
@@ -245,8 +249,8 @@ fn linear_growth(masses: f64) -> f64 {
     eigenvalues.iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Orbits of a rig test, the whirl of rotors above the threshold, and how fast a small whirl grows: the
-/// second figure of `theory/bearing.md`.
+/// The second figure of `theory/bearing.md`: orbits of a rig test, the whirl of rotors above the
+/// threshold, and the growth rate of a small whirl.
 #[test]
 fn the_film_in_motion_is_what_the_book_shows() {
     let across = || Axis::linear("y / c", "").range(-1.05, 1.05);
@@ -269,7 +273,7 @@ fn the_film_in_motion_is_what_the_book_shows() {
     }
     let mut whirl = Panel::new(across(), along()).title("oil whirl").curve(clearance());
     for masses in [1.2, 1.05] {
-        // The last eight turns of the shaft, which are four of the whirl.
+        // The last eight turns of the shaft, during which the rotor whirls four times.
         let x = let_go(masses, 0.02, 200);
         let last = x.len() - 8 * 200;
         let orbit = path(format!("mass {masses}"), &x, last, 8);

@@ -1,6 +1,7 @@
-//! The book's page of limits lists the constants of every `limits` module as the sources have them.
+//! The book's page of limits lists the constants of every `limits` module as they are in the
+//! sources.
 //!
-//! With the variable `MECHID_BLESS` set the page is written anew.
+//! With the variable `MECHID_BLESS` set, the test writes the page instead of comparing it.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -18,14 +19,14 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// A constant with its value as the source writes it, and its comment in one line.
+/// A constant: its value as the source writes it, and its comment in one line.
 struct Limit {
     name: String,
     value: String,
     comment: String,
 }
 
-/// Returns the text of the comment of an item, its paragraphs joined.
+/// Returns the comment of an item, its paragraphs joined to one line.
 fn comment(attributes: &[Attribute]) -> String {
     let mut lines = Vec::new();
     for attribute in attributes {
@@ -41,7 +42,7 @@ fn comment(attributes: &[Attribute]) -> String {
     lines.join(" ")
 }
 
-/// Removes the links from a comment: their targets are paths of the source.
+/// Replaces the links of a comment by their text, because their targets are paths in the source.
 fn without_links(comment: &str) -> String {
     let mut text = String::new();
     let mut rest = comment;
@@ -89,7 +90,7 @@ fn limits(file: &Path) -> Vec<Limit> {
     limits
 }
 
-/// Returns the `limits.rs` below a folder, in the order of their names.
+/// Returns the files `limits.rs` below a folder, in the order of their paths.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut entries: Vec<PathBuf> =
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();

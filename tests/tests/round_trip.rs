@@ -1,4 +1,5 @@
-//! Several rooms at once: simulate, write, read back, identify; exact responses from elsewhere judge.
+//! Tests across several crates: simulate, write, read back, identify; the exact responses are
+//! checked against another exact method.
 
 use mechid::estimate::Unknowns;
 use mechid::estimate::frequency_domain::equation_error;
@@ -12,7 +13,7 @@ use mechid_problems::{
 use nalgebra::DMatrix;
 use serde_json::json;
 
-/// The description of an experiment on a system, every degree of freedom driven on its own lines.
+/// Experiment on a system; the force on each degree of freedom has its own spectral lines.
 fn experiment(
     system: &SecondOrderSystem,
     scheme: &str,
@@ -36,8 +37,8 @@ fn largest_difference(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     (a - b).amax() / b.amax()
 }
 
-/// The exact response against one that knows no receptance: the matrix exponential over samples
-/// 32 times as dense, between which the force is taken as linear.
+/// Reference: the matrix exponential, which uses no receptance, with samples 32 times as dense and
+/// the force linear between them.
 #[test]
 fn exact_responses_agree_with_the_matrix_exponential() {
     const DENSER: usize = 32;
@@ -51,13 +52,14 @@ fn exact_responses_agree_with_the_matrix_exponential() {
             (ours.acceleration(), judge.acceleration()),
         ] {
             let other = DMatrix::from_fn(256, system.dof(), |k, c| other.data()[(DENSER * k, c)]);
-            // The line between samples misses the cosine by (ωΔt)²/8, 2.7e-4 at line 60.
+            // The linear force differs from the cosine by up to (ωΔt)²/8 of it, 2.7e-4 at line 60.
             assert!(largest_difference(ours.data(), &other) < 3e-4);
         }
     }
 }
 
-/// Simulation to text to table to estimate, with another room's exact response as the record.
+/// Simulation to text to table to estimate: a record with the exact response returns the system
+/// through a file.
 #[test]
 fn an_exact_record_goes_through_a_file_to_the_machine() {
     for system in [dissertation_sdof().system(), dissertation_bearing(KyxSign::Plus).system()] {
@@ -83,15 +85,15 @@ fn an_exact_record_goes_through_a_file_to_the_machine() {
         .unwrap();
         let found = equation_error(&data, &Unknowns::unknown_mass(dof).unwrap()).unwrap();
         let found = found.system().unwrap();
-        // Rounding of the transform times the condition of the fit, below 1e4 here.
+        // The error is rounding of the transform times the condition number of the fit, below 1e4.
         assert!(largest_difference(found.mass(), system.mass()) < 1e-9);
         assert!(largest_difference(found.damping(), system.damping()) < 1e-9);
         assert!(largest_difference(found.stiffness(), system.stiffness()) < 1e-9);
     }
 }
 
-/// A time-stepping scheme leaves its own error in the record, and identification shows it: Newmark's
-/// average acceleration is the trapezoidal rule, so the machine found at ω is the true one at
+/// A time-stepping scheme adds its own error to the record, and identification finds it: Newmark's
+/// average acceleration is the trapezoidal rule, so the response at ω is that of the true system at
 /// Ω = (2/Δt) tan(ωΔt/2).
 #[test]
 fn newmark_is_identified_as_the_trapezoidal_rule() {
@@ -112,7 +114,7 @@ fn newmark_is_identified_as_the_trapezoidal_rule() {
         let measured = data.displacement()[(row, 0)] / data.force()[(row, 0)];
         assert!((measured - expected).norm() < 1e-10 * expected.norm(), "line {}", row + 1);
     }
-    // Up to 1.47 rad per step the warping is not small: it must show.
+    // At up to 1.47 rad per step the warping of the frequency visibly changes the mass found.
     let found = equation_error(&data, &Unknowns::unknown_mass(1).unwrap()).unwrap();
     assert!((found.mass()[0] / 10.0 - 1.0).abs() > 0.01);
 }

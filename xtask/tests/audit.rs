@@ -1,4 +1,4 @@
-//! The audit page says what it must, and its verdicts can say no.
+//! The audit page has its required content, and its verdicts can be negative.
 
 use std::path::Path;
 
@@ -43,7 +43,7 @@ fn every_slip_misprint_claim_and_suggestion_is_on_the_page() {
         assert!(page.contains(&format!("| S{number} |")), "S{number}");
     }
     assert!(!page.contains("NaN"));
-    // A table whose rows have not as many cells as its head is not drawn.
+    // A table is not drawn if a row has another number of cells than the head.
     let cells = |line: &str| line.replace("\\|", "").matches('|').count();
     for pair in page.lines().collect::<Vec<_>>().windows(2) {
         if pair[0].starts_with('|') && pair[1].starts_with('|') {
@@ -52,7 +52,7 @@ fn every_slip_misprint_claim_and_suggestion_is_on_the_page() {
     }
 }
 
-/// What each slip is needed for, and what claims become without them.
+/// Each slip is needed, and the verdicts on some claims change without the slips.
 #[test]
 fn the_correction_overturns_what_the_slips_made() {
     let (published, results) = read();
@@ -61,15 +61,15 @@ fn the_correction_overturns_what_the_slips_made() {
         |number: u8| -> &Judged { judged.iter().find(|j| j.claim.number == number).unwrap() };
     let holds = |f: &Finding| f.holds();
     for (number, printed, corrected) in [
-        // Held in every comparison, with and without slips.
+        // Every comparison confirms the next claims, with and without slips.
         (4, Holds::Yes, Holds::Yes),
         (10, Holds::Yes, Holds::Yes),
         (23, Holds::Yes, Holds::Yes),
-        // Made by the harmonic offset.
+        // The harmonic offset makes these claims hold.
         (14, Holds::Yes, Holds::No),
         (19, Holds::Yes, Holds::No),
         (13, Holds::Hardly, Holds::No),
-        // Made by a misalignment of one sample.
+        // A misalignment of one sample makes these claims hold.
         (3, Holds::Yes, Holds::Hardly),
         (25, Holds::Yes, Holds::Hardly),
     ] {

@@ -1,4 +1,5 @@
-//! The page of numbers that somebody else printed is today's. On purpose changed: `cargo xtask conformance`.
+//! The page of published numbers is up to date. After an intended change, run `cargo xtask
+//! conformance`.
 
 use std::path::Path;
 
@@ -22,11 +23,12 @@ fn every_row_is_met_or_explained_but_those_of_appendix_b_and_two_records() {
     for judge in &judges {
         assert!(root().join(judge.test).exists(), "{}", judge.test);
         for row in judge.rows.iter().filter(|row| row.status == Status::Open) {
-            // The text of appendix B names neither integrator nor interpolation, that of appendix E no settings.
+            // Appendix B of the dissertation names neither integrator nor interpolation, and
+            // appendix E no settings.
             let is_unstated =
                 ["table B", "table E"].iter().any(|part| row.quantity.starts_with(part));
-            // Two modes of the arm fail to predict what they were not fitted to; two weak modes of the frame differ
-            // from those of a subspace model.
+            // Two modes of the arm do not predict another record, and two weak modes of the frame
+            // differ from those of a subspace model.
             let is_known = match judge.name {
                 "CD player's arm" => row.quantity.contains("predicted"),
                 "Steel subframe, two shakers" => {

@@ -1,5 +1,5 @@
-//! Today's numbers are yesterday's. On purpose changed ones:
-//! `cargo xtask reproduce-thesis --bless`.
+//! The numbers agree with the golden files. After an intended change, run `cargo xtask
+//! reproduce-thesis --bless`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -25,7 +25,8 @@ fn pages(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// What the pages tell the reader to type, typed; where it draws everything, one table is enough.
+/// Runs the commands that the pages show; a command that draws everything draws only one table
+/// here.
 #[test]
 fn the_tasks_in_the_pages_run() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();

@@ -1,4 +1,5 @@
-//! The intervals hold as they state: the short form of the studies. On purpose changed: `cargo xtask studies`.
+//! The intervals have their stated coverage, in the short form of the studies. After an intended
+//! change, run `cargo xtask studies`.
 
 use std::path::Path;
 
@@ -14,7 +15,7 @@ fn a_loss_of_coverage_is_noticed() {
     assert!(alarms_now.is_empty(), "{}", alarms_now.join("\n"));
     let differences = differences(root, &coverages).unwrap();
     assert!(differences.is_empty(), "{}", differences.join("\n"));
-    // The same counts with two in a hundred intervals less.
+    // The same counts with two per cent fewer intervals that contain the true value.
     let lost = coverages.into_iter().map(|of| {
         let held = of.held - (LOSS * of.experiments as f64) as u64;
         Coverage { held, ..of }

@@ -38,7 +38,7 @@ fn every_cell_with_known_settings_is_explained() {
     assert_eq!(counts(all.iter()), [143, 0, 9, 0]);
 }
 
-/// The verdict must be able to say no: each slip undone loses cells.
+/// A verdict can be negative: without one of the slips, fewer cells are reproduced.
 #[test]
 fn without_the_slips_most_cells_do_not_come_out() {
     let (_, rows) = reproduced();

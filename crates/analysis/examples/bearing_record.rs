@@ -10,7 +10,7 @@ use mechid_problems::rig::{BearingRig, Shakers};
 use mechid_signal::Sampling;
 use nalgebra::Matrix2;
 
-/// Samples of a period, and periods.
+/// Number of samples in a period, and number of periods.
 const LENGTH: [usize; 2] = [256, 4];
 
 fn rig() -> Result<BearingRig, Box<dyn std::error::Error>> {
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let is_dry = std::env::args().nth(1).is_some_and(|which| which == "dry");
     let (rig, seed) = if is_dry { (rig()?.dry(), 2) } else { (rig()?, 1) };
     let sampling = Sampling::from_rate_hz(1024.0, LENGTH[0])?;
-    // 20 to 252 Hz in steps of 4 Hz, the shakers by turns.
+    // 20 to 252 Hz in steps of 4 Hz; the shakers excite alternate lines.
     let lines: Vec<usize> = (5..=63).collect();
     let amplitude = if is_dry { 4.0 } else { 14.0 };
     let period = rig.period(sampling, &lines, amplitude, Shakers::Interleaved, seed)?;

@@ -1,6 +1,6 @@
-//! Fourteen published films as truth, many seeded rig tests of each: coverage of the 95 % intervals,
-//! scatter against the Cramér–Rao bound, false alarms of the likelihood-ratio test, and what a
-//! baseline does that is not subtracted.
+//! Study of many seeded rig tests of each of fourteen published films: coverage of the 95 %
+//! intervals, scatter relative to the Cramér–Rao bound, false alarms of the likelihood-ratio test,
+//! and the effect of a baseline that is not subtracted.
 //!
 //! ```text
 //! cargo run --release -p mechid-analysis --example bearing_study -- 1000
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 const PERIOD: usize = 256;
 const PERIODS: usize = 8;
-/// Force of a line, in N.
+/// Amplitude of the force on each line, in N.
 const AMPLITUDE: f64 = 20.0;
 /// Inertia of the fluid, in kg.
 const INERTIA: f64 = 3.0;
@@ -36,7 +36,7 @@ fn lines() -> Vec<usize> {
     (6..=50).step_by(2).collect()
 }
 
-/// The rows of Lund and Thomsen with units: D = 0.1 m, 0.02 Pa·s, 3000 rev/min.
+/// Returns the films of Lund and Thomsen, with units from D = 0.1 m, 0.02 Pa·s and 3000 rev/min.
 fn films() -> Vec<(String, [Matrix2<f64>; 2])> {
     let table = include_str!("../../bearing/tests/lund_thomsen_1978.csv");
     let row = |line: &str| {
@@ -84,9 +84,10 @@ fn settings(rig: &BearingRig, coefficients: Coefficients) -> IdentifyBearing {
     }
 }
 
-/// Standard errors of the Cramér–Rao bound: k, c and m, each row by row.
+/// Returns the standard errors of the Cramér–Rao bound, for k, c and m, each row by row.
 fn bound(rig: &BearingRig, periods: &[RigTest], count: usize) -> Vec<f64> {
-    // Two lines stand on the rotation or beside it.
+    // The identification excludes lines at multiples of the rotation frequency, and so does the
+    // bound.
     let kept = lines().into_iter().filter(|line| {
         let turns = *line as f64 * sampling().line_spacing_hz() / rig.rotation_hz;
         (turns - turns.round()).abs() * rig.rotation_hz
@@ -118,7 +119,7 @@ fn bound(rig: &BearingRig, periods: &[RigTest], count: usize) -> Vec<f64> {
     };
     let fit = output_error(&all, &unknowns.expect("two degrees of freedom")).expect("exact data");
     let errors: Vec<f64> = fit.estimate.parameters().map(|p| p.standard_error).collect();
-    // Of M, C and K: the other way round.
+    // The errors are in the order M, C, K; the result is in the order K, C, M.
     errors.chunks(4).rev().flatten().copied().collect()
 }
 
@@ -164,7 +165,7 @@ impl Tally {
         100.0 * self.held as f64 / self.intervals as f64
     }
 
-    /// RMS error over the bound, all coefficients together.
+    /// Returns the ratio of the RMS error to the bound, over all coefficients.
     fn ratio(&self, bound: &[f64]) -> f64 {
         let each = self.squares.iter().zip(bound);
         let mean = each.map(|(s, b)| s / self.tests as f64 / (b * b)).sum::<f64>();

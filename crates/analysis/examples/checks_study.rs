@@ -1,7 +1,9 @@
-//! Study of how often the checks of an identification warn, on records that the model fits and on others.
+//! Study of how often the checks of an identification warn, on records that the model fits and on
+//! others.
 //!
-//! `cargo run --release -p mechid-analysis --example checks_study -- RUNS [NAME]` prints, for each kind of
-//! record, the percentage of `RUNS` seeded records with any warning and with a warning of each subject.
+//! `cargo run --release -p mechid-analysis --example checks_study -- RUNS [NAME]` prints, for each
+//! kind of record, the percentage of `RUNS` seeded records with any warning and with a warning of
+//! each subject.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]
 
@@ -28,7 +30,7 @@ struct Case {
     truth: Truth,
     machine: Machine,
     periods: usize,
-    /// RMS of the noise over that of the channel: response, force.
+    /// Ratio of the RMS of the noise to the RMS of the channel, for the response and for the force.
     noise: [f64; 2],
     how: Identify,
     /// Responses that are measured.
@@ -37,7 +39,7 @@ struct Case {
 
 /// Truth about an estimate.
 enum Truth {
-    /// The model fits the record, and the estimator has no bias that shows.
+    /// The model fits the record, and the estimator has no noticeable bias.
     Right,
     /// The model fits the record, and noise biases the estimator.
     Biased,
@@ -131,7 +133,7 @@ impl Machine {
 }
 
 impl Case {
-    /// Subjects warned of.
+    /// Returns the subjects of the warnings.
     fn warnings(&self, seed: u64) -> Outcome<Vec<String>> {
         let dof = self.machine.dof();
         let channel = |channel: usize| -> Outcome<Vec<f64>> {
@@ -151,7 +153,8 @@ impl Case {
             }
             Ok(noise::add_white(&all, NoiseLevel::FractionOfRms(level), 8 * seed + stream)?)
         };
-        // Held between the samples, noise on the force is a disturbance that acts and is not measured.
+        // If the force is held between the samples, its noise also acts on the machine, and is not
+        // measured.
         let clean = force.repeated(self.periods)?;
         let noisy_force = noisy(if held { &clean } else { &force }, self.noise[1], 0)?;
         let (exact, force) = match held {

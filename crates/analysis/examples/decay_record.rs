@@ -1,4 +1,5 @@
-//! The example record of the book's free decay: a frame that is pulled and let go at a quarter of a second.
+//! Example record of the book's free decay: a frame that is pulled and released after a quarter of
+//! a second.
 //!
 //! ```text
 //! cargo run -p mechid-analysis --example decay_record > examples/decay.csv
@@ -25,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     ];
     let acceleration = |t: f64, channel: usize| -> f64 {
         let mode = |(at, pole): (usize, &Complex<f64>)| {
-            // Released from rest: x = Re(A e^{λt}) with A such that ẋ = 0 at first.
+            // The frame is at rest at the release: A in x = Re(A e^{λt}) is such that ẋ = 0 there.
             let amplitude = pulled[(at, channel)] * Complex::new(1.0, pole.re / pole.im);
             (amplitude * pole * pole * (pole * t).exp()).re
         };

@@ -1,11 +1,12 @@
-//! Faults of the measuring chain: does `identify` say so where they make the answer wrong?
+//! Study of faults in the measuring chain: does `identify` warn if they make the result wrong?
 //!
 //! ```text
 //! cargo run --release -p mechid-analysis --example fault_study -- 200
 //! ```
-//! prints, for tests with several periods and for random tests of one machine, how many of the 95 % intervals hold,
-//! how far the worst parameter is off, how often anything is warned of, and which subjects. A second argument chooses
-//! the rows that contain it.
+//! prints, for tests with several periods and for random tests of one machine, the percentage of 95
+//! % intervals that contain the true value, the error of the worst parameter, and the percentages
+//! of records with any warning and with a warning of each subject. A second argument chooses the
+//! rows that contain it.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::collections::BTreeMap;
@@ -34,7 +35,7 @@ enum Test {
     Random,
 }
 
-/// The records that have the fault.
+/// Channels that have the fault.
 #[derive(Clone, Copy, PartialEq)]
 enum On {
     Force,
@@ -98,7 +99,8 @@ fn faults() -> Vec<(String, On, Option<Fault>)> {
     all
 }
 
-/// Forces (N) and displacements (m) without noise; the responses later by a number of samples.
+/// Returns forces (N) and displacements (m) without noise; the responses are delayed by `late`
+/// samples.
 fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
     let delay = Fault::Delay { samples: late };
     let system = machine();
@@ -106,7 +108,7 @@ fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
         Test::Random => {
             let sampling = Sampling::new(DT, SAMPLES)?;
             let rig = RandomTest { system, sampling, quantity: QUANTITY, force: 100.0 };
-            // The whole period closes, so that all of it can be late.
+            // A whole period is cyclic, so that all of it can be delayed.
             let [force, response] = rig.period(seed)?;
             let response = delay.apply(&response, seed)?;
             let first = SAMPLES / 2 + 1;
@@ -129,9 +131,9 @@ fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
 }
 
 struct Run {
-    /// Part of the 95 % intervals that hold.
+    /// Fraction of the 95 % intervals that contain the true value.
     holding: f64,
-    /// Largest error of a parameter over the largest entry of its matrix.
+    /// Largest error of a parameter relative to the largest entry of its matrix.
     off: f64,
     warnings: Vec<String>,
 }

@@ -1,11 +1,11 @@
-//! Hammer tests of three masses, five hits on each, two of them bad: are the bad ones found, is a good one lost, and
-//! do the intervals hold?
+//! Study of hammer tests of three masses, with five hits on each, two of them bad: bad hits that
+//! are found, good hits that are lost, and coverage of the intervals.
 //!
 //! ```text
 //! cargo run --release -p mechid-analysis --example hammer_study -- 1000 100
 //! ```
-//! counts the hits of 1,000 tests and fits 100 of them; a third argument is the noise on the force, in N, of the rows
-//! that are made.
+//! counts the hits of 1,000 tests and fits 100 of them. A third argument is a noise level of the
+//! force, in N: only rows with this level are computed.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use mechid_analysis::identify::{Band, LineChoice};
@@ -17,7 +17,7 @@ use mechid_signal::{NoiseLevel, Record, Sampling, hits, noise};
 use nalgebra::dmatrix;
 use rayon::prelude::*;
 
-/// Noise on the response over the response, in the RMS.
+/// Ratio of the RMS of the noise on the response to the RMS of the response.
 const LEVEL: f64 = 0.01;
 /// Lines that are fitted.
 const BAND: Band = Band { low_hz: 2.0, high_hz: 200.0 };
@@ -71,7 +71,7 @@ fn rig(quantity: ResponseQuantity, force_noise: f64) -> HammerTest {
 /// A fit of one test.
 #[derive(Default)]
 struct Run {
-    /// Part of the 95 % intervals that hold, of parameters and of modes.
+    /// Fractions of the 95 % intervals that contain the true value, for parameters and for modes.
     holding: [f64; 2],
     /// Relative error of each damping ratio.
     damping: Vec<f64>,
@@ -80,7 +80,7 @@ struct Run {
 
 fn study(quantity: ResponseQuantity, force_noise: f64, points: usize, tests: u64, fits: u64) {
     let rig = rig(quantity, force_noise);
-    // Transducers have the same noise whatever they measure.
+    // The noise level follows from one record, and is the same for all hits.
     let usual = rig.measure(0, 0, 0).expect("a record").response;
     let noise = LEVEL * (usual.data().norm_squared() / usual.data().len() as f64).sqrt();
     let counts: Vec<[f64; 4]> =
@@ -97,7 +97,7 @@ fn study(quantity: ResponseQuantity, force_noise: f64, points: usize, tests: u64
         1 => "–".to_owned(),
         _ => format!("{:.1}", 100.0 * sum(&|run| run.holding[0]) / count),
     };
-    // Of the mode with the largest bias.
+    // The row shows the mode with the largest bias.
     let of_mode = |mode: usize| {
         let mean = sum(&|run| run.damping[mode]) / count;
         let square = sum(&|run| (run.damping[mode] - mean).powi(2)) / count;
@@ -124,7 +124,8 @@ fn measure(rig: &HammerTest, noise: f64, dof: usize, seed: u64) -> Option<Hammer
     Some(HammerRecord { response, ..record })
 }
 
-/// Bad hits, and those that are found bad; good hits, and those that are found bad.
+/// Returns the number of bad hits, how many of them are found, the number of good hits, and how
+/// many of them are excluded.
 fn count_hits(rig: &HammerTest, noise: f64, seed: u64) -> Option<[f64; 4]> {
     let mut counts = [0.0; 4];
     for dof in 0..3 {
@@ -151,7 +152,7 @@ fn fit(rig: &HammerTest, noise: f64, points: usize, seed: u64) -> Option<Run> {
             measured(&record.force, &record.response, rig.quantity, dof)
         })
         .collect();
-    // Where the hammer has a force to speak of.
+    // The fit uses the band in which the hammer has a significant force.
     let how = Identify::hits(HitRule::default()).lines(LineChoice::Band(BAND));
     compare(&identify(&tests?, &how).ok()?, rig)
 }

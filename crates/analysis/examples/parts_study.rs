@@ -1,11 +1,12 @@
-//! Do the parts of the data disagree where the model is wrong, and only there; and do the intervals that their scatter
-//! widens hold?
+//! Study of the scatter between parts of the data: do the parts disagree only if the model is
+//! wrong, and do intervals that are widened by this scatter contain the true values?
 //!
 //! ```text
 //! cargo run --release -p mechid-analysis --example parts_study -- 200 [NAME]
 //! ```
-//! For each row: runs with a factor of exactly 1, runs with any warning, the median factor, and the share of 95 %
-//! intervals of mass, damping and stiffness that hold the values of the machine; and the terms named as left out.
+//! For each row: runs with a factor of exactly 1, runs with any warning, the median factor, the
+//! share of 95 % intervals of mass, damping and stiffness that contain the values of the machine,
+//! and the terms that are named as missing.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::collections::BTreeMap;
@@ -24,13 +25,13 @@ use rayon::prelude::*;
 const KIND: ResponseQuantity = ResponseQuantity::Displacement;
 const SAMPLES: usize = 2048;
 const PERIOD: usize = 512;
-/// Band of the force over the sampling rate.
+/// Ratio of the bandwidth of the force to the sampling rate.
 const BAND: f64 = 0.35;
 
 /// What is recorded.
 #[derive(Debug, Clone, Copy)]
 enum Test {
-    /// Open records, the masses of which differ from the machine's by these fractions.
+    /// Open records of machines whose masses differ from the nominal mass by these fractions.
     Records(&'static [f64]),
     /// Periods of one record.
     Periods(usize),
@@ -42,14 +43,15 @@ enum Test {
     Sweep,
     /// Eight periods of a machine whose damping is structural.
     Structural,
-    /// Eight periods of a machine whose mass is said to be known, times this factor.
+    /// Eight periods of a machine; the fit uses its mass times this factor as a known mass.
     KnownMass(f64),
 }
 
 /// Loss factor in place of viscous damping.
 const LOSS_FACTOR: f64 = 0.04;
 
-/// Returns force (N) and displacement (m) over the last of the periods of a force (N), as the receptance has it.
+/// Returns force (N) and displacement (m) over the last of the periods of a force (N), computed
+/// from the receptance.
 fn steady(machine: &FaultyOscillator, force: &Record, loss_factor: Option<f64>) -> [Record; 2] {
     let mut lines = Spectrum::from_record(force).lines().clone();
     for (line, mut value) in lines.row_iter_mut().enumerate() {
@@ -62,7 +64,8 @@ fn steady(machine: &FaultyOscillator, force: &Record, loss_factor: Option<f64>) 
     [force.clone(), response.expect("as long as the force")]
 }
 
-/// Returns a sweep over the first half of the record that a machine answers from rest.
+/// Returns force and response of a machine that a sweep excites from rest in the first half of the
+/// record.
 fn sweep(machine: &FaultyOscillator, sampling: Sampling) -> [Record; 2] {
     let long = sampling.with_len(4 * sampling.len()).expect("a longer record");
     let (end, rate) = (0.75 * sampling.len() as f64 * sampling.dt(), 0.3 / sampling.dt());
@@ -173,7 +176,7 @@ fn row(name: &str, test: Test, machine: &FaultyOscillator, band: f64, runs: u64)
     };
     let mut factors: Vec<f64> = all.iter().map(scale).collect();
     factors.sort_by(f64::total_cmp);
-    // Far below its frequency on its spring the hidden mass moves along.
+    // Far below its natural frequency on its spring, the hidden mass moves with the machine.
     let mass = machine.mass + machine.hidden_mass;
     let truth = [("m", mass), ("c", machine.damping), ("k", machine.stiffness)];
     let is_estimated =

@@ -1,12 +1,13 @@
-//! Random tests of machines with light and heavy damping: do the intervals hold, what does a fit of averaged
-//! frequency responses make of the same records, and what do noise on the force and colour of the noise do?
+//! Study of random tests of machines with light and heavy damping: coverage of the intervals, the
+//! same records fitted by averaged frequency responses, and the effects of noise on the force and
+//! of coloured noise.
 //!
 //! ```text
 //! cargo run --release -p mechid-analysis --example random_study -- 1000
 //! cargo run --release -p mechid-analysis --example random_study -- 300 force
 //! ```
-//! The second argument chooses a table, `segments`, `force` or `colour`, and the third the rows that contain it;
-//! without them, all are made.
+//! The second argument chooses a table, `segments`, `force` or `colour`, and the third the rows
+//! that contain it; without them, all tables and rows are computed.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::collections::BTreeSet;
@@ -23,13 +24,13 @@ use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::dmatrix;
 use rayon::prelude::*;
 
-/// Samples of a record, 500 in a second.
+/// Number of samples of a record, 500 per second.
 const SAMPLES: usize = 8192;
 /// Time step, in s.
 const DT: f64 = 0.002;
 const QUANTITY: ResponseQuantity = ResponseQuantity::Displacement;
 
-/// Noise on force and response over the signal, in the RMS.
+/// Ratios of the RMS of the noise to the RMS of the signal, for force and response.
 #[derive(Clone, Copy)]
 struct Noise {
     force: f64,
@@ -144,7 +145,7 @@ fn study(row: &str, system: &SecondOrderSystem, runs: u64, how: &Identify, noise
 }
 
 struct Run {
-    /// Part of the 95 % intervals of the parameters that hold.
+    /// Fraction of the 95 % intervals of the parameters that contain the true value.
     holding: f64,
     /// Relative error of the damping ratio of the first mode.
     damping: f64,

@@ -305,10 +305,10 @@ pub enum AnalysisError {
         /// `true` if accelerations are needed, too.
         with_acceleration: bool,
     },
-    /// Spectral lines belong to whole periods.
+    /// The frequency domain needs whole periods, and no period was given.
     #[error("the frequency domain needs whole periods: say how long one is with `period`")]
     ForceNeedsPeriods,
-    /// The Kalman smoother has no periods.
+    /// The Kalman smoother needs an open record, and a period or lines were given.
     #[error("the Kalman smoother takes an open record: leave `period` and `lines` out")]
     KalmanIsOpen,
     /// The method has no standard error for a frequency band.
@@ -403,32 +403,33 @@ pub enum AnalysisError {
         /// Highest line with force.
         last: usize,
     },
-    /// The time domain needs the whole state.
+    /// The time domain needs both displacement and velocity.
     #[error(
         "in the time domain `displacement` and `velocity` are both needed (in the frequency domain \
          one kind of response is enough); with displacement or acceleration alone, `derivatives` says \
          how to find the others: spectral for whole periods, savitzky-golay:WINDOW:ORDER for any record"
     )]
     TimeDomainMotions,
-    /// Derivatives belong to one measured kind of response.
+    /// Derivatives are computed from one measured kind of response only.
     #[error(
         "`derivatives` completes a record of the displacement alone or of the acceleration alone: name \
          one of them, or leave `derivatives` out"
     )]
     NothingToDerive,
-    /// Second derivatives fit the equation of motion only.
+    /// Second derivatives are only for the fit of the equation of motion.
     #[error(
         "with the acceleration alone, a sliding polynomial gives second derivatives of force and \
          response, which only the equation of motion takes: leave `between_samples` out"
     )]
     TwiceDifferentiated,
-    /// Frequency responses are averages, which have no halves.
+    /// Instrumental variables need two halves of the periods, which averaged frequency responses do
+    /// not have.
     #[error(
         "instrumental variables need periods, not their averages: leave `from_frf` or `method` \
          instrumental out"
     )]
     InstrumentalResponses,
-    /// A steady state is predicted over whole periods.
+    /// The record for validation is shorter than one period.
     #[error("`validate`: {samples} samples are less than one period of {period}")]
     ValidationPeriod {
         /// Number of samples asked for.
@@ -451,16 +452,16 @@ pub enum AnalysisError {
     UnknownParameter {
         /// The file.
         file: String,
-        /// The name found.
+        /// Name of the unknown parameter.
         name: String,
-        /// The names there can be.
+        /// Names of the parameters of the system.
         known: String,
     },
     /// The machine has nonlinear terms, and the measured responses are not sufficient for them.
     #[error(
         "{file}: this machine has nonlinear terms ({terms}); its force is reconstructed by the equation \
-         of motion from displacement, velocity and acceleration of every degree of freedom, all of \
-         which a force may act on"
+         of motion, which needs displacement, velocity and acceleration of every degree of freedom, \
+         and a possible force on each (`forced`)"
     )]
     NonlinearMachine {
         /// The file of the machine.
@@ -468,7 +469,7 @@ pub enum AnalysisError {
         /// Terms of the machine.
         terms: String,
     },
-    /// A record has no such sampling rate.
+    /// The record cannot be decimated to the requested sampling rate.
     #[error(
         "a record of {own_hz} Hz has no samples at {rate_hz} Hz: its rates are {own_hz} Hz divided by \
          whole numbers"
@@ -479,9 +480,10 @@ pub enum AnalysisError {
         /// Rate of the record, in Hz.
         own_hz: f64,
     },
-    /// NPI belong to a described experiment, whose sampling can be chosen.
+    /// NPI (cycles of the natural frequency per period) needs a described experiment, whose
+    /// sampling can be chosen.
     #[error(
-        "`npi` belongs to the description of an experiment: a record has its rate; `decimate` takes \
+        "`npi` belongs to the description of an experiment; the rate of a record is fixed: `decimate` takes \
          every n-th sample"
     )]
     NpiOfRecord,
@@ -505,7 +507,7 @@ pub enum AnalysisError {
         /// The response that is missing.
         wanted: ResponseQuantity,
     },
-    /// A sweep has no settings.
+    /// A sweep was requested without a setting.
     #[error("a sweep needs one setting at least")]
     NoSetting,
     /// No setting of a sweep gave an estimate.

@@ -11,8 +11,8 @@ use crate::measurement::Reading;
 /// for several columns at a time.
 pub const INSPECT_BYTES: usize = 96;
 
-/// Bytes of memory per number of a section of a record: the identification from spectra, sample by
-/// sample, and frequency responses.
+/// Bytes of memory per number of a section of a record: for the identification from spectra or
+/// sample by sample, and for frequency responses.
 pub const STRETCH_BYTES: usize = 256;
 
 /// Bytes of memory per number of a window that is analysed as a whole: nonlinear terms, the
@@ -31,11 +31,11 @@ pub const PAIR_BYTES: usize = 128;
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
 /// Logarithm of the decay of the slowest mode in the zeros that follow the forces of a prediction:
-/// what comes round from the end is below 0.1 % of the response.
+/// the response that wraps around from the end is below 0.1 %.
 pub const REST_DECAY: f64 = 7.0;
 
-/// Largest number of records of zeros that follow the forces of a prediction by modes, for their
-/// memory.
+/// Largest number of records of zeros that follow the forces of a prediction by modes; it limits
+/// their memory.
 pub const REST_RECORDS: usize = 8;
 
 /// Minimum relative uncertainty of the standard errors for a remark: that of 12 degrees of freedom.
@@ -81,7 +81,8 @@ pub const MOST_SEGMENT_WORK: usize = 1 << 22;
 /// most of the remaining bias; two lines per resonance and little noise need about ten.
 pub const SHARPENING_ROUNDS: usize = 20;
 
-/// Change of a frequency or damping ratio, in standard errors, that ends these corrections.
+/// Change of a frequency or damping ratio, in standard errors, that ends the corrections of the
+/// window bias.
 pub const SHARPENING_SETTLED: f64 = 0.1;
 
 /// Maximum p-value, adjusted for the number of tests, of a failed check of the modes.
@@ -130,5 +131,6 @@ pub const COHERENCE_OF_ONE: f64 = 1e-6;
 /// Maximum number of fits with a force that is held or linear between its samples.
 pub const ACQUISITION_ROUNDS: usize = 8;
 
-/// Change of a parameter, in standard errors, that ends these fits.
+/// Change of a parameter, in standard errors, that ends the fits with a force that is held or
+/// linear between its samples.
 pub const ACQUISITION_SETTLED: f64 = 0.02;

@@ -214,7 +214,10 @@ pub(crate) fn settled_samples(
     if (2..len).contains(&samples) {
         Ok(samples)
     } else {
-        wrong(format!("a record of {len} samples settles within 2 to {} of them", len - 1))
+        wrong(format!(
+            "the initial state can be fitted to 2 to {} of the {len} samples of this record",
+            len - 1
+        ))
     }
 }
 
@@ -272,7 +275,7 @@ impl PredictionError {
         Self { quantity, degree_of_freedom, name, unit, rmse, nrmse, standard_error: None }
     }
 
-    /// Returns the same with the RMS of the errors due to the uncertainty of the modes.
+    /// Returns the error with the RMS of the errors due to the uncertainty of the modes.
     pub(crate) fn with_standard_error(self, standard_error: f64) -> Self {
         Self { standard_error: Some(standard_error), ..self }
     }

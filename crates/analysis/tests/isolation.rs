@@ -1,5 +1,5 @@
-//! Records that end the process which works on them. This program works for the fleets of its own tests, so it has a
-//! `main` of its own.
+//! Tests of records that end the process which analyses them. This program is also the process that
+//! analyses the fleets of its own tests, so it has its own `main`.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -10,7 +10,7 @@ use mechid_analysis::fleet::{Fleet, FleetSummary, Isolation, read_results, serve
 use mechid_analysis::{AnalysisError, Channels, Reading, ResponseQuantity, SavedAnalysis, Window};
 use mechid_io::{ParquetColumn, ParquetValues, write_parquet};
 
-/// Word that makes this program work for a fleet.
+/// Argument that makes this program analyse records for a fleet.
 const SERVE: &str = "serve";
 
 const RIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
@@ -49,7 +49,7 @@ fn run(
     Fleet::new(analysis, records, folder, 2)?.run_isolated(2, isolation, &|_| ())
 }
 
-/// Whoever computes a part, in whatever process, writes the same bytes.
+/// The rows of a fleet have the same bytes whether one process or several compute them.
 fn rows_are_those_of_one_process() {
     let home = tempfile::tempdir().unwrap();
     let records = [RIG.into(), "lost.csv".into(), home.path().join("empty.csv")];
@@ -78,10 +78,11 @@ fn a_program_that_ends_makes_rows() {
     assert!(message.contains("exit status: 3: it is over"), "{message}");
     let killed = by("sh", "printf '\\0\\0\\0\\0'; kill -SEGV $$").unwrap();
     assert!(killed.failures[0].message.contains("signal: 11"), "{}", killed.failures[0].message);
-    // A program that talks of something else sends no row.
+    // A program whose output has another format sends no row.
     let chatty = by("sh", "printf '\\0\\0\\0\\0\\4\\0\\0\\0abcd'; cat > /dev/null").unwrap();
     assert_eq!(chatty.failures[0].code, "analysis.record-process");
-    // A program that does not begin is no fault of a record; nor is one that does not exist.
+    // If the program cannot start or does not exist, the error is that of the run and not of a
+    // record.
     let error = by("sh", "echo no such module >&2; exit 1").unwrap_err().to_string();
     assert!(error.contains("exit status: 1: no such module"), "{error}");
     let missing = Isolation::new("no such program", Vec::new());
@@ -94,7 +95,7 @@ fn a_program_that_ends_makes_rows() {
     assert!(matches!(error, AnalysisError::Setting { setting: "record_seconds", .. }), "{error}");
 }
 
-/// A text of this many columns and rows, held whole: it takes eight bytes a number.
+/// Text of a table with this many columns and rows; each number takes eight bytes in memory.
 fn table(columns: usize, rows: usize) -> String {
     let mut text = String::from("time,force,displacement");
     (3..columns).for_each(|column| write!(text, ",c{column}").unwrap());
@@ -107,7 +108,7 @@ fn table(columns: usize, rows: usize) -> String {
 fn records_beyond_the_limits_make_rows() {
     let home = tempfile::tempdir().unwrap();
     let at = |name: &str| home.path().join(name);
-    // 40 million numbers, 320 MB, which the settings of the reading allow.
+    // The 40 million numbers take 320 MB, which the settings of the reading allow.
     fs::write(at("large.csv"), table(2000, 20_000)).unwrap();
     let records = [RIG.into(), at("large.csv")];
     let reading = Reading { memory_gb: Some(50.0), ..Reading::default() };
@@ -122,7 +123,8 @@ fn records_beyond_the_limits_make_rows() {
     assert_eq!((summary.failed, &*summary.failures[0].code), (2, "analysis.record-time"));
 }
 
-/// Records that are read together, of which one is too large for its process.
+/// If one of several records that are read together is too large for its process, only its row has
+/// the error.
 #[cfg(target_os = "linux")]
 fn the_record_that_ends_the_process_has_the_error() {
     let home = tempfile::tempdir().unwrap();
@@ -133,7 +135,7 @@ fn the_record_that_ends_the_process_has_the_error() {
         .skip(1)
         .map(|line| line.split(',').map(|number| number.parse().unwrap()).collect())
         .collect();
-    // The second record has as many rows as take more than there is.
+    // The second record needs more memory than the limit.
     let counts = [("a", 1), ("b", 8_000), ("c", 1)];
     let ids =
         counts.iter().flat_map(|(id, count)| vec![Some((*id).to_owned()); count * rows.len()]);

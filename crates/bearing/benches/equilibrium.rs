@@ -1,4 +1,4 @@
-//! One bearing: its equilibrium and its eight coefficients.
+//! Time to compute the equilibrium and the eight coefficients of one bearing.
 
 use std::hint::black_box;
 

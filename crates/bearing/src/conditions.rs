@@ -71,8 +71,8 @@ impl Conditions {
         Ok(self.load_of_unit() / sommerfeld)
     }
 
-    /// Returns the coefficients with their units, k = K W / c and c = C W / (c Ω), under a load W
-    /// (N).
+    /// Returns the coefficients with their units under a load W (N): stiffness K W / c and damping
+    /// C W / (c Ω), with the dimensionless K and C and the radial clearance c.
     ///
     /// x is along the load, y across it in the direction of rotation; kyx is an entry of the
     /// stiffness matrix (`KyxSign::Plus`).
@@ -100,7 +100,7 @@ impl Conditions {
         })
     }
 
-    /// Units of stiffness (N/m) and damping (N·s/m).
+    /// Returns the factors W / c (N/m) and W / (c Ω) (N·s/m) of stiffness and damping.
     fn units(&self, load: f64) -> Result<[f64; 2], BearingError> {
         self.check()?;
         require("load", load, "positive and finite", load > 0.0)?;

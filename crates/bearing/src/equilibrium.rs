@@ -1,6 +1,6 @@
 //! Static equilibrium of a bearing under its load.
 
-/// The position of the journal under a static load, and the coefficients of the film there.
+/// Position of the journal under a static load, and the coefficients of the film at this position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equilibrium {
     sommerfeld: f64,
@@ -39,7 +39,8 @@ impl Equilibrium {
     }
 }
 
-/// Eight coefficients of a film, dimensionless: K = k c / W and C = c Ω c / W.
+/// Eight coefficients of a film, dimensionless. A stiffness k (N/m) is k c / W, a damping b (N·s/m)
+/// is b Ω c / W, with the clearance c, the load W and the speed of rotation Ω.
 ///
 /// Index 0 is along the load, 1 across it in the direction of rotation; the first index belongs to
 /// the force, the second to the motion. [`Conditions`](crate::Conditions) converts them to SI

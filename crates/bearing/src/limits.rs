@@ -10,7 +10,8 @@ pub(crate) const JOURNAL_STEP: f64 = 0.1;
 pub(crate) const STEP_FILM_FRACTION: f64 = 0.3;
 
 /// Steps below which each mesh has converged, from coarse to fine: of the journal relative to the
-/// thinnest film, and of the fronts in rad. Newton's method squares the last one.
+/// thinnest film, and of the fronts in rad. Newton's method converges quadratically, so that the
+/// remaining error is about the square of the last step.
 pub(crate) const MESH_TOLERANCES: [f64; 3] = [1e-2, 1e-3, 1e-6];
 
 /// Largest eccentricity for which the mesh is graded towards thin films.

@@ -8,7 +8,7 @@ use crate::error::{BearingError, require};
 /// Whirl at the threshold of instability of a rigid rotor, from eight coefficients.
 ///
 /// A rotor of mass m per bearing obeys m ẍ + C ẋ + K x = 0. At the threshold it whirls with a
-/// frequency ω_w without growing or decaying, which needs
+/// frequency ω_w without growing or decaying, which requires
 ///
 /// ```text
 /// m ω_w² = k_eq = (kxx cyy + kyy cxx − kxy cyx − kyx cxy) / (cxx + cyy)
@@ -81,7 +81,7 @@ impl Threshold {
         let whirl_squared = (x * y - kxy * kyx) / determinant;
 
         let by_equivalent = SVector::from([cyy, -cyx, -cxy, cxx, -y, -kyx, -kxy, -x]) / trace;
-        // The derivatives of x y − kxy kyx − ω_w² det C = 0.
+        // The entries are the derivatives of x y − kxy kyx − ω_w² det C = 0.
         let apart = SVector::from([
             -y,
             -kyx,
@@ -110,17 +110,18 @@ impl Threshold {
         Self::new(&OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy }, 1.0)
     }
 
-    /// k_eq, in N/m.
+    /// Equivalent stiffness k_eq, in N/m.
     pub fn equivalent_stiffness(&self) -> f64 {
         self.equivalent_stiffness
     }
 
-    /// (ω_w / Ω)², a ratio; negative if no rotor whirls without decaying.
+    /// Square of the whirl frequency ratio, (ω_w / Ω)², a ratio; negative if no rotor whirls
+    /// without decaying.
     pub fn whirl_frequency_ratio_squared(&self) -> f64 {
         self.whirl_squared / (self.omega * self.omega)
     }
 
-    /// ω_w / Ω, a ratio; `None` if (ω_w / Ω)² is not positive.
+    /// Whirl frequency ratio ω_w / Ω, a ratio; `None` if (ω_w / Ω)² is not positive.
     pub fn whirl_frequency_ratio(&self) -> Option<f64> {
         (self.whirl_squared > 0.0).then(|| self.whirl_squared.sqrt() / self.omega)
     }

@@ -113,7 +113,7 @@ impl Check for Alternative {
             percent if percent < 0.01 => "less than 0.01".into(),
             percent => format!("{percent:.2}"),
         };
-        write!(f, "; with that {percent} % of the residual power remains. ")?;
+        write!(f, "; after this correction {percent} % of the residual power remains. ")?;
         f.write_str(match &self.cause {
             Cause::Delay { .. } => {
                 "Possible causes: a filter, a scanning converter, a trigger; correct the phase of the responses"
@@ -140,8 +140,8 @@ pub struct ModelledResponses {
     pub measured: DMatrix<Complex<f64>>,
     /// Modelled responses, rows × channels (unit of the channel).
     pub modelled: DMatrix<Complex<f64>>,
-    /// Logarithm of the area of the measured responses per area of the original ones (pure number);
-    /// 0 unless the numbers were converted.
+    /// Logarithm of the Jacobian of a conversion: the area in the complex plane of the converted
+    /// responses per area of the original ones (pure number); 0 without a conversion.
     pub log_area: f64,
 }
 
@@ -183,10 +183,10 @@ fn weighted(z: &DMatrix<Complex<f64>>, deviation: Option<&DMatrix<f64>>) -> DMat
 }
 
 /// Returns which of `others` explains the responses best, and the fraction of the residual power of
-/// `fitted` that remains with it. `None` unless it is more likely than the fitted model, and its
-/// residual is noise or has less than a quarter of the power. `omega` (rad/s) are the frequencies
-/// of the rows, `deviation` is the standard deviation of the noise if known, in the unit of the
-/// original responses.
+/// `fitted` that remains with it. `None` unless that model is more likely than the fitted one, and
+/// its residual is noise or has less than a quarter of the power. `omega` (rad/s) are the
+/// frequencies of the rows, `deviation` is the standard deviation of the noise if known, in the
+/// unit of the original responses.
 ///
 /// # Source
 /// The likelihood of complex normal noise of unknown level; the limits are ours.

@@ -19,7 +19,7 @@ pub struct Bias {
     /// Parameter with the largest change, in standard errors.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
     pub parameter: Parameter,
-    /// Value, in the unit of the parameter.
+    /// Value of the tested estimate, in the unit of the parameter.
     pub estimate: f64,
     /// Value by the other estimator (unit of the parameter).
     pub unbiased: f64,

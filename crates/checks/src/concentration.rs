@@ -28,10 +28,10 @@ struct Line {
     rows: Vec<(usize, usize)>,
 }
 
-/// Finds few lines that cause the misfit. `None` unless at most [`MOST_DISTURBED`] lines, and at
-/// most an eighth of all, have the share [`CONCENTRATED`] of the residual power beyond the noise,
-/// and the other lines at most [`DISTURBED_ALONE`] times the noise power: a wrong model, too, has
-/// its largest errors on few lines, near a resonance.
+/// Finds the few lines that cause the misfit. `None` unless at most [`MOST_DISTURBED`] lines, and
+/// at most an eighth of all, have the share [`CONCENTRATED`] of the residual power beyond the
+/// noise, and the other lines at most [`DISTURBED_ALONE`] times the noise power: a wrong model,
+/// too, has its largest errors on few lines, near a resonance.
 ///
 /// The line with the largest residual is removed from the linearised fit, then the next one: this
 /// also removes its effect on the residuals of the other lines.
@@ -51,7 +51,7 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
         return None;
     }
     let (mut values, mut chosen): (_, Vec<usize>) = (start.clone(), Vec::new());
-    // I − Q_Sᵀ Q_S and Q_Sᵀ e_S of the removed lines S.
+    // I − Q_Sᵀ Q_S and Q_Sᵀ e_S, with the rows Q_S and the residuals e_S of the removed lines S.
     let mut information = DMatrix::identity(parameters, parameters);
     let mut moved = DVector::zeros(parameters);
     let (mut remaining, mut share, mut ratio) = (count, 0.0, f64::INFINITY);

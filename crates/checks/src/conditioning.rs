@@ -58,7 +58,7 @@ impl Check for Conditioning {
         }
         f.write_str(match self.verdict() {
             Verdict::Good => "",
-            _ => ": relative noise is amplified up to that much in the worst combination of parameters",
+            _ => ": in the worst combination of parameters, relative noise is amplified by up to this factor",
         })
     }
 }

@@ -70,10 +70,10 @@ fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -
 
 /// Finds a delay of the responses of open records ([`Finding::Delay`]) that explains the residual
 /// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
-/// uncorrelated with the forces. If it is uncorrelated without the delay, too (`is_explained` is
-/// false), at most a quarter of its power may remain. `dt` is the sampling interval in s;
-/// sinusoidal disturbances have been subtracted from the `records`. `None` if no delay of up to 16
-/// samples (64 if the response hardly follows the force) satisfies this.
+/// uncorrelated with the forces. `is_explained` is false if the residual without the delay is
+/// uncorrelated with the forces, too; then at most a quarter of its power may remain. `dt` is the
+/// sampling interval in s; sinusoidal disturbances have been subtracted from the `records`. `None`
+/// if no delay of up to 16 samples (64 if the response hardly follows the force) satisfies this.
 ///
 /// The transients are estimated again for each delay; otherwise they would absorb a part of it.
 ///
@@ -286,7 +286,7 @@ fn residual_power(estimate: &Estimate, driven: &[usize]) -> Option<f64> {
     (estimate.undetermined().is_empty() && power.is_finite()).then_some(power)
 }
 
-/// Returns the step of least power; of two nearly equal ones the shorter.
+/// Returns the step with the smallest power; of two steps with nearly equal power, the shorter.
 fn best_step(undelayed: f64, max: isize, power: impl Fn(isize) -> Option<f64>) -> isize {
     let mut best = (0, undelayed);
     for step in (1..=max).flat_map(|size| [size, -size]) {

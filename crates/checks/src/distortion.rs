@@ -91,7 +91,7 @@ impl Check for Distortion {
             }
         }
         f.write_str(
-            ": the machine is nonlinear at this level of the force, to which its parameters belong; fit \
+            ": the machine is nonlinear at this level of the force, and its parameters hold at this level only; fit \
              the term, too (`nonlinear`), or test at a lower level",
         )
     }

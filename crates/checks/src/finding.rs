@@ -129,7 +129,7 @@ findings! {
     Gain in gain,
     /// Residual power compared with the noise power.
     Misfit in misfit,
-    /// Term that the model leaves out and that the residual shows.
+    /// Term that the model omits and that the residual indicates.
     TermLeftOut in omitted,
     /// Agreement between parts of the data.
     PartsAgreement in parts,

@@ -9,8 +9,9 @@ use super::p_value::PValue;
 /// and residual.
 ///
 /// If the model is right and only noise disturbs the fit, the probability that any finding of a
-/// group becomes a warning is at most [`SIGNIFICANCE`](super::limits::SIGNIFICANCE), three times
-/// that for all together, for any dependence between the tests.
+/// group becomes a warning is at most [`SIGNIFICANCE`](super::limits::SIGNIFICANCE). For all groups
+/// together it is at most three times as large. Both limits hold for any dependence between the
+/// tests.
 ///
 /// # Source
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
@@ -20,7 +21,8 @@ pub fn adjust_p_values<'a>(findings: impl IntoIterator<Item = &'a mut Finding>) 
     };
     let (bias, remaining): (Vec<&mut Finding>, Vec<&mut Finding>) =
         findings.into_iter().partition(of_parameters);
-    // The test for growth is made only if the estimate grows, and already for all modes together.
+    // The test for growth is made only if the estimate grows, and its p-value already covers all
+    // modes.
     let remaining =
         remaining.into_iter().filter(|f| !matches!(f, Finding::Instability(_))).collect::<Vec<_>>();
     for group in [bias, remaining] {

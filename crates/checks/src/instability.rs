@@ -15,8 +15,9 @@ use super::{Subject, Verdict};
 /// rigid-body modes.
 ///
 /// The p-value is the probability that the estimate of a neutrally stable system grows by as many
-/// standard errors in any mode: one-sided, Student's t times the number of modes. For a pair of
-/// real eigenvalues, one of them positive, their product is tested, the ratio of stiffness to mass.
+/// standard errors in any mode: the one-sided probability of Student's t distribution, times the
+/// number of modes. For a pair of real eigenvalues, one of them positive, their product is tested,
+/// the ratio of stiffness to mass.
 pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
     let grows = |mode: &&IdentifiedMode| {

@@ -204,7 +204,7 @@ pub enum Subject {
     Leakage,
     /// Delay between force and response.
     Delay,
-    /// Another model that explains what the fit leaves.
+    /// Alternative model that explains the residual of the fit.
     Alternative,
     /// Bias of the estimate by noise on the response.
     Bias,

@@ -4,7 +4,7 @@
 /// [`adjust_p_values`](super::adjust_p_values).
 pub const SIGNIFICANCE: f64 = 0.01;
 
-/// Minimum share of the residual power beyond the noise in few lines, for these to be reported.
+/// Minimum share of the residual power beyond the noise that a few lines must have to be reported.
 pub const CONCENTRATED: f64 = 0.8;
 
 /// Maximum ratio of residual power to noise power on all other lines, for the model to count as
@@ -27,21 +27,24 @@ pub const CONDITION_NUMBER: f64 = 1e4;
 /// inside, above which the record is hardly one period of a steady state.
 pub const SEAM_DOUBTFUL: f64 = 5.0;
 
-/// Ratio of these curvatures above which the record is not a period.
+/// Ratio of the curvature from the last sample of a period to its first to the RMS curvature
+/// inside, above which the record is not a period of a steady state.
 pub const SEAM_BAD: f64 = 20.0;
 
 /// RMS deviation of a period from the mean of all, relative to the RMS of the response, above which
 /// the response is hardly steady.
 pub const PERIOD_SCATTER_DOUBTFUL: f64 = 0.1;
 
-/// Relative RMS deviation above which the response does not repeat.
+/// RMS deviation of a period from the mean of all, relative to the RMS of the response, above which
+/// the response does not repeat.
 pub const PERIOD_SCATTER_BAD: f64 = 0.5;
 
 /// Fraction of the power of a response that the forces do not explain (1 − coherence, median over
 /// the lines), above which frequency responses are uncertain.
 pub const INCOHERENCE_DOUBTFUL: f64 = 0.1;
 
-/// Unexplained fraction above which frequency responses are mostly noise.
+/// Fraction of the power of a response that the forces do not explain, above which frequency
+/// responses are mostly noise.
 pub const INCOHERENCE_BAD: f64 = 0.5;
 
 /// Minimum number of lines of a segment in the half-power bandwidth of a resonance; below it the
@@ -49,10 +52,11 @@ pub const INCOHERENCE_BAD: f64 = 0.5;
 pub const RESONANCE_LINES: f64 = 1.0;
 
 /// Minimum number of samples per period of the highest mode, for a transition from sample to sample
-/// that hardly depends on the force between them: 2π/1.
+/// that hardly depends on the force between them: a natural frequency of 1 rad per sample.
 pub const SAMPLES_PER_PERIOD_DOUBTFUL: f64 = std::f64::consts::TAU;
 
-/// Minimum number of samples per period of a mode well below the Nyquist frequency: 2π/2.5.
+/// Minimum number of samples per period of a mode well below the Nyquist frequency: a natural
+/// frequency of 2.5 rad per sample.
 pub const SAMPLES_PER_PERIOD_BAD: f64 = std::f64::consts::TAU / 2.5;
 
 /// Minimum number of samples per period of the highest mode, for the equation of motion at the
@@ -90,7 +94,7 @@ pub const SPIKE: f64 = 20.0;
 /// Maximum residual, relative to the fitted signal (RMS), that counts as rounding.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Number of lags, to either side for a force, at which a residual is correlated.
+/// Number of lags of the correlation of a residual; with a force, on either side of lag 0.
 pub const LAGS: usize = 25;
 
 /// Minimum number of samples per lag.
@@ -108,12 +112,13 @@ pub const UNMEASURED_FORCE: f64 = 0.1;
 /// and in stiffness, for a gain to be reported; below it the ratio may be due to noise.
 pub const GAIN_SHOWS: f64 = 5.0;
 
-/// Maximum number of standard errors between the ratios in damping and in stiffness that count as
-/// the same gain.
+/// Maximum number of standard errors between the ratios of mirrored entries, in damping and in
+/// stiffness, that count as the same gain.
 pub const GAIN_AGREES: f64 = 2.5;
 
-/// Maximum difference of the logarithms of both ratios, relative to that in stiffness, that also
-/// counts as the same gain, for any standard errors.
+/// Maximum difference between the logarithms of the ratios of mirrored entries, in damping and in
+/// stiffness, relative to the logarithm in stiffness, that counts as the same gain even if it
+/// exceeds [`GAIN_AGREES`].
 pub const GAIN_NEAR: f64 = 0.05;
 
 /// Minimum fraction of samples of a coarsely quantised channel that equal the sample before.
@@ -143,7 +148,7 @@ pub(crate) const SAME_LINE: f64 = 1e-9;
 /// hardly follows the force.
 pub(crate) const HARDLY_FOLLOWS: f64 = 0.25;
 
-/// Number of reductions of the interval around the best step, each to two thirds.
+/// Number of reductions of the interval around the best delay, each to two thirds.
 pub(crate) const DELAY_REDUCTIONS: usize = 24;
 
 /// Maximum delay of the equations of motion, in samples, at which the search by maximum likelihood
@@ -153,13 +158,13 @@ pub(crate) const DELAY_NEAR: f64 = 0.5;
 /// Half width of the first parabola through the sums of squares around a delay, in samples.
 pub(crate) const DELAY_REACH: f64 = 0.25;
 
-/// Maximum number of parabolic steps.
+/// Maximum number of parabolic steps in the search for a delay.
 pub(crate) const DELAY_PARABOLAS: usize = 8;
 
-/// Minimum ratio of successive parabola widths.
+/// Minimum ratio of successive parabola widths in the search for a delay.
 pub(crate) const LEAST_PART: f64 = 0.1;
 
-/// Parabola width, in samples, that ends the search.
+/// Parabola width, in samples, that ends the search for a delay.
 pub(crate) const DELAY_RESOLVED: f64 = 0.005;
 
 /// Maximum share of the residual power after the first parabolic step, if no correlation with a
@@ -167,7 +172,7 @@ pub(crate) const DELAY_RESOLVED: f64 = 0.005;
 pub(crate) const DELAY_PROMISING: f64 = 0.5;
 
 /// Maximum ratio of the residual power of a longer delay to that of a shorter one, for the longer
-/// to be preferred.
+/// delay to be preferred.
 pub(crate) const DELAY_PREFERRED: f64 = 0.99;
 
 /// Minimum deviation of a gain from 1, or of a fault of the acquisition from 0, in standard errors,
@@ -227,22 +232,22 @@ pub(crate) const WINDOW_REACH: usize = 2;
 /// Maximum number of distances between lines at which residuals are correlated.
 pub(crate) const MAX_DISTANCES: usize = 12;
 
-/// Minimum ratio of the number of lines to the largest of those distances: fewer pairs of lines
-/// have products that are not normally distributed.
+/// Minimum ratio of the number of lines to the largest distance at which residuals are correlated:
+/// fewer pairs of lines have products that are not normally distributed.
 pub(crate) const LINES_PER_DISTANCE: usize = 8;
 
 /// Minimum number of pairs of lines at a distance.
 pub(crate) const RESPONSE_PAIRS: usize = 8;
 
-/// Minimum number of lines per such distance, and per lag of the correlation with a force: with
-/// more of them, noise and model error could not be distinguished.
+/// Minimum number of lines per distance of the correlation from line to line, and per lag of the
+/// correlation with a force: with fewer lines, noise and model error could not be distinguished.
 pub(crate) const LINES_PER_CORRELATION: usize = 8;
 
 /// Minimum number of residuals, real and imaginary parts, in excess of the parameters.
 pub(crate) const FREE_RESIDUALS: f64 = 8.0;
 
-/// Minimum residual power relative to the stated power of the response to an unmeasured force: a
-/// mean of periods may contain that little.
+/// Minimum residual power relative to the stated power of the response to an unmeasured force: the
+/// mean of the periods may contain as little as this.
 pub(crate) const SPECTRAL_LEAKED: f64 = 0.5;
 
 /// Minimum singular value of the sensitivity (columns of unit length), relative to the largest; a
@@ -264,24 +269,25 @@ pub(crate) const FIT_STEPS: usize = 8;
 pub(crate) const FIT_SETTLED: f64 = 0.01;
 
 /// Maximum number of sensitivities, residuals times parameters; in larger fits the residual of the
-/// estimate is tested without such steps.
+/// estimate is tested without Gauss–Newton steps.
 pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
 
-/// Maximum number of products, sensitivities times parameters, for such steps: some seconds.
+/// Maximum number of products, sensitivities times parameters, for Gauss–Newton steps; this number
+/// takes some seconds.
 pub(crate) const FIT_PRODUCTS: usize = 1 << 32;
 
 /// Number of samples on either side of a run of equal ones that decide about a drop-out.
 pub const DROP_OUT_NEIGHBOURS: usize = 64;
 
-/// Minimum standard deviation of these samples, in steps of the converter, for a channel to move: a
-/// structure that comes to rest moves through a few steps.
+/// Minimum standard deviation of the samples on either side of a run of equal ones, in steps of the
+/// converter, for a channel to move: a structure that comes to rest moves through a few steps.
 pub const DROP_OUT_MOTION: f64 = 10.0;
 
 /// Maximum probability of a run of equal samples that counts as a drop-out; real drop-outs have far
 /// smaller ones.
 pub const DROP_OUT_LEVEL: f64 = 1e-4;
 
-/// Maximum number of rounds in which the corner frequency of a coupled channel is refined.
+/// Maximum number of rounds in which the corner frequency of an AC-coupled channel is refined.
 pub(crate) const ACQUISITION_ROUNDS: usize = 4;
 
 /// Step of the corner frequency, relative to the lowest line, in the derivative of the effect of a

@@ -56,7 +56,8 @@ pub(crate) fn correlation_of_lines(
         coefficients,
         bound: 1.96 * (0.5 / residual.len() as f64).sqrt(),
         statistic,
-        // A square of a complex number is half a sum of two.
+        // The squared magnitude of a complex number is a sum of two squares, each with half of its
+        // mean.
         p_value: share_above_of(statistic, (last + 1 - first) as f64, 0.5 * square),
     })
 }

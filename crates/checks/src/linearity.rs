@@ -19,8 +19,8 @@ use super::{Subject, Verdict};
 
 /// Tests whether the residual response (samples × degrees of freedom) of an identified system under
 /// a random force (N) is correlated with the square or the cube of its displacement, or with the
-/// cube or the sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], of the
-/// power that correlates most).
+/// cube or the sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], for the
+/// power with the strongest correlation).
 ///
 /// Frequency responses do not show this: under a random force a hardening spring looks like a
 /// stiffer one with more noise, and dry friction like damping. Therefore the motion is predicted
@@ -114,7 +114,8 @@ impl Tested {
         Ok(Self { residual, receptances, sensitivities })
     }
 
-    /// Returns these under Hann's window, without the first and the last line.
+    /// Returns residual, receptances and sensitivities under Hann's window, without the first and
+    /// the last line.
     fn under_hann_window(&self) -> Self {
         let last = self.residual.ncols() - 1;
         let windowed = |lines: &DMatrix<Complex<f64>>| {
@@ -149,8 +150,8 @@ impl Tested {
         }
     }
 
-    /// Returns the power of the motion that correlates most, on lines of the force with this
-    /// correlation.
+    /// Returns the finding for the power of the motion whose response has the strongest correlation
+    /// with the residual. `correlation` is that of neighbouring lines.
     fn finding(
         &self,
         estimate: &Estimate,
@@ -185,7 +186,7 @@ impl Tested {
                 }
             }
         }
-        // Bonferroni: the smallest of all tests.
+        // Bonferroni's bound: the smallest p-value times the number of tests.
         let (p_value, power, dof) = least;
         let p_value = PValue::new(((n * Power::ALL.len()) as f64 * p_value).min(1.0));
         Ok(Finding::Linearity(Linearity { power, dof, p_value }))
@@ -364,7 +365,7 @@ impl Check for Linearity {
         write!(
             f,
             "the residual is correlated with the {power} {displacement} as a force ({p_value}): \
-             the machine is nonlinear at this level of the force, to which its parameters belong"
+             the machine is nonlinear at this level of the force, and its parameters hold at this level only"
         )
     }
 }

@@ -13,7 +13,7 @@ use super::{Subject, Verdict};
 
 /// Finds the most significant negative mass on the diagonal of M ([`Finding::NegativeMass`]);
 /// `None` if there is none. The p-value is the probability that noise alone makes any mass of zero
-/// as negative: one-sided, Student's t times the number of masses.
+/// as negative: the one-sided probability of Student's t distribution, times the number of masses.
 ///
 /// A machine may have negative damping or stiffness, but no negative mass: a force or a response of
 /// the wrong sign changes the sign of all matrices and leaves the modes unchanged.

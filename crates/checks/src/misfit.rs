@@ -13,8 +13,8 @@ use super::{Subject, Verdict};
 pub struct Misfit {
     /// Ratio of the residual power to its expectation for noise alone (pure number).
     pub ratio: f64,
-    /// Probability that noise alone deviates as much: to either side for periods, upwards for
-    /// coherence, downwards for the noise of the force.
+    /// Probability that noise alone deviates as much. The deviation is upwards for coherence,
+    /// downwards for the noise of the force, and to either side for periods.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Source of the noise power.
@@ -30,9 +30,10 @@ pub struct Misfit {
 pub struct Concentration {
     /// Frequencies of the lines, in Hz, rising.
     pub frequencies_hz: Vec<f64>,
-    /// Fraction of the residual power beyond the noise that vanishes without these lines.
+    /// Fraction of the residual power beyond the noise that vanishes without the lines at
+    /// `frequencies_hz`.
     pub share: f64,
-    /// Frequency, in Hz, that has all of them as multiples, unless this may be chance.
+    /// Frequency, in Hz, with all of the lines near its multiples; `None` if this may be chance.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub multiples_of_hz: Option<f64>,
 }
@@ -87,7 +88,7 @@ impl Display for NoiseSource {
             NoiseSource::Periods => "estimated from the periods",
             NoiseSource::Coherence => "that follows from the coherence",
             NoiseSource::Stated => "that the standard errors state",
-            NoiseSource::Force => "where that of the force decides",
+            NoiseSource::Force => "on the lines where the noise of the force dominates",
         })
     }
 }
@@ -107,7 +108,7 @@ impl Concentration {
         match self.multiples_of_hz.map(line_hz) {
             Some(of) => write!(
                 f,
-                "; all are near multiples of {of} Hz, of a rotation? `without_hz` {of}:multiples"
+                "; all are near multiples of {of} Hz; if this is a speed of rotation, `without_hz` {of}:multiples"
             ),
             None => Ok(()),
         }

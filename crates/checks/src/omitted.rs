@@ -12,14 +12,14 @@ use super::limits::LISTED_CHANGES;
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Term that the model leaves out and that the residual shows.
+/// Term that the model omits and that the residual indicates.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TermLeftOut {
     /// The most likely term.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub term: OmittedTerm,
-    /// Part of the power that the model leaves, a ratio.
+    /// Fraction of the residual power that the term explains.
     pub explained: f64,
     /// Probability that noise alone makes one of the terms explain as much.
     #[cfg_attr(feature = "serde", serde(flatten))]

@@ -14,7 +14,8 @@ pub struct PValue {
     /// Probability of this test alone (pure number).
     #[cfg_attr(feature = "serde", serde(rename = "p_value"))]
     pub raw: f64,
-    /// Adjusted for the number of tests made on the same fit; as `raw` before that (pure number).
+    /// Adjusted for the number of tests made on the same fit; equal to `raw` before the adjustment
+    /// (pure number).
     #[cfg_attr(feature = "serde", serde(rename = "adjusted_p_value"))]
     pub adjusted: f64,
 }
@@ -38,7 +39,7 @@ impl PValue {
 
 impl Display for PValue {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        // Distribution functions are not accurate below this.
+        // Distribution functions are not accurate below 1e-15.
         match self.raw {
             p if p < 1e-15 => return f.write_str("p < 1e-15"),
             p if p < 1e-3 => write!(f, "p = {p:.1e}")?,

@@ -12,8 +12,8 @@ use super::p_value::PValue;
 use super::{Subject, Verdict};
 use crate::Finding;
 
-/// Difference of the parts of the data about the parameters: records, bands of lines, sections of
-/// time.
+/// Difference between the parameters that parts of the data give: records, bands of lines, sections
+/// of time.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PartsAgreement {
@@ -22,7 +22,7 @@ pub struct PartsAgreement {
     pub p_value: PValue,
     /// The part that differs most from the others.
     pub part: DataPart,
-    /// Parameter in which it does.
+    /// Parameter in which this part differs most.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
     pub parameter: Parameter,
     /// Value by the part (unit of the parameter).
@@ -34,7 +34,7 @@ pub struct PartsAgreement {
     /// Ratio of standard errors from the scatter of the parts to those from the noise (pure
     /// number).
     pub scatter: f64,
-    /// Number of independent differences of the parts behind that factor.
+    /// Number of independent differences of the parts that `scatter` is computed from.
     pub degrees_of_freedom: usize,
 }
 
@@ -90,7 +90,7 @@ pub enum RowParts {
 /// possible.
 ///
 /// # Source
-/// That of [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.
+/// The source of [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.
 pub fn agreement_of_parts(fit: &PartsOfFit<'_>, splits: &[(Split, RowParts)]) -> Option<Finding> {
     let compared = splits.iter().filter_map(|(split, rows)| Some((fit.compare(split)?, *rows)));
     let compared: Vec<(PartsComparison, RowParts)> = compared.collect();

@@ -247,7 +247,7 @@ impl PeriodFault {
         match *self {
             PeriodFault::Neighbour { period, mismatch, claimed_mismatch } => write!(
                 f,
-                "the period is {period} samples: from one to the next the force differs by {} of its \
+                "the period is {period} samples: from one period to the next the force differs by {} of its \
                  RMS, after {claimed} samples by {}",
                 percent(mismatch),
                 percent(claimed_mismatch)
@@ -255,7 +255,7 @@ impl PeriodFault {
             PeriodFault::Interruption { sample, mismatch } => write!(
                 f,
                 "the force repeats every {claimed} samples, to {} of its RMS, but not across sample {} \
-                 of the window, as if samples were missing there or too many: keep to one side of it",
+                 of the window, as if samples were missing or inserted there: use the samples on one side only",
                 percent(mismatch),
                 sample + 1
             ),

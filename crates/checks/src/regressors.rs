@@ -18,10 +18,10 @@ use super::p_value::PValue;
 
 /// Tests whether the response one sample before and after explains the residual of the equation of
 /// motion, fitted sample by sample to displacement, velocity, acceleration and force (N)
-/// ([`Finding::Bias`]): it does with white noise on the response, but not with noise on the force.
-/// `None` if it does not, if no parameter changes by more than its standard error with these
-/// neighbours as instruments, if the residual is not white (this is another finding), or if there
-/// is no noise. Only the first 32,768 samples of a long record are used.
+/// ([`Finding::Bias`]): white noise on the response has this effect, noise on the force does not.
+/// `None` if the neighbours do not explain the residual, if no parameter changes by more than its
+/// standard error with the neighbours as instruments, if the residual is not white (this is another
+/// finding), or if there is no noise. Only the first 32,768 samples of a long record are used.
 ///
 /// The finding names the parameter with the largest change, in standard errors of `estimate`.
 ///
@@ -56,7 +56,7 @@ pub fn noise_on_response(
             (a, b) => a.or(b),
         };
     }
-    // Bonferroni: the smallest of all equations.
+    // Bonferroni's bound: the smallest p-value times the number of equations.
     let p_value = |change: &Change| (change.p_value * equations as f64).min(1.0);
     let significant = least.filter(|change| p_value(change) < SIGNIFICANCE);
     // A smaller bias is significant, too, in a long record, but hardly affects the interval.
@@ -148,7 +148,8 @@ impl Equation {
         let explained = (variance * total_freedom - reduced * freedom).max(0.0) / added as f64;
         let distribution = FisherSnedecor::new(added as f64, freedom).expect("positive numbers");
         let p_value = distribution.sf(explained / reduced);
-        // y = Φa + Zb and Φ = ZΠ + noise: instruments Z give a + Π⁻¹b.
+        // The right-hand side is y = Φa + Zb, with the regressors Φ and the neighbours Z, and Φ =
+        // ZΠ + noise. With the instruments Z the parameters are a + Π⁻¹b.
         let projection = fit(&self.neighbours, &self.regressors)?;
         let b = both.coefficients.rows(count, count).column(0).into_owned();
         let Some(indirect) = self.scaled_solve(projection.coefficients, b) else {

@@ -63,9 +63,11 @@ pub fn after_response_fit(
 }
 
 /// Tests the residual of an estimate on tables of frequency responses against the noise of their
-/// standard errors, if all `columns` state it ([`Finding::Misfit`]), and for correlation of lines
-/// too far apart for the window of an analyser ([`Finding::Whiteness`]). A column has the responses
-/// to a force at one degree of freedom. Returns the findings of each column.
+/// standard errors, if all `columns` state it ([`Finding::Misfit`]), and for correlation between
+/// lines that are too far apart to be correlated by the window of an analyser
+/// ([`Finding::Whiteness`]). A column has the responses to a force at one degree of freedom.
+/// Returns the findings of each column.
+///
 ///
 /// # Errors
 /// As [`after_spectral_fit`].

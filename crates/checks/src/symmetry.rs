@@ -19,7 +19,8 @@ use super::{Subject, Verdict};
 /// do not belong to the same points and directions.
 ///
 /// The p-value is the probability that one pair m_ij, m_ji of a symmetric M differs by as many
-/// standard errors: two-sided, Student's t times the number of pairs.
+/// standard errors: the two-sided probability of Student's t distribution, times the number of
+/// pairs.
 ///
 /// # Source
 /// Meirovitch, *Fundamentals of Vibrations* (2001), section 4.4 (the kinetic energy); the test is

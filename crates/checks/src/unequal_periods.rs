@@ -66,7 +66,7 @@ pub(super) fn unequal_periods(
         Segments::Periods(period),
     )?;
     average.push(&deviations(force, &acting)?, &deviations(response, &responses)?)?;
-    // The mean has been subtracted.
+    // The subtraction of the mean removes one independent period.
     let independent = average.pieces().saturating_sub(1);
     let follows = average.response_follows(independent as f64);
     Ok(follows.then_some(Finding::UnequalPeriods(UnequalPeriods { fraction })))
@@ -89,7 +89,7 @@ impl Check for UnequalPeriods {
         write!(
             f,
             "single periods of the force differ from their mean by up to {:.2} %, and the response \
-             follows them: the test does not repeat, and what differs is no noise. Average frequency \
+             follows them: the test does not repeat, and the differences are not noise. Average frequency \
              responses over the periods (`from_frf`), or fit the strokes of a hammer as `hits`",
             100.0 * self.fraction
         )

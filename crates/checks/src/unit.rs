@@ -16,8 +16,8 @@ pub struct Unit {
     pub column: String,
     /// Text in the header.
     pub text: String,
-    /// Factor that it makes or would make, in SI units per unit of the column; `None` if it is not
-    /// understood.
+    /// Factor from the unit of the column to the SI unit if the text is read as a unit; `None` if
+    /// it is not understood.
     pub factor: Option<f64>,
     /// `true` if the numbers are multiplied by the factor.
     pub used: bool,

@@ -3,8 +3,8 @@
 use std::io::Write as _;
 
 fn main() -> std::process::ExitCode {
-    // No backtrace, because the program would wait for its memory for ever if it fails for lack of
-    // memory.
+    // The message has no backtrace: a backtrace needs memory, and a program that fails for lack of
+    // memory would wait for it for ever.
     std::panic::set_hook(Box::new(|panic| {
         let _ = writeln!(std::io::stderr(), "{panic}");
     }));

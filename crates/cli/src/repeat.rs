@@ -11,7 +11,7 @@ pub fn command(arguments: &[OsString]) -> String {
     for argument in arguments {
         let argument = argument.to_string_lossy();
         command.push(' ');
-        command += &quoter.quote(&argument).expect("only a NUL cannot be quoted, and it may stand");
+        command += &quoter.quote(&argument).expect("only a NUL is refused, and NULs are allowed");
     }
     command
 }

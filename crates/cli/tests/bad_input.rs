@@ -1,4 +1,4 @@
-//! Whatever is wrong with the input: one clear message, exit code 2, and nothing written.
+//! Faulty input of every kind gives one clear message and exit code 2, and no file is written.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 
-/// A record of 32 samples, 4 ms apart: force on line 3, a displacement that answers to it.
+/// A record of 32 samples, 4 ms apart: a force on line 3 and a displacement that responds to it.
 fn good() -> String {
     record(|k| {
         let turn = std::f64::consts::TAU * 3.0 * f64::from(k) / 32.0;
@@ -23,7 +23,7 @@ fn record(sample: impl Fn(u8) -> (f64, f64, f64)) -> String {
 }
 
 /// Runs `mechid` on a file of this content in an empty folder, where it must fail with a message
-/// that holds all of `parts`, print nothing, and leave the folder as it was.
+/// that contains all of `parts`, without other output, and leave the folder unchanged.
 fn refused(content: &str, arguments: &str, parts: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.csv"), content).unwrap();
@@ -48,7 +48,7 @@ fn files(folder: &Path) -> Vec<String> {
     fs::read_dir(folder).unwrap().map(|entry| name(entry).unwrap()).collect()
 }
 
-/// `identify` on the file with its own columns, a plot asked for, and some more arguments.
+/// Runs `identify` on the file with its own columns, a plot and the arguments `more`; it must fail.
 fn identify(content: &str, more: &str, parts: &[&str]) {
     let common = "identify a.csv --force force --displacement x --plot out.svg";
     refused(content, &format!("{common} {more}"), parts);
@@ -161,7 +161,7 @@ fn lines_above_the_table() {
     let parts = ["a.csv: the table seems to begin on line 4, with 3 fields", "--skip-lines 3"];
     identify(&text, "", &parts);
     refused(&text, "info a.csv", &parts);
-    // Too many: the names are gone.
+    // With one line skipped too many, the names of the columns are lost.
     identify(&text, "--skip-lines 4 --sample-rate 250", &["a.csv has no column \"force\""]);
 }
 
@@ -191,7 +191,7 @@ fn empty_record() {
 #[test]
 fn uneven_time_steps() {
     let text = with_line(18, "0.0615,1,0");
-    identify(&text, "", &["not uniform: 0.0065 s up to line 19, where the usual step is 0.004 s"]);
+    identify(&text, "", &["the step up to line 19 is 0.0065 s, the usual step 0.004 s"]);
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn window_past_the_end() {
 
 #[test]
 fn no_excited_line() {
-    // Line 3 of 128 ms stands at 23.4375 Hz.
+    // Line 3 of a record of 128 ms is at 23.4375 Hz.
     identify(&good(), "--band-hz 30:60", &["no excited line between 30 and 60 Hz", "23.4375"]);
     identify(&good(), "--band-hz 1e300:2e300", &["between 1e300 and 2e300 Hz"]);
     identify(&good(), "--lines even", &["no excited line among even"]);
@@ -229,7 +229,7 @@ fn no_excited_line() {
 fn a_force_that_is_zero() {
     let text = record(|k| (0.004 * f64::from(k), 0.0, f64::from(k)));
     identify(&text, "", &["a.csv: the force (column force) is zero throughout the window"]);
-    // A constant is no excitation either.
+    // A constant force excites no line, either.
     let text = record(|k| (0.004 * f64::from(k), 0.1, f64::from(k % 5)));
     identify(&text, "", &["no excited line: over a period of 32 samples the force does not vary"]);
 }
@@ -259,14 +259,14 @@ fn too_few_rows_for_the_unknowns() {
 
 #[test]
 fn a_singular_fit_names_what_the_data_do_not_excite() {
-    // A static test: the machine never moves, so mass and damping do not matter.
+    // In a static test velocity and acceleration are zero, so mass and damping cannot be found.
     let mut text = String::from("time,f,x,v,a\n");
     for k in 0..20 {
         writeln!(text, "{k},{k},{},0,0", 0.5 * f64::from(k)).unwrap();
     }
     let common = "identify a.csv --force f --displacement x --velocity v --acceleration a";
     refused(&text, &format!("{common} --domain time"), &["the data do not determine m, c:"]);
-    // A sensor that is not connected.
+    // The sensor is not connected.
     let text = record(|k| {
         let t = f64::from(k);
         (0.004 * t, (t * t).sin(), 0.0)
@@ -305,7 +305,7 @@ fn pages_that_cannot_be_written() {
     refused(&good(), &format!("{common} F --output out.html"), &["no column \"F\""]);
     let elsewhere = format!("{common} force --mass 1 --output no/such/folder/out.html");
     refused(&good(), &elsewhere, &["cannot write no/such/folder"]);
-    // One line, two equations: the fit fails after the record was read.
+    // One line gives two equations, so the fit fails after the record was read.
     refused(&good(), &format!("{common} force --output out.html"), &["3 unknowns"]);
 }
 
@@ -330,16 +330,16 @@ fn descriptions_that_describe_nothing() {
     refused(&scheme("\"wilson-theta\", \"theta\": 0.5"), common, &["0.5"]);
     let from_rest = text(sdof, ", \"response\": \"from-rest\"");
     refused(&from_rest, common, &["gives the periodic response only"]);
-    // ωΔt = 4 where central difference allows 2.
+    // The step is ωΔt = 4; central difference is stable up to 2.
     let stiff = "{ \"mass\": 1, \"damping\": 0, \"stiffness\": 4096 }";
     let scheme = ", \"scheme\": { \"name\": \"central-difference\" }";
     refused(&text(stiff, scheme), common, &["central difference is unstable", "3.125000e-2 s"]);
-    // It grows at c/2m = 0.05 1/s and doubles in ln 2 / 0.05 s.
+    // The oscillation grows at c/2m = 0.05 1/s and doubles in ln 2 / 0.05 s.
     let growing = "{ \"mass\": 1, \"damping\": -0.1, \"stiffness\": 40 }";
     let told =
         ["reaches no periodic response", "pole 0.05 ± 6.324i rad/s", "doubles every 13.86 s"];
     refused(&text(growing, ""), common, &told);
-    // Driven exactly where nothing holds it.
+    // The force acts exactly at the resonance of an undamped oscillator.
     let resonant = "{ \"mass\": 1, \"damping\": 0, \"stiffness\": 39.47841760435743 }";
     refused(&text(resonant, ""), common, &["6.28"]);
 }
@@ -355,7 +355,7 @@ fn a_free_decay_that_is_none() {
     fit("--period 8", &["--period: a free decay has no period: choose --from and --to"]);
     fit("--velocity force", &["one kind of response: name the columns of displacement or"]);
     fit("--modes 0", &["--modes"]);
-    fit("--modes 99", &["99 modes cannot be fitted: from 1 to 40"]);
+    fit("--modes 99", &["99 modes cannot be fitted: give a number from 1 to 40"]);
     fit("--from 0 --modes 5", &["the record has 32 samples where at least 61 are needed"]);
     refused(&good(), "modes a.csv", &["name the columns of the response with --displacement"]);
     let still = record(|k| (0.004 * f64::from(k), 1.0, 2.5));

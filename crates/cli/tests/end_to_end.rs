@@ -1,4 +1,5 @@
-//! From a description, or a closed-form response, to a file, to the machine and back.
+//! Complete paths: from a description or a closed-form response to a file, from the file to the
+//! machine, and back.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
 use std::f64::consts::TAU;
@@ -32,7 +33,8 @@ fn assert_close(report: &Value, name: &str, truth: f64, tolerance: f64) {
     assert!((value - truth).abs() <= tolerance, "{name} = {value}, truth {truth}");
 }
 
-/// One oscillator under Σ A cos(nω0 t + n²): its steady displacement summed term by term.
+/// One oscillator under the force Σ A cos(nω0 t + n²); its steady displacement is summed term by
+/// term.
 struct Oscillator {
     m: f64,
     c: f64,
@@ -54,14 +56,14 @@ fn force(amplitude: f64, lines: &[u32], omega0: f64, t: f64) -> f64 {
     lines.iter().map(|&n| amplitude * (f64::from(n) * omega0 * t + f64::from(n * n)).cos()).sum()
 }
 
-/// Judge: the closed form, summed in the test.
+/// Reference: the closed form, summed in the test.
 #[test]
 fn a_closed_form_record_gives_its_oscillator() {
     let folder = tempfile::tempdir().unwrap();
     let truth = Oscillator { m: 2.0, c: 3.0, k: 800.0 };
     let lines: Vec<u32> = (1..=31).step_by(2).collect();
     let (dt, omega0) = (1.0 / 64.0, TAU / 2.0);
-    // A transducer offset and a run-in before the window, as on a rig.
+    // The record has an offset of the sensor and a run-in before the window, as on a real rig.
     let mut text = String::from("\"clock\";\"F\";\"x\";\n");
     for k in -10..128 {
         let t = f64::from(k) * dt;
@@ -71,7 +73,8 @@ fn a_closed_form_record_gives_its_oscillator() {
     fs::write(folder.path().join("rig.csv"), text).unwrap();
     let common = "identify rig.csv --time clock --force F --displacement x --start 11 --period 128";
     let report = mechid(folder.path(), &format!("{common} --lines odd"));
-    // Rounding of 17 digits and of the transform (1e-16 each), times the condition (about 1e2).
+    // The error is rounding of 17 digits and of the transform (1e-16 each), times the condition
+    // number (about 1e2).
     for (name, value) in [("m", truth.m), ("c", truth.c), ("k", truth.k)] {
         assert_close(&report, name, value, 1e-10 * value);
     }
@@ -80,11 +83,11 @@ fn a_closed_form_record_gives_its_oscillator() {
     let mode = &report["modes"][0];
     let hz = mode["natural_frequency_hz"]["value"].as_f64().unwrap();
     assert!((hz - 20.0 / TAU).abs() < 1e-10);
-    // With the mass known two parameters are left, and the report says so.
+    // With a known mass there are two parameters, and the report says so.
     let report = mechid(folder.path(), &format!("{common} --mass 2 --band-hz 1:6"));
     assert_eq!(report["parameters"][0]["known"], true);
     assert_eq!(report["fit"]["unknowns"], 2);
-    // The machine found is read back by whoever needs it.
+    // Other commands can read the identified machine.
     let path = folder.path().join("found.json");
     fs::write(&path, report.to_string()).unwrap();
     let found = mechid::io::read_system(&path).unwrap();
@@ -92,7 +95,8 @@ fn a_closed_form_record_gives_its_oscillator() {
     assert_close(&report, "k", truth.k, 1e-10 * truth.k);
 }
 
-/// Judge: two equal masses on three springs move as two oscillators, in phase and in opposition.
+/// Reference: two equal masses on three springs move as two oscillators, in phase and in
+/// opposition.
 #[test]
 fn two_degrees_of_freedom_with_one_shaker() {
     let folder = tempfile::tempdir().unwrap();
@@ -121,12 +125,13 @@ fn two_degrees_of_freedom_with_one_shaker() {
         ("k21", -200.0),
         ("k22", 500.0),
     ] {
-        // As above, the condition being about 1e3, against the largest stiffness or damping.
+        // The error is rounding times a condition number of about 1e3, relative to the largest
+        // stiffness or damping.
         let scale = if name.starts_with('k') { 500.0 } else { 1.1 };
         assert_close(&report, name, value, 1e-9 * scale);
     }
-    // Without a mass the equation without force has no scale, and may be added to the other: the matrices are
-    // not given, the modes are.
+    // If no force acts on a mass and the mass is unknown, its equation has no scale and may be
+    // added to the other one. The matrices are then not given, but the modes are.
     let report = mechid(folder.path(), "identify two.csv --force f,0 --displacement x,y");
     assert!(
         report.get("system").is_none() && report["unscaled"]["equations"] == json!([1, 2]),
@@ -142,7 +147,7 @@ fn two_degrees_of_freedom_with_one_shaker() {
     }
 }
 
-/// A bearing: C and K are not symmetric, two shakers on interleaved lines.
+/// A bearing test: C and K are not symmetric, and two shakers use interleaved lines.
 const BEARING: &str = r#"{
     "system": {
         "mass": [[14.8, 0], [0, 14.8]],
@@ -166,7 +171,8 @@ fn a_simulated_bearing_is_read_back_and_drawn() {
         let columns = format!("{motion}_1,{motion}_2");
         let report = mechid(folder.path(), &format!("{common} --{motion} {columns}"));
         for (name, value) in [("m11", 14.8), ("c12", 150.0), ("k12", 45000.0), ("k21", -30000.0)] {
-            // Rounding times a condition of about 1e3 on the largest entry of each matrix.
+            // The error is rounding times a condition number of about 1e3, relative to the largest
+            // entry of each matrix.
             assert_close(&report, name, value, 1e-9 * value.abs().max(10.0));
         }
         for (found, true_mode) in
@@ -198,7 +204,7 @@ fn noise_stays_inside_the_standard_errors() {
     let unbiased = mechid(folder.path(), &format!("{common} --method maximum-likelihood"));
     for (name, value) in truth {
         let (found, error) = parameter(&unbiased, name);
-        // One seed, not a study: four standard errors are exceeded once in 16,000 draws.
+        // The test uses one seed only; four standard errors are exceeded once in 16,000 draws.
         assert!((found - value).abs() < 4.0 * error, "{name} = {found} ± {error}, truth {value}");
         assert!(error < 0.02 * value, "{name} ± {error}");
     }
@@ -207,7 +213,7 @@ fn noise_stays_inside_the_standard_errors() {
     assert!(report["fit"]["unexplained_motion"].as_f64().unwrap() > 0.02);
 }
 
-/// Schemes differ from the exact response by their own error and no more.
+/// Every scheme differs from the exact response only by its own error.
 #[test]
 fn every_scheme_simulates_what_it_says() {
     let folder = tempfile::tempdir().unwrap();
@@ -242,12 +248,14 @@ fn every_scheme_simulates_what_it_says() {
         let arguments = "identify s.csv --force force --displacement displacement";
         let report = mechid(folder.path(), arguments);
         let hz = report["modes"][0]["natural_frequency_hz"]["value"].as_f64().unwrap();
-        // 320 steps per period: second-order schemes are off by some (ωΔt)²/12 … (ωΔt)²/2, 2e-4.
+        // With 320 steps per period the error of second-order schemes is about (ωΔt)²/12 to
+        // (ωΔt)²/2, 2e-4.
         assert!((hz / (20.0 / TAU) - 1.0).abs() < 3e-4, "{name}: {hz} Hz");
     }
 }
 
-/// Judge: the closed forms of a machine under a force that is held, or linear, between samples.
+/// Reference: the closed forms of a machine under a force that is constant, or linear, between
+/// samples.
 #[test]
 fn the_time_domain_gives_the_machine_whose_force_is_held_or_linear() {
     use mechid::model::{InitialState, Sdof};
@@ -271,16 +279,16 @@ fn the_time_domain_gives_the_machine_whose_force_is_held_or_linear() {
         let common = "identify t.csv --force f --displacement x --velocity v --domain time";
         let report = mechid(folder.path(), &format!("{common} --between-samples {between}"));
         for (name, value) in [("m", 2.0), ("c", 6.0), ("k", 800.0)] {
-            // Rounding times the condition of the transition over the step.
+            // The error is rounding times the condition number of the transition over one step.
             assert_close(&report, name, value, 1e-8 * value);
         }
-        // Euler's rule on the same record is off by more than half of ωΔt = 0.2.
+        // Euler's rule on the same record has an error of more than half of ωΔt = 0.2.
         let euler = mechid(folder.path(), &format!("{common} --between-samples euler"));
         assert!((parameter(&euler, "c").0 / 6.0 - 1.0).abs() > 0.1);
     }
 }
 
-/// The measured benchmark: plain least squares over the 168 odd lines of its multisine.
+/// The measured benchmark: ordinary least squares over the 168 odd lines of its multisine.
 #[test]
 fn the_silverbox_comes_out() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

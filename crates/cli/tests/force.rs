@@ -1,11 +1,11 @@
-//! The `force` subcommand from outside: simulate, identify, reconstruct.
+//! The subcommand `force`: simulate, identify, reconstruct.
 
 use std::path::{Path, PathBuf};
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
 
-/// Runs the program in a folder; the report, or the message of a failure with exit code 2.
+/// Runs the program in a folder; returns the report, or the message of a failure with exit code 2.
 fn mechid(folder: &Path, arguments: &str) -> Result<Vec<u8>, String> {
     let output = cargo_bin_cmd!("mechid")
         .current_dir(folder)
@@ -25,7 +25,7 @@ fn report(folder: &Path, arguments: &str) -> Value {
     serde_json::from_slice(&mechid(folder, &format!("{arguments} --json")).unwrap()).unwrap()
 }
 
-/// A folder with a record of the example machine and what was identified from it.
+/// Makes a folder with a record of the example machine and the machine identified from it.
 fn experiment() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let example = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.json");
@@ -73,10 +73,10 @@ fn the_force_of_the_record_comes_back() {
     let stated = column(&folder.join("force.csv"), "standard_error");
     let stated = (stated.iter().map(|e| e * e).sum::<f64>() / 256.0).sqrt();
     let size = (truth.iter().map(|f| f * f).sum::<f64>() / truth.len() as f64).sqrt();
-    // Noise of 1 % on the displacement, more at the lines far above the resonance; what is seen
-    // is within what is stated, give or take one draw.
+    // The displacement has 1 % noise, which weighs more at the lines far above the resonance. The
+    // actual error agrees with the stated one up to the scatter of one draw.
     assert!(seen < 3.0 * stated / size, "seen {seen:.3}, stated {:.3}", stated / size);
-    // Lines 4 to 60, 0.5 Hz apart, and no others.
+    // The spectrum has only the lines 4 to 60, which are 0.5 Hz apart.
     let amplitude = column(&folder.join("lines.csv"), "amplitude");
     let frequency = column(&folder.join("lines.csv"), "frequency_hz");
     assert_eq!((frequency.len(), frequency[0], frequency[56]), (57, 2.0, 30.0));
@@ -116,7 +116,7 @@ fn the_method_follows_the_record_and_says_why() {
     }
 }
 
-/// The bearing driven in y, its displacement measured in x alone.
+/// A bearing is driven in y, and only its displacement in x is measured.
 #[test]
 fn one_sensor_finds_the_force_in_the_other_direction() {
     let folder = tempfile::tempdir().unwrap();
@@ -143,7 +143,7 @@ fn one_sensor_finds_the_force_in_the_other_direction() {
     assert!(seen < 1e-9, "{seen:.1e}");
     let picture = std::fs::read(folder.join("f.png")).unwrap();
     assert_eq!(&picture[1..4], b"PNG");
-    // Two forces cannot be told apart with one sensor.
+    // One sensor cannot distinguish two forces.
     let both = arguments.replace("--forced 2", "");
     assert!(mechid(folder, &both).unwrap_err().contains("name fewer forced ones"));
 }
@@ -167,7 +167,7 @@ fn bad_requests_say_what_to_change() {
         let arguments = format!("force run.csv --system machine.json {arguments}");
         let long = arguments.contains("tikhonov");
         if long {
-            // Two periods are 512 samples: one more is too many.
+            // The method takes at most 512 samples, two periods, so three are refused.
             let experiment = std::fs::read_to_string(folder.join("experiment.json")).unwrap();
             let three = experiment.replace("\"periods\": 2", "\"periods\": 3");
             std::fs::write(folder.join("experiment.json"), three).unwrap();

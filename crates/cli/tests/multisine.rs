@@ -1,4 +1,4 @@
-//! The `multisine` subcommand from outside.
+//! The subcommand `multisine`.
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
@@ -13,7 +13,7 @@ fn json(arguments: &str) -> Value {
     serde_json::from_slice(&output.get_output().stdout).unwrap()
 }
 
-/// Exit code 2, and a message with the given words.
+/// Runs the program, which must fail with exit code 2 and a message with the given words.
 fn refused(arguments: &str, words: &[&str]) {
     let output = cargo_bin_cmd!("mechid")
         .arg("multisine")

@@ -1,8 +1,9 @@
-//! A fleet that is killed, that finds the disk full, that meets poison, and of which two write into one folder: at the end
-//! the results are those of an undisturbed run, to the last byte.
+//! Fleets under disturbances: they are killed, find the disk full, meet faulty records, or two of
+//! them write into one folder. In the end the results are those of an undisturbed run, to the last
+//! byte.
 //!
-//! `MECHID_SOAK_SECONDS=3600 cargo test --release -p mechid-cli --test soak` does so for an hour; the test of every
-//! change for some seconds.
+//! `MECHID_SOAK_SECONDS=3600 cargo test --release -p mechid-cli --test soak` runs this for an hour;
+//! the check of every change runs it for some seconds.
 #![cfg(target_os = "linux")]
 
 use std::collections::BTreeMap;
@@ -12,26 +13,27 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Seconds of the run unless `MECHID_SOAK_SECONDS` says so.
+/// Duration of the run in seconds, unless `MECHID_SOAK_SECONDS` is set.
 const SECONDS: u64 = 5;
 
-/// Number of good records; of poisonous ones there are two more.
+/// Number of good records; there are two faulty ones in addition.
 const RECORDS: usize = 12;
 
-/// Numbers that follow from each other as if drawn.
+/// Pseudorandom numbers.
 struct Draws(u64);
 
 impl Draws {
     /// Returns a number below `end`.
     fn below(&mut self, end: u64) -> u64 {
-        // Numerical Recipes' linear congruence; its high digits are the random ones.
+        // Linear congruential generator of Numerical Recipes; only its high digits are random
+        // enough.
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % end
     }
 }
 
-/// Writes the records: good ones, one that is cut short, and one that is no record.
+/// Writes the records: good ones, one that is cut short, and a file that is no record.
 fn write_records(home: &Path) {
     let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
     let rig = fs::read_to_string(rig).unwrap();
@@ -47,7 +49,7 @@ fn write_records(home: &Path) {
     fs::write(home.join("analysis.json"), analysis).unwrap();
 }
 
-/// Starts a fleet; `before` is what its shell does first.
+/// Starts a fleet; its shell first runs `before`.
 fn start(home: &Path, results: &str, before: &str) -> Child {
     let run = "fleet day --analysis analysis.json --part-records 2 --workers 2 --quiet --output";
     Command::new("sh")
@@ -59,7 +61,7 @@ fn start(home: &Path, results: &str, before: &str) -> Child {
         .unwrap()
 }
 
-/// The files of a folder with their contents.
+/// Returns the files of a folder with their contents.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     files
@@ -70,23 +72,23 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// Disturbs a run into `results` until all parts are there.
+/// Disturbs a run that writes into `results`.
 fn disturbed(home: &Path, draws: &mut Draws) {
     let patience = draws.below(400);
     match draws.below(4) {
-        // Killed at any moment.
+        // The fleet is killed at a random time.
         0 => {
             let mut fleet = start(home, "results", "");
             sleep(Duration::from_millis(patience));
             let _ = fleet.kill();
             fleet.wait().unwrap();
         }
-        // No file may have a byte, which fails as a full disk does.
+        // The limit of zero bytes per file acts like a full disk.
         1 => {
             let status = start(home, "results", "trap '' XFSZ; ulimit -f 0;").wait().unwrap();
             assert!(matches!(status.code(), Some(1 | 2)), "{status}");
         }
-        // Two at a time, of which one may be killed.
+        // Two fleets run at the same time, and one of them is killed.
         2 => {
             let [mut one, mut other] = [(); 2].map(|()| start(home, "results", ""));
             sleep(Duration::from_millis(patience));
@@ -94,7 +96,8 @@ fn disturbed(home: &Path, draws: &mut Draws) {
             one.wait().unwrap();
             assert_eq!(other.wait().unwrap().code(), Some(1));
         }
-        // Little memory: some records or none have a row, in a folder of its own.
+        // With little memory only some records, or none, have a row; so this run has a separate
+        // folder.
         _ => {
             let kilobytes = 60_000 + 1000 * draws.below(100);
             let limit = format!("ulimit -v {kilobytes};");
@@ -119,7 +122,8 @@ fn what_disturbs_a_fleet_leaves_nothing_half_doubled_or_different() {
         (0..1 + draws.below(5)).for_each(|_| disturbed(home, &mut draws));
         assert_eq!(start(home, "results", "").wait().unwrap().code(), Some(1));
         let mut found = contents(&home.join("results"));
-        // What was being written when a fleet was killed has a hidden name, and is removed in time.
+        // A file that was being written when a fleet was killed has a hidden name; a later run
+        // removes it.
         found.retain(|name, _| !name.starts_with('.'));
         assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
         assert!(found == expected, "the rows differ, round {rounds}");

@@ -1,4 +1,4 @@
-//! The `stability` subcommand from outside.
+//! The subcommand `stability`.
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
@@ -9,7 +9,7 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_slice(&output.get_output().stdout).unwrap()
 }
 
-/// Exit code 2, and a message with the given words.
+/// Runs the program, which must fail with exit code 2 and a message with the given words.
 fn refused(arguments: &[&str], words: &str) {
     let output = cargo_bin_cmd!("mechid").arg("stability").args(arguments).assert().code(2);
     let message = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
@@ -21,7 +21,7 @@ fn anchors_and_limits_are_in_the_json() {
     let report = json(&["--step", "0.1"]);
     let schemes = report["schemes"].as_array().unwrap();
     let elongation = |k: usize| schemes[k]["chart"][0]["period_elongation"].as_f64().unwrap();
-    // Known to four decimals of a per cent at ten steps per period.
+    // Published period elongations at ten steps per period, with four decimals of a per cent.
     for (k, percent) in
         [3.2075, 1.6002, -1.6934, 12.3206, 6.1462, 3.3828, 1.6179, 0.1122].iter().enumerate()
     {
@@ -39,7 +39,7 @@ fn anchors_and_limits_are_in_the_json() {
     }
 }
 
-/// ρ∞ is what its schemes are chosen by: the spectral radius at very large steps.
+/// Schemes that are chosen by ρ∞ have it as spectral radius at very large steps.
 #[test]
 fn schemes_of_a_radius_have_it() {
     let of = |rho: &str| {
@@ -57,7 +57,7 @@ fn schemes_of_a_radius_have_it() {
         for scheme in schemes {
             let radius = |k: usize| scheme["chart"][k]["spectral_radius"].as_f64().unwrap();
             let expected: f64 = rho.parse().unwrap();
-            // A double eigenvalue keeps half of the digits.
+            // A double eigenvalue is accurate to only half of the digits.
             assert!((radius(1) - expected).abs() < 1e-4, "{}: {}", scheme["name"], radius(1));
             assert!(radius(0) > 0.99, "{}: {}", scheme["name"], radius(0));
             assert_eq!(scheme["stability_limit"], Value::Null, "{}", scheme["name"]);
@@ -69,7 +69,7 @@ fn schemes_of_a_radius_have_it() {
 fn a_machine_gets_its_largest_steps() {
     let folder = tempfile::tempdir().unwrap();
     let (file, plot) = (folder.path().join("machine.json"), folder.path().join("charts.svg"));
-    // ω = √500 rad/s: central difference is stable up to 2/ω.
+    // With ω = √500 rad/s central difference is stable up to the step 2/ω.
     std::fs::write(
         &file,
         r#"{ "system": { "mass": 10, "damping": 180, "stiffness": 5000 },

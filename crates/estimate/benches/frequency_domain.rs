@@ -1,5 +1,5 @@
-//! Cost of identifying the bearing in the frequency domain, records included, and of the search of machines
-//! with many degrees of freedom, which the last lines tell.
+//! Cost of the identification of the bearing in the frequency domain, records included, and of the
+//! search of machines with many degrees of freedom, which the last lines print.
 
 #![allow(clippy::print_stdout, reason = "the last lines are the result")]
 
@@ -51,7 +51,7 @@ fn identify(c: &mut Criterion) {
         group.bench_function(format!("{count} lines, from amplitudes"), |b| {
             b.iter(|| equation_error(black_box(&data), &unknowns).unwrap())
         });
-        // The yardstick: the transforms alone.
+        // The reference: the transforms alone.
         group.bench_function(format!("{count} lines, four transforms alone"), |b| {
             b.iter(|| {
                 (
@@ -83,8 +83,8 @@ fn estimators(c: &mut Criterion) {
     group.finish();
 }
 
-/// The maximum-likelihood search for all of M, C and K of a held chain with every mass driven, from 4
-/// periods.
+/// The maximum-likelihood search for all entries of M, C and K of a fixed chain with every mass
+/// driven, from 4 periods.
 fn many_degrees_of_freedom(_: &mut Criterion) {
     const LINES: usize = 500;
     let mut before: Option<(usize, f64)> = None;

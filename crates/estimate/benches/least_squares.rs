@@ -57,7 +57,7 @@ fn row_blocks(matrix: &DMatrix<f64>) -> LeastSquares {
     rows
 }
 
-/// Shortest of several runs, in seconds: what the machine can do when nobody else uses it.
+/// Returns the shortest of several runs, in seconds: the time without other load on the computer.
 fn shortest<T>(runs: usize, mut job: impl FnMut() -> T) -> f64 {
     let time = |_| {
         let start = Instant::now();
@@ -94,8 +94,8 @@ fn ratios(_: &mut Criterion) {
     }
 }
 
-/// Least squares of all of M, C and K, with standard errors, against nalgebra's QR of the same rows solved
-/// for all equations at once, without any.
+/// Least squares for all entries of M, C and K, with standard errors, compared with nalgebra's QR
+/// of the same rows, solved for all equations at once and without standard errors.
 fn many_degrees_of_freedom(_: &mut Criterion) {
     const ROWS: usize = 2048;
     let mut before: Option<(usize, f64)> = None;

@@ -25,13 +25,13 @@ use mechid_spectra::{Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods}
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
-/// Noise over the response, in the RMS.
+/// Ratio of the RMS of the noise to that of the response.
 const LEVEL: f64 = 0.05;
-/// Narrow disturbance over white noise, in the RMS.
+/// Ratio of the RMS of a narrow disturbance to that of the white noise.
 const NARROW: f64 = 3.0;
-/// Experiments by which the covariance of a noise is known.
+/// Number of experiments from which the covariance of a noise is estimated.
 const MANY: u64 = 4000;
-/// Samples before the first, after which a recursion is steady.
+/// Number of samples before the first, after which a recursion is steady.
 const BEFORE: usize = 2000;
 
 /// Colour of a noise.
@@ -44,7 +44,8 @@ enum Colour {
     OneOverF,
     /// White noise, and [`NARROW`] times its RMS in a resonance of the width of four lines.
     Narrow,
-    /// Response of the machine to a force of the first order (0.9) on its last mass, and white noise of a tenth of it.
+    /// Response of the machine to a force of the first order (0.9) on its last mass, and white
+    /// noise of a tenth of its size.
     UnmeasuredForce,
 }
 
@@ -62,7 +63,7 @@ impl Colour {
         }
     }
 
-    /// A channel of `len` samples, steady from the first.
+    /// Returns a channel of `len` samples, stationary from the first one.
     fn samples(self, len: usize, seed: u64) -> Vec<f64> {
         let all = Sampling::new(1.0, len + BEFORE).expect("samples");
         let white = |stream: u64| {
@@ -106,7 +107,8 @@ impl Colour {
     }
 }
 
-/// A chain of masses with a damping ratio of about 3 %, and where its modes are among the lines.
+/// A chain of masses with a damping ratio of about 3 %, by the position of its modes among the
+/// lines.
 enum Machine {
     /// One mass, whose mode is at line 12 of 100.
     LowMode,
@@ -155,7 +157,7 @@ struct Study {
     lines: Lines,
     unknowns: Unknowns,
     colour: Colour,
-    /// RMS of the noise on each channel over that of the samples drawn.
+    /// Ratio of the RMS of the noise on each channel to that of the samples drawn.
     scale: Vec<f64>,
     force: Record,
     exact: Record,
@@ -201,7 +203,7 @@ impl Study {
         let (len, dof) = (self.exact.len(), self.scale.len());
         let mut motion = self.exact.data().clone();
         if let Colour::UnmeasuredForce = self.colour {
-            // One force makes all channels move.
+            // One force moves all channels.
             let by = self.scale[dof - 1];
             let all = self.exact.sampling().with_len(4 * len)?;
             motion += by * response(&self.test.system, all, seed)?.rows(len, len);
@@ -247,7 +249,7 @@ impl Study {
         })
     }
 
-    /// Standard errors of maximum likelihood that knows the covariance of the noise.
+    /// Returns the standard errors of maximum likelihood with a known noise covariance.
     fn bound(&self) -> Result<Vec<f64>> {
         let dof = self.scale.len();
         let exact = {

@@ -25,7 +25,7 @@ use std::time::Instant;
 use judge::{Judged, judge};
 use mechid_estimate::likelihood::{LikelihoodEstimate, NoiseSource, Settings};
 
-/// Truth by name, and one experiment for each seed.
+/// True values by name, and one experiment for each seed.
 type Study = (
     &'static str,
     Vec<(String, f64)>,
@@ -97,7 +97,7 @@ fn studies() -> Vec<Study> {
     ]
 }
 
-/// Share of experiments in which a test that should tell something does, at a level of 1 %.
+/// Share of experiments in which a test that should report a fault does so, at a level of 1 %.
 fn told(name: &str, seeds: u64, p_value: impl Fn(u64) -> Option<f64>) {
     let count = (0..seeds).filter(|seed| p_value(*seed).is_some_and(|p| p < 0.01)).count();
     println!("{name}: told in {count} of {seeds}");

@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let start = Instant::now();
         let found = output_error(&data, &unknowns);
         let seconds = start.elapsed().as_secs_f64();
-        // The judge knows the machine, and searches from there as well.
+        // The reference search starts from the true machine.
         let best = output_error_near(&data, &unknowns, Some(&test.system))?;
         let tally = tallies.entry(test.name).or_default();
         tally.machines += 1;

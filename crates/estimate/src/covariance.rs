@@ -5,8 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// Covariance of parameters θ.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Covariance {
-    /// Every entry.
-    /// In products of SI units.
+    /// Full matrix, in products of SI units.
     Full(DMatrix<f64>),
     /// Factors, for equations that were solved one by one: n equations of 3n unknowns each have
     /// (3n²)² covariances, but these depend on not many more than (3n)² numbers.
@@ -21,8 +20,7 @@ pub struct Product {
     /// S, equations × equations.
     /// In products of SI units.
     pub residual: DMatrix<f64>,
-    /// The different rows h, one below the other.
-    /// In inverse SI units of the regressors.
+    /// Distinct rows h, one below the other, in inverse SI units of the regressors.
     pub rows: DMatrix<f64>,
     /// Indices of the equation and of the row h of every parameter.
     pub places: Vec<(usize, usize)>,

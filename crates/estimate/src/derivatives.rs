@@ -3,12 +3,12 @@
 //! Differentiation amplifies noise in proportion to the frequency, and to its square for the
 //! acceleration. The caller chooses the method, because each one assumes something:
 //!
-//! | Function | Assumes | Costs |
+//! | Function | Assumption | Loss |
 //! |---|---|---|
 //! | [`spectral_from_displacement`] | the record is whole periods | none; exact up to Nyquist |
-//! | [`spectral_from_acceleration`] | the same, and no interest in the mean | static displacement |
-//! | [`SavitzkyGolay::motion`] | smooth over a window | ends and highest frequencies |
-//! | [`SavitzkyGolay::twice_differentiated`] | same, with the force | same, and noise times ω² |
+//! | [`spectral_from_acceleration`] | the record is whole periods | static displacement |
+//! | [`SavitzkyGolay::motion`] | the displacement is smooth | ends and highest frequencies |
+//! | [`SavitzkyGolay::twice_differentiated`] | acceleration and force are smooth | ends, highest frequencies, noise times ω² |
 
 use mechid_model::Response;
 use mechid_signal::{Record, SignalError, Spectrum};
@@ -18,7 +18,7 @@ use crate::EstimateError;
 
 /// Returns x, ẋ and ẍ of a displacement (m) recorded over whole periods: its lines times iω.
 ///
-/// The Nyquist line (even length) has no velocity at the samples.
+/// At the Nyquist frequency (records of even length) the velocity is zero at every sample.
 ///
 /// # Errors
 /// [`EstimateError::Signal`] if a derivative is too large for a record.
@@ -63,7 +63,7 @@ fn times(
     Spectrum::from_lines(spectrum.sampling(), lines)?.to_record()
 }
 
-/// A sliding polynomial fit to windows of 2·half_width + 1 samples.
+/// Fit of a sliding polynomial to windows of 2·half_width + 1 samples.
 ///
 /// It is exact for polynomials of its order. Near the ends of the record the first and the last
 /// window are evaluated off their centres, with more noise.

@@ -25,8 +25,8 @@ pub enum EstimateError {
         /// Degrees of freedom expected.
         dof: usize,
     },
-    /// A value said to be known is NaN or infinite.
-    #[error("{parameter} is said to be known, but as {value}, which is not a finite number")]
+    /// A known value is NaN or infinite.
+    #[error("the known value of {parameter} is {value}, which is not a finite number")]
     FixedValue {
         /// Name of the parameter.
         parameter: String,
@@ -36,12 +36,12 @@ pub enum EstimateError {
     /// A problem needs at least one degree of freedom.
     #[error("an identification needs at least one degree of freedom")]
     NoDof,
-    /// An unknown parameter is asked for.
+    /// No unknown parameter has the given name.
     #[error("no unknown parameter is called \"{name}\"; the unknowns are {known}")]
     NoSuchParameter {
-        /// The name asked for.
+        /// Name that was given.
         name: String,
-        /// The names there are.
+        /// Names of the unknown parameters.
         known: String,
     },
     /// An equation of motion has neither a force nor a known entry: it fixes only ratios.
@@ -135,7 +135,7 @@ pub enum EstimateError {
         /// Order of the polynomial.
         order: usize,
     },
-    /// The identified system has no steady state with that period.
+    /// The identified system has no steady state with the period of the force.
     #[error(
         "the identified machine has no steady state of period {period} s: it is undamped or unstable"
     )]
@@ -149,7 +149,7 @@ pub enum EstimateError {
          degrees of freedom without mass of their own, or sample faster"
     )]
     TooStiff {
-        /// Modulus of its eigenvalue, in rad/s.
+        /// Modulus of the eigenvalue of the mode, in rad/s.
         rate: f64,
         /// Sampling interval, in s.
         dt: f64,
@@ -183,7 +183,7 @@ pub enum EstimateError {
     NotConverged {
         /// Number of searches, each from another start.
         searches: usize,
-        /// Steps allowed for the first.
+        /// Maximum number of steps of the first search.
         steps: usize,
     },
     /// Spectral lines are unusable.

@@ -106,10 +106,10 @@ impl Estimate {
         })
     }
 
-    /// Squared Mahalanobis distance dᵀ Cov⁻¹ d of the parameters of another estimate from these,
-    /// with this covariance: a pure number. If the estimates differ by noise alone, its mean is
-    /// about the number of parameters. `None` if the covariance has no inverse, as with related
-    /// entries, or if the other estimate has other parameters.
+    /// Squared Mahalanobis distance dᵀ Cov⁻¹ d of the parameters of another estimate from those of
+    /// this one, with the covariance of this one: a pure number. If the estimates differ by noise
+    /// alone, its mean is about the number of parameters. `None` if the covariance has no inverse,
+    /// as with related entries, or if the other estimate has other parameters.
     ///
     /// # Source
     /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
@@ -247,7 +247,7 @@ impl Estimate {
 
     /// Returns the same estimate with standard errors multiplied by `scale` (a pure number), the
     /// Birge ratio of data that disagree by more than their noise. The degrees of freedom are those
-    /// of `scale` if these are fewer.
+    /// of `scale`, if `scale` has fewer.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.

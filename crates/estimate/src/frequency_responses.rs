@@ -18,8 +18,8 @@ pub struct ResponseEstimate {
     pub fit: OutputErrorFit,
     /// Fitted responses of each record: the measured ones, corrected for the bias of their window.
     pub responses: Vec<Frf>,
-    /// Largest change of a parameter by this correction, in its standard errors (pure number); zero
-    /// if the window has no bias.
+    /// Largest change of a parameter by the correction of the window bias, in its standard errors
+    /// (pure number); zero if the window has no bias.
     pub blunted: f64,
     /// True if the alternation between the correction and the parameters converged.
     pub settled: bool,
@@ -28,10 +28,11 @@ pub struct ResponseEstimate {
 /// Fits the frequency responses of one or several records of a machine, each with the degrees of
 /// freedom of its forces, counted from 0.
 ///
-/// An average over segments smooths a response by |W|² of their window. The bias is computed from
-/// the identified system and subtracted from the data, and the fit is repeated, until neither
-/// changes. The covariance allows for three things: the window correlates the errors of
-/// neighbouring lines, motions and forces have errors in common, and the weights are sampled from
+/// An average over segments smooths a response with |W|², the squared magnitude of the spectrum of
+/// their window. The bias is computed from the identified system and subtracted from the data, and
+/// the fit is repeated, until neither changes. The covariance allows for three things: the window
+/// correlates the errors of neighbouring lines, motions and forces have errors in common, and the
+/// weights are sampled from
 /// few segments.
 ///
 /// # Errors
@@ -171,7 +172,7 @@ struct Errors {
     white: Whitened,
     dof: usize,
     q: DMatrix<f64>,
-    /// R⁻¹.
+    /// Inverse R⁻¹ of the triangular factor.
     root: DMatrix<f64>,
 }
 

@@ -4,13 +4,15 @@
 /// noise have no weight in the linear estimate.
 pub(crate) const WEIGHTING_CLEAR: f64 = 0.1;
 
-/// Maximum number of Gauss–Newton steps from one delay of the force to the next.
+/// Maximum number of Gauss–Newton steps from one delay of the force to the next in a search for a
+/// delay.
 pub(crate) const DELAY_STEPS: usize = 30;
 
-/// Maximum number of Gauss–Newton steps of the first search.
+/// Maximum number of Gauss–Newton steps of the first search by maximum likelihood.
 pub(crate) const SEARCH_STEPS: usize = 200;
 
-/// Maximum number of Gauss–Newton steps of the searches that confirm the first one.
+/// Maximum number of Gauss–Newton steps of each search after the first one, which confirms its
+/// minimum.
 pub(crate) const STEPS_MORE: usize = 60;
 
 /// Maximum number of Gauss–Newton steps in resampled data, where the search need not converge.
@@ -19,7 +21,7 @@ pub(crate) const STEPS_RESAMPLED: usize = 15;
 /// Largest relative difference of the sums of squares of two searches that count as one minimum.
 pub(crate) const RESTART_SAME: f64 = 1e-6;
 
-/// Largest sum of squares, in units of the noise or the response, that counts as rounding.
+/// Largest sum of squares of a fit, in units of the noise or the response, that counts as rounding.
 pub(crate) const RESTART_EXACT: f64 = 1e-16;
 
 /// Relative difference of the sums of squares of two initial estimates below which the second one
@@ -43,7 +45,7 @@ pub(crate) const RESTART_RESTARTS: usize = 2;
 /// explains several minima.
 pub(crate) const RESTARTS_AMONG_MANY: usize = 12;
 
-/// Maximum number of restarts.
+/// Maximum number of restarts of a search from its best minima.
 pub(crate) const MAX_RESTARTS: u64 = 60;
 
 /// Number of the best minima that restarts begin from in turn.
@@ -64,7 +66,7 @@ pub(crate) const GRAM_LINES: usize = 256;
 /// than it saves.
 pub(crate) const LINES_AT_ONCE: usize = 64;
 
-/// Maximum number of Lanczos steps; after as many, an extreme eigenvalue is accurate to many
+/// Maximum number of Lanczos steps; after this number, an extreme eigenvalue is accurate to many
 /// digits.
 pub(crate) const GRAM_LANCZOS: usize = 80;
 
@@ -100,7 +102,8 @@ pub(crate) const MAX_LEVERAGES: usize = 1 << 20;
 /// data without them.
 pub(crate) const SINUSOID_ROUNDS: usize = 8;
 
-/// Change of the data without sinusoids, relative to the residual, that ends these rounds.
+/// Change of the data without sinusoids, relative to the residual, that ends the rounds of fit and
+/// subtraction.
 pub(crate) const SINUSOID_TOLERANCE: f64 = 1e-3;
 
 /// Minimum power of a residual relative to the noise of the round before; a smaller residual would
@@ -110,13 +113,14 @@ pub(crate) const NOISE_LEAST: f64 = 1e-12;
 /// Minimum share of its noise that a residual is assumed to keep after the fit (1 − leverage).
 pub(crate) const NOISE_KEPT: f64 = 0.1;
 
-/// Number of rounds of weighting by the dynamic stiffness of the round before.
+/// Number of rounds of the initial estimates, each weighted by the dynamic stiffness of the round
+/// before.
 pub(crate) const INITIAL_ROUNDS: usize = 4;
 
 /// Maximum number of corrections of the window bias; each removes most of the remaining bias.
 pub(crate) const SHARPENING_ROUNDS: usize = 20;
 
-/// Step, in standard errors of the parameters, that ends the corrections.
+/// Step, in standard errors of the parameters, that ends the corrections of the window bias.
 pub(crate) const SHARPENING_SETTLED: f64 = 0.02;
 
 /// Minimum modal assurance criterion of two real eigenvalues that form an overdamped pair, if there
@@ -132,7 +136,7 @@ pub(crate) const INITIAL_UNSEEN: f64 = 1e-10;
 /// Maximum number of steps of the search for proportional damping, the only nonlinear relation.
 pub(crate) const RELATED_STEPS: usize = 100;
 
-/// Relative change of the unknowns that ends this search.
+/// Relative change of the unknowns that ends the search for proportional damping.
 pub(crate) const RELATED_SETTLED: f64 = 1e-12;
 
 /// Largest ratio of residual to force of an equation that counts as rounding.

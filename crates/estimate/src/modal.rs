@@ -299,7 +299,7 @@ struct Sensitivity {
     eigenvalue: DVector<Complex<f64>>,
     /// Derivative of the equation of motion of each parameter with respect to it, at fixed λ.
     push: Vec<Complex<f64>>,
-    /// U of dφ = −U f for changes f of the equations of motion, n×n.
+    /// Matrix U of dφ = −U f for changes f of the equations of motion, n×n.
     answers: DMatrix<Complex<f64>>,
 }
 

@@ -92,7 +92,7 @@ impl Relations {
         self.shared + if self.proportional { 2 } else { 0 }
     }
 
-    /// Returns the index of the unknown that a free entry is, for linear relations.
+    /// Returns the index of the unknown that gives a free entry; for linear relations only.
     ///
     /// # Panics
     /// For an entry of proportional damping.

@@ -8,7 +8,7 @@ use crate::Estimate;
 /// Outcome at one setting.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepPoint<S, E> {
-    /// The setting, such as an NPI.
+    /// Setting, such as a time step or a number of natural periods per record (NPI).
     pub setting: S,
     /// The estimate with its intervals, or the error.
     pub outcome: Result<Estimate, E>,

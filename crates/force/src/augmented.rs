@@ -17,12 +17,12 @@ use crate::posterior_points::posterior_points;
 use crate::smoother::StateSpace;
 use crate::state_space::Machine;
 
-/// The system with forces of any model. The state of a force is its contribution to x + ½ẍΔt²
-/// within a step, so that no entry is large in any unit of the system.
+/// The system with forces of any model, as one state space. The state of a force is its
+/// contribution to x + ½ẍΔt² within a step, so that no entry is large in any unit of the system.
 pub(crate) struct Augmented {
     machine: Machine,
     rate: DMatrix<f64>,
-    /// Force of each force state, in N.
+    /// Force that corresponds to one unit of each force state, in N.
     units: Vec<f64>,
     start: Start,
     /// Largest displacement, and velocity times Δt, that the measurement allows.
@@ -33,14 +33,14 @@ pub(crate) struct Augmented {
     information: ForceInformation,
 }
 
-/// A model of the forces with the remaining noise, in channel scales.
+/// A model of the forces, and the noise that remains, in channel scales.
 #[derive(Debug, Clone)]
 pub(crate) struct Tuned {
     pub model: ForceModel,
     pub noise: f64,
     pub log_likelihood: f64,
-    /// Logarithms of the signal-to-noise ratio of each force and of the corner in radians per
-    /// sample; none for a given model.
+    /// Logarithms of the signal-to-noise ratio of each force and of the corner frequency in radians
+    /// per sample; empty for a given model.
     free: Vec<f64>,
 }
 
@@ -82,7 +82,7 @@ impl Augmented {
         &self.information
     }
 
-    /// Force of each force state, in N.
+    /// Returns the force that corresponds to one unit of each force state, in N.
     pub fn units(&self) -> &[f64] {
         &self.units
     }
@@ -134,9 +134,9 @@ impl Augmented {
         })
     }
 
-    /// Returns the likelihood under a model, given as the logarithms of each force's
-    /// signal-to-noise ratio and of the corner in radians per sample. An unknown noise comes from
-    /// the innovations, and all variances scale with it.
+    /// Returns a model, with its likelihood, for the logarithms of the signal-to-noise ratio of
+    /// each force and of the corner frequency in radians per sample. If the noise is unknown, the
+    /// innovations determine it, and all variances scale with it.
     fn trial(&self, process: &LowPass, noise: Option<f64>, free: &[f64]) -> Option<Tuned> {
         let (corner, ratios) = free.split_last()?;
         let (lowest, forces) = (self.lowest(), ratios.len());
@@ -158,7 +158,7 @@ impl Augmented {
             return None;
         }
         let largest = ratios.iter().copied().fold(0.0, f64::max).exp();
-        // Ten times the measured size is no constraint, and keeps the digits of the filter.
+        // Ten times the measured motion is no constraint, and it keeps the digits of the filter.
         let spread = 10.0 * if noise.is_none() { largest } else { 1.0 };
         let space = self.space(&model, process, unit, spread).ok()?;
         let innovations = space.innovations(&self.data);
@@ -178,8 +178,8 @@ impl Augmented {
         log_likelihood.is_finite().then_some(Tuned { model, noise, log_likelihood, free })
     }
 
-    /// Returns the log-likelihood of a model, without constants. Where displacement and velocity
-    /// of the first sample are unknown, they have their most likely values.
+    /// Returns the log-likelihood of a model, without constants. If displacement and velocity of
+    /// the first sample are unknown, their most likely values are used.
     pub fn likelihood(&self, tuned: &Tuned, process: &LowPass) -> Result<f64, ForceError> {
         let mut space = self.space(&tuned.model, process, tuned.noise, 10.0)?;
         if self.start == Start::InMotion {
@@ -192,15 +192,15 @@ impl Augmented {
         if likelihood.is_finite() { Ok(likelihood) } else { Err(ForceError::NoLikelihood) }
     }
 
-    /// Returns the noise beside a free response if the Bayesian information criterion finds no
-    /// force in the record.
+    /// Returns the noise of a record that is a free response; `None` if the Bayesian information
+    /// criterion finds a force in the record.
     ///
     /// # Source
     /// Schwarz (1978), Annals of Statistics 6, 461–464.
     pub fn noise_without_force(&self) -> Option<f64> {
         let forces = self.units.len();
         let process = LowPass::new(limits::FORCE_ORDERS[0]).ok()?;
-        // The least force that a trial may have, at any corner.
+        // The least force that a trial may have is the same at any corner frequency.
         let mut least = vec![(limits::RATIO_RANGE.start * (1.0 + 1e-9)).ln(); forces];
         least.push((0.1 * limits::HIGHEST_CORNER).ln());
         let without = self.trial(&process, None, &least)?;
@@ -214,8 +214,8 @@ impl Augmented {
         self.machine.out.nrows()
     }
 
-    /// Returns the squares of the innovations of each sample over their variances, summed over the
-    /// channels.
+    /// Returns, for each sample, the squared innovations divided by their variances, summed over
+    /// the channels.
     pub fn energies(&self, tuned: &Tuned) -> Option<Vec<f64>> {
         let process = LowPass::new(tuned.model.order).ok()?;
         let space = self.space(&tuned.model, &process, tuned.noise, 10.0).ok()?;
@@ -236,7 +236,8 @@ impl Augmented {
         Ok(Tuned { model: model.clone(), noise: 1.0, log_likelihood, free: Vec::new() })
     }
 
-    /// Lowest corner, in radians per sample: half a period in twenty records.
+    /// Returns the lowest corner frequency, in radians per sample: that of half a period in twenty
+    /// records.
     fn lowest(&self) -> f64 {
         0.05 * PI / self.sampling.len() as f64
     }
@@ -261,8 +262,8 @@ impl Augmented {
                     None => continue,
                 },
             };
-            // A hundredth in the log-likelihood moves no parameter by a tenth of its own
-            // uncertainty.
+            // A difference of a hundredth in the log-likelihood moves no parameter by more than a
+            // tenth of its uncertainty.
             let step = if order > 2 { 0.3 } else { 1.0 };
             let point = minimise(cost, &start, step, 0.01, 60 * (forces + 1));
             let Some(tuned) = self.trial(&process, noise, &point) else { continue };
@@ -271,7 +272,7 @@ impl Augmented {
             if gain.is_none_or(|gain| gain > 0.0) {
                 best = Some(tuned);
             }
-            // Twice the order without a gain means no gain by four times the order.
+            // If twice the order brings no gain, four times the order does not either.
             if order > 4 && gain.is_some_and(|gain| gain < limits::ORDER_GAIN) {
                 break;
             }
@@ -279,7 +280,7 @@ impl Augmented {
         best.ok_or(ForceError::NoLikelihood)
     }
 
-    /// Returns posterior models with their weights; only the best one if it was given.
+    /// Returns posterior models with their weights; if the model was given, only this one.
     pub fn posterior_points(
         &self,
         best: &Tuned,
@@ -297,7 +298,7 @@ impl Augmented {
         Ok(points.into_iter().filter_map(tuned).collect())
     }
 
-    /// Returns the best point of a grid, with equal forces.
+    /// Returns the best point of a grid on which all forces have the same signal-to-noise ratio.
     fn coarse(&self, forces: usize, cost: &dyn Fn(&[f64]) -> f64) -> Option<Vec<f64>> {
         let mut best = (f64::INFINITY, None);
         let mut corner = PI / self.sampling.len() as f64;
@@ -315,12 +316,12 @@ impl Augmented {
         best.1
     }
 
-    /// Returns the state space with the initial state of a first pass, with standard deviations of
-    /// at most a hundred times those of the converged filter.
+    /// Returns the state space with the initial state from a first pass; its standard deviations
+    /// are at most a hundred times those of the converged filter.
     ///
-    /// The wide initial covariance of the first pass costs the variances of the first samples their
-    /// digits; this one does not, and changes the estimates by a ten-thousandth of their standard
-    /// error.
+    /// With the wide initial covariance of the first pass, the variances of the first samples lose
+    /// their digits. The narrower one keeps them, and changes the estimates by a ten-thousandth of
+    /// their standard error.
     pub fn started(&self, mut space: StateSpace) -> StateSpace {
         let (m, machine) = (space.states, self.rate.nrows());
         let first = space.filter(&self.data);
@@ -338,8 +339,9 @@ impl Augmented {
     }
 }
 
-/// Returns an initial estimate for a higher order: the corner of the one before, and the ratio for
-/// a sharper end. A band with a gentle end would model noise as force.
+/// Returns an initial estimate for a higher order: the corner frequency of the previous order, and
+/// the ratio that suits a sharper end of the band. A band with a gentle end would model noise as
+/// force.
 fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
     let mut best = (cost(point), point.to_vec());
     let last = point.len() - 1;
@@ -354,8 +356,8 @@ fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
     best.1
 }
 
-/// Upper bounds of the motion from the measurement: velocities by differences of the samples
-/// (including noise), displacements as if all motion were one period long.
+/// Upper bounds of the motion, from the measurement: velocities from differences of the samples
+/// (including noise), displacements as if all motion had the period of the record.
 #[derive(Default)]
 struct Sizes {
     displacement: f64,

@@ -66,7 +66,7 @@ pub(crate) fn empty_band([low_hz, high_hz]: [f64; 2], sampling: Sampling) -> For
     ForceError::EmptyBand { low_hz, high_hz, spacing_hz, last_hz }
 }
 
-/// A projection: twice applied it does no more than once.
+/// Projection of a record onto a band; a second application has no effect.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BandFilter {
     pub sampling: Sampling,

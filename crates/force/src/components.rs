@@ -1,23 +1,24 @@
-//! The least-squares problem in its singular vectors: one number per unknown.
+//! The least-squares problem in its singular vectors, with one component per unknown.
 
 use nalgebra::DMatrix;
 
 use crate::error::ForceError;
 
-/// Unknowns, in descending order of the singular value: y_i = s_i f_i + noise.
+/// Components of the unknown force, in descending order of the singular value s_i: y_i = s_i f_i +
+/// noise.
 ///
-/// A component of a complex line represents two real unknowns and has weight 2, so that white noise
-/// of variance σ² has mean energy weight·σ² in it.
+/// A component of a complex line represents two real unknowns and has the weight 2; white noise of
+/// variance σ² then has the mean energy weight·σ² in it.
 pub(crate) struct Components {
-    /// s_i, in descending order, the last ones possibly zero.
+    /// Singular values s_i, in descending order; the last ones may be zero.
     pub singular: Vec<f64>,
-    /// |y_i|².
+    /// Energy |y_i|² of each component.
     pub energy: Vec<f64>,
-    /// Real unknowns per component, 1 or 2.
+    /// Number of real unknowns per component, 1 or 2.
     pub weight: Vec<f64>,
     /// Rate of change of the force of each component, positive, in any unit.
     pub frequency: Vec<f64>,
-    /// Lowest frequency in it, in Hz.
+    /// Lowest frequency in each component, in Hz.
     pub lowest_hz: Vec<f64>,
     /// Energy of the measurement outside the space of the forces.
     pub outside_energy: f64,
@@ -28,45 +29,48 @@ pub(crate) struct Components {
 /// A measurement in its singular vectors, and the transformation back to the force.
 pub(crate) trait Operator {
     fn components(&self) -> &Components;
-    /// Returns samples × forces from the components times these factors (f̂_i = φ_i y_i / s_i).
+    /// Returns samples × forces from the components with the filter factors φ_i: f̂_i = φ_i y_i /
+    /// s_i.
     fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError>;
-    /// Keeps the part of every component in a band of frequencies in Hz.
+    /// Restricts every component to a band of frequencies in Hz.
     fn keep(&mut self, band_hz: [f64; 2]) -> Result<(), ForceError>;
     /// Returns the variance, samples × forces, from the variances of the components per real
     /// unknown.
     fn variance(&self, components: &[f64]) -> DMatrix<f64>;
 }
 
-/// Effect of filter factors on this measurement.
+/// Effect of filter factors on a measurement.
 pub(crate) struct Fit {
-    /// Energy not explained, ‖y − H f̂‖².
+    /// Residual energy ‖y − H f̂‖².
     pub residual: f64,
-    /// ‖f̂‖².
+    /// Energy of the force, ‖f̂‖².
     pub size: f64,
-    /// Σ φ_i: the effective number of real unknowns.
+    /// Effective number of real unknowns, Σ φ_i.
     pub unknowns: f64,
 }
 
 impl Fit {
-    /// Returns the residual variance per remaining real datum: the noise level if the fit is right.
+    /// Returns the residual variance per remaining real datum, which is the noise level if the fit
+    /// is right.
     pub fn noise(&self, components: &Components) -> f64 {
         self.residual / (components.data() - self.unknowns).max(f64::MIN_POSITIVE)
     }
 }
 
 impl Components {
-    /// Real data in all.
+    /// Returns the total number of real data.
     pub fn data(&self) -> f64 {
         self.weight.iter().sum::<f64>() + self.outside_weight
     }
 
-    /// Returns the components that can carry a force: s_i above rounding of the largest.
+    /// Returns the number of components that can carry a force: those whose s_i exceeds rounding of
+    /// the largest.
     pub fn transmitted(&self) -> usize {
         let floor = 1e-14 * self.singular[0];
         self.singular.partition_point(|s| *s > floor)
     }
 
-    /// Lowest frequency, in Hz, of the components that show a force.
+    /// Returns the lowest frequency, in Hz, of the components for which `shows` is true.
     pub fn lowest_hz(&self, shows: impl Fn(usize) -> bool) -> Option<f64> {
         let shown = (0..self.singular.len()).filter(|i| shows(*i));
         shown.map(|i| self.lowest_hz[i]).min_by(f64::total_cmp)
@@ -86,13 +90,14 @@ impl Components {
         fit
     }
 
-    /// Tikhonov's factor s²/(s² + λ²).
+    /// Returns Tikhonov's filter factor s²/(s² + λ²) of a component.
     pub fn tikhonov(&self, i: usize, lambda: f64) -> f64 {
         let square = self.singular[i].powi(2);
         square / (square + lambda * lambda)
     }
 
-    /// 1 for the components at least as strong as `lambda`, 0 for the others.
+    /// Returns the factor of truncation: 1 for components at least as strong as `lambda`, 0 for
+    /// others.
     pub fn truncated(&self, i: usize, lambda: f64) -> f64 {
         if self.singular[i] >= lambda { 1.0 } else { 0.0 }
     }

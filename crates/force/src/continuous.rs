@@ -6,11 +6,12 @@ use mechid_signal::Record;
 use crate::error::ForceError;
 use crate::identified::IdentifiedForce;
 
-/// F̂ = M ẍ + C ẋ + K x at every sample.
+/// Computes F̂ = M ẍ + C ẋ + K x at every sample.
 ///
-/// Exact if the response satisfies equilibrium at the sampled instants. Newmark, Houbolt, central
-/// difference and Runge-Kutta responses do; Wilson's θ method does not: it enforces equilibrium at
-/// t + θΔt, so that its response gives another force even with the exact matrices.
+/// The force is exact if the response satisfies equilibrium at the sampled instants. Newmark,
+/// Houbolt, central difference and Runge-Kutta responses do; Wilson's θ method does not: it
+/// enforces equilibrium at t + θΔt, so that its response gives another force even with the exact
+/// matrices.
 ///
 /// Cost: three products of samples × n by n × n.
 ///

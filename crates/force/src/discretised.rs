@@ -13,15 +13,16 @@ use crate::state_space::exact_transition;
 
 /// Computes the force that takes the response from each sample to the next.
 ///
-/// With z = [x; ẋ] and the discretised equation z(k+1) = Φ z(k) + Γ F(k), the velocity rows are
-/// solved for F(k); Euler's Γ is zero in the displacement rows. A held force of an open record has
-/// one sample less than the response. For a linear force, z(k+1) = Φ z(k) + Γ₀ F(k) + Γ₁ (F(k+1) −
-/// F(k)), all 2n rows together give F at both ends of each step; inner samples are the mean of
-/// their two values. Without a recursion along the record, no error grows along it.
+/// The state z = [x; ẋ] obeys the discretised equation z(k+1) = Φ z(k) + Γ F(k), and the velocity
+/// rows are solved for F(k); Euler's Γ is zero in the displacement rows. A held force of an open
+/// record has one sample less than the response. For a linear force, z(k+1) = Φ z(k) + Γ₀ F(k) + Γ₁
+/// (F(k+1) − F(k)), and all 2n rows together give F at both ends of each step; at an inner sample,
+/// the result is the mean of its two values. There is no recursion along the record, so that no
+/// error grows along it.
 ///
 /// The result amplifies noise in the velocity by M/Δt (held), and in the displacement by 6M/Δt²
-/// (linear). Euler's rule is exact for no motion: at a line ω it returns the force times M(e^{iωΔt}
-/// − 1)/Δt + C + K/(iω) over M iω + C + K/(iω), see the book, `theory/force.md`.
+/// (linear). Euler's rule is exact for no motion: at a line ω it returns the force times the ratio
+/// of M(e^{iωΔt} − 1)/Δt + C + K/(iω) to M iω + C + K/(iω); see the book, `theory/force.md`.
 ///
 /// Cost: one exponential of order 4n, then one product of samples × 2n by 2n × n.
 ///
@@ -82,9 +83,9 @@ fn force_of_steps(
     Ok(IdentifiedForce::from_record(Record::new(sampling, force)?))
 }
 
-/// Solver for the input of a step, q in step units, from its change z(k+1) − Φ z(k).
+/// Solver for the input q of a step, in step units, from the change z(k+1) − Φ z(k) of the state.
 pub(crate) struct Solution {
-    /// Φ, 2n×2n.
+    /// Transition matrix Φ, 2n×2n.
     pub state: DMatrix<f64>,
     /// Factor of order n if the input is held over a step, of order 2n if it is linear.
     input: LU<f64, Dyn, Dyn>,
@@ -121,8 +122,8 @@ impl Solution {
         Ok(Self { state, input: invertible(input, dt)? })
     }
 
-    /// Solves for changes, 2n × any number: the input at the start of each step, n × the same; for
-    /// a linear input also at its end.
+    /// Solves for changes, 2n × any number: returns the input at the start of each step, n × the
+    /// same number, and for a linear input also the input at its end.
     pub fn inputs(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let n = self.state.nrows() / 2;
         if self.input.lu_internal().nrows() == n {
@@ -134,7 +135,7 @@ impl Solution {
         (change.rows(0, n).into_owned(), Some(change.rows(n, n).into_owned()))
     }
 
-    /// Returns q, n × samples; for a held input n × steps.
+    /// Returns the input q, n × samples; for a held input n × steps.
     fn input(&self, response: &Response, extent: Extent) -> DMatrix<f64> {
         let len = response.sampling().len();
         let (start, end) = self.inputs(changes(&self.state, response, extent));
@@ -163,12 +164,12 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
     change
 }
 
-/// Factors the input matrix, unless its rows do not show some force.
+/// Factors the input matrix; an error if its rows do not show some force.
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
-    // The input matrix of a short step is about I in step units, which allows a test of a single
-    // force, too.
+    // The input matrix of a short step is about I in step units; the test with 1 as a reference
+    // thus works for a single force, too.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });

@@ -35,7 +35,7 @@ pub enum ForceError {
         described: usize,
     },
     /// A degree of freedom that the system does not have.
-    #[error("degree of freedom {} (counted from 1) of a system of {dofs}", dof.saturating_add(1))]
+    #[error("degree of freedom {} (counted from 1) does not exist in a system of {dofs}", dof.saturating_add(1))]
     NoSuchDof {
         /// Degree of freedom requested, counted from 0.
         dof: usize,
@@ -59,7 +59,7 @@ pub enum ForceError {
     NoForcedDof,
     /// More unknown forces than measured channels.
     #[error(
-        "{forces} unknown forces cannot be told apart with {}: \
+        "{forces} unknown forces cannot be separated with {}: \
          measure more degrees of freedom, or name fewer forced ones", message::count(*measurements, "measured channel")
     )]
     MoreForcesThanMeasurements {
@@ -209,7 +209,7 @@ pub enum ForceError {
     },
     /// A band of frequencies with impossible ends.
     #[error(
-        "the band from {low_hz} to {high_hz} Hz is none: give a lower end from 0 Hz on and an upper \
+        "the band from {low_hz} to {high_hz} Hz is empty: give a lower end of at least 0 Hz and an upper \
          end above it"
     )]
     NoBand {
@@ -238,7 +238,7 @@ pub enum ForceError {
     /// The Kalman filter overflows at every tuning tried, or at the one given.
     #[error(
         "the Kalman filter of this measurement overflows: use units that keep the values \
-         of data and system between 1e-50 and 1e50; of an unstable machine, shorten the time step \
+         of data and system between 1e-50 and 1e50; for an unstable machine, shorten the time step \
          or take the initial state as unknown"
     )]
     NoLikelihood,

@@ -1,39 +1,40 @@
 //! Marginal likelihood of force and noise, before any parameter is chosen.
 //!
-//! Each component is y_i = s_i f_i + e_i with e of variance σ². Of the `reach` strongest components
-//! a share π carries a force of variance τ² g_i; the others and all weaker ones carry none. A band
-//! of frequencies is a reach, single lines are a share, a white force is reach = all and π = 1. The
-//! colour g_i = (ω_i/ω₁)^(−2a) makes a force of falling spectrum: a = 1 is a random walk. The
-//! result is averaged over all parameter values that are about as likely as the best: a force with
-//! a standard error must not depend on parameters that the measurement does not determine.
+//! Each component is y_i = s_i f_i + e_i, with noise e of variance σ². Of the strongest components,
+//! whose number is the `reach`, a share π carries a force of variance τ² g_i; the others and all
+//! weaker ones carry none. A band of frequencies has a certain reach, single lines have a small
+//! share, and a white force has the reach of all components and π = 1. The colour g_i =
+//! (ω_i/ω₁)^(−2a) makes a force of falling spectrum: a = 1 is a random walk. The result is averaged
+//! over all parameter values that are about as likely as the best: a force with a standard error
+//! must not depend on parameters that the measurement does not determine.
 
 use crate::components::Components;
 use crate::error::ForceError;
 use crate::limits;
 use crate::posterior_points::posterior_points;
 
-/// Share, variances, reach and colour.
+/// Parameters of force and noise: share, variances, reach and colour.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Evidence {
     share: f64,
     force: f64,
-    /// σ², per real datum.
+    /// Noise variance σ², per real datum.
     noise: f64,
     reach: usize,
-    /// Exponent a of the amplitude.
+    /// Exponent a of the amplitude, (ω_i/ω₁)^(−a).
     colour: i32,
     likelihood: f64,
 }
 
-/// Posterior of the parameters: values with their weights.
+/// Posterior of the parameters: their values with weights.
 pub(crate) struct Posterior {
     best: Evidence,
     parts: Vec<(f64, Evidence)>,
 }
 
 impl Posterior {
-    /// Averages over reach, colour and, at the most likely of them, share and variances; a known
-    /// noise is 1.
+    /// Averages over reach and colour and, at the most likely of them, over share and variances. If
+    /// the noise is known, its variance is 1.
     pub fn from_components(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
         let white = Evidence::most_likely(components, limits::COLOURS[0], noise);
@@ -66,23 +67,24 @@ impl Posterior {
         Ok(Self { best, parts })
     }
 
-    /// Mean of the noise variance, per real datum.
+    /// Returns the mean of the noise variance, per real datum.
     pub fn noise(&self) -> f64 {
         self.parts.iter().map(|(weight, evidence)| weight * evidence.noise).sum()
     }
 
-    /// Returns the factor φ_i of the mean of f_i given the measurement and the most likely
-    /// parameters, f̄_i = φ_i y_i / s_i.
+    /// Returns the factor φ_i of the posterior mean f̄_i = φ_i y_i / s_i for the most likely
+    /// parameters.
     pub fn best_factor(&self, components: &Components, i: usize) -> f64 {
         self.best.factor(components, i)
     }
 
-    /// Returns the factor of the mean of f_i given only the measurement.
+    /// Returns the factor φ_i of the posterior mean f̄_i = φ_i y_i / s_i, averaged over the
+    /// parameters.
     pub fn factor(&self, components: &Components, i: usize) -> f64 {
         self.parts.iter().map(|(weight, evidence)| weight * evidence.factor(components, i)).sum()
     }
 
-    /// Returns the variance of f_i given the measurement, per real unknown.
+    /// Returns the posterior variance of f_i, per real unknown, averaged over the parameters.
     pub fn variance(&self, components: &Components, i: usize) -> f64 {
         let (s, mean) = (components.singular[i], self.factor(components, i));
         let energy = components.energy[i] / components.weight[i];
@@ -94,8 +96,8 @@ impl Posterior {
         weighted.sum()
     }
 
-    /// Returns the frequency, in Hz, below which no component shows a force as strong as the driven
-    /// ones better than noise; `None` if none does.
+    /// Returns the frequency, in Hz, below which noise hides a force as strong as the driven
+    /// components; `None` if noise hides it in every component.
     pub fn seen_from_hz(&self, components: &Components) -> Option<f64> {
         let endless = Evidence { reach: components.singular.len(), ..self.best };
         components.lowest_hz(|i| {
@@ -105,12 +107,12 @@ impl Posterior {
 }
 
 impl Evidence {
-    /// Finds the most likely reach: a coarse descent, then smaller steps about the best.
+    /// Finds the most likely reach: a coarse descent, then smaller steps around the best.
     fn most_likely(components: &Components, colour: i32, noise: Option<f64>) -> Self {
         let most = components.transmitted();
         let mut reach = most;
         let mut best = Self::at_reach(components, most, colour, noise);
-        // A falling spectrum has no end.
+        // A force of falling spectrum has no upper end, so that it needs no reach.
         while colour == 0 && reach > 2 {
             reach = ((reach as f64 * limits::REACH_RATIO) as usize).max(2);
             best = best.better(Self::at_reach(components, reach, colour, noise));
@@ -131,8 +133,8 @@ impl Evidence {
         if other.likelihood > self.likelihood { other } else { self }
     }
 
-    /// Returns this and the neighbouring reaches that count, with the number of reaches that each
-    /// represents.
+    /// Adds this reach and those of its neighbours that are likely enough, each with the number of
+    /// reaches that it represents.
     fn beside(
         self,
         components: &Components,
@@ -176,7 +178,8 @@ impl Evidence {
         }
     }
 
-    /// Returns posterior share and variances with their weights; the prior of the share is uniform.
+    /// Returns posterior values of share and variances with their weights; the prior of the share
+    /// is uniform.
     fn posterior_points(
         self,
         components: &Components,
@@ -201,7 +204,7 @@ impl Evidence {
         Ok(points.into_iter().map(|(weight, point)| (weight, at(&point))).collect())
     }
 
-    /// Variance τ² g_i of the force of a driven component.
+    /// Returns the variance τ² g_i of the force of a driven component.
     fn driven(&self, components: &Components, i: usize) -> f64 {
         if i >= self.reach {
             return 0.0;
@@ -263,7 +266,8 @@ impl Evidence {
             .expect("there are starts")
     }
 
-    /// Noise variances to start from: the tail, or low quantiles if the tail is short.
+    /// Returns initial noise variances: from the weakest components, or low quantiles if these are
+    /// few.
     fn first_noises(components: &Components, reach: usize) -> Vec<f64> {
         let tail_weight: f64 =
             components.weight[reach..].iter().sum::<f64>() + components.outside_weight;
@@ -276,7 +280,8 @@ impl Evidence {
         [50, 5].map(|part| per_datum[per_datum.len() / part].max(f64::MIN_POSITIVE)).to_vec()
     }
 
-    /// Drives every component within reach: the ratio σ/τ on a grid, both variances from it.
+    /// Fits a force that drives every component within reach: the ratio σ/τ on a grid, and both
+    /// variances from it.
     fn white(self, components: &Components, noise: Option<f64>) -> Self {
         let (data, tail) = (components.data(), tail_energy(components, self.reach));
         let shown =
@@ -295,7 +300,7 @@ impl Evidence {
             log += (data - within) * ratio.ln();
             force /= data;
             let cost = match noise {
-                // The level follows from the ratio.
+                // With a known noise, the variance of the force follows from the ratio.
                 Some(noise) => {
                     let given = noise / ratio;
                     data * given.ln() + log + data * force / given
@@ -326,7 +331,7 @@ impl Evidence {
         self
     }
 
-    /// Logarithm of the likelihood of all components.
+    /// Returns the logarithm of the likelihood of all components.
     fn log_likelihood(&self, components: &Components) -> f64 {
         let within: f64 = components.weight[..self.reach].iter().sum();
         let mut likelihood = -0.5 * (components.data() - within) * self.noise.ln();
@@ -335,7 +340,8 @@ impl Evidence {
         likelihood
     }
 
-    /// Takes one round; the likelihood belongs to the values before it.
+    /// Performs one round of expectation and maximisation; the likelihood belongs to the values
+    /// before it.
     fn round(self, components: &Components, known: Option<f64>) -> Self {
         let likelihood = self.log_likelihood(components);
         let (mut driven, mut driven_weight, mut force) = (0.0, 0.0, 0.0);
@@ -362,7 +368,7 @@ impl Evidence {
         }
     }
 
-    /// Returns the log-likelihood of y_i, and the probability that it is driven.
+    /// Returns the log-likelihood of y_i, and the probability that component i is driven.
     fn component(&self, components: &Components, i: usize) -> (f64, f64) {
         let (weight, energy) = (components.weight[i], components.energy[i]);
         let log = |share: f64, variance: f64| {

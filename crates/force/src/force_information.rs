@@ -11,7 +11,7 @@ use crate::limits;
 use crate::measurement::Measurement;
 use crate::transfer::Transfer;
 
-/// The information HᴴH of the scaled channels on forces, at frequencies from 0 to Nyquist.
+/// The information HᴴH about the forces in the scaled channels, at frequencies from 0 to Nyquist.
 pub(crate) struct ForceInformation {
     terms: Vec<Term>,
     channels: f64,
@@ -21,7 +21,7 @@ pub(crate) struct ForceInformation {
     least_hz: f64,
 }
 
-/// An interval of angular frequencies.
+/// Information within an interval of angular frequencies.
 struct Term {
     omega: f64,
     width: f64,
@@ -29,11 +29,11 @@ struct Term {
     information: Option<DMatrix<Complex<f64>>>,
 }
 
-/// Information of a measurement on a force, by frequency.
+/// Remaining uncertainty of each force, by frequency.
 pub(crate) struct ErrorSpectrum {
     /// Lower and upper end of each interval, in Hz.
     edges: Vec<[f64; 2]>,
-    /// Variance of each force's error within it, forces × intervals, in N².
+    /// Error variance of each force in each interval, forces × intervals, in N².
     pub variance: DMatrix<f64>,
     /// True if the interval determines every force better than its model does.
     is_determined: Vec<bool>,
@@ -51,7 +51,8 @@ impl ForceInformation {
         let transfer = Transfer { system, channels: measured.channels(), forced, scale };
         let (count, nyquist) =
             (sampling.len().min(limits::INFORMATION_FREQUENCIES), PI / sampling.dt());
-        // Half a line apart where they are few; where they are many, ever closer towards 0.
+        // The frequencies are half a line apart if there are few lines; otherwise they become
+        // denser towards 0.
         let lowest = 0.5 * sampling.omega0();
         let bend = if sampling.len() > limits::INFORMATION_FREQUENCIES { 3 } else { 1 };
         let at = |i: usize| {
@@ -66,7 +67,7 @@ impl ForceInformation {
                 Term { omega, width: high - low, information }
             })
             .collect();
-        // A system without springs has no static response, and accelerates instead.
+        // A system without springs has no static response; its acceleration is used instead.
         let constant =
             transfer.scaled(0, 0.0).map_or(true, |h| h.column_iter().all(|f| f.camax() > 0.0));
         let least_hz =
@@ -83,8 +84,9 @@ impl ForceInformation {
         shown.sum::<f64>().sqrt()
     }
 
-    /// Returns the remaining uncertainty of each force under a model and a noise (in channel
-    /// scales), far from the ends of a record: S_e = (S_f⁻¹ + Hᴴ S_n⁻¹ H)⁻¹.
+    /// Returns the remaining uncertainty S_e = (S_f⁻¹ + Hᴴ S_n⁻¹ H)⁻¹ of each force, far from the
+    /// ends of a record, for the spectrum S_f of a model and the spectrum S_n of a noise (in
+    /// channel scales).
     ///
     /// # Source
     /// Wiener (1949), the smoother of stationary processes.
@@ -99,7 +101,8 @@ impl ForceInformation {
                 is_determined.push(true);
                 continue;
             };
-            // Units of each force's density: (I + D HᴴH D)⁻¹ with D² = S_f/S_n.
+            // In units of the density S_f of each force, the uncertainty is (I + D HᴴH D)⁻¹ with D²
+            // = S_f/S_n.
             let density: Vec<f64> =
                 (0..forces).map(|f| model.density(f, *omega, process)).collect();
             let root = |f: usize| (density[f] / (noise * noise * self.dt)).sqrt();
@@ -124,7 +127,8 @@ impl ErrorSpectrum {
         Some(self.edges[first][0].max(self.least_hz))
     }
 
-    /// Mean square rate of change of the error of force `f` below a frequency, in N²/s².
+    /// Returns the mean square rate of change of the error of force `f` below a frequency, in
+    /// N²/s².
     pub fn rate_below(&self, f: usize, low_hz: f64) -> f64 {
         let parts = self.edges.iter().enumerate().map(|(i, [from, to])| {
             let inside = (to.min(low_hz) - from).max(0.0) / (to - from);
@@ -133,7 +137,7 @@ impl ErrorSpectrum {
         parts.sum()
     }
 
-    /// Variance of the error of force `f` between two frequencies, in N².
+    /// Returns the error variance of force `f` between two frequencies, in N².
     pub fn within(&self, f: usize, [low_hz, high_hz]: [f64; 2]) -> f64 {
         let parts = self.edges.iter().enumerate().map(|(i, [from, to])| {
             let inside = (to.min(high_hz) - from.max(low_hz)).max(0.0);

@@ -26,7 +26,7 @@ pub struct ForceModel {
     pub order: usize,
     /// Corner frequency ω_c/2π, in Hz, the same for all forces.
     pub corner_hz: f64,
-    /// τ: RMS value of each force over all frequencies, in N, one per forced degree of freedom.
+    /// RMS value τ of each force over all frequencies, in N, one per forced degree of freedom.
     pub rms: Vec<f64>,
 }
 
@@ -51,7 +51,8 @@ impl ForceModel {
         }
     }
 
-    /// Two-sided spectral density of force `f` at ω, in N²/(rad/s) times 2π: ∫ S dω/2π = τ².
+    /// Returns the two-sided spectral density S of force `f` at ω, in N²·s/rad, scaled such that ∫
+    /// S dω/2π = τ².
     pub(crate) fn density(&self, f: usize, omega: f64, process: &LowPass) -> f64 {
         let corner = TAU * self.corner_hz;
         let fall = (omega / corner).powi(2 * self.order as i32);
@@ -61,7 +62,7 @@ impl ForceModel {
 
 /// A Butterworth low-pass of unit variance driven by white noise, in the time unit 1/ω_c.
 pub(crate) struct LowPass {
-    /// u̇ = rate·u + (white noise on the last state); the force is u₀.
+    /// Rate matrix of u̇ = rate·u + (white noise on the last state); the force is u₀.
     pub rate: DMatrix<f64>,
     /// Intensity of the white noise.
     pub intensity: f64,
@@ -70,7 +71,8 @@ pub(crate) struct LowPass {
 }
 
 impl LowPass {
-    /// Sections of second order, and one of first order for an odd order, one driving the next.
+    /// Creates the low-pass from sections of second order, and one of first order for an odd order,
+    /// in a chain.
     ///
     /// # Source
     /// Butterworth (1930): poles at equal angles on a circle.
@@ -104,7 +106,7 @@ impl LowPass {
 }
 
 /// Returns the covariance of the state of u̇ = A u + noise due to the white noise within a unit of
-/// time: a series over a short step, doubled up to the unit. It only adds sums of squares.
+/// time: a series over a short step, doubled up to the unit. Only sums of squares are added.
 ///
 /// # Source
 /// Van Loan (1978) for the integral; doubling as in Higham (2008), *Functions of Matrices*, 10.3.

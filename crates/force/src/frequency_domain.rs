@@ -12,12 +12,12 @@ use crate::noise::{Noise, channel_sizes};
 use crate::transfer::{FrequencyResponse, Transfer};
 use crate::unexplained::Residual;
 
-/// F_n = (K − ω²M + iωC) X_n at the chosen lines of a whole period, zero at all others.
+/// Computes F_n = (K − ω²M + iωC) X_n at the chosen lines of a whole period, zero at all others.
 ///
 /// Velocity and acceleration lines are divided by iω and −ω². With fewer forces than channels, or
-/// some degrees of freedom only, each line is a weighted least-squares problem X_n = H_n F_n. The
-/// choice of only the excited lines excludes the noise of all others. The Nyquist line of an even
-/// record has no phase: leave it out.
+/// if only some degrees of freedom are measured, each line is a weighted least-squares problem X_n
+/// = H_n F_n. If only the excited lines are chosen, the noise of all others has no effect. The
+/// Nyquist line of an even record has no phase: leave it out.
 ///
 /// The standard error covers measurement noise, if its level is known, and the uncertainty of a
 /// system that states it ([`FrequencyResponse::response_covariance`]); it is the same at every
@@ -90,7 +90,7 @@ pub fn frequency_domain(
     })
 }
 
-/// Mean squares over a period that errors cause.
+/// Mean squares over a period due to errors.
 struct Variance {
     /// Part in each force from noise of the channels with standard deviation `scale`.
     noise: Vec<f64>,
@@ -109,8 +109,8 @@ impl Variance {
         Self { noise: zeros(), system: zeros(), residual, is_known: false }
     }
 
-    /// Adds what the uncertainty of the system does on a line: to first order δF = −G δH F, and the
-    /// residual changes by −(I − H G) δH F, with the inverse G of H.
+    /// Adds the effect of the uncertainty of the system on a line: to first order δF = −G δH F, and
+    /// the residual changes by −(I − H G) δH F, with the inverse G of H.
     fn add_system(
         &mut self,
         transfer: &Transfer<'_>,

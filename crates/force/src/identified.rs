@@ -18,7 +18,7 @@ pub struct IdentifiedForce {
     /// Computed on demand: a search over many forces does not need it.
     spectrum: OnceLock<Spectrum>,
     standard_error: Option<Record>,
-    /// Residual of the measured channels; `None` if there are no more of them than forces.
+    /// Residual of the measured channels; `None` if there are not more channels than forces.
     rest: Option<Residual>,
     /// Band of record and standard error; `None`: all frequencies.
     band_hz: Option<[f64; 2]>,
@@ -48,12 +48,12 @@ impl IdentifiedForce {
         self
     }
 
-    /// Returns the same with another record.
+    /// Returns the same force with another record.
     pub(crate) fn replaced(self, record: Record) -> Self {
         Self { record, spectrum: OnceLock::new(), ..self }
     }
 
-    /// Returns the same, restricted to this band.
+    /// Returns the same force, restricted to this band.
     pub(crate) fn with_band(mut self, band_hz: [f64; 2]) -> Self {
         self.band_hz = Some(band_hz);
         self
@@ -98,18 +98,18 @@ impl IdentifiedForce {
         self.rest.as_ref()
     }
 
-    /// F̂(t), in N: samples × degrees of freedom.
+    /// Force F̂(t), in N: samples × degrees of freedom.
     pub fn record(&self) -> &Record {
         &self.record
     }
 
-    /// Lines of F̂, lines × degrees of freedom, in N; the record must be one whole period.
+    /// Lines of the force, lines × degrees of freedom, in N; the record must be one whole period.
     pub fn spectrum(&self) -> &Spectrum {
         self.spectrum.get_or_init(|| Spectrum::from_record(&self.record))
     }
 
-    /// One standard deviation of F̂(t), in N: samples × degrees of freedom; `None` if the method
-    /// cannot estimate it.
+    /// Standard deviation of F̂(t), in N: samples × degrees of freedom; `None` if the method cannot
+    /// estimate it.
     pub fn standard_error(&self) -> Option<&Record> {
         self.standard_error.as_ref()
     }

@@ -1,5 +1,5 @@
-//! Forces that act for a part of a record: noise from the part in which they do not, and the rest
-//! before them.
+//! Forces that act during a part of a record: the noise comes from the part without force, and a
+//! state of rest at the beginning is detected.
 
 use mechid_model::SecondOrderSystem;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -12,11 +12,10 @@ use crate::measurement::{Measurement, Start};
 use crate::noise::channel_sizes;
 
 /// Returns the range of samples in which the innovations of a stationary force are smallest, if
-/// they are smaller there than chance makes them; `None` of a force that is stationary.
+/// they are smaller than by chance; `None` for a stationary force.
 ///
-/// The likelihood of a stationary force takes the spectrum of a pulse, which falls with the
-/// frequency, for that of the whole record; the noise below it, which the quiet part shows, is then
-/// lost.
+/// The spectrum of a pulse falls with frequency. A stationary force has the same spectrum in the
+/// whole record, so that the fit takes noise in the quiet part for force.
 ///
 /// # Source
 /// Goldfeld & Quandt (1965), Journal of the American Statistical Association 60, 539–547 (the ratio
@@ -46,7 +45,7 @@ pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Ra
             .map(|blocks| (blocks * block * channels) as f64);
         let ratio = ((total - inside) / of_outside) / (inside / of_inside);
         let p_value = FisherSnedecor::new(of_outside, of_inside).ok()?.sf(ratio);
-        // The longest of ranges that are as certain knows the noise best.
+        // The longest of equally certain ranges determines the noise best.
         if best.as_ref().is_none_or(|(least, longest)| {
             p_value < *least || (p_value == *least && range.len() > longest.len())
         }) {

@@ -62,9 +62,9 @@ pub struct KalmanForce {
 ///
 /// Each force is a stationary process with a band from 0 up to a corner frequency ([`ForceModel`]),
 /// continuous in time, without an assumption between samples. Order and corner of the band, the
-/// sizes of the forces and the noise are those of maximum likelihood; where the force acts for a
-/// part of the record only, the noise is that of the other part. The smoother uses the whole
-/// record for every instant. The standard error comes from the model.
+/// sizes of the forces and the noise are those of maximum likelihood. If the force acts only during
+/// a part of the record, the noise is that of the other part. The smoother uses the whole record
+/// for every instant. The standard error comes from the model.
 ///
 /// For a structure on springs, accelerations and velocities do not show a constant force, and their
 /// noise exceeds a slow one. Without a displacement the force is therefore restricted to
@@ -155,7 +155,7 @@ pub fn kalman(
 }
 
 /// Returns the noise of the part of the record in which no force acts, in the scales of the
-/// channels; `None` of a stationary force, and where one acts everywhere.
+/// channels; `None` for a stationary force, and for one that acts everywhere.
 fn quiet_part_noise(
     augmented: &Augmented,
     tuned: &Tuned,
@@ -167,9 +167,9 @@ fn quiet_part_noise(
     alone.noise_without_force().filter(|noise| *noise > 0.0 && noise.is_finite())
 }
 
-/// Returns the part of the force in a band. Its variance is the one far from the ends of the
-/// record, plus the increase of the whole force's variance from the middle to each instant, plus
-/// the slower errors that leak into the band at the ends of the record.
+/// Returns the part of the force in a band. Its variance has three parts: the variance far from the
+/// ends of the record, the increase of the variance of the whole force from the middle to each
+/// instant, and the slower errors that leak into the band at the ends of the record.
 fn in_band(
     force: IdentifiedForce,
     forced: &[usize],
@@ -205,7 +205,7 @@ fn known(measured: &Measurement, noise: &[f64]) -> Result<Vec<f64>, ForceError> 
     Ok(level.unwrap_or_default())
 }
 
-/// Checks that the forces can be separated at an arbitrary frequency; otherwise they cannot at any.
+/// Checks at an arbitrary frequency that the forces can be separated; otherwise they cannot at any.
 pub(crate) fn check_seen(
     system: &SecondOrderSystem,
     measured: &Measurement,

@@ -13,56 +13,60 @@ pub(crate) const UNDETERMINED_LOGARITHM: f64 = 1.5;
 /// best point alone is then enough.
 pub(crate) const NARROW_POSTERIOR: f64 = 0.02;
 
-/// Largest logarithm of the ratio of the likelihood of a point to its approximation.
+/// Largest logarithm of the ratio of the likelihood of a posterior point to its approximation.
 pub(crate) const POINT_WEIGHT: f64 = 1.0;
 
 // Kalman filter
 
-/// Orders of the force model tried, each starting from the best point of the one before; the first
-/// two start from a grid.
+/// Orders of the force model that are tried. The search for each starts from the best point of the
+/// previous order; the first two start from a grid.
 pub(crate) const FORCE_ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
 
-/// Smallest gain in the log-likelihood by a higher order for which the next order is tried.
+/// Smallest gain in the log-likelihood by a higher order of the force model for which the next
+/// order is tried.
 pub(crate) const ORDER_GAIN: f64 = 1.0;
 
 /// Maximum number of states of all forces; with more, long records take too long.
 pub(crate) const FORCE_STATES: usize = 16;
 
-/// Ratio between the corner frequencies of the grid, from half a period in the record up.
+/// Ratio of successive corner frequencies of the grid, from half a period in the record up.
 pub(crate) const CORNER_RATIO: f64 = 4.0;
 
-/// Highest corner, in radians per sample: the Nyquist frequency.
+/// Highest corner frequency, in radians per sample: the Nyquist frequency.
 pub(crate) const HIGHEST_CORNER: f64 = std::f64::consts::PI;
 
-/// Signal-to-noise ratios of the grid.
+/// Signal-to-noise ratios of the grid for the force model.
 pub(crate) const GRID_RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
 
-/// Range of the ratio: above it the noise has no digits, below it the measurement is only noise.
+/// Range of the signal-to-noise ratio: above it the noise has no digits, below it the measurement
+/// is only noise.
 pub(crate) const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
 
 /// Relative change of every variance over a step at which the covariance has converged. Variances
 /// that converge by a factor of 1 − 10⁻⁴ per step are then within 10⁻⁸ of their limit.
 pub(crate) const CONVERGED_COVARIANCE: f64 = 1e-12;
 
-/// The same limit if only the likelihood is needed.
+/// Relative change of every variance over a step at which the covariance has converged, if only the
+/// likelihood is needed.
 pub(crate) const CONVERGED_LIKELIHOOD: f64 = 1e-7;
 
 /// Number of time constants 1/ω_c after which the start of a force has decayed: e^(−0.1·512) for
 /// order 16.
 pub(crate) const DECAY_TIME: f64 = 512.0;
 
-/// Largest norm of a rate matrix over a sub-step; terms of the series then fall by half or more.
+/// Largest norm of a rate matrix times a sub-step; the terms of the series then fall by half or
+/// more.
 pub(crate) const SUBSTEP: f64 = 0.25;
 
-/// Number of terms of the series; the next would be below rounding.
+/// Number of terms of the series for the noise of a step; the next would be below rounding.
 pub(crate) const SERIES_TERMS: usize = 18;
 
 /// Maximum number of frequencies at which the system is evaluated; only resonances are narrower,
 /// and there the force is known best.
 pub(crate) const INFORMATION_FREQUENCIES: usize = 1024;
 
-/// Number of periods in the record of the slowest force that is distinguishable from a constant
-/// one, if a constant force is not shown: the unknown mean affects the lines below.
+/// Number of periods in the record that the slowest force has, if the channels do not show a
+/// constant force: the unknown mean affects slower ones.
 pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
 
 // Likelihood of the components
@@ -70,14 +74,15 @@ pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
 /// Colours tried: white, random walk, integrated random walk.
 pub(crate) const COLOURS: [i32; 3] = [0, 1, 2];
 
-/// Minimum number of driven components of a white force for a colour; the amplitudes of fewer may
-/// follow some slope by chance.
+/// Minimum number of driven components of a white force for which a colour is tried; the amplitudes
+/// of fewer may follow some slope by chance.
 pub(crate) const COLOUR_COMPONENTS: f64 = 16.0;
 
-/// Gain in the log-likelihood by a colour that is not chance with fewer components.
+/// Minimum gain in the log-likelihood by a colour if there are fewer components; a smaller gain may
+/// be chance.
 pub(crate) const COLOUR_GAIN: f64 = 6.0;
 
-/// Ratio of successive reaches of the first search, from all components down.
+/// Ratio of successive reaches of the first search, which starts at all components.
 pub(crate) const REACH_RATIO: f64 = 0.8;
 
 /// Maximum number of EM rounds; a few dozen are typical.
@@ -86,21 +91,21 @@ pub(crate) const EM_ROUNDS: usize = 300;
 /// Change of the log-likelihood in a round at which the iteration ends.
 pub(crate) const EM_CHANGE: f64 = 1e-3;
 
-/// Difference to the largest log-likelihood above which a reach or colour no longer counts.
+/// Difference to the largest log-likelihood above which a reach or colour has a negligible weight.
 pub(crate) const NEGLIGIBLE_LIKELIHOOD: f64 = 6.0;
 
-/// Prior probability that a white force has no end, relative to all reaches.
+/// Prior probability that the reach of a white force is all components, relative to all reaches.
 pub(crate) const ENDLESS_PRIOR: f64 = 0.25;
 
-/// Number of reaches on either side of the best in the average.
+/// Number of reaches, on either side of the best one, that are averaged.
 pub(crate) const NEIGHBOURING_REACHES: usize = 16;
 
-/// Share of driven components of a band; with less the force consists of single lines. The silent
-/// components then determine where they are, and the reach adds no information.
+/// Minimum share of driven components of a band; with less the force consists of single lines. The
+/// silent components then determine where the lines are, and the reach adds no information.
 pub(crate) const BAND_SHARE: f64 = 0.5;
 
-/// Number of driven components of a band; with fewer the force consists of single lines, at any
-/// share.
+/// Minimum number of driven components of a band; with fewer the force consists of single lines, at
+/// any share.
 pub(crate) const BAND_COMPONENTS: f64 = 6.0;
 
 // Regularisation
@@ -111,22 +116,22 @@ pub(crate) const LAMBDAS_PER_DECADE: usize = 25;
 /// Number of decades of λ below the largest singular value.
 pub(crate) const LAMBDA_DECADES: usize = 8;
 
-/// Ratio of the residual variance to the noise for the corner of the L-curve; no higher residual
-/// is searched.
+/// Largest ratio of the residual variance to the noise at which the corner of the L-curve is
+/// searched for.
 pub(crate) const CORNER_NOISE_RATIO: f64 = 2.0;
 
-/// Smallest relative change of residual and force that makes a step of λ effective.
+/// Smallest relative change of residual and force for which a step of λ counts as effective.
 pub(crate) const LAMBDA_EFFECT: f64 = 1e-3;
 
-/// Smallest fraction of the data that truncation must leave as a residual: with fewer, some small
-/// data by chance would look like a perfect fit.
+/// Smallest fraction of the data that truncation must leave as a residual: with a smaller one, a
+/// few data that are small by chance would look like a perfect fit.
 pub(crate) const TRUNCATION_RESIDUAL: f64 = 0.1;
 
-/// Smallest fraction of the data that Tikhonov's factors must leave: with less, the residual of
-/// data without noise is rounding, which would decide.
+/// Smallest fraction of the data that Tikhonov's factors must leave as a residual: with a smaller
+/// one, the residual of data without noise would be only rounding, which would decide.
 pub(crate) const TIKHONOV_RESIDUAL: f64 = 1e-4;
 
-/// Largest relative difference of equal costs.
+/// Largest relative difference of costs that count as equal.
 pub(crate) const EQUAL_COSTS: f64 = 1e-6;
 
 /// Maximum number of Newton steps to the half width of an interval; they converge in far fewer.
@@ -146,23 +151,23 @@ pub(crate) const NOT_TRANSMITTED: f64 = 1e-12;
 /// identified force is entirely wrong.
 pub(crate) const FREE_GROWTH: f64 = 14.0;
 
-/// Tolerance of the ends of a band, in line spacings, for rounding.
+/// Tolerance for rounding at the ends of a band, in line spacings.
 pub(crate) const BAND_TOLERANCE: f64 = 1e-9;
 
-/// Change of an entry for a derivative, in standard errors.
+/// Change of an entry for a numerical derivative, in standard errors.
 pub(crate) const PARAMETER_STEP: f64 = 0.1;
 
 // Forces that act for a part of a record
 
-/// Number of parts of a record that are quiet or not.
+/// Number of parts into which a record is divided in the search for quiet ones.
 pub(crate) const INTERMITTENT_BLOCKS: usize = 16;
 
-/// Minimum number of consecutive parts that show the noise: a quarter of the record.
+/// Minimum number of consecutive quiet parts that determine the noise: a quarter of the record.
 pub(crate) const QUIET_BLOCKS: usize = 4;
 
-/// Probability of parts as different by chance, below which a force is not stationary.
+/// Probability that parts differ as much by chance; below it a force is not stationary.
 pub(crate) const INTERMITTENT_LEVEL: f64 = 0.01;
 
-/// Number of samples, the first of a record, that decide whether it begins at rest; more do not
-/// know the first state better once its free response has decayed, and take longer.
+/// Number of samples, from the first on, that decide whether a record begins at rest. More samples
+/// do not determine the first state better once its free response has decayed, and take longer.
 pub(crate) const REST_SAMPLES: usize = 1024;

@@ -5,12 +5,13 @@ use mechid_signal::Spectrum;
 use crate::error::ForceError;
 use crate::measurement::{Measurement, first_repeated};
 
-/// Every line of the record with a complex amplitude: 1 up to, not including, Nyquist.
+/// Returns every line of the record with a complex amplitude: from 1 to the last one below Nyquist.
 pub fn inner_lines(measured: &Measurement) -> Vec<usize> {
     (1..measured.sampling().len().div_ceil(2)).collect()
 }
 
-/// Variance of each part of a line's amplitude under white noise of unit variance.
+/// Returns the variance of the real part of a line's amplitude under white noise of unit variance;
+/// the imaginary part has the same.
 pub(crate) fn noise_weight(len: usize, line: usize) -> f64 {
     if line == 0 || 2 * line == len { 1.0 / len as f64 } else { 2.0 / len as f64 }
 }

@@ -110,7 +110,7 @@ impl Measurement {
         self.band_hz
     }
 
-    /// Returns the band in which channels without a displacement show a force, unless it is the
+    /// Returns the band in which channels without a displacement show a force; `None` if it is the
     /// whole band.
     pub(crate) fn shown(&self, seen_from_hz: Option<f64>) -> Option<[f64; 2]> {
         let displaced = self.channels.iter().any(|c| c.quantity == ResponseQuantity::Displacement);
@@ -129,7 +129,7 @@ impl Measurement {
         self.channels.len() > forced.len()
     }
 
-    /// Returns an error unless these channels allow to identify the forces at `forced`.
+    /// Returns an error unless these channels can identify the forces at `forced`.
     pub(crate) fn check(&self, dofs: usize, forced: &[usize]) -> Result<(), ForceError> {
         let named = self.channels.iter().map(|c| c.dof).chain(forced.iter().copied());
         if let Some(dof) = named.into_iter().find(|dof| *dof >= dofs) {

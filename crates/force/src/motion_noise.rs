@@ -102,9 +102,10 @@ pub fn continuous_with_noise(
 
 /// Computes [`discretised`], with the standard error due to noise in displacement and velocity.
 ///
-/// The force of a sample is linear in the neighbouring samples, F̂(k) = Σₗ Aₗ z(k+l); its variance
-/// is the sum of the squares of all Aₗ times the variances of the noise. The first and last sample
-/// of an open record, with a step on one side only, have a larger variance than the others.
+/// The force of a sample is linear in the neighbouring samples, F̂(k) = Σₗ Aₗ z(k+l). Its variance
+/// is the sum over l of the squared entries of Aₗ times the variances of the noise. The first and
+/// last sample of an open record have a step on one side only, and thus a larger variance than the
+/// others.
 ///
 /// # Errors
 /// The errors of [`discretised`]; [`ForceError::ChannelCount`] if a noise level is missing.
@@ -136,10 +137,10 @@ pub fn discretised_with_noise(
 
 /// Estimate of the force in a step, from the motion at its ends.
 struct Side {
-    /// Number of the step, relative to the one that begins with the sample: 0 or, the one before,
-    /// −1.
+    /// Number of the step, relative to the one that begins with the sample: 0, or −1 for the
+    /// previous step.
     step: isize,
-    /// n × 2n: weights of the states at its two ends.
+    /// Weights of the states at the two ends of the step, n × 2n each.
     of_ends: [DMatrix<f64>; 2],
 }
 
@@ -154,7 +155,7 @@ fn sides(solution: &Solution) -> Vec<Side> {
     sides
 }
 
-/// Standard deviation of the force at sample k, in N, one per degree of freedom.
+/// Returns the standard deviation of the force at sample k, in N, one per degree of freedom.
 fn error(
     system: &SecondOrderSystem,
     sampling: Sampling,
@@ -169,8 +170,8 @@ fn error(
         extent == Extent::WholePeriod || (0..len - 1).contains(&step)
     };
     let sides: Vec<&Side> = sides.iter().filter(within).collect();
-    // A sample of a short period may be both before and after another: its contributions are added
-    // before they are squared.
+    // In a short period, a sample may be both before and after another one: its contributions are
+    // added before they are squared.
     let mut parts: BTreeMap<isize, DMatrix<f64>> = BTreeMap::new();
     for side in &sides {
         for (sample, part) in (k as isize + side.step..).zip(&side.of_ends) {
@@ -188,7 +189,7 @@ fn error(
     variance.map(|variance| variance.sqrt() / (dt * dt))
 }
 
-/// Σⱼ (matrixᵢⱼ σⱼ)² of every row i.
+/// Returns Σⱼ (matrixᵢⱼ σⱼ)² of every row i.
 pub(crate) fn through(matrix: &DMatrix<f64>, levels: &DVector<f64>) -> DVector<f64> {
     matrix.component_mul(matrix) * levels.component_mul(levels)
 }

@@ -15,17 +15,18 @@ pub enum Noise {
     Unknown,
     /// One standard deviation per channel, in the channel's unit.
     PerChannel(Vec<f64>),
-    /// Measured on the lines that were not chosen (without DC and Nyquist): the force is zero there
-    /// and the response is noise. Needs at least [`MIN_OUTSIDE_LINES`] of them.
+    /// Noise measured on the lines that were not chosen (without DC and Nyquist), on which the
+    /// force is assumed zero and the response is noise. Needs at least [`MIN_OUTSIDE_LINES`] of
+    /// them.
     OutsideLines,
 }
 
-/// Minimum number of lines for a noise level by [`Noise::OutsideLines`]: each gives two degrees of
-/// freedom, so that the level is known to about 20 % or better.
+/// Minimum number of lines for a noise level by [`Noise::OutsideLines`]: each line gives two
+/// degrees of freedom, so that the level is known to about 20 % or better.
 pub const MIN_OUTSIDE_LINES: usize = 8;
 
 impl Noise {
-    /// Standard deviation per channel, if it is known.
+    /// Returns the standard deviation of the noise per channel, if it is known.
     pub(crate) fn resolve(
         &self,
         measured: &Measurement,
@@ -51,7 +52,7 @@ impl Noise {
     }
 }
 
-/// σ² = N/4 · mean |X_n|² over the lines that were not chosen.
+/// Returns σ of each channel, from σ² = N/4 · mean |X_n|² over the lines that were not chosen.
 fn outside_level(
     measured: &Measurement,
     spectrum: &Spectrum,

@@ -9,9 +9,9 @@ use crate::error::ForceError;
 use crate::identified::IdentifiedForce;
 use crate::motion_noise::{MotionNoise, through};
 
-/// F̂ = M ẍ + C ẋ + K x + Σ θ f(q, q̇) at every sample.
+/// Computes F̂ = M ẍ + C ẋ + K x + Σ θ f(q, q̇) at every sample.
 ///
-/// Exact if the response satisfies equilibrium at the sampled instants, as for
+/// The force is exact if the response satisfies equilibrium at the sampled instants, as for
 /// [`continuous`](crate::continuous()).
 ///
 /// Cost: three products of samples × n by n × n, and one value of each term for each sample.

@@ -85,8 +85,8 @@ impl OpenOperator {
     }
 }
 
-/// Frequency of a force: change from sample to sample over size, in half periods per record, at
-/// least one.
+/// Returns the frequency of a force: its RMS change from sample to sample relative to its RMS
+/// value, expressed as the number of half periods per record, at least one.
 fn frequency(shape: &[f64], samples: usize) -> f64 {
     let steps = shape.chunks(samples).flat_map(|force| force.windows(2));
     let change: f64 = steps.map(|w| (w[1] - w[0]).powi(2)).sum();

@@ -12,8 +12,9 @@ use crate::lines::{check_lines, noise_weight};
 use crate::measurement::Measurement;
 use crate::transfer::Transfer;
 
-/// Lines are in units in which white noise of variance σ² in time has variance σ² in each real
-/// part: amplitude times √(N/2), at DC √N. Then ‖F‖² is the same in time and over the lines.
+/// Operator of a whole period. Amplitudes are scaled by √(N/2), at DC by √N: white noise of
+/// variance σ² in time then has the variance σ² in each real part, and ‖F‖² is the same in time and
+/// over the lines.
 pub(crate) struct PeriodOperator {
     components: Components,
     /// Index of each component and the shape of its force.
@@ -24,7 +25,7 @@ pub(crate) struct PeriodOperator {
 
 struct Place {
     line: usize,
-    /// y_i with its phase, over s_i: the undamped coefficient of the force.
+    /// Undamped coefficient of the force: y_i with its phase, divided by s_i.
     coefficient: Complex<f64>,
     shape: DVector<Complex<f64>>,
 }
@@ -78,8 +79,9 @@ impl PeriodOperator {
     }
 }
 
-/// Frequency of a line: change from sample to sample over size, times half the period in samples.
-/// The mean is assumed to be as strong as the first line.
+/// Returns the frequency of a line as a line number: N/2π times the RMS change from sample to
+/// sample, relative to the RMS value, with N samples per period. The mean is assumed to be as
+/// strong as the first line.
 fn frequency(line: usize, len: usize) -> f64 {
     let half = std::f64::consts::PI / len as f64;
     (half * line.max(1) as f64).sin() / half

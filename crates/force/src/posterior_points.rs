@@ -1,4 +1,4 @@
-//! Posterior points: parameters about as likely as the best ones, with their weights.
+//! Posterior points: parameters that are about as likely as the best ones, with their weights.
 
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::DMatrix;
@@ -6,9 +6,9 @@ use nalgebra::DMatrix;
 use crate::error::ForceError;
 use crate::limits;
 
-/// Returns points about the parameters of maximum likelihood with weights that sum to 1, with the
-/// mean and covariance of the posterior. Only the best point if the measurement determines the
-/// parameters so well that the others have no effect.
+/// Returns points around the parameters of maximum likelihood, with weights that sum to 1. They
+/// have the mean and covariance of the posterior. Only the best point is returned if the
+/// measurement determines the parameters so well that the others have no effect.
 ///
 /// `log_likelihood` is `None` for impossible parameters.
 ///

@@ -38,7 +38,7 @@ pub struct RegularisedForce {
     pub force: IdentifiedForce,
     /// λ, in the unit of a scaled channel per N; `None` for [`Filter::Shrinkage`], which has none.
     pub parameter: Option<f64>,
-    /// Effective number of real unknowns of the filter, a pure number and rarely an integer.
+    /// Effective number of real unknowns of the filter, a pure number that is rarely an integer.
     pub unknowns: f64,
     /// Standard deviation of the noise in each channel, in the channel's unit: stated, or estimated
     /// by maximum likelihood.
@@ -59,7 +59,7 @@ pub struct RegularisedForce {
 /// uncertainty of the sizes of force and noise. A noise level that is stated or measured separately
 /// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. For a given λ
 /// ([`Rule::Given`](crate::Rule::Given)) the standard error belongs to a force of variance
-/// (noise/λ)² in every component, and for truncation to the noise.
+/// (noise/λ)² in every component; for truncation it covers only the noise.
 ///
 /// Channels without a displacement do not show a constant force. The force is then restricted to
 /// frequencies above [`RegularisedForce::seen_from_hz`] ([`IdentifiedForce::band_hz`]), unless the
@@ -159,7 +159,7 @@ fn solve(
     Ok((solution, spread(whole)?))
 }
 
-/// The filter factors that a rule chooses, and the posterior of the force that they approximate.
+/// Filter factors that a rule chooses, and the posterior of the force that they approximate.
 struct Choice {
     parameter: Option<f64>,
     factors: Vec<f64>,

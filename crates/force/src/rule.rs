@@ -29,12 +29,13 @@ pub enum Rule {
     /// # Source
     /// Golub, Heath & Wahba (1979).
     Gcv,
-    /// The corner of an L-curve, log of the residual per remaining datum against log ‖force‖,
-    /// searched only where this residual is at most twice the noise (in variance).
+    /// The corner of an L-curve: the logarithm of the residual per remaining datum over the
+    /// logarithm of ‖force‖. It is searched for only where this residual is at most twice the noise
+    /// (in variance).
     ///
-    /// The textbook curve has ‖residual‖, which vanishes as the unknowns use up the data: with as
-    /// many data as unknowns its corner is at no damping. Far above the noise it has other corners,
-    /// where only the resonance is fitted.
+    /// The textbook curve has ‖residual‖, which vanishes when there are as many unknowns as data:
+    /// its corner is then at no damping. Far above the noise it has other corners, where only the
+    /// resonance is fitted.
     ///
     /// # Source
     /// Hansen & O'Leary (1993) for the curve and its curvature; both changes are ours.
@@ -49,9 +50,9 @@ pub enum Rule {
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Filter {
-    /// f̂ = s y/(s² + λ²): least ‖y − H f‖² + λ²‖f‖².
+    /// Tikhonov's f̂ = s y/(s² + λ²), which minimises ‖y − H f‖² + λ²‖f‖².
     Tikhonov(Rule),
-    /// Components with s ≥ λ unchanged, the others zero.
+    /// Truncation: components with s ≥ λ are unchanged, the others are zero.
     TruncatedSvd(Rule),
     /// The posterior mean of the force, with a factor for each component, as in
     /// [`Rule::Likelihood`]: driven lines are kept, silent ones suppressed.
@@ -82,7 +83,7 @@ impl Filter {
     }
 }
 
-/// Returns the λ of a rule; infinity means that zero is the nearest force.
+/// Returns the λ of a rule; it is infinite if zero is the nearest force.
 pub(crate) fn choose(
     filter: Filter,
     components: &Components,
@@ -121,7 +122,7 @@ pub(crate) fn factor(filter: Filter, components: &Components, i: usize, lambda: 
     }
 }
 
-/// λ from the largest singular value down, evenly in its logarithm.
+/// Returns values of λ from the largest singular value down, equidistant in the logarithm.
 fn grid(largest: f64) -> Vec<f64> {
     (0..=limits::LAMBDAS_PER_DECADE * limits::LAMBDA_DECADES)
         .map(|step| largest * 10f64.powf(-(step as f64) / limits::LAMBDAS_PER_DECADE as f64))
@@ -129,8 +130,8 @@ fn grid(largest: f64) -> Vec<f64> {
 }
 
 /// Returns one threshold per distinct singular value above rounding, halfway (in its logarithm) to
-/// the next: with the value itself as its threshold the least change of the system would exclude
-/// it.
+/// the next one. If the singular value itself were the threshold, the least change of the system
+/// would exclude it.
 fn thresholds(components: &Components) -> Vec<f64> {
     let transmitted = components.transmitted();
     let mut values = components.singular[..transmitted].to_vec();
@@ -140,7 +141,7 @@ fn thresholds(components: &Components) -> Vec<f64> {
     values.iter().zip(next).map(|(s, next)| (s * next.max(1e-3 * s)).sqrt()).collect()
 }
 
-/// Returns the least residual²/remaining², if the remaining data are enough.
+/// Returns the candidate with the least residual²/remaining², if enough data remain.
 fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     let share = if matches!(filter, Filter::TruncatedSvd(_)) {
         limits::TRUNCATION_RESIDUAL
@@ -166,7 +167,7 @@ fn least(costs: impl Iterator<Item = f64>) -> usize {
     costs.iter().position(|cost| *cost <= least * (1.0 + limits::EQUAL_COSTS)).unwrap_or(0)
 }
 
-/// Returns the point of largest curvature near the noise level, as GCV estimates it.
+/// Returns the point of largest curvature of the L-curve, near the noise level that GCV estimates.
 fn corner(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     let reference = least_gcv(filter, components, fits);
     let limit = limits::CORNER_NOISE_RATIO * fits[reference].noise(components);
@@ -180,9 +181,9 @@ fn corner(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     curved.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(reference, |(i, _)| i)
 }
 
-/// Curvature through three points, by the circle through them (4·area over the three sides),
-/// positive where the L bends as λ falls: first left, then up. If λ has no effect there is no
-/// corner, only rounding.
+/// Returns the curvature through three points, from the circle through them (4·area over the
+/// product of the three sides). It is positive where the L bends as λ falls: first left, then up.
+/// If λ has no effect there is no corner, only rounding.
 fn curvature(p: [(f64, f64); 3]) -> f64 {
     let side = |a: usize, b: usize| (p[b].0 - p[a].0).hypot(p[b].1 - p[a].1);
     if side(0, 1).min(side(1, 2)) < limits::LAMBDA_EFFECT {

@@ -1,15 +1,15 @@
 //! The Kalman filter and fixed-interval smoother, one scalar measurement at a time.
 //!
-//! Processing the channels of a sample one after the other avoids matrix inverses, as does the
-//! smoother in the form of backward sums r and N; their loops do not allocate. The estimates are
-//! those of the Rauch-Tung-Striebel smoother.
+//! The channels of a sample are processed one after the other, which avoids matrix inverses, as
+//! does the smoother in the form of backward sums r and N; the loops do not allocate. The estimates
+//! are those of the Rauch-Tung-Striebel smoother.
 //!
 //! # Source
 //! Durbin & Koopman (2012), Time Series Analysis by State Space Methods, sections 4.4 and 6.4.
 
 use crate::limits;
 
-/// a(k+1) = T a(k) + noise of covariance Q, y_c(k) = Z_c a(k) + noise of variance R.
+/// State space a(k+1) = T a(k) + noise of covariance Q, y_c(k) = Z_c a(k) + noise of variance R.
 ///
 /// Square matrices are stored row by row.
 pub(crate) struct StateSpace {
@@ -18,7 +18,7 @@ pub(crate) struct StateSpace {
     pub transition: Vec<f64>,
     pub process: Vec<f64>,
     pub output: Vec<f64>,
-    /// R.
+    /// Variance R of the measurement noise.
     pub noise_variance: f64,
     /// Mean and covariance of the state at the first sample, before its measurement.
     pub start_mean: Vec<f64>,
@@ -30,38 +30,38 @@ pub(crate) struct StateSpace {
 pub(crate) struct Passage {
     mean: Vec<f64>,
     covariance: Vec<f64>,
-    /// P Zᵀ of each scalar measurement.
+    /// Product P Zᵀ of each scalar measurement, with the covariance P.
     gain: Vec<f64>,
     /// Innovation and its variance.
     innovation: Vec<(f64, f64)>,
-    /// Last sample with its own covariance and gains.
+    /// Last sample that has a separate covariance and gains; later ones have converged.
     last: usize,
 }
 
 impl Passage {
-    /// Innovations with their variances, channels of a sample side by side.
+    /// Returns the innovations with their variances, channels of a sample side by side.
     pub fn innovations(&self) -> &[(f64, f64)] {
         &self.innovation
     }
 
-    /// Variance of each state before the measurement of sample k.
+    /// Returns the variance of each state before the measurement of sample k.
     pub fn variances(&self, k: usize, states: usize) -> impl Iterator<Item = f64> + '_ {
         let block = &self.covariance[k.min(self.last) * states * states..][..states * states];
         block.iter().step_by(states + 1).copied()
     }
 }
 
-/// Prediction error of a model: each sample from those before it.
+/// Prediction errors of a model: each sample is predicted from those before it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Innovations {
-    /// Sum of the logarithms of their variances.
+    /// Sum of the logarithms of the variances of the innovations.
     pub log_variance: f64,
-    /// Sum of their squares over their variances.
+    /// Sum of the squared innovations divided by their variances.
     pub energy: f64,
 }
 
 impl Innovations {
-    /// Log-likelihood, without constants.
+    /// Returns the log-likelihood, without constants.
     pub fn log_likelihood(self) -> f64 {
         -0.5 * (self.log_variance + self.energy)
     }
@@ -70,10 +70,10 @@ impl Innovations {
 struct Filter {
     mean: Vec<f64>,
     covariance: Vec<f64>,
-    /// P Zᵀ of each channel, and its innovation's variance, at the last sample.
+    /// Product P Zᵀ of each channel, and the variance of its innovation, at the last sample.
     gain: Vec<f64>,
     variance: Vec<f64>,
-    /// True once covariance, gains and variances have converged to those of the sample before.
+    /// `true` once covariance, gains and variances no longer change from sample to sample.
     settled: bool,
     tolerance: f64,
     /// Variances before the measurements of the last sample.
@@ -154,7 +154,7 @@ impl StateSpace {
         (passage.mean, variance)
     }
 
-    /// r ← Tᵀ r, N ← Tᵀ N T.
+    /// Computes r ← Tᵀ r, N ← Tᵀ N T.
     fn back_over_step(
         &self,
         r: &mut [f64],
@@ -235,7 +235,7 @@ impl Filter {
                 self.covariance[j * m + i] = p;
             }
         }
-        // Variances of the filter before the measurements of the last sample and of this one.
+        // The variances before the measurements of the last sample and of this one are compared.
         self.settled = true;
         for (before, now) in self.before.iter_mut().zip(self.covariance.iter().step_by(m + 1)) {
             self.settled &= (now - *before).abs() <= self.tolerance * now.abs();
@@ -244,7 +244,8 @@ impl Filter {
     }
 }
 
-/// r ← Zᵀ v/F + Lᵀ r and N ← ZᵀZ/F + Lᵀ N L with L = I − g Z/F.
+/// Computes r ← Zᵀ v/F + Lᵀ r and N ← ZᵀZ/F + Lᵀ N L, with L = I − g Z/F, the innovation v and its
+/// variance F.
 fn back_over_measurement(
     r: &mut [f64],
     n: &mut [f64],
@@ -269,14 +270,14 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// out ← A x.
+/// Computes out ← A x.
 fn times(a: &[f64], x: &[f64], out: &mut [f64]) {
     for (out, row) in out.iter_mut().zip(a.chunks_exact(x.len())) {
         *out = dot(row, x);
     }
 }
 
-/// out ← A B, all m×m.
+/// Computes out ← A B, all m×m.
 fn multiply(a: &[f64], b: &[f64], out: &mut [f64], m: usize) {
     for (row, out) in a.chunks_exact(m).zip(out.chunks_exact_mut(m)) {
         out.fill(0.0);

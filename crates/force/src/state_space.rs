@@ -27,11 +27,11 @@ pub(crate) fn growth_rate(system: &SecondOrderSystem) -> Result<f64, ForceError>
 /// Outputs of the system in step units: y = out·z + through·q, with a force linear over a step.
 pub(crate) struct Machine {
     pub transition: StateTransition,
-    /// Channels × 2n, divided by the channel's scale.
+    /// Output matrix, channels × 2n; each row is divided by the scale of its channel.
     pub out: DMatrix<f64>,
-    /// Channels × forces.
+    /// Direct effect of the input on the outputs, channels × forces.
     pub through: DMatrix<f64>,
-    /// n × forces: q of a unit force.
+    /// Input q of a unit force, n × forces.
     pub input: DMatrix<f64>,
 }
 
@@ -65,7 +65,7 @@ impl Machine {
         Ok(Self { transition, out, through, input })
     }
 
-    /// Channels × samples from rest, for a force given as forces × samples.
+    /// Returns the response, channels × samples, from rest, to a force given as forces × samples.
     pub fn response(&self, force: &DMatrix<f64>) -> DMatrix<f64> {
         let samples = force.ncols();
         let held_input = &self.transition.held * &self.input;
@@ -83,7 +83,8 @@ impl Machine {
         motion
     }
 
-    /// Rows ordered by channel, columns by force: the responses to unit forces at each sample.
+    /// Returns the responses to unit forces at each sample: rows ordered by channel, then by
+    /// sample, columns by force.
     pub fn impulse_responses(&self, samples: usize) -> DMatrix<f64> {
         let (channels, forces) = self.through.shape();
         let ramp = &self.transition.ramp * &self.input;
@@ -110,7 +111,8 @@ impl Machine {
         matrix
     }
 
-    /// Rows as above, one column per entry of the state at the first sample.
+    /// Returns the free responses: rows ordered by channel, then by sample, and one column per
+    /// entry of the state at the first sample.
     pub fn free_responses(&self, samples: usize) -> DMatrix<f64> {
         let (channels, states) = self.out.shape();
         let mut matrix = DMatrix::zeros(channels * samples, states);

@@ -10,7 +10,7 @@ use crate::measurement::Channel;
 
 type Line = Complex<f64>;
 
-/// Ratio of measured channels to forces, frequency by frequency: that of M, C and K, or of modes.
+/// Ratio of measured channels to forces, frequency by frequency, from M, C and K or from modes.
 pub trait FrequencyResponse {
     /// Returns the number of places where a force can act.
     fn places(&self) -> usize;
@@ -34,10 +34,10 @@ pub trait FrequencyResponse {
         None
     }
 
-    /// Returns the covariance E[δy δyᴴ] of the channels' responses to given forces (one for each
-    /// entry of `forced`, in N) that the uncertainty of the system causes, channels × channels in
-    /// the products of their units; `None` if the system is exact or its uncertainty is counted
-    /// elsewhere.
+    /// Returns the covariance E[δy δyᴴ] of the responses of the channels to given forces (one for
+    /// each entry of `forced`, in N) due to the uncertainty of the system: channels × channels in
+    /// the products of their units. `None` if the system is exact or its uncertainty is taken into
+    /// account elsewhere.
     fn response_covariance(
         &self,
         _channels: &[Channel],
@@ -83,12 +83,12 @@ pub(crate) struct Transfer<'a> {
     pub system: &'a dyn FrequencyResponse,
     pub channels: &'a [Channel],
     pub forced: &'a [usize],
-    /// Standard deviation of each channel's noise, or its size: the divisor of its row.
+    /// Divisor of the row of each channel: the standard deviation of its noise, or its size.
     pub scale: &'a [f64],
 }
 
 impl Transfer<'_> {
-    /// Measured channels × forces, each row divided by the scale of its channel.
+    /// Returns measured channels × forces, each row divided by the scale of its channel.
     pub fn scaled(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
         let mut response = self
             .system
@@ -100,10 +100,10 @@ impl Transfer<'_> {
         Ok(response)
     }
 
-    /// Forces × measured channels: the matrix that turns a measured line into forces.
+    /// Returns forces × measured channels: the matrix that turns a measured line into forces.
     ///
-    /// With every degree of freedom forced and measured once this is the dynamic stiffness itself;
-    /// otherwise the weighted least-squares inverse of the transfer matrix.
+    /// If every degree of freedom is forced and measured once, this is the dynamic stiffness
+    /// itself; otherwise it is the weighted least-squares inverse of the transfer matrix.
     pub fn inverse(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
         if self.measures_everything_once()
             && let Some(stiffness) = self.system.stiffness_matrix(omega)
@@ -156,7 +156,7 @@ impl Transfer<'_> {
         Ok(inverse)
     }
 
-    /// Returns the error with the force that has the smallest effect on the measured channels.
+    /// Returns an error that names the force with the smallest effect on the measured channels.
     fn not_transmitted(
         &self,
         line: usize,

@@ -96,8 +96,8 @@ pub fn with_uncertain_nonlinear_system(
     })
 }
 
-/// Returns a force with the uncertainty of parameters of this covariance; `changed` gives it with
-/// one of them larger.
+/// Returns a force with the uncertainty of parameters of this covariance; `changed` returns the
+/// force with one of the parameters increased.
 fn propagate(
     force: IdentifiedForce,
     covariance: &DMatrix<f64>,
@@ -129,8 +129,8 @@ fn propagate(
     Ok(force.with_standard_error(Some(error)).with_residual(residual))
 }
 
-/// Returns gᵀ Σ g for every entry of a matrix of this shape; g are the derivatives there, one
-/// matrix per parameter.
+/// Returns gᵀ Σ g for every entry of a matrix of this shape; g are the derivatives of this entry,
+/// from one matrix per parameter.
 fn propagated(
     covariance: &DMatrix<f64>,
     (rows, columns): (usize, usize),

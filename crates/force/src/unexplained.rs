@@ -32,8 +32,8 @@ pub struct Unexplained {
 }
 
 impl Unexplained {
-    /// Residual over response, a pure number: 0 if all is explained, 1 if none is (2 if the
-    /// response has the opposite sign).
+    /// Ratio of residual to response, a pure number: 0 if all is explained, 1 if none is (2 if the
+    /// predicted response has the opposite sign).
     ///
     /// The larger of the two responses is the reference, since the response of a dead sensor is
     /// zero.
@@ -69,10 +69,11 @@ impl Residual {
         Self { residual, channels }
     }
 
-    /// Computes the residual on lines of a period: Y_n − S H_n F_n for each line.
+    /// Computes the residual on lines of a period: the measured response minus the response to the
+    /// force, line by line.
     ///
-    /// White noise of standard deviation σ has the RMS value σ √(Σ w) on them, with w the variance
-    /// of each part of a line under noise of unit variance.
+    /// White noise of standard deviation σ has the RMS value σ √(Σ w) on these lines, with w the
+    /// variance of each part of a line under noise of unit variance.
     pub fn from_lines(
         system: &dyn FrequencyResponse,
         measured: &Measurement,
@@ -104,8 +105,9 @@ impl Residual {
         Ok(Self::new(in_time(seen)?.data(), in_time(residual)?.into_data(), noise))
     }
 
-    /// Computes the residual in an open record that no force of these samples, linear between them,
-    /// and no initial state explain; the latter in least squares of channels divided by `scale`.
+    /// Computes the residual in an open record: the part that neither a force of these samples,
+    /// linear between them, nor an initial state explains. The initial state comes from least
+    /// squares of channels divided by `scale`.
     pub fn from_open_record(
         system: &SecondOrderSystem,
         measured: &Measurement,
@@ -176,7 +178,8 @@ impl Residual {
         &self.channels
     }
 
-    /// Returns the same, with the variance of each entry due to the uncertainty of the system.
+    /// Returns the same residual, with the variance of each entry due to the uncertainty of the
+    /// system.
     pub fn with_machine(mut self, variance: &DMatrix<f64>) -> Self {
         for (channel, variance) in self.channels.iter_mut().zip(variance.column_iter()) {
             channel.machine = Some(rms(variance.sum(), variance.len()));

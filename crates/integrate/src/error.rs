@@ -172,7 +172,7 @@ pub enum IntegrateError {
     },
     /// Numbers overflow in a search for modes.
     #[error(
-        "the search for modes overflows in a space of {}: the entries of the matrices are too far apart",
+        "the search for modes overflows in a space of {}: the entries of the matrices differ by too many orders of magnitude",
         message::count(*vectors, "vector")
     )]
     ModesOverflow {
@@ -215,9 +215,9 @@ pub enum IntegrateError {
     NoPeriodicState {
         /// Period of the force, in seconds.
         period: f64,
-        /// Reciprocal condition of I − Φ, Φ being the free motion over one period.
+        /// Reciprocal condition of I − Φ, where Φ is the free motion over one period.
         reciprocal_condition: f64,
-        /// Change that rounding alone can make.
+        /// Reciprocal condition that rounding alone can cause.
         rounding: f64,
     },
     /// The periodic response of a large linear system was not found in the Krylov space.
@@ -237,7 +237,7 @@ pub enum IntegrateError {
     },
     /// Newton's method found no periodic response of a nonlinear system.
     #[error(
-        "no response that repeats every {period} s is found from there: the best still changes by \
+        "no response that repeats every {period} s was found from this start: the best still changes by \
          {missed:.1e} of its size in a period; start nearer, or let the motion settle for longer",
         period = message::number(*period)
     )]

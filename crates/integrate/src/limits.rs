@@ -9,9 +9,9 @@ pub(crate) const DENSE_DOF: usize = 64;
 /// Fraction of non-zero entries below which larger dense matrices are converted to sparse.
 pub(crate) const SPARSE_FRACTION: f64 = 0.1;
 
-/// Maximum number of diagonals of a matrix that is factored by band. At this width the solutions
-/// with a two-dimensional grid take about as long either way, and 100,000 degrees of freedom 0.4
-/// GB.
+/// Maximum number of diagonals of a matrix that is factored by band. At this width, solutions for a
+/// two-dimensional grid take about as long with a band as with other factors, and the band of
+/// 100,000 degrees of freedom takes 0.4 GB.
 pub(crate) const BAND_DIAGONALS: usize = 256;
 
 /// Maximum number of diagonals of a band that is always factored by band: no other form is faster.
@@ -21,8 +21,8 @@ pub(crate) const NARROW_BAND_DIAGONALS: usize = 32;
 /// pivot. Below it rows are exchanged, which keeps rounding small but widens the band.
 pub(crate) const PIVOT_FRACTION: f64 = 0.1;
 
-/// Maximum number of operations of an LU factorisation column by column; above it the blocks of
-/// columns of `faer` are faster.
+/// Maximum number of operations of an LU factorisation that works column by column; above it, the
+/// factorisation of `faer`, which works in blocks of columns, is faster.
 pub(crate) const COLUMN_OPERATIONS: f64 = 4e9;
 
 /// Largest backward error, relative to the terms of the rows, of an LU factorisation without
@@ -37,15 +37,15 @@ pub(crate) const CONDITION_STEPS: usize = 4;
 /// Maximum number of degrees of freedom whose steps are matrix products of fixed size.
 pub(crate) const FIXED_SIZE_DOF: usize = 2;
 
-/// Maximum number of secant steps of a nonlinear force at fixed size; Newton's method, which has
-/// safeguards, takes the step after them.
+/// Maximum number of secant steps for a nonlinear force in a step of fixed size. If they do not
+/// suffice, Newton's method, which has safeguards, takes the step.
 pub(crate) const SECANT_STEPS: usize = 12;
 
 /// Residual, in tolerances, above which a secant step updates the slope; below it the residual is
 /// mostly rounding.
 pub(crate) const SECANT_UPDATE: f64 = 1e3;
 
-/// Number of steps that the general stepper takes after a step of fixed size was not solved.
+/// Number of steps that the general stepper takes after an unsolved step of fixed size.
 pub(crate) const GENERAL_STEPS: usize = 16;
 
 /// Number of computed values between two log messages about the progress.
@@ -56,8 +56,8 @@ pub(crate) const NUMBERS_PER_MESSAGE: usize = 1 << 20;
 /// Residual of the accelerations, relative to the largest, at which Newton's method ends.
 pub(crate) const STEP_RESIDUAL: f64 = 1e-12;
 
-/// Residual accepted where no Newton step reduces it: a small extension between large
-/// displacements is rounded.
+/// Residual that is accepted if no Newton step reduces it: a small extension between large
+/// displacements has a rounding error.
 pub(crate) const STEP_RESIDUAL_ROUNDING: f64 = 1e-9;
 
 /// Maximum number of Newton steps.
@@ -82,7 +82,7 @@ pub(crate) const PERIODIC_GAP: f64 = 1e-13;
 /// Relative residual of the equations of a linear periodic state in a Krylov space.
 pub(crate) const PERIODIC_GMRES_RESIDUAL: f64 = 1e-9;
 
-/// Maximum number of Krylov searches, each for the residual of the one before.
+/// Maximum number of Krylov searches; each one reduces the residual of the previous one.
 pub(crate) const PERIODIC_SEARCHES: usize = 8;
 
 /// Maximum number of passes over the period that correct a linear periodic state found by its
@@ -93,7 +93,7 @@ pub(crate) const PERIODIC_PASSES: usize = 4;
 pub(crate) const PERIODIC_PROGRESS: f64 = 0.1;
 
 /// Change of the state, relative to the largest displacement, velocity or acceleration, for a
-/// derivative by central differences, whose error is its square.
+/// derivative by central differences. The error of the derivative is the square of this number.
 pub(crate) const SHOOTING_DIFFERENCE: f64 = 1e-5;
 
 /// Maximum memory of the vectors of a Krylov space, in bytes.
@@ -114,7 +114,7 @@ pub(crate) const ORBIT_GMRES_RESIDUAL: f64 = 1e-4;
 /// acceleration, at which Newton's method ends.
 pub(crate) const ORBIT_GAP: f64 = 1e-11;
 
-/// Change accepted where no Newton step reduces it.
+/// Change of the state over a period that is accepted if no Newton step reduces it.
 pub(crate) const ORBIT_GAP_ROUNDING: f64 = 1e-8;
 
 /// Maximum number of Newton steps to a periodic orbit.
@@ -151,19 +151,20 @@ pub(crate) const DENSE_EIGENVALUE_DOF: usize = 200;
 /// million steps to grow by a factor e.
 pub(crate) const TOLERATED_GROWTH: f64 = 1e-6;
 
-/// Growth per step beyond the critical step, unless the system has a free body. The rounding of
-/// two eigenvalues that are about to meet there is far smaller.
+/// Growth per step above which a step is larger than the critical step, unless the system has a
+/// free body. The rounding of two eigenvalues that almost coincide at the critical step is far
+/// smaller.
 pub(crate) const CRITICAL_GROWTH: f64 = 1e-9;
 
-/// Ratio to the limit of a scheme that is assumed for an eigenvalue not proven to be below the
-/// limit: its motion then grows by more than is tolerated.
+/// Factor on the limit of a scheme. An eigenvalue that is not proved to be below the limit is
+/// assumed to be at the limit times this factor; its motion then grows by more than is tolerated.
 pub(crate) const EXCEEDED_LIMIT: f64 = 1.0 + 1e-8;
 
-/// Largest relative difference of two entries of a symmetric matrix.
+/// Largest relative difference of two mirrored entries of a matrix that counts as symmetric.
 pub(crate) const ASYMMETRY: f64 = 1e-12;
 
-/// Negative eigenvalue of C or K, relative to the size of its rows, that counts as rounding. For K
-/// the slowest motion may then grow by 3·10⁻⁷ of the highest frequency.
+/// Negative eigenvalue of C or K, relative to the size of its rows, that counts as rounding. For K,
+/// the slowest motion may then grow at a rate of 3·10⁻⁷ of the highest natural frequency.
 pub(crate) const SEMIDEFINITE_SHIFT: f64 = 1e-13;
 
 /// Maximum number of Lanczos steps to the highest frequency.
@@ -172,13 +173,14 @@ pub(crate) const LANCZOS_STEPS: usize = 100;
 /// Relative width to which the highest eigenvalue is enclosed by factorisations.
 pub(crate) const ENCLOSURE_WIDTH: f64 = 1e-4;
 
-/// First relative step of the upper end of the enclosure; each later step is twice as large.
+/// First relative step of the upper end of the enclosure of the highest eigenvalue; each later step
+/// is twice as large.
 pub(crate) const ENCLOSURE_STEP: f64 = 0.01;
 
 /// Maximum number of factorisations for each end of the enclosure.
 pub(crate) const ENCLOSURE_FACTORISATIONS: usize = 64;
 
-/// Number of Arnoldi steps for the eigenvalue of largest modulus.
+/// Number of Arnoldi steps that estimate the eigenvalue of largest modulus.
 pub(crate) const ARNOLDI_STEPS: usize = 32;
 
 /// Maximum number of vectors of the search for the fastest growing free motion.
@@ -198,13 +200,14 @@ pub(crate) const VANISHED_MOTION: f64 = 1e-150;
 /// Number of periods over which a motion is followed if the search leaves its growth undecided.
 pub(crate) const FOLLOWED_PERIODS: usize = 20;
 
-/// Energy ratio of the second half of these periods to the first above which the motion grows.
+/// Ratio of the energy in the second half of the followed periods to that in the first half; above
+/// it the motion grows.
 pub(crate) const FOLLOWED_GROWTH: f64 = 2.0;
 
 // Modes of sparse systems.
 
-/// Maximum number of shifts. Close modes far from one shift converge from another shift among
-/// them.
+/// Maximum number of shifts in a search for modes. Modes that are close together and far from one
+/// shift converge from another shift among them.
 pub(crate) const SHIFTS: usize = 8;
 
 /// Number of rigid-body modes of a free structure in three dimensions.
@@ -227,7 +230,8 @@ pub(crate) const REAL_SHIFT: f64 = 1e-6;
 /// singular.
 pub(crate) const SHIFT_OFFSET: f64 = 1e-6;
 
-/// Largest relative difference of converged eigenvalues from two shifts that are the same.
+/// Largest relative difference of converged eigenvalues from two shifts that count as the same
+/// eigenvalue.
 pub(crate) const SAME_EIGENVALUE: f64 = 3e-8;
 
 /// Largest residual of a mode that is preferred for the next shift; a larger residual may belong
@@ -238,18 +242,19 @@ pub(crate) const SHIFT_RESIDUAL: f64 = 1e-2;
 /// planes, are found up to this multiplicity.
 pub(crate) const START_VECTORS: usize = 4;
 
-/// Largest relative residual of a converged eigenvalue of the inverted operator.
+/// Largest relative residual at which an eigenvalue of the inverted operator counts as converged.
 pub(crate) const RITZ_RESIDUAL: f64 = 1e-8;
 
 /// Modulus, relative to the largest, below which an eigenvalue of the inverted operator counts as
 /// zero.
 pub(crate) const NEGLIGIBLE_EIGENVALUE: f64 = 1e-14;
 
-/// Largest relative difference of eigenvalues of the inverted operator that form a multiple one.
+/// Largest relative difference of eigenvalues of the inverted operator that count as one multiple
+/// eigenvalue.
 pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-9;
 
-/// Norm of a unit eigenvector without its parts along others of the same eigenvalue above which it
-/// is independent of them.
+/// Smallest norm of a unit eigenvector, after its parts along other eigenvectors of the same
+/// eigenvalue are subtracted, for which it is independent of them.
 pub(crate) const INDEPENDENT_EIGENVECTOR: f64 = 1e-6;
 
 /// Number of eigenvalues examined beyond the modes wanted, since the operator orders them a little

@@ -74,7 +74,7 @@ impl<'a> Matrices<'a> {
         }
     }
 
-    /// The system, if its steps are faster with dense matrices.
+    /// Returns the system if its steps are faster with dense matrices.
     pub(crate) fn dense(self) -> Option<&'a SecondOrderSystem> {
         let Matrices::Dense(system) = self else { return None };
         let n = system.dof();

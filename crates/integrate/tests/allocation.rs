@@ -46,7 +46,7 @@ fn a_step_of_a_large_system_allocates_nothing() {
     let shuffled = |i: usize| i * 7 % n;
     let scattered =
         triplets(n, stiffness.triplet_iter().map(|(i, j, v)| (shuffled(i), shuffled(j), *v)));
-    // Without an order of a narrow band.
+    // These entries allow no order with a narrow band.
     let far = (0..n).flat_map(|i| [(i, (i * i + 1) % n), (i, (7 * i + 3) % n)]);
     let far = far.flat_map(|(i, j)| [(i, j, -300.0), (j, i, -300.0)]);
     let wide = triplets(n, far.chain((0..n).map(|i| (i, i, 4000.0)))).unwrap();
@@ -93,7 +93,8 @@ fn a_longer_record_takes_no_more_allocations() {
                 measure(|| drop(integrate(scheme, &system, force, &rest).unwrap())).count_total
             };
             assert_eq!(once(&short), once(&long), "{} n {dof}", scheme.name());
-            // Lengths whose binary logarithms round down alike: as many squarings of a matrix.
+            // The binary logarithms of the lengths round down to the same number, so that a matrix
+            // is squared equally often.
             let periodic = |force: &Record| {
                 measure(|| drop(integrate_periodic(scheme, &system, force).unwrap())).count_total
             };

@@ -160,7 +160,7 @@ pub(crate) enum Axis {
     /// Uniform from 0 s, with a step in s that follows from a named number of the file, such as
     /// `Fs`.
     Stated { step: f64, scalar: usize },
-    /// Contradiction between two such numbers.
+    /// Contradiction between two named numbers of the file that state different steps.
     Contradiction { scalars: [usize; 2], steps: [f64; 2] },
     /// Column with this index.
     Column(usize),
@@ -176,7 +176,7 @@ pub(crate) enum Unusable {
         line: u64,
         text: String,
     },
-    /// A number whose decimal sign differs from the other numbers.
+    /// Number whose decimal sign differs from that of the other numbers.
     DecimalSign {
         line: u64,
         text: String,

@@ -46,7 +46,7 @@ pub enum IoError {
         source: std::io::Error,
     },
     /// The file is HDF5, but the feature `hdf5`, which reads it, is not enabled.
-    #[error("{}", Message(format_args!("{file} is HDF5, as a MATLAB file of version 7.3 is, and this program was compiled without: save it \
+    #[error("{}", Message(format_args!("{file} is HDF5, like MATLAB files of version 7.3, and this program was compiled without HDF5: save it \
         with -v7")))]
     Hdf5 {
         /// The file.
@@ -81,7 +81,7 @@ pub enum IoError {
         what: &'static str,
     },
     /// The rows of one record are not consecutive.
-    #[error("{}", Message(format_args!("{file}: record {id} goes on in row {row} (counted from 1) behind rows of other records: sort the \
+    #[error("{}", Message(format_args!("{file}: record {id} continues in row {row} (counted from 1) after rows of other records: sort the \
         rows by record and time")))]
     RecordApart {
         /// The file.
@@ -281,7 +281,7 @@ pub enum IoError {
         value: f64,
     },
     /// The instants of the time column are not equally spaced.
-    #[error("{}", Message(format_args!("{file}: the time steps are not uniform: {} s up to {at}, where the usual step is \
+    #[error("{}", Message(format_args!("{file}: the time steps are not uniform: the step up to {at} is {} s, the usual step \
          {} s ({})",
         message::number(six_digits(*step)),
         message::number(six_digits(*usual)),
@@ -478,7 +478,7 @@ fn six_digits(value: f64) -> f64 {
 /// Returns the remedy for a time step that differs from the usual one, both in s.
 fn remedy(step: f64, usual: f64) -> &'static str {
     if usual > 0.0 && step < 0.0 {
-        "the time goes back, as where a second record was appended: keep them in files of their own"
+        "the time goes back, as if a second record had been appended: keep each record in a separate file"
     } else {
         "resample the record, or give the sample rate instead of the time column if the times are \
          only rounded"

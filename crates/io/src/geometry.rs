@@ -175,7 +175,7 @@ impl Geometry {
 
     pub(crate) fn add(&mut self, name: &str, position: [f64; 3]) -> Result<(), String> {
         if self.index(name).is_some() {
-            return Err(format!("point {name} is there twice"));
+            return Err(format!("point {name} occurs twice"));
         }
         self.points.push(GeometryPoint { name: name.to_owned(), position });
         Ok(())
@@ -287,7 +287,7 @@ mod tests {
         assert_eq!(geometry.points[1].position, [1.5, 0.0, 0.0]);
         assert_eq!(geometry.lines, [[0, 1], [1, 2]]);
         for (text, part) in [
-            ("1 0 0 0\n1 1 0 0\n", "line 2: point 1 is there twice"),
+            ("1 0 0 0\n1 1 0 0\n", "line 2: point 1 occurs twice"),
             ("1 0 0 0\nline 1 7\n", "line 2: there is no point 7"),
             ("1 0 0 0\n2 0 NaN 0\n", "line 2: a point is a name"),
             ("1 0 0 0\n2 0 0\n", "line 2: a point is a name"),

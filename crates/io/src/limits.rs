@@ -9,7 +9,7 @@ pub(crate) const NUMBER_BYTES: usize = 16;
 /// analysers are shorter.
 pub(crate) const DETAILS_BYTES: u64 = 64 << 10;
 
-/// Size, in bytes, that the text in any gzip file may have, however small the file is.
+/// Size, in bytes, that the text in a gzip file may have even if the file is very small.
 const TEXT_BYTES: usize = 64 << 20;
 
 /// Options for reading a record file.

@@ -160,7 +160,9 @@ impl Header {
             _ => return Err(lines.malformed("coordinate and array are the formats that are read")),
         };
         if !matches!(field, "real" | "double" | "integer") {
-            return Err(lines.malformed("the matrix of a machine has entries real or integer"));
+            return Err(
+                lines.malformed("the entries of the matrix of a machine are real or integer")
+            );
         }
         let symmetry = match symmetry {
             "general" => Symmetry::General,

@@ -93,7 +93,8 @@ pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoEr
         let is_new =
             file.stage.destination().is_none_or(|path| destinations.insert(path.to_owned()));
         if !is_new {
-            let twice = io::Error::new(io::ErrorKind::AlreadyExists, "two files would go there");
+            let twice =
+                io::Error::new(io::ErrorKind::AlreadyExists, "two files have this destination");
             return Err(failed(&file.path, twice));
         }
         file.complete()?;
@@ -172,7 +173,7 @@ impl BegunFile {
             Ok(metadata) => {
                 // Renaming does not need write permission on the file, so it is checked here.
                 if metadata.permissions().readonly() {
-                    let why = "the file that stands there is read-only";
+                    let why = "the existing file is read-only";
                     return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
                 }
                 OpenOptions::new().write(true).open(&destination)?;
@@ -284,8 +285,8 @@ fn keep(file: &File, permissions: Permissions) -> io::Result<()> {
 mod beside {
     use super::{File, OpenOptions, Path, PathBuf, Temporary, fs, io};
 
-    /// Maximum length, in bytes, of the name of a destination in that of its temporary file: with
-    /// prefix and suffix it stays below the 255 bytes that file systems allow.
+    /// Maximum length, in bytes, of the name of a destination within the name of its temporary
+    /// file: with prefix and suffix it stays below the 255 bytes that file systems allow.
     const NAME_BYTES: usize = 200;
 
     /// Maximum number of names that are tried.

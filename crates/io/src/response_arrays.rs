@@ -19,8 +19,9 @@ const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
 /// dimension has the responses to one force.
 ///
 /// # Errors
-/// [`IoError::Description`] if no array has a dimension of the length of the frequencies, for one
-/// with too many dimensions, one that is not finite, and for two of the same response.
+/// [`IoError::Description`] if no array has a dimension of the length of the frequencies, for an
+/// array with too many dimensions, for one that is not finite, and for two arrays with the same
+/// response.
 pub(crate) fn add_functions(
     table: &Table,
     arrays: &[ComplexArray],
@@ -91,8 +92,8 @@ fn add_array(
         }
     }
     responses.remarks.push(format!(
-        "{}: {points} by {references} responses (points of the response by points of the force) in SI units, for \
-         none are stated",
+        "{}: {points} by {references} responses (points of the response by points of the force) in SI units, because \
+         no units are stated",
         escaped(&array.name)
     ));
     Ok(())

@@ -43,7 +43,7 @@ pub(crate) fn frequencies(
             return Err(IoError::Description {
                 file: table.file().into(),
                 what: format!(
-                    "it has responses, and no vector of their frequencies: save it as {}",
+                    "it has responses, and no vector of their frequencies: save this vector as {}",
                     FREQUENCY[..4].join(" or ")
                 ),
             });
@@ -123,7 +123,7 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     let negative = hz.iter().filter(|hz| **hz < 0.0).count();
     order.retain(|at| hz[*at] >= 0.0);
     if let Some(pair) = order.windows(2).find(|pair| hz[pair[0]] == hz[pair[1]]) {
-        let what = format!("the frequency {} Hz stands there twice", hz[pair[0]]);
+        let what = format!("the frequency {} Hz occurs twice", hz[pair[0]]);
         return Err(IoError::Description { file: responses.file.clone(), what });
     }
     let mirrored = mirrored(responses, &order);

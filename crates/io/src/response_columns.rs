@@ -14,7 +14,7 @@ const ALONE: &str = "1";
 /// phases are degrees.
 const MAX_RADIANS: f64 = 6.5;
 
-/// Part of a frequency response: what the numbers of a column are.
+/// Part of a frequency response that the numbers of a column are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Part {
     Real,

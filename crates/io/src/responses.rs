@@ -230,7 +230,7 @@ impl FrequencyResponses {
         let any = AveragedSegments::COLUMNS[..4].iter().any(|name| table.find(name).is_ok());
         if any && responses.segments.is_none() {
             responses.remarks.push(format!(
-                "the columns {} state no segments that are possible, the same in every row: the bias of the window was not corrected",
+                "the columns {} do not state possible segments that are the same in every row: the bias of the window was not corrected",
                 AveragedSegments::COLUMNS.join(", ")
             ));
         }

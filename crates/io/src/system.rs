@@ -25,8 +25,8 @@ const DENSE_DOF: usize = 64;
 /// more, the factors of an irregular pattern may have all entries.
 const SPARSE_SHARE: f64 = 0.1;
 
-/// Maximum number of degrees of freedom of such a machine for computations that need full matrices:
-/// above it, all modes or the response at every line would take minutes.
+/// Maximum number of degrees of freedom of a machine in sparse matrices for computations that need
+/// full matrices: above it, all modes or the response at every line would take minutes.
 const ALL_ENTRIES_DOF: usize = 300;
 
 /// The matrices of a system as rows of numbers: the `system` of every JSON report, which
@@ -107,9 +107,9 @@ impl Described {
 /// Returns the error for a machine that is too large for full matrices.
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
-        "the machine has {dof} degrees of freedom in sparse matrices, too many for what needs all entries \
-         of the matrices: simulate finds its response, stability the largest steps, and modes --modes COUNT \
-         some of its modes; for the rest reduce it to the degrees of freedom that are measured"
+        "the machine has {dof} degrees of freedom in sparse matrices, too many for a computation that needs all entries \
+         of the matrices: simulate computes its response, stability the largest steps, and modes --modes COUNT \
+         some of its modes; for other computations reduce it to the measured degrees of freedom"
     );
     IoError::Description { file: file.into(), what }
 }

@@ -1,6 +1,6 @@
-//! A text of any length goes through the estimators in the same memory.
+//! A text of any length is processed by the estimators in the same memory.
 //!
-//! The counter is that of the whole program: this file has one test.
+//! The counter covers the whole program; therefore this file has one test.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -17,14 +17,14 @@ use peak_alloc::PeakAlloc;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Samples in a period, and periods in a stretch.
+/// Number of samples in a period, and of periods in a section.
 const PERIOD: usize = 500;
 const AT_ONCE: usize = 4;
 
-/// Rows held of the beginning.
+/// Number of rows at the beginning that stay in memory.
 const HELD: usize = 2000;
 
-/// Bytes of a block of text with its numbers.
+/// Number of bytes of a block of text with its numbers.
 const BLOCK: usize = 130_000;
 
 const COLUMNS: [&str; 4] = ["f", "x", "v", "a"];
@@ -55,7 +55,7 @@ impl From<SpectraError> for Failure {
     }
 }
 
-/// Four columns and the time, with an empty line and a comment every so often.
+/// Writes four columns and the time, with an empty line and a comment from time to time.
 fn write(path: &Path, rows: usize) {
     let mut file = BufWriter::new(File::create(path).unwrap());
     writeln!(file, "time,{},unused", COLUMNS.join(",")).unwrap();
@@ -69,7 +69,7 @@ fn write(path: &Path, rows: usize) {
     }
 }
 
-/// Bytes that a pass over a record takes at most, beyond what was there before.
+/// Returns the maximum number of bytes that a pass over a record allocates.
 fn peak(path: &Path, rows: usize) -> usize {
     MEMORY.reset_peak_usage();
     let before = MEMORY.current_usage();
@@ -109,8 +109,8 @@ fn memory_does_not_grow_with_the_record() {
     });
     // Five columns of the long record are 8 MB.
     assert!(long < 2_000_000, "{long} bytes");
-    // Twenty times the rows: what may grow is the width of numbers, and how many of the blocks that threads read
-    // and parse at a time meet at the peak.
+    // The record is twenty times as long. Only the width of the numbers may grow, and the number of
+    // blocks that the threads read and parse at the same time.
     assert!(
         long < short + short / 20 + 2 * BLOCK,
         "{short} bytes for the short record, {long} for the long one"

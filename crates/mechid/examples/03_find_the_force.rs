@@ -26,7 +26,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         FrequencyData::from_records(&excitation, motion, ResponseQuantity::Displacement, 1..=120)?;
     let identified = equation_error(&data, &Unknowns::unknown_mass(1)?)?.system()?;
 
-    // In operation, an unbalance acts on line 40, which is not measured.
+    // In operation, an unmeasured unbalance acts on line 40.
     let unbalance = Multisine::flat([40], 30.0, Phases::Zero)?.sample(sampling)?;
     let at_work = mechid::exact_periodic(&machine, &unbalance)?;
     let found = mechid::force::continuous(&identified, &at_work)?;

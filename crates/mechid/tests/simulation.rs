@@ -7,7 +7,8 @@ use mechid::model::exact_periodic;
 use mechid::simulate;
 use mechid::simulation::{Multiplier, SimulateError, Simulation};
 
-/// Largest displacement error against the receptance, relative, for a scheme as JSON.
+/// Returns the largest displacement error of a scheme (as JSON), relative to the response from the
+/// receptance.
 fn error(scheme: &str, samples: usize) -> f64 {
     let text = format!(
         r#"{{ "system": {{ "mass": 10, "damping": 180, "stiffness": 5000 }},
@@ -21,7 +22,8 @@ fn error(scheme: &str, samples: usize) -> f64 {
     (found - truth).amax() / truth.amax()
 }
 
-/// Judge: ẍ + 2 ẋ + x + x³ = F with F such that x = cos 2t, damped enough to be the only orbit.
+/// Reference: F in ẍ + 2 ẋ + x + x³ = F is chosen for x = cos 2t; the damping is so large that no
+/// other periodic response exists.
 #[test]
 fn a_nonlinear_machine_goes_round_its_orbit() {
     let simulated = |scheme: &str, response: &str| {
@@ -60,8 +62,9 @@ fn a_nonlinear_machine_goes_round_its_orbit() {
     assert!(matches!(exact, Err(SimulateError::ExactNonlinear)));
 }
 
-/// Judge: of ẍ + 1.5 ẋ − x + x³ = 0 at rest λ² + 1.5 λ − 1 = 0, so that a disturbance grows by e^(λT),
-/// λ = 1/2, in a period; at rest on the other side of zero, with + x, it dies out.
+/// Reference: at the equilibrium x = 0 of ẍ + 1.5 ẋ − x + x³ = 0 the characteristic equation λ² +
+/// 1.5 λ − 1 = 0 has the root λ = 1/2, so that a disturbance grows by e^(λT) in a period T. With +
+/// x instead of − x it decays.
 #[test]
 fn an_orbit_that_no_machine_stays_on_is_refused() {
     let simulated = |stiffness: f64| {
@@ -78,7 +81,7 @@ fn an_orbit_that_no_machine_stays_on_is_refused() {
     let SimulateError::UnstableOrbit { multiplier } = refused else { panic!("{refused}") };
     assert!((multiplier - std::f64::consts::E).norm() < 1e-6, "{multiplier}");
     assert!(refused.to_string().contains("a disturbance by 2.7183 "), "{refused}");
-    // λ² + 1.5 λ + 1 = 0: of modulus 1, real part −3/4, over 2 s.
+    // The roots of λ² + 1.5 λ + 1 = 0 have modulus 1 and real part −3/4; the period is 2 s.
     let stable = simulated(1.0).unwrap();
     let Multiplier { value, error } = stable.multiplier.unwrap();
     assert!((value.norm() - (-1.5_f64).exp()).abs() < 1e-6 && error < 1e-6, "{value}");
@@ -87,7 +90,8 @@ fn an_orbit_that_no_machine_stays_on_is_refused() {
     assert!(told.contains("it is stable"), "{told}");
 }
 
-/// Judge: each mass of a chain gains energy at the rate −c / 2m = 0.1 1/s for 0.64 s.
+/// Reference: the free response of each mass of a chain grows at the rate −c / 2m = 0.1 1/s, for
+/// 0.64 s.
 #[test]
 fn a_large_machine_that_grows_has_no_periodic_response() {
     let simulated = |damping: f64, scheme: &str| {
@@ -132,7 +136,7 @@ fn unstable(response: &str, samples: usize) -> Result<Simulation, SimulateError>
     simulate(&Experiment::parse("test.json", &text).unwrap())
 }
 
-/// Judge: −c / 2m = 0.1 1/s.
+/// Reference: the free response grows at the rate −c / 2m = 0.1 1/s.
 #[test]
 fn an_unstable_machine_has_no_periodic_response_and_is_told() {
     let refused = unstable("periodic", 64).unwrap_err();
@@ -156,7 +160,7 @@ fn simulated(scheme: &str, response: &str) -> Result<Simulation, SimulateError> 
     simulate(&Experiment::parse("test.json", &text).unwrap())
 }
 
-/// Judge: x = x0 cos ωt + v0/ω sin ωt with ω = 2.
+/// Reference: x = x0 cos ωt + v0/ω sin ωt with ω = 2.
 #[test]
 fn a_free_motion_starts_where_it_is_told_to() {
     let from = r#"{ "from": { "displacement": 0.5, "velocity": -3 } }"#;
@@ -170,7 +174,8 @@ fn a_free_motion_starts_where_it_is_told_to() {
         let simulation = simulated(scheme, from).unwrap();
         let x = simulation.response.displacement();
         for (k, t) in x.sampling().times().enumerate() {
-            // Second order: (ωΔt)² = 4e-4 per unit of time and amplitude, 0.64 s of 1.6 m.
+            // The error is of second order: (ωΔt)² = 4e-4 per unit of time and amplitude, for 0.64
+            // s and 1.6 m.
             assert!((x.channel(0)[k] - truth(t)).abs() < 4e-4, "{scheme} at {t} s");
         }
     }

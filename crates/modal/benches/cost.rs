@@ -1,7 +1,7 @@
 //! Cost of identifying modes over outputs, lines and modes; the last lines are the goals.
 //!
-//! The order is found by the identification itself; every case states how many of its modes it
-//! finds, so that a time bought by missing modes shows.
+//! The identification chooses the order. Every case prints how many of its modes were found, so
+//! that a shorter time due to missing modes is visible.
 #![allow(clippy::print_stdout, reason = "the lines are the result")]
 
 #[path = "../tests/suite/generator.rs"]

@@ -1,8 +1,8 @@
 //! Modes of a measured record: a text file with a header and columns separated by commas.
 //!
-//! `cargo run --release -p mechid-modal --example modal_record -- FILE RATE_HZ INPUTS LOW_HZ HIGH_HZ [SHARE]`
-//! takes the first INPUTS columns as forces; with SHARE, the modes of that part of the record
-//! predict the rest.
+//! `cargo run --release -p mechid-modal --example modal_record -- FILE RATE_HZ INPUTS LOW_HZ
+//! HIGH_HZ [SHARE]` takes the first INPUTS columns as forces; with SHARE, the modes of this part of
+//! the record predict the rest.
 #![allow(clippy::print_stdout, reason = "an example prints its table")]
 
 use std::error::Error;
@@ -13,7 +13,7 @@ use mechid_signal::{Record, Sampling};
 use mechid_spectra::LineData;
 use nalgebra::DMatrix;
 
-/// Prints what the identification does, with the time since the start.
+/// Prints the progress of the identification, with the time since the start.
 struct Progress(Instant);
 
 impl log::Log for Progress {

@@ -62,7 +62,7 @@ pub struct Difference {
     pub standard_error: f64,
     /// Probability of a difference as large by the errors alone; `None` without errors.
     pub p_value: Option<f64>,
-    /// The same after Holm's adjustment for the number of tests of the comparison.
+    /// P-value after Holm's adjustment for the number of tests of the comparison.
     pub adjusted_p_value: Option<f64>,
 }
 
@@ -75,7 +75,7 @@ pub struct ShapeTest {
     pub degrees_of_freedom: usize,
     /// Probability of a statistic as large by the errors alone.
     pub p_value: f64,
-    /// The same after Holm's adjustment.
+    /// P-value after Holm's adjustment for the number of tests of the comparison.
     pub adjusted_p_value: f64,
 }
 
@@ -90,7 +90,7 @@ pub struct ModePair {
     pub mac: Indicator,
     /// Difference of the natural frequencies, in Hz.
     pub natural_frequency_hz: Difference,
-    /// Difference of the damping ratios; `None` if one has none.
+    /// Difference of the damping ratios; `None` if one of the modes has no damping ratio.
     pub damping_ratio: Option<Difference>,
     /// Test of the shapes; `None` without errors, or with a single output.
     pub shape: Option<ShapeTest>,

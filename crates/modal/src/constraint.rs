@@ -37,7 +37,7 @@ pub enum ModalConstraint {
         /// d: 0 for displacements, 1 for velocities, 2 for accelerations.
         derivative: i32,
     },
-    /// Reciprocity: the responses between any two of these points are equal both ways.
+    /// Reciprocity: the response between any two of the points is the same in both directions.
     Reciprocity {
         /// Driving points, at least two.
         points: Vec<DrivingPoint>,
@@ -87,7 +87,10 @@ impl ModalConstraint {
                     let same =
                         |p: &DrivingPoint| p.output == point.output || p.input == point.input;
                     if points[..k].iter().any(same) {
-                        return refused(point.output, "different points");
+                        return refused(
+                            point.output,
+                            "a driving point that shares no output or input with another",
+                        );
                     }
                 }
                 Ok(())

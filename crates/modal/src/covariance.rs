@@ -124,7 +124,8 @@ impl Covariance {
         response
     }
 
-    /// Returns the covariance of real and imaginary part of a shape over its entry `reference`.
+    /// Returns the covariance of real and imaginary part of a shape divided by its entry
+    /// `reference`.
     ///
     /// An unmeasured force on the mode multiplies all its entries by the same factor, which cancels
     /// in the quotient.
@@ -261,7 +262,7 @@ struct ModeResponse {
     response: DMatrix<f64>,
     /// Derivatives by the complex factor that an unmeasured force puts on the shape.
     common: DMatrix<f64>,
-    /// Covariance of that factor with the score.
+    /// Covariance of this complex factor with the score.
     cross: DMatrix<f64>,
 }
 

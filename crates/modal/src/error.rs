@@ -36,7 +36,7 @@ pub enum ModalError {
     },
     /// Inputs that are multiples of one another on every line.
     #[error(
-        "input {input} follows the other inputs (share of its own {own_share:.1e}): their responses \
+        "input {input} follows the other inputs (independent share {own_share:.1e}): their responses \
          cannot be separated; record a test in which it differs, or leave it out"
     )]
     DependentInputs {

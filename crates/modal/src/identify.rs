@@ -215,8 +215,8 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Adds modes beside others whose unmeasured forces took their response, if the likelihood of
-    /// fit and noise together rises by the penalty of their parameters.
+    /// Adds modes whose response is attributed to the unmeasured force of a mode nearby, if the
+    /// likelihood of fit and noise together rises by the penalty of their parameters.
     fn add_hidden(&mut self, required: f64, most: usize) {
         while self.settings.unmeasured_forces && self.modes_in_band() < most {
             let mut trial = self.fit.clone();

@@ -1,9 +1,9 @@
 //! Modes of a structure from any set of sensors and any number of forces, with intervals.
 //!
 //! [`identify_modes`] takes spectral lines ([`mechid_spectra::LineData`]) of one record or of
-//! several: open records with forces, hits with decays that are cut, free decays without forces, or
-//! a table of frequency responses (unit inputs, one record for each column). It fits the modal
-//! model by maximum likelihood, without a window and without averages.
+//! several: open records with forces, hits with truncated decays, free decays without forces, or a
+//! table of frequency responses (unit inputs, one record for each column). It fits the modal model
+//! by maximum likelihood, without a window and without averages.
 //!
 //! | Equation | File |
 //! |---|---|

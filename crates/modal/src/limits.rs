@@ -3,8 +3,8 @@
 /// Number of lines in a block of the parallel sums: blocks bound the memory of a sum and fix its
 /// order, so that a result does not depend on the number of processors.
 pub const BLOCK_LINES: usize = 256;
-/// Maximum ratio of the part of a column that the columns before it do not explain to its length at
-/// which it counts as dependent; a dependent column gets no coefficient.
+/// Maximum length of the part of a dependent column that the columns before it do not explain,
+/// relative to the length of the column; a dependent column gets no coefficient.
 pub const DEPENDENT_COLUMN: f64 = 1e-11;
 /// Largest number of damped steps of one search.
 pub const MAX_STEPS: usize = 40;
@@ -18,7 +18,7 @@ pub const ROUGH_COST_TOLERANCE: f64 = 0.5;
 /// Maximum number of steps of a search before noise and number of modes are known.
 pub const ROUGH_STEPS: usize = 10;
 /// Minimum curvature that scales a step: a pole outside the band has curvatures of 1e-10, which
-/// would block the steps of all others.
+/// would block the steps of all other poles.
 pub const LEAST_CURVATURE: f64 = 1e-2;
 /// Largest step of the logarithm of a decay rate.
 pub const MAX_DECAY_STEP: f64 = 1.0;
@@ -79,10 +79,10 @@ pub const TWIN_HALF_WIDTHS: f64 = 1.0;
 pub const EDGE_HALF_WIDTHS: f64 = 3.0;
 /// Significance level of the test that two shapes differ.
 pub const DIFFERENCE_PROBABILITY: f64 = 1e-3;
-/// Power of a dead channel relative to the strongest channel, at most.
+/// Maximum power of a dead channel, relative to the strongest channel.
 pub const DEAD_CHANNEL: f64 = 1e-26;
 /// Minimum part of an input that the inputs before it do not explain, relative to the input; below
-/// it their responses cannot be separated.
+/// it the responses to these inputs cannot be separated.
 pub const DEPENDENT_INPUTS: f64 = 1e-6;
 /// Distance in half-widths within which two modes may explain the same response: only one of them
 /// is removed at a time.
@@ -93,12 +93,12 @@ pub const GROUP_HALF_WIDTHS: f64 = 10.0;
 /// Distance from a mode, in half-widths, within which its unmeasured force may hide another mode:
 /// the force acts where the mode resonates.
 pub const HIDDEN_HALF_WIDTHS: f64 = 1.0;
-/// Largest ratio of the widths of a mode and of another that it hides; the tails of a wider one
-/// stand out.
+/// Largest ratio of the widths of a mode and of another that it hides; the tails of a wider mode
+/// are visible beside the other.
 pub const HIDDEN_WIDTHS: f64 = 3.0;
-/// Minimum share of the residual around a mode that the measured forces explain at which a hidden
-/// mode is tried: noise explains the number of forces over that of the lines. The likelihood
-/// decides.
+/// Minimum share of the residual around a mode that the measured forces must explain before a
+/// hidden mode is tried; the likelihood then decides. Of noise alone, they explain the ratio of the
+/// number of forces to the number of lines.
 pub const LEAST_HIDDEN_SHARE: f64 = 0.5;
 /// Minimum noise of a sensor, relative to the root-mean-square of its output: lower noise is
 /// rounding, and in data without noise ever more modes would be significant.

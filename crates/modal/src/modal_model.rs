@@ -8,9 +8,10 @@ type C = Complex<f64>;
 
 /// Modes and residual terms of a test: its frequency responses, valid in the band of the test.
 ///
-/// Output i at ω answers forces f by Σ_r [φ_ir L_rᵀf/(jω − λ_r) + φ_ir* L_rᴴf/(jω − λ_r*)] + Σ_n
-/// c_inᵀf (jω/ω₀)ⁿ. The covariance holds poles, shapes and participations; residual terms, and
-/// modes outside the band, count as exact.
+/// At ω and under forces f, output i is Σ_r [φ_ir L_rᵀf/(jω − λ_r) + φ_ir* L_rᴴf/(jω − λ_r*)] + Σ_n
+/// c_inᵀf (jω/ω₀)ⁿ, with the poles λ, shapes φ, participations L and coefficients c of the residual
+/// terms. The covariance includes poles, shapes and participations; residual terms, and modes
+/// outside the band, count as exact.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.6 (modal sum and residual terms).
@@ -137,7 +138,7 @@ impl ModalModel {
     }
 
     /// Returns whether all lists have the sizes that belong together, so that no index is out of
-    /// range: of a model that was read from a file.
+    /// range, for example of a model that was read from a file.
     pub fn is_consistent(&self) -> bool {
         let (outputs, inputs) = (self.outputs(), self.inputs());
         let fits = |term: &ModalTerm| {

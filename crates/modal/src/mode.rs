@@ -19,8 +19,8 @@ pub struct IdentifiedMode {
     /// Standard errors of the real and imaginary part of each entry of `shape`, as real and
     /// imaginary part.
     pub shape_standard_error: Vec<Complex<f64>>,
-    /// Participation of each input, such that the residue of output i and input j is shape_i
-    /// participation_j.
+    /// Participation of each input: the residue of output i and input j is the product of shape
+    /// entry i and participation j.
     pub participation: Vec<Complex<f64>>,
     /// Standard errors of the real and imaginary part of each participation.
     pub participation_standard_error: Vec<Complex<f64>>,
@@ -53,9 +53,9 @@ impl IdentifiedMode {
         self.shape[output] * self.participation[input]
     }
 
-    /// Returns the shape at the inputs, largest entry 1: where the inputs are forces at points of
-    /// one structure (roving hammer), reciprocity makes the participations its shape at these
-    /// points.
+    /// Returns the shape at the inputs, with a largest entry of 1. If the inputs are forces at
+    /// points of one structure (roving hammer), the participations are the shape at these points,
+    /// by reciprocity.
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), section 3.5 (a row of a response matrix is as good

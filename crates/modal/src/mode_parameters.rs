@@ -17,7 +17,7 @@ type C = Complex<f64>;
 pub(crate) struct ModeParameters {
     pub(crate) outputs: usize,
     pub(crate) inputs: usize,
-    /// Load whose participation is 1; beyond the inputs if it is a transient.
+    /// Index of the load whose participation is 1; an index beyond the inputs is a transient.
     pub(crate) gauge: usize,
     pub(crate) values: DVector<f64>,
     pub(crate) covariance: DMatrix<f64>,

@@ -1,8 +1,9 @@
 //! Kernels of the modal model: response of a mode to a load on a line, and its derivatives.
 //!
-//! Output i at ω is Σ_r [φ_ir g_r(ω) + φ_ir* g̃_r(ω)] + Σ_e E_e Σ_n c_ien (jω)ⁿ with g_r = Σ_e L_re
-//! E_e h_re, where h is 1/(jω − λ_r) for a force and Δt/(1 − e^{(λ_r − jω)Δt}), the exact transform
-//! of a sampled decay, for the transient of a record; g̃ is g with λ* and L* in place of λ and L.
+//! With the amplitudes E_e of the loads e, output i at ω is Σ_r [φ_ir g_r(ω) + φ_ir* g̃_r(ω)] + Σ_e
+//! E_e Σ_n c_ien (jω)ⁿ with g_r = Σ_e L_re E_e h_re. The kernel h is 1/(jω − λ_r) for a force and
+//! Δt/(1 − e^{(λ_r − jω)Δt}), the exact transform of a sampled decay, for the transient of a
+//! record; g̃ is g with λ* and L* in place of λ and L.
 //!
 //! # Source
 //! Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -194,8 +195,8 @@ impl Model {
 
     /// Writes the derivatives of a block: a pair of columns for each pair of parameters in `pairs`.
     ///
-    /// With a = ∂g/∂λ (or ∂g/∂L) and b, the same of the conjugate mode, the pair is a + b and j(a −
-    /// b); the derivative of output i is this pair turned by its shape φ_i.
+    /// With a = ∂g/∂λ (or ∂g/∂L) and the same derivative b of the conjugate mode, the pair is a + b
+    /// and j(a − b); the derivative of output i is this pair multiplied by its complex shape φ_i.
     pub(crate) fn fill_derivatives(
         &self,
         lines: &Lines,

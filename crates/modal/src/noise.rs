@@ -1,7 +1,8 @@
 //! Noise of the outputs: a smooth spectrum per sensor, and unmeasured forces through the modes.
 //!
-//! e(ω) = Σ_r φ_r w_r(ω)/(jω − λ_r) + n(ω), with E|w_r|² = S_r and E|n_i|² = D_i(ω) smooth. A
-//! resonance is only a few lines wide; a smooth spectrum cannot follow the first term.
+//! The noise is e(ω) = Σ_r φ_r w_r(ω)/(jω − λ_r) + n(ω), with the unmeasured force w_r on mode r
+//! and the noise n_i of sensor i; E|w_r|² = S_r, and E|n_i|² = D_i(ω) is smooth. A resonance is
+//! only a few lines wide; a smooth spectrum cannot follow the first term.
 //!
 //! # Source
 //! Au, *Operational Modal Analysis* (2017), chapter 10 (likelihood of the lines of modal

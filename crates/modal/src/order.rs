@@ -63,8 +63,8 @@ pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
     (0..modes).map(loss).collect()
 }
 
-/// Returns whether a pole lies within the resonance of a mode of the fit and is about as wide: the
-/// unmeasured force of a mode takes up no more than this.
+/// Returns whether a pole lies within the resonance of a mode of the fit and is about as wide: only
+/// such a pole can be hidden by the unmeasured force of the mode.
 pub(crate) fn is_within_resonance(pole: C, modes: &[C]) -> bool {
     let width = |mode: &C| pole.re / mode.re;
     let inside = |mode: &&C| (pole.im - mode.im).abs() < HIDDEN_HALF_WIDTHS * -mode.re;

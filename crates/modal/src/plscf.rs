@@ -66,7 +66,7 @@ pub enum PlscfError {
         needed: usize,
     },
     /// The orders do not rise, are zero, or are too high.
-    #[error("orders must rise from at least 1, and order × inputs be at most {most}")]
+    #[error("orders must rise from at least 1, and order × inputs must be at most {most}")]
     Orders {
         /// Largest product of order and number of inputs.
         most: usize,

@@ -28,7 +28,7 @@ pub(crate) trait Design: Sync {
     fn columns(&self, lines: &Lines) -> usize;
     /// Returns the columns that act on a block.
     fn block_columns(&self, lines: &Lines, block: &Block) -> Vec<usize>;
-    /// Writes these columns, whitened; each has the real parts above the imaginary parts.
+    /// Writes the whitened columns of a block; each has the real parts above the imaginary parts.
     fn fill(&self, lines: &Lines, block: &Block, weight: &[f64], columns: &mut [f64]);
 }
 
@@ -52,7 +52,7 @@ pub(crate) struct BlockArrays {
     pub(crate) weight: Vec<f64>,
     /// Whitened outputs, 2n rows each.
     pub(crate) outputs: Vec<f64>,
-    /// Columns of the whole problem that act here.
+    /// Columns of the whole problem that act on the block.
     pub(crate) columns: Vec<usize>,
     /// Whitened columns, 2n rows each.
     pub(crate) design: Vec<f64>,
@@ -60,7 +60,7 @@ pub(crate) struct BlockArrays {
     pub(crate) residual: Vec<f64>,
     /// Design and outputs, replaced by their triangular factor.
     stacked: Vec<f64>,
-    /// Unknowns of this block's columns.
+    /// Unknowns of the columns of the block.
     local: Vec<f64>,
 }
 
@@ -69,7 +69,7 @@ pub(crate) struct BlockArrays {
 pub(crate) struct Projection {
     pub(crate) blocks: Vec<BlockArrays>,
     pub(crate) triangle: Triangle,
-    /// Unknowns of each output, one output after the other, over the level of the output.
+    /// Unknowns of each output, divided by the level of the output, one output after the other.
     pub(crate) unknowns: Vec<f64>,
     /// Sum of the squared whitened residuals.
     pub(crate) cost: f64,

@@ -150,8 +150,9 @@ impl Scores<'_> {
         effect
     }
 
-    /// Returns Σ_i x_si α_i and Σ_i y_si α_i of every pair, α the whitened shape of the driven
-    /// mode, and Σ |α_i|².
+    /// Returns Σ_i x_si α_i and Σ_i y_si α_i of every pair of parameters, and Σ |α_i|²: α is the
+    /// whitened shape of the driven mode, x_s and y_s are the real and imaginary parts of the
+    /// whitened shape of the pair's mode s.
     fn along(&self, mode: usize, outputs: usize) -> (Vec<(C, C)>, f64) {
         let column = |row: usize| &self.shapes[row * outputs..(row + 1) * outputs];
         let product = |a: usize, b: usize| -> f64 {

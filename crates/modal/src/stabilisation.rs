@@ -59,9 +59,11 @@ pub struct StabilisationPole {
     pub pole: Pole,
     /// `true` if a pole of the order before is within [`STABLE_FREQUENCY`].
     pub stable_frequency: bool,
-    /// `true` if that pole also agrees within [`STABLE_DAMPING`].
+    /// `true` if a pole of the order before has a stable frequency and agrees within
+    /// [`STABLE_DAMPING`].
     pub stable_damping: bool,
-    /// `true` if its participation or shape agrees within [`STABLE_VECTOR`].
+    /// `true` if participation or shape of the nearest pole of the order before agrees within
+    /// [`STABLE_VECTOR`].
     pub stable_vector: bool,
 }
 

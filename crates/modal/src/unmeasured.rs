@@ -13,7 +13,8 @@ type C = Complex<f64>;
 /// Sums over the lines for the unmeasured force of one mode.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ForceSums {
-    /// Derivative of the log-likelihood with respect to ln S_r: Σ S_r (|b_rᴴV⁻¹e|² − b_rᴴV⁻¹b_r).
+    /// Derivative of the log-likelihood with respect to ln S_r: Σ S_r (|b_rᴴV⁻¹e|² − b_rᴴV⁻¹b_r),
+    /// with the response b_r to a unit force on mode r, the residual e and its covariance V.
     pub(crate) score: f64,
     /// Information on ln S_r, including the part shared with other forces: Σ_s Σ S_r S_s
     /// |b_rᴴV⁻¹b_s|².
@@ -37,18 +38,18 @@ pub(crate) struct ForceModel<'a> {
     /// Shapes in the units of the outputs: `[mode][output]`.
     pub(crate) shapes: &'a [Vec<C>],
     pub(crate) residuals: &'a Residuals,
-    /// φ_rᴴD⁻¹φ_r: `[mode · lines + line]`.
+    /// Squared shapes weighted by the noise, φ_rᴴD⁻¹φ_r: `[mode · lines + line]`.
     pub(crate) directions: &'a [f64],
 }
 
-/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line; its
-/// memory is reused from line to line.
+/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for the columns φ_r h_r of B and the covariance V of
+/// the line; its memory is reused from line to line.
 #[derive(Default)]
 pub(crate) struct Posterior {
     active: Vec<usize>,
     gains: Vec<C>,
     process: Vec<f64>,
-    /// `[a · size + b]`.
+    /// Matrix BᴴV⁻¹B, with the entries `[a · size + b]`.
     information: Vec<C>,
     projected_error: Vec<C>,
     row: Vec<C>,

@@ -10,8 +10,8 @@ use crate::{ModelError, Response, Sdof};
 impl Sdof {
     /// Returns the free response from x(0) = `x0` (m) and ẋ(0) = `v0` (m/s).
     ///
-    /// With h the impulse response, x = x0 (ḣ + c/m h) + v0 h: one expression for underdamped,
-    /// critically damped and overdamped systems.
+    /// The response is x = x0 (ḣ + c/m h) + v0 h, with h the impulse response. This one expression
+    /// holds for underdamped, critically damped and overdamped systems.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] if `x0` or `v0` is not finite, [`ModelError::Signal`] if an
@@ -29,8 +29,8 @@ impl Sdof {
         self.respond(sampling, |t| (self.free_motion(t, x0, v0), 0.0))
     }
 
-    /// Returns the response from `x0`, `v0` to a force switched on at t = 0: F(t) = `force` (N) for
-    /// t ≥ 0.
+    /// Returns the response from x(0) = `x0` (m) and ẋ(0) = `v0` (m/s) to a force switched on at t
+    /// = 0: F(t) = `force` (N) for t ≥ 0.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] if `force`, `x0` or `v0` is not finite, [`ModelError::Signal`] if
@@ -55,7 +55,8 @@ impl Sdof {
         })
     }
 
-    /// Returns the response from `x0`, `v0` to F(t) = Re(`force` exp(iωt)), transient included.
+    /// Returns the response from x(0) = `x0` (m) and ẋ(0) = `v0` (m/s) to F(t) = Re(`force`
+    /// exp(iωt)), transient included.
     ///
     /// A force F cos(ωt + φ) has `force` = F exp(iφ). Resonance needs no exception: without damping
     /// the amplitude grows in proportion to t. The error is of the order of ε relative to the
@@ -119,17 +120,20 @@ impl Sdof {
         self.integrated_impulse_response(0, t)
     }
 
-    /// Returns the impulse response integrated `k` times from 0: tᵏ⁺¹ φ_k[λ₁t, λ₂t] / m.
+    /// Returns the impulse response integrated `k` times from 0: tᵏ⁺¹ φ_k[λ₁t, λ₂t] / m, with the
+    /// poles λ₁, λ₂ and the divided difference φ_k[a, b] of [`phi_divided`].
     ///
-    /// k = 1 is the response to a unit step, k = 2 to the ramp F = t.
+    /// The response to a unit step has k = 1, the response to the ramp F = t has k = 2.
     pub(crate) fn integrated_impulse_response(&self, k: usize, t: f64) -> f64 {
         let [a, b] = self.poles().map(|p| p * t);
         phi_divided(k, a, b).re * t.powi(k as i32 + 1) / self.mass()
     }
 
-    /// Returns x and ẋ at `t` of the free response from `x0`, `v0`.
+    /// Returns x and ẋ at `t` of the free response from the displacement `x0` and the velocity
+    /// `v0`.
     pub(crate) fn free_motion(&self, t: f64, x0: f64, v0: f64) -> (f64, f64) {
-        // The first real root is the faster one, which avoids cancellation in these two sums.
+        // The first real root is the faster one; taking it first avoids cancellation in these two
+        // sums.
         let [fast, slow] = self.poles();
         let h = t * phi_divided(0, fast * t, slow * t);
         let h_dot = (fast * t).exp() + slow * h;
@@ -139,7 +143,7 @@ impl Sdof {
     }
 
     /// Returns x and ẋ at `t`, from rest under the complex force exp(μt): the divided difference of
-    /// exp(zt) over λ₁, λ₂ and μ, over m.
+    /// exp(zt) at λ₁, λ₂ and μ, divided by m.
     fn forced_motion(&self, t: f64, mu: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
         let [p, q] = self.poles();
         // Division by the distance to the farther root avoids cancellation, also at resonance.

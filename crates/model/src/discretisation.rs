@@ -23,14 +23,14 @@ pub enum Discretisation {
     /// hold).
     #[cfg_attr(feature = "serde", serde(rename = "held"))]
     ZeroOrderHold,
-    /// The force is linear between samples: Φ as above, z⁺ = Φ z + Γ₀ F + Γ₁ F⁺, where
-    /// Γ₀ + Γ₁ = ∫₀^Δt exp(As) ds B.
+    /// The force is linear between samples: Φ = exp(AΔt), z⁺ = Φ z + Γ₀ F + Γ₁ F⁺, where Γ₀ + Γ₁ =
+    /// ∫₀^Δt exp(As) ds B.
     #[cfg_attr(feature = "serde", serde(rename = "linear"))]
     FirstOrderHold,
 }
 
 impl Discretisation {
-    /// All assumptions.
+    /// All assumptions on a force between its samples.
     pub const ALL: [Self; 3] = [Self::Euler, Self::ZeroOrderHold, Self::FirstOrderHold];
 
     fn name(self) -> &'static str {

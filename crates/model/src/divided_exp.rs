@@ -1,9 +1,10 @@
 //! Divided differences of the exponential, accurate for roots of an oscillator that are far apart,
 //! close together or equal.
 //!
-//! φ₀(z) = exp z and φ_{k+1}(z) = (φ_k(z) − 1/k!) / z. The responses of an oscillator with roots
-//! λ₁, λ₂ are divided differences φ_k[λ₁t, λ₂t]: one expression for all values of the damping,
-//! whereas the three expressions of textbooks lose digits between them.
+//! The functions are φ₀(z) = exp z and φ_{k+1}(z) = (φ_k(z) − 1/k!) / z. The responses of an
+//! oscillator with roots λ₁, λ₂ are divided differences φ_k[λ₁t, λ₂t]: one expression for all
+//! values of the damping. The three expressions of textbooks (underdamped, critical, overdamped)
+//! lose digits near critical damping.
 //!
 //! # Source
 //! Higham (2008), Functions of Matrices, chapter 10 (the φ functions) and appendix B.16 (divided
@@ -13,10 +14,10 @@ use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Number of terms of a power series for |z| < 1: 1/20! < ε/2.
+/// Number of terms of a power series for |z| < 1; the next term is below 1/20! < ε/2.
 const TERMS: usize = 20;
 
-/// Returns φ_k(z).
+/// Returns φ_k(z) = (φ_{k−1}(z) − 1/(k−1)!) / z, with φ₀(z) = exp z.
 pub(crate) fn phi(k: usize, z: C) -> C {
     if k > 0 && z.norm() < 1.0 {
         // The series Σ z^j / (j + k)! is summed from the small terms up.
@@ -61,7 +62,7 @@ fn series(k: usize, a: C, b: C) -> C {
 
 /// Returns sinh(z) / z.
 fn sinhc(z: C) -> C {
-    // The next term, z²/6, is below ε.
+    // The next term of the series 1 + z²/6 is below the rounding ε.
     if z.norm() < 1e-8 { C::from(1.0) } else { z.sinh() / z }
 }
 

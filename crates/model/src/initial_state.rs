@@ -36,12 +36,12 @@ impl InitialState {
         Self { displacement: DVector::zeros(dof), velocity: DVector::zeros(dof) }
     }
 
-    /// x(0), in m.
+    /// Displacement x(0), in m.
     pub fn displacement(&self) -> &DVector<f64> {
         &self.displacement
     }
 
-    /// ẋ(0), in m/s.
+    /// Velocity ẋ(0), in m/s.
     pub fn velocity(&self) -> &DVector<f64> {
         &self.velocity
     }

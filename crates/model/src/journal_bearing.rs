@@ -7,7 +7,7 @@ use crate::{ModelError, SecondOrderSystem};
 
 /// Sign of the coefficient Kyx in the equation of the y direction.
 ///
-/// Sources differ, and so do the eigenvalues: there is no default.
+/// Sources use different signs, which lead to different eigenvalues, so that there is no default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum KyxSign {
     /// + Kyx x: the coefficient is the entry of the stiffness matrix.
@@ -17,7 +17,7 @@ pub enum KyxSign {
 }
 
 impl KyxSign {
-    /// The factor +1 or −1.
+    /// Returns the factor +1 or −1.
     pub fn factor(self) -> f64 {
         match self {
             KyxSign::Plus => 1.0,
@@ -49,7 +49,7 @@ pub struct OilFilm {
     pub cyy: f64,
 }
 
-/// A rigid shaft of mass M in an oil film, with springs of its support in x and y.
+/// Rigid shaft of mass M in an oil film; springs Sx and Sy support it in x and y.
 ///
 /// ```text
 /// M ẍ + Cxx ẋ + Cxy ẏ + (Kxx + Sx) x +        Kxy y = Fx
@@ -83,7 +83,7 @@ pub struct JournalBearing {
 }
 
 impl JournalBearing {
-    /// A shaft of `mass` (kg, positive) in an oil film, without springs of a support.
+    /// Creates a shaft of `mass` (kg, positive) in an oil film, without springs of a support.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] naming the mass or coefficient that is out of range.
@@ -135,7 +135,7 @@ impl JournalBearing {
         self.support
     }
 
-    /// M, C and K, 2×2.
+    /// Returns the system with M, C and K, 2×2.
     pub fn system(&self) -> SecondOrderSystem {
         let OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy } = self.film;
         let [sx, sy] = self.support;

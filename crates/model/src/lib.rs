@@ -26,17 +26,17 @@
 //! | a system | [`SecondOrderSystem::new`], [`Sdof`], [`JournalBearing`] |
 //! | a system of many degrees of freedom | [`SparseSystem`] |
 //! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
-//! | the free response that grows | [`SecondOrderSystem::instability`] |
+//! | the free response that grows fastest | [`SecondOrderSystem::instability`] |
 //! | dynamic stiffness | [`SecondOrderSystem::dynamic_stiffness`] |
 //! | receptance | [`SecondOrderSystem::receptance`] |
 //! | exact responses of one degree of freedom | [`Sdof`], such as [`Sdof::free_response`] |
 //! | the exact step from one sample to the next | [`StateTransition`] |
 //! | the name of a measured quantity | [`ResponseQuantity`] |
 //! | the name of an identified entry | [`Parameter`] |
-//! | the course of a force between samples | [`Discretisation`] |
+//! | the assumption on a force between samples | [`Discretisation`] |
 //! | a system that was identified, with its covariance | [`UncertainSystem`] |
 //! | springs and dampers that are not linear | [`NonlinearSystem`], [`Terms`] |
-//! | frequency over amplitude | [`UncertainNonlinearSystem::backbone`] |
+//! | frequency of free vibration as a function of its amplitude | [`UncertainNonlinearSystem::backbone`] |
 //! | a time axis that suits the system | [`npi_sampling`] |
 
 mod closed_form;

@@ -4,20 +4,20 @@
 // Modes
 
 /// Maximum relative difference of eigenvalues that count as one multiple eigenvalue: about √ε, the
-/// rounding of a defective pair.
+/// distance that rounding causes within a defective pair.
 pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-7;
 
-/// Distance of the shift of inverse iteration from the eigenvalue, in units of its rounding. It
-/// exceeds the coupling of equal eigenvalues by rounding, so that each start gives its own
-/// direction.
+/// Distance between the shift of inverse iteration and the eigenvalue, in units of the rounding of
+/// the eigenvalue. It is larger than the coupling that rounding causes between equal eigenvalues,
+/// so that each start vector gives another direction.
 pub(crate) const INVERSE_ITERATION_SHIFT: f64 = 100.0;
 
-/// Number of steps of inverse iteration: the first reduces other modes to rounding, the second
-/// below it.
+/// Number of steps of inverse iteration: the first step reduces the other modes to the size of
+/// rounding, the second below it.
 pub(crate) const INVERSE_ITERATION_STEPS: usize = 2;
 
-/// Smallest independent part of a shape, relative to others of the same eigenvalue, that makes it
-/// a separate shape.
+/// Smallest part of a shape that is independent of the other shapes of the same eigenvalue,
+/// relative to the shape; below it there is no further independent shape.
 pub(crate) const INDEPENDENT_SHAPE: f64 = 1e-3;
 
 /// Maximum number of degrees of freedom for which all singular values of M are computed; above it
@@ -26,20 +26,21 @@ pub(crate) const SINGULAR_VALUES_DOF: usize = 64;
 
 // Backbone
 
-/// Number of harmonics of the motion, in addition to its mean.
+/// Number of harmonics of a motion on the backbone, in addition to its mean.
 pub(crate) const HARMONICS: usize = 9;
 
-/// Number of instants of a period: enough that the ninth power of nine harmonics, times one of
-/// them, does not alias.
+/// Number of instants per period: enough to avoid aliasing of the ninth power of a sum of nine
+/// harmonics, multiplied by one of them.
 pub(crate) const INSTANTS: usize = 128;
 
-/// Maximum number of Newton steps for one amplitude.
+/// Maximum number of Newton steps for one amplitude of a backbone.
 pub(crate) const BACKBONE_NEWTON_STEPS: usize = 30;
 
-/// Newton step, relative to amplitude and frequency, that ends the iteration.
+/// Newton step, relative to amplitude and frequency, that ends the iteration for a backbone.
 pub(crate) const BACKBONE_STEP: f64 = 1e-11;
 
-/// Maximum number of attempts from one amplitude to the next; each failure halves the step.
+/// Maximum number of attempts from one amplitude of a backbone to the next; each failure halves the
+/// step.
 pub(crate) const BACKBONE_ATTEMPTS: usize = 16;
 
 /// Change of a parameter for a numerical derivative, in standard errors.
@@ -57,5 +58,5 @@ pub(crate) const HIGHEST_EXPONENT: u32 = 9;
 #[cfg(feature = "serde")]
 pub(crate) const MAX_MATRIX_ORDER: usize = 10_000;
 
-/// Maximum number of names in a message; more would hide the wrong one.
+/// Maximum number of names in a message; a longer list would hide the wrong name.
 pub(crate) const LISTED_NAMES: usize = 12;

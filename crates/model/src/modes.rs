@@ -39,12 +39,13 @@ impl Mode {
         (sound && shape.iter().all(finite)).then_some(Self { eigenvalue, shape })
     }
 
-    /// λ, in rad/s, with Im λ ≥ 0; its conjugate belongs to the conjugate shape.
+    /// Eigenvalue λ, in rad/s, with Im λ ≥ 0; its conjugate belongs to the conjugate shape.
     pub fn eigenvalue(&self) -> Complex<f64> {
         self.eigenvalue
     }
 
-    /// φ, one entry per degree of freedom, dimensionless: scaled so that its largest entry is 1.
+    /// Mode shape φ, one entry per degree of freedom, dimensionless, scaled so that its largest
+    /// entry is 1.
     pub fn shape(&self) -> &DVector<Complex<f64>> {
         &self.shape
     }
@@ -84,19 +85,19 @@ fn largest_entry(shape: &DVector<Complex<f64>>) -> Complex<f64> {
     })
 }
 
-/// Growing free response exp(λt), Re λ > 0.
+/// Free response that grows as exp(λt), with Re λ > 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instability {
     eigenvalue: Complex<f64>,
 }
 
 impl Instability {
-    /// λ, in rad/s, with Im λ ≥ 0.
+    /// Eigenvalue λ, in rad/s, with Im λ ≥ 0.
     pub fn eigenvalue(&self) -> Complex<f64> {
         self.eigenvalue
     }
 
-    /// Re λ, in 1/s.
+    /// Growth rate Re λ, in 1/s.
     pub fn growth_rate(&self) -> f64 {
         self.eigenvalue.re
     }
@@ -148,7 +149,7 @@ impl SecondOrderSystem {
     /// ```
     ///
     /// # Source
-    /// Dissertation eqs. (4.5.8) and (4.5.26), with the order x, ẋ, y, ẏ there.
+    /// Dissertation eqs. (4.5.8) and (4.5.26); there the order of the states is x, ẋ, y, ẏ.
     pub fn state_matrix(&self) -> DMatrix<f64> {
         let n = self.dof();
         let mass = self.mass().clone().lu();
@@ -172,7 +173,7 @@ impl SecondOrderSystem {
 
     fn decomposition(&self) -> Result<Decomposition, ModelError> {
         let mut a = self.state_matrix();
-        // Balancing squares the entries, and does not end for infinite ones.
+        // Balancing squares the entries, and it does not terminate for infinite ones.
         let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
         if largest > 1e150 || a.iter().any(|v| v.is_nan()) {
             return Err(ModelError::StateMatrixOverflow { largest });
@@ -203,14 +204,15 @@ impl SecondOrderSystem {
     /// Computes the modes in ascending order of natural frequency: one for each conjugate pair, one
     /// for each real eigenvalue.
     ///
-    /// The n degrees of freedom have n modes if all of them oscillate, up to 2n otherwise. A
-    /// repeated eigenvalue with enough independent shapes gives orthonormal directions of their
-    /// space (each then scaled). If it has fewer (it is defective, as in critical damping), a shape
-    /// is repeated. Rounding splits a defective pair by about √ε: a rigid-body mode has |λ| of
-    /// about 1e-7 rad/s instead of 0.
+    /// A system of n degrees of freedom has n modes if all of them oscillate, otherwise up to 2n.
+    /// If a repeated eigenvalue has enough independent shapes, they are orthogonal; each is then
+    /// scaled. If it has fewer (it is defective, as in critical damping), a shape is repeated.
+    /// Rounding splits a defective pair by about √ε: a rigid-body mode has |λ| of about 1e-7 rad/s
+    /// instead of 0.
     ///
-    /// The shapes come from the same Schur form as the eigenvalues, O(n²) each; if only frequencies
-    /// and damping are needed, [`eigenvalues`](Self::eigenvalues) is a little faster.
+    /// The shapes come from the same Schur form as the eigenvalues, at a cost of O(n²) each; if
+    /// only frequencies and damping are needed, [`eigenvalues`](Self::eigenvalues) is a little
+    /// faster.
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).
@@ -229,7 +231,7 @@ impl SecondOrderSystem {
             let twins: Vec<&Mode> = modes.iter().filter(near).collect();
             let shape = decomposition.shape(eigenvalue, twins.len());
             let mut apart = shape.clone();
-            // The second pass removes the rounding of the first.
+            // The second pass over the same shapes removes the rounding of the first.
             for twin in twins.iter().chain(&twins) {
                 let along = twin.shape.dotc(&apart) / Complex::from(twin.shape.norm_squared());
                 apart.axpy(-along, &twin.shape, Complex::from(1.0));
@@ -253,7 +255,8 @@ struct Decomposition {
 }
 
 impl Decomposition {
-    /// Returns the eigenvalues by modulus; in a conjugate pair the one with Im λ > 0 comes first.
+    /// Returns the eigenvalues, sorted by modulus; in a conjugate pair the one with Im λ > 0 comes
+    /// first.
     fn eigenvalues(&self) -> Vec<Complex<f64>> {
         let mut eigenvalues = self.schur.eigenvalues();
         eigenvalues.sort_by(|p, q| {
@@ -263,7 +266,7 @@ impl Decomposition {
     }
 
     /// Returns a shape φ for the eigenvalue λ, of any length, by inverse iteration; for a repeated
-    /// eigenvalue each `copy` gives another one.
+    /// eigenvalue each `copy` gives another shape.
     fn shape(&self, eigenvalue: Complex<f64>, copy: usize) -> DVector<Complex<f64>> {
         let len = self.balance.len();
         let shift = eigenvalue
@@ -299,8 +302,8 @@ impl Decomposition {
                     [shifted, t[(at, at + 1)].into(), y[at]],
                     [t[(at + 1, at)].into(), t[(at + 1, at + 1)] - shift, y[at + 1]],
                 ];
-                // Cramer's rule would lose the direction of a nearly singular block, so this is
-                // elimination.
+                // Elimination is used here because Cramer's rule would lose the direction of a
+                // nearly singular block.
                 if rows[0][0].norm() < rows[1][0].norm() {
                     rows.swap(0, 1);
                 }
@@ -483,8 +486,8 @@ mod tests {
         }
     }
 
-    /// Judge: a chain between walls has the shapes sin(r π i / (n + 1)); in two planes that know
-    /// nothing of one another each belongs to two modes.
+    /// Judge: a chain between walls has the shapes sin(r π i / (n + 1)); in two planes without
+    /// coupling, each shape belongs to two modes.
     #[test]
     fn two_equal_chains_have_the_shapes_of_the_closed_form() {
         let n = 20;

@@ -56,7 +56,7 @@ impl Parameter {
             .ok_or_else(|| ModelError::NoSuchParameter { name: name.to_owned(), dof })
     }
 
-    /// Returns the entry with a name, for both forms of its numbers.
+    /// Returns the entry with a name such as `k12`, or `k1,12` for ten or more degrees of freedom.
     fn read(name: &str, dof: usize) -> Option<Self> {
         let matrix = Matrix::ALL.into_iter().find(|matrix| name.starts_with(matrix.letter()))?;
         let numbers = &name[matrix.letter().len_utf8()..];

@@ -21,11 +21,11 @@ use crate::ModelError;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ResponseQuantity {
-    /// x, in m.
+    /// Displacement x, in m.
     Displacement,
-    /// ẋ, in m/s.
+    /// Velocity ẋ, in m/s.
     Velocity,
-    /// ẍ, in m/s².
+    /// Acceleration ẍ, in m/s².
     Acceleration,
 }
 

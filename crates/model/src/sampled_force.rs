@@ -88,8 +88,8 @@ impl Sdof {
         self.sampled(force, x0, v0, |_, right| right)
     }
 
-    /// Computes the response; `end` returns the force at the end of a step from the samples on its
-    /// left and right.
+    /// Computes the response; `end` returns the force just before the end of a step from the
+    /// samples at its beginning and end.
     fn sampled(
         &self,
         force: &Record,

@@ -60,17 +60,17 @@ impl Sdof {
         Self::new(mass, damping, mass * natural_frequency * natural_frequency)
     }
 
-    /// m, in kg.
+    /// Mass m, in kg.
     pub fn mass(&self) -> f64 {
         self.mass
     }
 
-    /// c, in N·s/m.
+    /// Damping c, in N·s/m.
     pub fn damping(&self) -> f64 {
         self.damping
     }
 
-    /// k, in N/m.
+    /// Stiffness k, in N/m.
     pub fn stiffness(&self) -> f64 {
         self.stiffness
     }

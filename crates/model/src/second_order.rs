@@ -13,16 +13,16 @@ use mechid_numerics::linear_algebra::singular_values;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Matrix {
-    /// M, in kg.
+    /// Mass matrix M, in kg.
     Mass,
-    /// C, in N·s/m.
+    /// Damping matrix C, in N·s/m.
     Damping,
-    /// K, in N/m.
+    /// Stiffness matrix K, in N/m.
     Stiffness,
 }
 
 impl Matrix {
-    /// M, C, K, in the order of every covariance.
+    /// Matrices M, C, K, in the order of every covariance.
     pub const ALL: [Self; 3] = [Self::Mass, Self::Damping, Self::Stiffness];
 
     /// Returns the letter of its entries: `m`, `c` or `k`.
@@ -98,8 +98,8 @@ impl SecondOrderSystem {
         {
             check(matrix, entries, dof)?;
         }
-        // Solvers factor M by LU, so a matrix that is accepted here must not have a vanishing pivot
-        // there.
+        // Solvers factor M by LU decomposition, so that a matrix without a regular LU decomposition
+        // is refused here, too.
         let factored = mass.clone().lu();
         let reciprocal_condition = reciprocal_condition(&mass, &factored);
         let invertible = factored.is_invertible();
@@ -114,17 +114,17 @@ impl SecondOrderSystem {
         self.mass.nrows()
     }
 
-    /// M, n×n, in kg.
+    /// Mass matrix M, n×n, in kg.
     pub fn mass(&self) -> &DMatrix<f64> {
         &self.mass
     }
 
-    /// C, n×n, in N·s/m.
+    /// Damping matrix C, n×n, in N·s/m.
     pub fn damping(&self) -> &DMatrix<f64> {
         &self.damping
     }
 
-    /// K, n×n, in N/m.
+    /// Stiffness matrix K, n×n, in N/m.
     pub fn stiffness(&self) -> &DMatrix<f64> {
         &self.stiffness
     }
@@ -176,7 +176,7 @@ fn reciprocal_condition(mass: &DMatrix<f64>, factored: &LU<f64, Dyn, Dyn>) -> f6
     for _ in 0..6 {
         large = mass.tr_mul(&(mass * large.normalize()));
         small.normalize_mut();
-        // The transposed matrix is Uᵀ Lᵀ P.
+        // The transposed matrix of M = Pᵀ L U is Uᵀ Lᵀ P.
         let solved = upper.tr_solve_upper_triangular_mut(&mut small)
             && lower.tr_solve_lower_triangular_mut(&mut small);
         if !solved {

@@ -145,7 +145,7 @@ pub fn band(dof: usize, diagonals: &[(isize, f64)]) -> CsrMatrix<f64> {
     CsrMatrix::from(&coo)
 }
 
-/// Returns an error for the first entry that is not finite; rows and columns count from 0.
+/// Returns an error for the first entry that is not finite; its row and column count from 0.
 fn check_finite(
     matrix: Matrix,
     entries: impl IntoIterator<Item = (usize, usize, f64)>,
@@ -158,8 +158,8 @@ fn check_finite(
     }
 }
 
-/// Returns the smallest over the largest entry of a diagonal M; 0 for an empty row or column,
-/// otherwise 1.
+/// Returns the ratio of the smallest to the largest entry of a diagonal M. For any other M it is 0
+/// if a row or column is empty, and otherwise 1.
 fn mass_spread(mass: &CsrMatrix<f64>) -> f64 {
     let dof = mass.nrows();
     let (mut rows, mut columns) = (vec![0.0_f64; dof], vec![0.0_f64; dof]);

@@ -5,11 +5,11 @@ use nalgebra::DMatrix;
 use crate::{ModelError, SecondOrderSystem};
 use mechid_numerics::linear_algebra::exponential;
 
-/// Transition of the state over one step Δt: z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)), with
-/// Γ₁ only for a linear input.
+/// Transition of the state z over one step Δt: z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)). The
+/// last part applies only to an input u that is linear between samples.
 ///
-/// Step units: the state is z = \[x; Δt ẋ\] and time is τ = t/Δt, so that no entry is large unless
-/// the step is long for the system:
+/// In step units the state is z = \[x; Δt ẋ\] and time is τ = t/Δt, so that no entry is large
+/// unless the step is long for the system:
 ///
 /// ```text
 /// d ┌  x   ┐   ┌      0           I     ┐ ┌  x   ┐   ┌ 0 ┐

@@ -6,8 +6,8 @@ use nalgebra::{Complex, DMatrix};
 use crate::{ModelError, Response, SecondOrderSystem};
 
 /// Computes the periodic response to a `force` of samples × n (N), which is band-limited between
-/// its samples, line by line: X_n = (K − ω²M + iωC)⁻¹ F_n. It is exact up to rounding, without a
-/// time step.
+/// its samples. Each line has the amplitude X_n = (K − ω²M + iωC)⁻¹ F_n; the response is exact up
+/// to rounding and needs no time step.
 ///
 /// For an unstable system the equations have a solution, too, but no real response converges to it.
 ///

@@ -46,7 +46,7 @@ fn spectrum_gap(p: &[Complex<f64>], q: &[Complex<f64>]) -> f64 {
     p.iter().map(nearest).fold(0.0, f64::max) / largest
 }
 
-/// A nearly defective pair among random systems moves by √ε of rounding; hardly ever more.
+/// Rounding moves a nearly defective pair among random systems by √ε, hardly ever by more.
 const EIGENVALUE: f64 = 1e-6;
 
 proptest! {
@@ -83,7 +83,7 @@ proptest! {
     #[test]
     fn shapes_solve_the_quadratic_eigenvalue_problem(s in systems()) {
         for mode in s.modes().unwrap() {
-            // Backward stable up to the balancing of the state matrix.
+            // The modes are backward stable up to the balancing of the state matrix.
             prop_assert!(residual(&s, &mode) < 1e-12, "{:?}", mode);
             let largest = mode.shape().iter().map(|z| z.norm()).fold(0.0, f64::max);
             prop_assert!((largest - 1.0).abs() < 1e-15);
@@ -95,7 +95,7 @@ proptest! {
 
     #[test]
     fn coordinates_do_not_matter(s in systems(), seed in 0u64..100) {
-        // x = T q: Tᵀ M T and so on; the shapes turn with T.
+        // In coordinates x = T q the mass is Tᵀ M T and so on, and the shapes are transformed by T.
         let t = coordinates(s.dof(), seed);
         let turn = |a: &DMatrix<f64>| t.transpose() * a * &t;
         let turned =

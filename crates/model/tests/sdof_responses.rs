@@ -64,8 +64,8 @@ fn the_regimes_meet_without_a_seam() {
             let force = Record::from_channel(sampling, (0..1000).map(|k| (k % 7) as f64).collect());
             let force = force.unwrap();
             let near = sdof(c);
-            // The motion depends smoothly on c: a relative change of about the same size.
-            // The recurrence remembers about 50 steps of rounding.
+            // The motion depends smoothly on c, with a relative change of about the same size. The
+            // recurrence accumulates about 50 steps of rounding.
             let tolerance = off + 1e-13;
             let free = |s: &Sdof| s.free_response(sampling, 1.0, 3.0).unwrap();
             assert!(gap(&free(&near), &free(&critical)) < tolerance, "{c}");
@@ -87,7 +87,7 @@ fn small_steps_keep_their_digits() {
 
 #[test]
 fn stiff_overdamped_motion_keeps_its_slow_part() {
-    // Roots about −1e8 and −1e-8 · 4: after one second the slow one alone is left.
+    // The roots are about −1e8 and −4e-8; after one second only the slow one remains.
     let slow = Sdof::new(1.0, 1e8, 4.0).unwrap();
     let free = slow.free_response(Sampling::new(1.0, 2).unwrap(), 1.0, 0.0).unwrap();
     let expected = (-4e-8f64).exp();
@@ -213,7 +213,7 @@ fn bad_input_is_named() {
         named(sdof(1.0).harmonic_response(sampling, 1.0.into(), omega, 0.0, 0.0)),
         "angular frequency"
     );
-    // An unstable motion overflows: told, not returned.
+    // An unstable motion overflows, which is an error, not a result.
     let far = Sampling::new(100.0, 4).unwrap();
     assert!(matches!(sdof(-30.0).free_response(far, 1.0, 0.0), Err(ModelError::Signal(_))));
 }
@@ -221,8 +221,8 @@ fn bad_input_is_named() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// ẋ and ẍ are the derivatives of x (and ẍ is the one the equation of motion asks for, by
-    /// construction: so the equation holds), for any damping and any frequency.
+    /// Judge: ẋ and ẍ are the derivatives of x, for any damping and any frequency. Since ẍ follows
+    /// from the equation of motion, the equation then holds.
     #[test]
     fn harmonic_motion_satisfies_the_equation_of_motion(
         zeta in 0.0..3.0f64, omega_n in 0.5..5.0f64, omega in 0.0..6.0f64, phase in 0.0..6.3f64,
@@ -245,7 +245,7 @@ proptest! {
         }
     }
 
-    /// Changing the units of time and force changes nothing but numbers.
+    /// A change of the units of time and force changes only the numbers.
     #[test]
     fn responses_are_invariant_to_units(
         zeta in 0.0..3.0f64, second in 0.01..100.0f64, newton in 0.01..100.0f64,

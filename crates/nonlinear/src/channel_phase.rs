@@ -24,22 +24,22 @@ use nalgebra::Complex;
 pub struct ChannelPhase {
     /// Delay of the force, in s.
     pub delay: f64,
-    /// p₃, in rad.
+    /// Coefficient p₃ of the phase, in rad.
     pub cubic: f64,
-    /// p₅, in rad.
+    /// Coefficient p₅ of the phase, in rad.
     pub quintic: f64,
 }
 
 impl ChannelPhase {
     /// Returns the factors from the measured to the true lines of force and response at `omega`
-    /// (rad/s), the share `z` of half the sampling rate.
+    /// (rad/s), which is the fraction `z` of half the sampling rate.
     pub(super) fn corrections(&self, omega: f64, z: f64) -> [Complex<f64>; 2] {
         let common = z * z * z * (self.cubic + self.quintic * z * z);
         [Complex::cis(common - omega * self.delay), Complex::cis(common)]
     }
 
-    /// Returns force and response before the channels, for records that are one period (N, and m,
-    /// m/s or m/s²; samples × channels).
+    /// Returns force and response as they are before the measuring channels, for records that are
+    /// one period (N, and m, m/s or m/s²; samples × channels).
     ///
     /// # Errors
     /// [`EstimateError::Signal`] if the time axes of the records differ, or values overflow.

@@ -8,7 +8,7 @@ use super::grid::Grid;
 use super::scatter::{Misfit, PeriodScatter};
 use crate::limits::{COVARIANCE_MOST, TIME_CONSTANTS};
 
-/// Covariance of all parameters, and its origin.
+/// Covariance of all parameters, and its origin: periods, blocks, or a white residual.
 pub(super) struct Uncertainty {
     pub(super) covariance: DMatrix<f64>,
     pub(super) standard_errors: StandardErrors,
@@ -71,7 +71,7 @@ pub(super) fn block_count(duration: f64, rate: f64) -> usize {
 /// time.
 ///
 /// The formula s²(AᵀA)⁻¹ assumes a residual that is white and independent of the response. The
-/// residual of a nonlinear model is neither. The estimates without one block at a time show the
+/// residual of a nonlinear model is neither. Estimates that omit one block at a time show the
 /// variance without this assumption.
 ///
 /// # Source
@@ -123,9 +123,10 @@ impl BlockScores {
         self.blocks.len()
     }
 
-    /// Returns the covariance (B − 1)/B Σ d dᵀ over B blocks, where d = (AᵀA − A_bᵀA_b)⁻¹ s_b is
-    /// the change of the estimate without block b and `inverse` = (AᵀA)⁻¹, and the least degrees of
-    /// freedom of the first `wanted` parameters. `None` if a parameter depends on one block only.
+    /// Returns the covariance (B − 1)/B Σ d dᵀ over B blocks. Here d = (AᵀA − A_bᵀA_b)⁻¹ s_b is the
+    /// change of the estimate without block b, with the regressors A, their rows A_b and the scores
+    /// s_b in this block, and `inverse` = (AᵀA)⁻¹. Also returns the least degrees of freedom of the
+    /// first `wanted` parameters. `None` if a parameter depends on one block only.
     pub(super) fn covariance(
         &self,
         inverse: &DMatrix<f64>,
@@ -160,7 +161,7 @@ impl BlockScores {
         let freedom = |(sum, square): (&f64, &f64)| sum * sum / square - 1.0;
         let freedoms = sums.iter().zip(squares.iter()).take(wanted).map(freedom);
         let least = freedoms.fold(f64::INFINITY, f64::min);
-        // One at least, and fewer than the number of blocks.
+        // The result is at least one, and less than the number of blocks.
         (least as usize).clamp(1, self.blocks.len().max(2) - 1)
     }
 }

@@ -52,8 +52,8 @@ pub struct Distortion {
     pub even: Option<Level>,
     /// Level on odd lines that are not driven: odd nonlinearities, such as x³.
     pub odd: Option<Level>,
-    /// Share of the force (RMS) on the lines of the band that a linear model does not explain,
-    /// weighted by the response of the linear model to it.
+    /// Share of the force (RMS) on the lines of the band that a linear model does not explain; the
+    /// lines are weighted by the response of the linear model to it.
     pub linear_leaves: f64,
     /// Kinds of terms, by decreasing explained share.
     pub kinds: Vec<Kind>,
@@ -72,8 +72,8 @@ const KINDS: [(Option<[u32; 2]>, &str); 4] = [
 /// a linear model, in whole periods of force (N) and response of one or several experiments at the
 /// lines of a band.
 ///
-/// All experiments share one linear model; a single one need not determine it. The levels are
-/// reported for the experiment with the largest.
+/// All experiments share one linear model; a single one need not determine it. The levels are those
+/// of the experiment with the largest level.
 ///
 /// A nonlinear system responds at sums and differences of the driven lines: if odd lines are
 /// driven, an even power responds at even lines and an odd power at odd lines. If all odd lines are
@@ -203,7 +203,7 @@ struct OneByOne {
     /// \[A | b\] of the linear columns, the terms and the force.
     rows: LeastSquares,
     linear: Vec<usize>,
-    /// Weighted squares of the force, and of the residual of the linear columns.
+    /// Sums of the weighted squares of the force, and of the residual of the linear columns.
     total: f64,
     without: f64,
     /// Number of equations minus parameters of a fit with one term.
@@ -300,12 +300,12 @@ impl fmt::Display for Distortion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.kind() {
             None => f.write_str(
-                "no square or cube of displacement or velocity explains what a linear model leaves: \
+                "no square or cube of displacement or velocity explains the residual of a linear model: \
                  consistent with a linear system",
             )?,
             Some(kind) => write!(
                 f,
-                "nonlinear: {kind} explains {:.1} % of the power that a linear model leaves",
+                "nonlinear: {kind} explains {:.1} % of the residual power of a linear model",
                 100.0 * kind.explained
             )?,
         }

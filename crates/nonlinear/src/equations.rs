@@ -28,8 +28,8 @@ pub(super) struct Equations<'a> {
     pub(super) rows: Vec<usize>,
     /// Coefficients of each equation and their indices among the parameters.
     coefficients: Vec<Vec<(usize, Coefficient)>>,
-    /// Factor of each row and equation that gives all the same variance under white noise, 0 if the
-    /// row is not used in the equation: rows × degrees of freedom.
+    /// Factor of each row and equation that gives all of them the same variance under white noise;
+    /// 0 if the row is not used in the equation: rows × degrees of freedom.
     pub(super) unit: DMatrix<f64>,
 }
 
@@ -223,7 +223,8 @@ impl<'a> Equations<'a> {
         !self.coefficients[dof].is_empty()
     }
 
-    /// Refuses an equation without force and known entry, because it determines only ratios.
+    /// Returns an error for an equation that has no force and no known entry, because it determines
+    /// only ratios.
     pub(super) fn check_forces(&self, columns: &[Columns]) -> Result<(), EstimateError> {
         for dof in 0..self.data.dof() {
             let without_force = |columns: &Columns| {
@@ -247,7 +248,7 @@ fn coefficients(free: &[Parameter], terms: &Terms, dof: usize) -> Vec<(usize, Co
     entries.chain(forces).collect()
 }
 
-/// Returns (iω)², iω or 1.
+/// Returns the factor of a matrix in the dynamic stiffness: (iω)², iω or 1.
 pub(super) fn power(matrix: Matrix, omega: f64) -> Complex<f64> {
     match matrix {
         Matrix::Mass => Complex::from(-omega * omega),

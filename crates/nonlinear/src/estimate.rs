@@ -21,7 +21,7 @@ pub struct NamedParameter {
     pub estimate: Uncertain,
 }
 
-/// Origin of the standard errors.
+/// Origin of the standard errors of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StandardErrors {
     /// Noise of force and response from this number of periods of all records: the errors hold for
@@ -54,7 +54,7 @@ pub struct NonlinearEstimate {
 }
 
 impl NonlinearEstimate {
-    /// Creates a linear system with terms whose coefficients are zero: the initial estimate of a
+    /// Creates a linear system with terms whose coefficients are zero, as the initial estimate of a
     /// search.
     pub(super) fn without_force(linear: &Estimate, terms: &Terms) -> Result<Self, EstimateError> {
         terms.check_dof(linear.dof())?;
@@ -224,7 +224,7 @@ impl NonlinearEstimate {
 }
 
 impl fmt::Display for NamedParameter {
-    /// `k3 = 3.951e0 ± 1.7e-3 N/m³`, with one standard error after ±.
+    /// Writes `k3 = 3.951e0 ± 1.7e-3 N/m³`, with one standard error after ±.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, unit, Uncertain { value, standard_error, .. }) =
             (&self.name, &self.unit, self.estimate);

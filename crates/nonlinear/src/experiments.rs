@@ -27,7 +27,7 @@ pub struct SteadyExperiments {
     steady: Vec<Experiment>,
 }
 
-/// One experiment.
+/// One experiment: its periods and their mean.
 struct Experiment {
     /// Mean of its periods.
     mean: Steady,
@@ -41,13 +41,13 @@ struct Steady {
     displacement: DMatrix<Complex<f64>>,
 }
 
-/// Columns of the equations of one experiment at the rows of a fit.
+/// Columns of the equations of motion of one experiment, on the lines of a fit.
 pub(super) struct Columns {
-    /// Rows × degrees of freedom.
+    /// Force, rows × degrees of freedom.
     pub(super) force: DMatrix<Complex<f64>>,
-    /// Rows × degrees of freedom.
+    /// Displacement, rows × degrees of freedom.
     pub(super) displacement: DMatrix<Complex<f64>>,
-    /// Rows × terms.
+    /// Force of each term per unit of its coefficient, rows × terms.
     pub(super) terms: DMatrix<Complex<f64>>,
 }
 
@@ -66,8 +66,8 @@ impl SteadyExperiments {
     /// Adds an experiment: the mean of the whole periods of force (N) and response (m, m/s or
     /// m/s²); an incomplete period at the end is ignored.
     ///
-    /// Even powers depend on the zero of the displacement: subtract the offset of the sensor first,
-    /// or the mean of the whole record ([`Record::without_mean`]) if the offset is unknown.
+    /// Even powers depend on the zero of the displacement: first subtract the offset of the sensor
+    /// or, if it is unknown, the mean of the whole record ([`Record::without_mean`]).
     ///
     /// # Errors
     /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of

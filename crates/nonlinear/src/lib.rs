@@ -12,7 +12,7 @@
 //! | see whether the system is linear, and what kind of term it needs | [`distortion()`] |
 //! | choose terms | [`select_terms`] |
 //! | fit steady periods, fast and without start values | [`equation_error`] on [`SteadyExperiments`] |
-//! | fit any record, without bias from noise on the response | [`output_error`], started from it |
+//! | fit any record, without bias from noise on the response | [`output_error`], started from [`equation_error`] |
 //! | fit a sweep, a random or a hammer record | [`output_error_of_open_records`], started from a linear fit |
 //! | look at the restoring force, within the data and beyond | [`NonlinearEstimate::restoring_forces`], [`NonlinearEstimate::extrapolations`] |
 //! | predict a response | [`predict()`], from the [`fitted_start`] |

@@ -1,10 +1,10 @@
-//! Limits of this crate, each with the effect of values on either side.
+//! Limits of this crate: when searches end, and what is significant, negligible or rounding.
 
 /// Maximum number of Gauss–Newton steps of a search; a search that needs more did not start near a
 /// minimum.
 pub(crate) const SEARCH_STEPS: usize = 60;
 
-/// Maximum number of blocks of one experiment.
+/// Maximum number of blocks of time into which one experiment is divided for standard errors.
 pub(crate) const COVARIANCE_MOST: usize = 32;
 
 /// Minimum number of blocks of all experiments for standard errors from their scatter.
@@ -14,11 +14,11 @@ pub(crate) const FEWEST: usize = 10;
 /// blocks are then nearly independent.
 pub(crate) const TIME_CONSTANTS: f64 = 3.0;
 
-/// Minimum amplitude of the force on a driven line, relative to the largest: mains hum in the force
+/// Minimum amplitude of the force on a driven line, relative to the largest; mains hum in the force
 /// channel is below it.
 pub(crate) const DISTORTION_DRIVEN: f64 = 0.03;
 
-/// Significance level of a kind of nonlinearity.
+/// Significance level of the test for a kind of nonlinearity.
 pub(crate) const DISTORTION_SIGNIFICANT: f64 = 1e-3;
 
 /// Maximum number of degrees of freedom for which terms between any two of them are tested.
@@ -27,10 +27,10 @@ pub(crate) const DISTORTION_PAIRS: usize = 4;
 /// Maximum number of weighting rounds.
 pub(crate) const WEIGHTING_ROUNDS: usize = 12;
 
-/// Relative change of the weights that ends the weighting rounds.
+/// Relative change of the weights below which the weighting rounds end.
 pub(crate) const WEIGHTING_SETTLED: f64 = 1e-3;
 
-/// Number of lines per block of rows of the least squares: bounds the memory.
+/// Number of lines per block of rows of the least squares, which limits the memory.
 pub(crate) const EQUATIONS_CHUNK: usize = 256;
 
 /// Oversampling of the grid on which nonlinear terms are evaluated: products of up to seven lines
@@ -44,10 +44,10 @@ pub(crate) const OUTPUT_FORGOTTEN: f64 = 8.0;
 /// Maximum number of Newton steps towards a periodic response.
 pub(crate) const PREDICTION_SHOTS: usize = 30;
 
-/// Maximum relative change of the state over a period of a steady state.
+/// Maximum change of the state over a period of a steady state, relative to the state.
 pub(crate) const PREDICTION_CLOSED: f64 = 1e-10;
 
-/// Growth exponent of a term above which its extrapolation is unreliable.
+/// Exponent of the growth of a term above which its extrapolation is unreliable.
 pub(crate) const HIGHEST_ORDER: f64 = 3.5;
 
 /// Relative standard error of the restoring force above which its extrapolation is poor.
@@ -63,10 +63,10 @@ pub(crate) const SELECTION_LEVEL: f64 = 0.05;
 /// residual.
 pub(crate) const SIGNIFICANT: f64 = 0.01;
 
-/// Step of a derivative with respect to a shape constant, relative to its size or scale.
+/// Step of a derivative with respect to a shape constant, relative to the constant or its scale.
 pub(crate) const SHAPE_STEP: f64 = 1e-5;
 
-/// Scale of a phase, in rad.
+/// Scale of a phase of the channels, in rad.
 pub(crate) const SHAPE_RADIAN: f64 = 1.0;
 
 /// Maximum phase angle (rad) of the fastest mode of the linear part in one step.
@@ -78,8 +78,8 @@ pub(crate) const FEWEST_STEPS: usize = 2;
 /// Maximum number of steps in a sampling interval.
 pub(crate) const MOST_STEPS: usize = 256;
 
-/// Change of the response by a doubled number of steps, relative to its peak, that ends the
-/// refinement: the remaining error of a fourth-order method is a fifteenth of it.
+/// Change of the response by a doubled number of steps, relative to its peak, below which the
+/// refinement ends: the remaining error of a fourth-order method is a fifteenth of this change.
 pub(crate) const SIMULATION_SETTLED: f64 = 1.5e-4;
 
 /// Relative step of the derivative with respect to a constant of a law.
@@ -91,7 +91,7 @@ pub(crate) const HALF_WIDTH: usize = 10;
 /// Maximum number of independent averages of a smooth spectrum.
 pub(crate) const WEIGHTING_GROUPS: usize = 32;
 
-/// Minimum residual power of a line, relative to the largest of the equation.
+/// Minimum residual power of a line, relative to the largest line of its equation.
 pub(crate) const WEIGHTING_FLOOR: f64 = 1e-12;
 
 /// Total number of windows for the first search on open records: over many cycles, the response of

@@ -11,9 +11,9 @@ use super::limits::SEARCH_STEPS;
 use super::simulate::{Course, Direction, FineForce, Tangent};
 use crate::limits::{PREDICTION_CLOSED, PREDICTION_SHOTS};
 
-/// Displacement, velocity and acceleration of a nonlinear system under a sampled force (N), from
-/// `start` for an open record, or in the steady state for a whole period (its search begins at
-/// `start`).
+/// Computes displacement, velocity and acceleration of a nonlinear system under a sampled force
+/// (N). For an open record they begin at `start`; for a whole period they are the steady state,
+/// whose search begins at `start`.
 ///
 /// Between the samples the force is band-limited, not held or linear: for a hardening spring with a
 /// third harmonic near resonance, the difference is several times the noise of a good sensor. The

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::simulate::Transition;
 
-/// Linearised response to small changes of the force about a simulated response.
+/// Linearised response to small changes of the force, about a simulated response.
 ///
 /// Between the samples a force is band-limited. Here each sample acts as an impulse, half of it
 /// before the sample and half after: the two are equivalent below half the sampling rate.
@@ -73,8 +73,8 @@ impl<'a> Propagation<'a> {
         response
     }
 
-    /// Returns the adjoint of [`Propagation::response`]: the weights (samples × n) of the force in
-    /// the inner product of the response with given weights (samples × n).
+    /// Returns the adjoint of [`Propagation::response`]: the weights (samples × n) of the force
+    /// that give the same inner product as the given weights (samples × n) of the response.
     pub(super) fn adjoint(&self, weights: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.dof();
         let mut force_weights = DMatrix::zeros(weights.nrows(), n);

@@ -11,8 +11,8 @@ use super::estimate::NonlinearEstimate;
 use super::grid::Grid;
 use crate::limits::{HIGHEST_ORDER, RESTORING_NEGLIGIBLE, RESTORING_POOR};
 
-/// Points of the restoring-force surface: the measured force minus the inertia force, over
-/// displacement and velocity. All records are samples of one period × degrees of freedom.
+/// Points of the restoring-force surface: the measured force minus the inertia force, as a function
+/// of displacement and velocity. All records are samples of one period × degrees of freedom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RestoringForce {
     /// Displacement, in m.
@@ -31,13 +31,14 @@ pub struct RestoringForce {
 pub struct Extrapolation {
     /// Name of the term.
     pub term: String,
-    /// Exponent with which the force of the term grows between the edge of the data and there; 3
-    /// for a cubic spring.
+    /// Exponent with which the force of the term grows from the edge of the data to [`REACH`] times
+    /// as far; 3 for a cubic spring.
     pub order: f64,
     /// Ratio of the standard error of the restoring force to the restoring force, at the edge of
     /// the data and at [`REACH`] times as far.
     pub relative_error: [f64; 2],
-    /// Ratio of the force of the term to the restoring force, at the same two points.
+    /// Ratio of the force of the term to the restoring force, at the edge of the data and at
+    /// [`REACH`] times as far.
     pub share: [f64; 2],
 }
 
@@ -46,14 +47,15 @@ pub struct Extrapolation {
 pub const REACH: f64 = 1.5;
 
 impl Extrapolation {
-    /// Returns true if the restoring force is poorly known beyond the data: its standard error
-    /// exceeds 10 % there, or a term of fourth or higher order makes more than 1 % of it.
+    /// Returns true if the restoring force is poorly known at [`REACH`] times the range of the
+    /// data: its standard error exceeds 10 %, or a term of fourth or higher order makes more than 1
+    /// % of it.
     pub fn is_poor(&self) -> bool {
         self.relative_error[1] > RESTORING_POOR || self.grows_fast()
     }
 
-    /// Returns true if the term is of fourth or higher order and makes more than 1 % of the force
-    /// there.
+    /// Returns true if the term is of fourth or higher order and makes more than 1 % of the
+    /// restoring force at [`REACH`] times the range of the data.
     pub fn grows_fast(&self) -> bool {
         self.order > HIGHEST_ORDER && self.share[1].abs() > RESTORING_NEGLIGIBLE
     }

@@ -36,9 +36,10 @@ pub(super) struct Line<'a> {
 /// Covariance of parameters from the scatter of the periods, line by line.
 ///
 /// Noise e on the mean periods changes an estimate by G Σ Re(ḡ e), summed over lines and channels,
-/// with the sensitivities g of the residuals and G = (AᵀA)⁻¹. The deviations of the periods from
-/// their mean show this noise for any spectrum and any correlation of the channels; lines of
-/// stationary noise are independent, so that each adds degrees of freedom.
+/// with the sensitivities g of the residuals (ḡ their conjugates) and G = (AᵀA)⁻¹ for the
+/// regressors A. The deviations of the periods from their mean show this noise for any spectrum and
+/// any correlation of the channels. Lines of stationary noise are independent, so that each adds
+/// degrees of freedom.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -67,7 +68,8 @@ impl PeriodScatter {
         self.periods += periods;
     }
 
-    /// Adds a line with the sensitivities of its residuals, channels × parameters, and G.
+    /// Adds a line with the sensitivities of its residuals, channels × parameters, and the matrix
+    /// G.
     pub(super) fn push(
         &mut self,
         inverse: &DMatrix<f64>,
@@ -109,7 +111,7 @@ pub(super) struct Powers {
     residual: f64,
     noise: f64,
     signal: f64,
-    /// Squares of the noise divided by the degrees of freedom of the residual and of the scatter.
+    /// Squared noise powers, divided by the degrees of freedom of the residual and of the scatter.
     squares: [f64; 2],
 }
 
@@ -150,8 +152,8 @@ impl Powers {
 mod tests {
     use super::*;
 
-    /// A mean of P values on L lines: its variance is that of the values over P, with 2 L (P − 1)
-    /// degrees of freedom, fewer where the values of the lines are found to differ.
+    /// Judge: a mean of P values on L lines has the variance of the values divided by P, with 2 L
+    /// (P − 1) degrees of freedom, or fewer if the variances of the lines differ.
     #[test]
     fn a_mean_has_the_variance_of_its_values() {
         let (lines, periods) = (50, 4);

@@ -45,7 +45,7 @@ pub struct Selection {
     pub terms: Terms,
     /// Steps of the selection: without any candidate, then with each added term.
     pub steps: Vec<SelectionStep>,
-    /// Next best candidate, which the criterion refused.
+    /// Best of the candidates that the criterion refused.
     pub refused: Option<SelectionStep>,
     /// Names of the terms that were added and removed again, least certain first.
     pub removed: Vec<String>,
@@ -182,7 +182,7 @@ impl Selection {
     }
 }
 
-/// Weighted squared residuals for some columns.
+/// Weighted squared residuals for some of the columns.
 struct Misfit {
     /// Sum of all experiments, fitted together.
     fitted: f64,
@@ -201,8 +201,8 @@ struct Judge {
 }
 
 impl Judge {
-    /// Returns the column among `columns` that lowers the residual of all experiments most, with
-    /// the residuals.
+    /// Returns the column among `columns` that lowers the residual of all experiments most, and the
+    /// residuals with it.
     fn best_next(
         &self,
         chosen: &[usize],
@@ -252,7 +252,7 @@ impl Judge {
         Ok(rows.solve()?.coefficients.column(0).iter().copied().collect())
     }
 
-    /// Returns n ln(residual²/n) + p (ln n + 2 ln(candidates)).
+    /// Returns n ln(residual²/n) + p (ln n + 2 ln(candidates)), for n equations and p parameters.
     fn information(&self, misfit: &Misfit, parameters: usize) -> f64 {
         let n = self.equations as f64;
         let price = n.ln() + 2.0 * (self.candidates.max(1) as f64).ln();

@@ -28,7 +28,7 @@ pub struct ShapeConstants {
     pub phase: bool,
 }
 
-/// Terms and channels with their constants, and the selection of free ones.
+/// Terms and channels with their constants, and the choice of the free ones.
 #[derive(Clone)]
 pub(super) struct Shape {
     terms: Terms,
@@ -119,8 +119,9 @@ impl Shape {
         values.iter().enumerate().map(step).collect()
     }
 
-    /// Returns the derivatives of the model's force (minus the residual's) with respect to each
-    /// free constant: for each experiment and constant one matrix of rows × degrees of freedom.
+    /// Returns the derivatives of the force of the model (minus those of the residual) with respect
+    /// to each free constant: for each experiment and constant one matrix of rows × degrees of
+    /// freedom.
     pub(super) fn slopes(
         &self,
         equations: &Equations<'_>,
@@ -249,7 +250,7 @@ impl Residuals for Projected<'_> {
         for (at, mut column) in jacobian.column_iter_mut().enumerate() {
             let share: Vec<f64> = solution.coefficients.column(1 + at).iter().copied().collect();
             let model = self.equations.residuals(columns, &share);
-            // Target minus residual is the model's force for these coefficients.
+            // The target minus the residual is the force of the model for these coefficients.
             let changes: Vec<_> = slopes
                 .iter()
                 .zip(target.iter().zip(&model))

@@ -25,7 +25,7 @@ pub(super) enum Direction {
 
 /// Force at the instants of all stages of the steps.
 pub(super) struct FineForce {
-    /// Degrees of freedom × instants, 2 · steps in a sampling interval.
+    /// Degrees of freedom × instants; a sampling interval has twice as many instants as steps.
     values: DMatrix<f64>,
     steps: usize,
     samples: usize,
@@ -33,8 +33,8 @@ pub(super) struct FineForce {
 }
 
 impl FineForce {
-    /// Interpolates a force band-limited, by the Fourier series of a period or, for an open record,
-    /// of the record and its mirror image, which has no jump; with as many steps as the response
+    /// Interpolates a band-limited force, by the Fourier series of a period or, for an open record,
+    /// of the record and its mirror image, which has no jump. It uses as many steps as the response
     /// from `start` needs.
     pub(super) fn sufficient(
         force: &Record,
@@ -102,7 +102,7 @@ pub(super) struct Transition {
     pub(super) acceleration: DMatrix<f64>,
 }
 
-/// Rates at the stages of a step, and the first rate of a sampling interval.
+/// Rates of change at the stages of a step, and the first rate of a sampling interval.
 struct Stages {
     first: Vec<f64>,
     rates: [Vec<f64>; 4],
@@ -125,10 +125,10 @@ impl Stages {
 pub(super) struct Tangent<'a> {
     system: &'a NonlinearSystem,
     directions: &'a [Direction],
-    /// M⁻¹, n×n: solved once, applied at every stage.
+    /// Inverse M⁻¹, n×n, computed once and applied at every stage.
     inverse_mass: DMatrix<f64>,
-    /// Step and term with one changed constant, for the derivatives with respect to the constants
-    /// of each law.
+    /// Term with one changed constant, and the change, for the derivatives with respect to the
+    /// constants of each law.
     moved: Vec<Vec<(f64, Term)>>,
     /// Work arrays of a stage.
     acceleration: Vec<f64>,

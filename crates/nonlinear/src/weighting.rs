@@ -13,16 +13,17 @@ use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
     serde(rename_all = "kebab-case")
 )]
 pub enum Weighting {
-    /// The alternative with the highest likelihood of the residual (Akaike's criterion).
+    /// The one of the other choices with the highest likelihood of the residual (Akaike's
+    /// criterion).
     #[default]
     Automatic,
-    /// Equally large on all lines of an equation of motion: white noise of the force.
+    /// Equal size on all lines of an equation of motion: white noise of the force.
     WhiteForce,
-    /// Equally large on all lines as a response of the linear part: the model error is largest at
-    /// the resonances.
+    /// Equal size on all lines of the response of the linear part to it: the model error is largest
+    /// at the resonances.
     Response,
-    /// Smooth over the lines: the spectrum of the residual, averaged over neighbouring lines and
-    /// all experiments.
+    /// Smooth spectrum: the spectrum of the residual, averaged over neighbouring lines and all
+    /// experiments.
     SmoothSpectrum,
 }
 
@@ -110,8 +111,8 @@ pub(super) fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Op
     Some(equations.unit.zip_map(&variance, |unit, v| unit / v.sqrt()))
 }
 
-/// Returns the variance of a force in each equation whose response is equally large on all rows;
-/// `None` if the coefficients define no system.
+/// Returns, for each equation, the variance of a force whose response has the same size on all
+/// rows; `None` if the coefficients define no system.
 fn variance_of_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
     let [m, c, k] = equations.unknowns.assemble(&coefficients[..equations.free.len()]);
     let system = mechid_model::SecondOrderSystem::new(m, c, k).ok()?;

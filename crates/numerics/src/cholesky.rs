@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Number of columns in a block: its triangle fits into the first-level cache.
+/// Number of columns in a block; the triangle of a block fits into the first-level cache.
 const BLOCK: usize = 48;
 
-/// L of a symmetric positive definite matrix A = L Lᵀ.
+/// Cholesky factor L of a symmetric positive definite matrix A = L Lᵀ.
 ///
 /// The columns are processed in blocks, so that nearly all operations are matrix products: at a
 /// thousand columns this is ten times as fast as column by column.
@@ -60,14 +60,14 @@ impl Cholesky {
         solution
     }
 
-    /// Returns L⁻¹, rows × columns as A, in the root of the inverse unit of A.
+    /// Returns L⁻¹, with as many rows and columns as A; its unit is one over the root of that of A.
     pub fn inverse_of_lower(&self) -> DMatrix<f64> {
         let size = self.lower.nrows();
         let mut inverse = DMatrix::zeros(size, size);
         for start in (0..size).step_by(BLOCK) {
             let width = BLOCK.min(size - start);
             let diagonal = self.lower.view((start, start), (width, width));
-            // The rows X of this block follow from L X = I and the rows of the inverse above.
+            // The rows X of this block of L⁻¹ follow from L X = I and from the rows of L⁻¹ above.
             let mut rows = DMatrix::zeros(width, start + width);
             rows.columns_mut(start, width).fill_with_identity();
             let left_part = self.lower.view((start, 0), (width, start));

@@ -3,7 +3,7 @@
 use nalgebra::DMatrixView;
 use thiserror::Error;
 
-/// Error of a numerical method; every variant carries the numbers behind it.
+/// Error of a numerical method; every variant carries the numbers that explain it.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NumericsError {
@@ -62,8 +62,8 @@ pub enum NumericsError {
     /// Every unknown is already known.
     #[error("there is nothing to estimate: every entry of M, C and K is known")]
     NothingUnknown,
-    /// A matrix has no real logarithm: the transition from sample to sample is not that of a
-    /// continuous system.
+    /// A matrix has no real logarithm: as a transition from sample to sample it does not belong to
+    /// a continuous system.
     #[error(
         "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \
          has no logarithm and no continuous machine moves like that: either a mode oscillates near or \

@@ -1,11 +1,11 @@
-//! Nonlinear least squares: Gauss–Newton steps that follow the curvature of the residuals, with
-//! damping if they do not descend.
+//! Nonlinear least squares by Gauss–Newton steps, corrected for the curvature of the residuals and
+//! damped if they do not descend.
 //!
 //! A problem returns its sum of squares for given parameters, and a linearisation of its residuals
-//! there in coordinates that it chooses. There are two linearisations: [`GramMatrix`] (normal
-//! equations, for many residuals and well-scaled coordinates) and [`Triangle`] (QR of the Jacobian,
-//! for badly conditioned ones). [`minimise_residuals`] is for problems that compute all residuals
-//! and their Jacobian at once.
+//! at these parameters in coordinates of its choice. There are two linearisations: [`GramMatrix`]
+//! (normal equations, for many residuals and well-scaled coordinates) and [`Triangle`] (QR of the
+//! Jacobian, for badly conditioned ones). [`minimise_residuals`] is for problems that compute all
+//! residuals and their Jacobian at once.
 
 mod gram_matrix;
 mod residuals;
@@ -21,25 +21,25 @@ pub use gram_matrix::GramMatrix;
 pub use residuals::{Residuals, minimise_residuals};
 pub use triangle::{DampedTriangle, Triangle};
 
-/// Residuals r linearised about some parameters, r + J v, in coordinates v of a change of the
-/// parameters.
+/// Residuals r linearised about some parameters: r + J v, with v the change of the parameters in
+/// scaled coordinates.
 ///
 /// In these coordinates the columns of J have unit length, so that damping has the same effect on
 /// all.
 pub trait Linearisation {
-    /// Factor of JᵀJ + λI.
+    /// Factor of the damped matrix JᵀJ + λI.
     type Factor;
 
-    /// Returns Jᵀr.
+    /// Returns the gradient Jᵀr.
     fn gradient(&self) -> &DVector<f64>;
 
     /// Returns the factor of JᵀJ + `damping`·I; `None` if that is numerically singular.
     fn factor(&self, damping: f64) -> Option<Self::Factor>;
 
-    /// Returns (JᵀJ + λI)⁻¹ `right`.
+    /// Returns (JᵀJ + λI)⁻¹ `right`, with the factor of JᵀJ + λI.
     fn solve(&self, factor: &Self::Factor, right: &DVector<f64>) -> DVector<f64>;
 
-    /// Returns the step (JᵀJ + λI)⁻¹ Jᵀr.
+    /// Returns the step (JᵀJ + λI)⁻¹ Jᵀr, with the factor of JᵀJ + λI.
     fn step(&self, factor: &Self::Factor) -> DVector<f64> {
         self.solve(factor, self.gradient())
     }
@@ -66,11 +66,12 @@ pub trait SumOfSquares {
     /// Accepts the most recently tried parameters, to which linearisation and curvature then refer.
     fn accept(&mut self);
 
-    /// Returns the linearisation; `None` if rounding or overflow prevents it.
+    /// Returns the linearisation at the accepted parameters; `None` if rounding or overflow
+    /// prevents it.
     fn linearise(&mut self) -> Option<Self::Linearisation>;
 
     /// Returns Jᵀr″ with r″ the second derivative of the residuals along `change`, a change of the
-    /// parameters; `None` if it is not known, which gives steps without correction. The change is a
+    /// parameters; `None` if it is not known, so that steps are not corrected. The change is a
     /// list, one entry for each parameter, in its unit.
     fn curvature(
         &self,
@@ -90,12 +91,13 @@ pub struct Minimum {
     pub cost: f64,
     /// Number of steps taken.
     pub steps: usize,
-    /// `true` for a minimum up to rounding; `false` if the number of steps was exhausted.
+    /// `true` if a minimum was reached up to rounding; `false` if the number of steps was
+    /// exhausted.
     pub converged: bool,
 }
 
-/// Searches for the local minimum from `parameters` in at most `max_steps` steps; `problem` keeps
-/// the accepted parameters.
+/// Searches for the local minimum from `parameters` in at most `max_steps` steps; afterwards
+/// `problem` holds the accepted parameters.
 ///
 /// A step v and its correction a for the curvature of the residuals solve
 ///
@@ -103,9 +105,10 @@ pub struct Minimum {
 /// (JᵀJ + λI) v = −Jᵀr,      (JᵀJ + λI) a = −½ Jᵀr″(v)
 /// ```
 ///
-/// and the step v + a is tried if a is small relative to v. The correction follows curved valleys,
-/// which arise when the data determine a combination of parameters badly, and in which steps
-/// without correction would be tiny. Parameters are a list in any units.
+/// and the step v + a is tried if a is small relative to v. Here r are the residuals, J is their
+/// Jacobian, r″(v) is their second derivative along v, and λ is the damping. The correction makes a
+/// step follow curved valleys, which arise when the data determine a combination of parameters
+/// badly; without it the steps would be tiny. Parameters are a list in any units.
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, section 10.3; Nielsen (1999), IMM-REP-1999-05, for
@@ -151,7 +154,7 @@ pub fn minimise<P: SumOfSquares>(
         log::trace!("step {}, sum of squares {cost:.4e}", steps + 1);
         let linearisation = problem.linearise()?;
         let undamped = linearisation.factor(0.0);
-        // The search for a minimum needs the undamped step, which does not exist if JᵀJ is
+        // Only the undamped step shows whether this is a minimum; it does not exist if JᵀJ is
         // numerically singular.
         if let Some(factor) = &undamped {
             if is_minimum(&linearisation, factor, &parameters, cost) {
@@ -180,8 +183,8 @@ pub fn minimise<P: SumOfSquares>(
             damping = f64::max(growth * damping, FIRST_DAMPING);
             growth *= 2.0;
             if damping > LARGEST_DAMPING {
-                // No direction descends: this is a minimum up to rounding, if the data determine
-                // one.
+                // No direction descends: this is a minimum up to rounding, unless the data
+                // determine none.
                 return Some(Minimum { parameters, cost, steps, converged: undamped.is_some() });
             }
         }
@@ -189,7 +192,7 @@ pub fn minimise<P: SumOfSquares>(
     Some(Minimum { parameters, cost, steps: max_steps, converged: false })
 }
 
-/// Returns whether the undamped step, or the decrease that it predicts, is negligible.
+/// Returns whether the undamped step, or the decrease of the cost that it predicts, is negligible.
 fn is_minimum<L: Linearisation>(
     linearisation: &L,
     factor: &L::Factor,

@@ -8,7 +8,8 @@ use crate::limits::{RANK_TOLERANCE, SHARE_TOLERANCE};
 use crate::linear_algebra::svd;
 use crate::triangular::TriangularFactor;
 
-/// Overdetermined linear equations A θ ≈ B gathered block by block; memory does not grow with rows.
+/// Overdetermined linear equations A θ ≈ B, gathered block by block, so that the memory does not
+/// grow with the number of rows.
 ///
 /// ```
 /// use mechid_numerics::least_squares::LeastSquares;
@@ -39,22 +40,23 @@ pub struct Solution {
     /// θ: unknowns × right-hand sides, in the unit of the target divided by the unit of the
     /// regressor. Undetermined entries are NaN.
     pub coefficients: DMatrix<f64>,
-    /// (AᵀA)⁻¹: unknowns × unknowns, in inverse units of the regressors, over the determined
-    /// directions. The covariance of coefficients (i, a) and (j, b) is `unscaled_covariance[(i, j)]
-    /// · residual_covariance[(a, b)]`.
+    /// (AᵀA)⁻¹: unknowns × unknowns, in inverse units of the regressors, restricted to the
+    /// determined directions. The covariance of coefficients (i, a) and (j, b) is
+    /// `unscaled_covariance[(i, j)] · residual_covariance[(a, b)]`.
     pub unscaled_covariance: DMatrix<f64>,
-    /// EᵀE / (rows − unknowns): right-hand sides × right-hand sides, in the units of the targets;
-    /// infinite without excess rows.
+    /// EᵀE / (rows − unknowns) with the residuals E: right-hand sides × right-hand sides, in the
+    /// units of the targets; infinite without excess rows.
     pub residual_covariance: DMatrix<f64>,
-    /// √(Σe² / Σb²), a pure number, of each right-hand side.
+    /// √(Σe² / Σb²) of each right-hand side b with its residual e, a pure number.
     pub residual_nrmse: Vec<f64>,
-    /// Rows minus determined directions.
+    /// Number of rows minus number of determined directions.
     pub degrees_of_freedom: usize,
-    /// Largest over smallest singular value of A with its columns scaled to unit length.
+    /// Ratio of the largest to the smallest singular value of A with its columns scaled to unit
+    /// length.
     pub condition: f64,
-    /// Undetermined combinations of unknowns.
+    /// Combinations of unknowns that the rows do not determine.
     pub undetermined: Vec<Direction>,
-    /// A⁺, applied to the rows of the triangular factor, in inverse units of the regressors.
+    /// Pseudo-inverse A⁺ of the rows of the triangular factor, in inverse units of the regressors.
     pub inverse: DMatrix<f64>,
     /// Residuals of the rows of the triangular factor, in the units of the targets.
     pub residuals: DMatrix<f64>,
@@ -63,7 +65,8 @@ pub struct Solution {
 /// Combination of unknowns that can be added to a solution without changing the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction {
-    /// Ratio of the singular value of the scaled regressors along it to the largest one.
+    /// Singular value along this direction divided by the largest one, for regressors with columns
+    /// scaled to unit length.
     pub relative_singular_value: f64,
     /// One entry per unknown, in its unit; the entry that is largest in scaled columns is 1.
     pub combination: DVector<f64>,

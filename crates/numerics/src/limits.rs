@@ -1,14 +1,14 @@
-//! Limits that decide something in this crate.
+//! Numerical limits of this crate: when searches and iterations end, and what counts as zero.
 
-/// Predicted decrease, relative to the sum of squares, that ends a search at a minimum: parameters
-/// are then within 10⁻⁶·√(residuals) standard errors of it.
+/// Predicted decrease, relative to the sum of squares, that ends a search at a minimum. The
+/// parameters are then within 10⁻⁶·√(number of residuals) standard errors of the minimum.
 pub(crate) const COST_TOLERANCE: f64 = 1e-12;
 
 /// Length of a step, relative to the parameters and in scaled coordinates, that ends a search at a
-/// minimum: for data without noise, the predicted decrease never does.
+/// minimum. It is needed for data without noise, for which the predicted decrease ends no search.
 pub(crate) const STEP_TOLERANCE: f64 = 1e-12;
 
-/// Initial damping of a step that does not descend, relative to a Gram matrix of unit diagonal.
+/// Initial damping after a step that does not descend, relative to a Gram matrix of unit diagonal.
 pub(crate) const FIRST_DAMPING: f64 = 1e-8;
 
 /// Minimum damping; a smaller one is replaced by zero.
@@ -17,15 +17,15 @@ pub(crate) const SMALLEST_DAMPING: f64 = 1e-13;
 /// Maximum damping; above it rounding decides, so the search ends without descent.
 pub(crate) const LARGEST_DAMPING: f64 = 1e12;
 
-/// Maximum length of the correction of a step for curvature, relative to the step; if it is longer,
-/// the step is damped instead (Transtrum & Sethna 2012).
+/// Maximum length of the curvature correction of a step, relative to the step; if the correction is
+/// longer, the step is damped instead (Transtrum & Sethna 2012).
 pub(crate) const LARGEST_CORRECTION: f64 = 0.75;
 
 /// Maximum relative singular value of an undetermined direction: a hundred times the rounding of a
 /// matrix whose columns have unit length.
 pub(crate) const RANK_TOLERANCE: f64 = 100.0 * f64::EPSILON;
 
-/// Minimum part of an unknown in an undetermined direction for which the unknown counts as
+/// Minimum component of an unknown in an undetermined direction for which the unknown counts as
 /// undetermined.
 pub(crate) const SHARE_TOLERANCE: f64 = 1e-6;
 
@@ -33,8 +33,8 @@ pub(crate) const SHARE_TOLERANCE: f64 = 1e-6;
 /// digits.
 pub(crate) const SMALLEST_NORM: f64 = 1e-140;
 
-/// Maximum ratio, to the largest entry, of an entry that counts as 0 in a decomposition: its square
-/// would underflow.
+/// Largest magnitude, relative to the largest entry, of an entry that counts as 0 in a
+/// decomposition: its square would underflow.
 pub(crate) const NEGLIGIBLE: f64 = 1e-140;
 
 /// Maximum number of iterations per row or column of a decomposition; two or three are usual.
@@ -48,5 +48,6 @@ pub(crate) const EXPONENTIAL_NORM: f64 = 1e11;
 /// zero, too.
 pub(crate) const PATIENCE: usize = 20;
 
-/// Maximum number of QR sweeps without a deflation; more are not convergence.
+/// Maximum number of QR sweeps without a deflation; if more are needed, the iteration does not
+/// converge.
 pub(crate) const SWEEPS: usize = 100;

@@ -94,7 +94,7 @@ pub fn hermitian_eigen<T: ComplexField<RealField = f64>>(
         .ok_or(NumericsError::NotConverged { rows, columns })
 }
 
-/// Returns the exponential of an n × n matrix without unit.
+/// Returns the exponential of an n × n matrix of pure numbers.
 ///
 /// # Errors
 /// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`];

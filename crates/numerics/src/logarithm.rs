@@ -8,9 +8,9 @@
 //! └ 0  I ┘ = exp └  0    0  ┘
 //! ```
 //!
-//! if the force is constant between samples. The logarithm of the left side therefore gives A and B
-//! at once, also if A is singular (rigid-body modes), and its derivative converts the covariance of
-//! Φ and Γ.
+//! if the force f is constant between samples. The logarithm of the left side therefore gives A and
+//! B at once, also if A is singular (rigid-body modes), and its derivative converts the covariance
+//! of Φ and Γ to that of A and B.
 
 use nalgebra::DMatrix;
 
@@ -53,7 +53,7 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
 /// ```
 ///
 /// # Errors
-/// [`NumericsError::NoLogarithm`] if an eigenvalue is real and not positive (or two are, to
+/// [`NumericsError::NoLogarithm`] if an eigenvalue is real and not positive (or a pair is, up to
 /// rounding), [`NumericsError::Size`] if `a` is not square, [`NumericsError::NotFinite`],
 /// [`NumericsError::Eigenvalues`].
 ///
@@ -68,7 +68,7 @@ pub fn logarithm(a: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     Ok(Generator::new(&(a - DMatrix::identity(size, size)), &none)?.value)
 }
 
-/// \[AΔt BΔt\] from \[Φ − I, Γ\], prepared for derivatives.
+/// Logarithm \[AΔt BΔt\] of the transition \[Φ, Γ\], prepared for derivatives.
 #[derive(Debug, Clone)]
 pub struct Generator {
     /// \[AΔt BΔt\]: states × (states + inputs), dimensionless.
@@ -76,11 +76,12 @@ pub struct Generator {
     /// Schur vectors of Φ.
     q: DMatrix<f64>,
     blocks: Vec<(usize, usize)>,
-    /// (I + U)^(1/2^l) − I for l = 1, 2, …, with U the Schur form of \[Φ − I, Γ; 0, 0\].
+    /// Square roots (I + U)^(1/2^l) − I for l = 1, 2, …, with U the Schur form of \[Φ − I, Γ; 0,
+    /// 0\].
     roots: Vec<DMatrix<f64>>,
     /// Last of these roots, or U itself if there is none.
     x: DMatrix<f64>,
-    /// Factor that scaled Γ to the size of Φ − I.
+    /// Factor that scaled Γ to the magnitude of Φ − I.
     input_scale: f64,
 }
 
@@ -190,7 +191,7 @@ fn pade(x: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     Ok(sum)
 }
 
-/// Returns Σ w (I + t X)⁻¹ E (I + t X)⁻¹.
+/// Returns Σ w (I + t X)⁻¹ E (I + t X)⁻¹, the change of `pade(x)` if X changes by E.
 fn pade_derivative(x: &DMatrix<f64>, e: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     let mut sum = DMatrix::zeros(x.nrows(), x.ncols());
     for (node, weight) in nodes() {

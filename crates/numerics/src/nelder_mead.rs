@@ -1,8 +1,8 @@
 //! Minimum of a function of a few variables, without derivatives.
 
-/// Returns the best point from a search at `start`, with an initial simplex of edge `step`, after
-/// at most `rounds` rounds or once the values at the simplex differ by at most `settled`. A point
-/// is a list in any unit, the same for all coordinates.
+/// Returns the best point from a search at `start`, with an initial simplex of edge `step`. The
+/// search ends after `rounds` rounds, or earlier if the values at the corners of the simplex differ
+/// by at most `settled`. A point is a list in any unit, the same for all coordinates.
 ///
 /// # Source
 /// Nelder & Mead (1965), with the usual coefficients 1, 2, ½, ½.
@@ -55,7 +55,7 @@ pub fn minimise(
     simplex.swap_remove(0).1
 }
 
-/// Halves the simplex towards its best point.
+/// Moves all other corners of the simplex half-way towards its best point.
 fn shrink(simplex: &mut [(f64, Vec<f64>)], cost: impl Fn(&[f64]) -> f64) {
     let best = simplex[0].1.clone();
     for vertex in &mut simplex[1..] {

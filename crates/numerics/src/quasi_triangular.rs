@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix2, Matrix4, Vector4};
 
 /// Returns (I + U)^½ − I of a quasi-triangular U, without forming I + U.
 ///
-/// With Y the result, Y² + 2Y = U: this is the recurrence of Björck and Hammarling, shifted to
+/// The result Y satisfies Y² + 2Y = U: this is the recurrence of Björck and Hammarling, shifted to
 /// avoid cancellation for a small U.
 ///
 /// # Source
@@ -16,7 +16,7 @@ pub(crate) fn shifted_root(u: &DMatrix<f64>, blocks: &[(usize, usize)]) -> DMatr
     for (at, &(start, width)) in blocks.iter().enumerate() {
         root_of_block(u, &mut y, start, width);
         // The blocks of a column are computed upwards, because each needs the blocks to its left
-        // and below.
+        // and below it.
         for &(row, height) in blocks[..at].iter().rev() {
             let inner = row + height..start;
             let mut right = Matrix2::zeros();
@@ -46,8 +46,8 @@ fn root_of_block(u: &DMatrix<f64>, y: &mut DMatrix<f64>, start: usize, width: us
     let half_gap = 0.5 * (b[(0, 0)] - b[(1, 1)]);
     let imaginary_square = -(half_gap * half_gap + b[(0, 1)] * b[(1, 0)]);
     let real = 1.0 + 0.5 * trace;
-    // For a pair near the negative real axis, tr(I + B) + 2p suffers cancellation, and its
-    // imaginary part does not.
+    // For a pair of eigenvalues near the negative real axis, tr(I + B) + 2p suffers cancellation;
+    // the imaginary part of the pair does not.
     let s = if real < 0.0 && imaginary_square > 0.0 {
         (2.0 * imaginary_square / (p - real)).sqrt()
     } else {
@@ -57,8 +57,8 @@ fn root_of_block(u: &DMatrix<f64>, y: &mut DMatrix<f64>, start: usize, width: us
     y.fixed_view_mut::<2, 2>(start, start).copy_from(&((b + shift) / s));
 }
 
-/// Returns Z with Y Z + Z Y + 2 Z = E: the change of [`shifted_root`] when U changes by E (E may be
-/// full).
+/// Returns the change Z of the result Y of [`shifted_root`] when U changes by E: the solution of Y
+/// Z + Z Y + 2 Z = E. E may be a full matrix.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.3 (Bartels–Stewart).
@@ -86,8 +86,8 @@ pub(crate) fn root_derivative(
     z
 }
 
-/// Solves Y_ii Z + Z Y_jj + 2 Z = right for one block of `z`; `z` itself is Y if no other Y is
-/// given.
+/// Solves Y_ii Z + Z Y_jj + 2 Z = `right` for one block Z of `z`. If `y` is `None`, Y is the part
+/// of `z` computed so far.
 fn solve_block(
     z: &mut DMatrix<f64>,
     y: Option<&DMatrix<f64>>,

@@ -1,7 +1,8 @@
 //! Real Schur form of a matrix.
 //!
-//! The implementation of nalgebra has shifts that suffer from cancellation, and no exceptional
-//! shifts: it does not converge if several eigenvalues are equal up to rounding.
+//! The implementation of nalgebra chooses shifts that suffer from cancellation and has no
+//! exceptional shifts, so that it does not converge if several eigenvalues are equal up to
+//! rounding.
 
 use nalgebra::{Complex, DMatrix, Hessenberg, Vector3};
 
@@ -9,7 +10,7 @@ use crate::NumericsError;
 use crate::limits::{PATIENCE, SWEEPS};
 use crate::linear_algebra::{check_finite, check_square};
 
-/// A = Q T Qᵀ, all size × size, Q orthogonal and T quasi-upper-triangular.
+/// Real Schur form A = Q T Qᵀ, all size × size, with Q orthogonal and T quasi-upper-triangular.
 ///
 /// ```
 /// use mechid_numerics::RealSchur;
@@ -120,9 +121,9 @@ fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, 
         let product = h[(last, last - 1)] * h[(last - 1, last)];
         (h[(last, last)], h[(last - 1, last - 1)], product)
     };
-    // This is the first column of H² − (x + y) H + (x y − w) I, divided by h21. Differences come
-    // first, because the plain formula loses all digits to cancellation when the eigenvalues are
-    // close together.
+    // This is the first column of H² − (x + y) H + (x y − w) I, divided by h21. It is written with
+    // differences, because the plain formula loses all digits to cancellation when the eigenvalues
+    // are close together.
     let (r, s) = (x - h[(start, start)], y - h[(start, start)]);
     let mut bulge = Vector3::new(
         (r * s - w) / h[(start + 1, start)] + h[(start, start + 1)],
@@ -143,7 +144,7 @@ fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, 
         reflect_columns(h, axis, k, width, (k + 4).min(last + 1));
         reflect_columns(q, axis, k, width, q.nrows());
         if k > start {
-            // Rounding must not leave small numbers in the entries that the reflection sets to
+            // The reflection sets these entries to zero up to rounding; here they become exactly
             // zero.
             h.view_mut((k + 1, k - 1), (width - 1, 1)).fill(0.0);
         }

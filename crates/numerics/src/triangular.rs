@@ -11,8 +11,8 @@ use crate::limits::SMALLEST_NORM;
 /// Number of rows reduced at a time: a block of a dozen columns fits into the first-level cache.
 const BLOCK_ROWS: usize = 256;
 
-/// Number of rows that one thread reduces. It is fixed, so that the results do not depend on the
-/// number of threads.
+/// Number of rows that one thread reduces. It does not depend on the number of threads, so that the
+/// results do not, either.
 const SEGMENT_ROWS: usize = 16_384;
 
 /// Triangular factor R of A = Q R, computed from row blocks of A; Q is never formed.
@@ -27,11 +27,11 @@ const SEGMENT_ROWS: usize = 16_384;
 pub struct TriangularFactor {
     columns: usize,
     rows: usize,
-    /// columns × columns, upper triangular.
+    /// Triangle R, columns × columns, upper triangular.
     r: DMatrix<f64>,
-    /// One block, in columns.
+    /// Entries of one block of rows, stored column by column.
     block: Vec<f64>,
-    /// `true` for columns with a value whose square underflows, and no larger value.
+    /// `true` for columns in which the square of some value underflows and no value is larger.
     vanished: Vec<bool>,
 }
 
@@ -91,7 +91,7 @@ impl TriangularFactor {
             }
             self.absorb(len);
         }
-        // NaN and infinity persist in sums of squares, so R shows them, and overflow, too.
+        // NaN and infinity persist in sums of squares, so R shows them; it also shows overflow.
         if !self.r.iter().all(|v| v.is_finite()) {
             self.r = before;
             return false;
@@ -131,15 +131,16 @@ impl TriangularFactor {
         })
     }
 
-    /// Sets the number of rows that the factor represents.
+    /// Sets the number of original rows that the factor represents.
     pub fn stand_for(&mut self, rows: usize) {
         self.rows = rows;
     }
 
     /// Rotates the first `len` rows of the block buffer into R, two columns in one sweep.
     ///
-    /// It is compiled for every width of vector registers, and chosen at run time; the sums are
-    /// split into the same lanes in each, so that the results do not depend on the processor.
+    /// The function is compiled for every width of vector registers, and one version is chosen at
+    /// run time. All versions split the sums into the same partial sums, so that the results do not
+    /// depend on the processor.
     fn absorb(&mut self, len: usize) {
         Arch::new().dispatch(Absorb { factor: self, len });
     }
@@ -158,8 +159,8 @@ impl TriangularFactor {
             let w = first.apply(&mut self.r, j + 1, d);
             subtract(x2, w, x1, 0.0, x1);
             let second = Reflection::new(&mut self.r, j + 1, x2);
-            // This is x1ᵀx2 after the change of x2, for the columns to which both reflections are
-            // applied at once.
+            // This is x1ᵀx2 after the change of x2. It is needed because both reflections are
+            // applied to the other columns in one sweep.
             let across = dot(x1, x2);
             for (k, y) in remaining.chunks_exact_mut(len).enumerate() {
                 let [d1, d2] = dots(x1, x2, y);
@@ -256,7 +257,7 @@ fn dots(x1: &[f64], x2: &[f64], y: &[f64]) -> [f64; 2] {
     [total(first) + rest(x1_rest, y_rest), total(second) + rest(x2_rest, y_rest)]
 }
 
-/// Returns the sum of the lanes, by repeatedly adding one half to the other.
+/// Returns the sum of all partial sums, by repeatedly adding one half of them to the other.
 #[inline(always)]
 fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
     let mut half = N / 2;
@@ -269,7 +270,7 @@ fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
     sums[0]
 }
 
-/// Returns xᵀy of the entries that do not fill the lanes.
+/// Returns xᵀy of the entries that remain after the last full group of `LANES` entries.
 #[inline(always)]
 fn rest(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(a, b)| a * b).sum()

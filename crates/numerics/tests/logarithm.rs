@@ -16,7 +16,7 @@ fn random(size: usize, seed: u64) -> DMatrix<f64> {
 fn exponential(a: &DMatrix<f64>) -> DMatrix<f64> {
     let halvings = (a.norm().log2().ceil().max(0.0) as i32) + 4;
     let small = a / 2f64.powi(halvings);
-    // Of exp − I, so that nothing is lost against I: (I + E)² − I = 2 E + E².
+    // The series is that of exp − I, so that no digits are lost against I: (I + E)² − I = 2 E + E².
     let mut term = small.clone();
     let mut sum = small.clone();
     for k in 2..=20 {
@@ -99,7 +99,7 @@ fn matrices_close_to_the_identity_keep_their_relative_accuracy() {
     for size in [1e-3, 1e-6, 1e-10] {
         let step = random(4, 9) * size;
         let a = DMatrix::identity(4, 4) + &step;
-        // What is left of the step after rounding a to doubles.
+        // This is the step after `a` was rounded to doubles.
         let x = &a - DMatrix::identity(4, 4);
         let series = &x - &x * &x / 2.0 + &x * &x * &x / 3.0 - &x * &x * &x * &x / 4.0;
         // The series stops at x⁵/5, a share of size⁴ of the first term.

@@ -1,4 +1,4 @@
-//! Draws one figure of each kind into the folder given, `target/gallery` otherwise.
+//! Draws one figure of each kind into the given folder, or into `target/gallery`.
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use mechid_plot::charts::{self, FrequencyResponse, Quantity, Series};
 use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
 
-/// Mass, damping and stiffness everything here is drawn for.
+/// Mass, damping and stiffness of the machine in all figures.
 const MACHINE: (f64, f64, f64) = (10.0, 180.0, 5000.0);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,4 +1,5 @@
-//! Writes interactive pages of a response and of the shapes of a frame into the folder given (default: the current one).
+//! Writes interactive pages of a response and of the shapes of a frame into the given folder
+//! (default: the current one).
 #![allow(clippy::print_stdout)]
 
 use std::f64::consts::TAU;

@@ -47,16 +47,16 @@ impl Color {
 /// Line pattern.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Dash {
-    /// ────
+    /// Solid line: ────
     #[default]
     Solid,
-    /// ─ ─ ─
+    /// Dashed line: ─ ─ ─
     Dashed,
-    /// · · · ·
+    /// Dotted line: · · · ·
     Dotted,
-    /// ─ · ─ ·
+    /// Line of dashes and dots: ─ · ─ ·
     DashDot,
-    /// ── ── with long strokes
+    /// Line of long dashes: ── ──
     LongDash,
 }
 
@@ -80,19 +80,19 @@ impl Dash {
 /// Shape drawn at each point of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Marker {
-    /// ●
+    /// Circle: ●
     Circle,
-    /// ■
+    /// Square: ■
     Square,
-    /// ▲
+    /// Triangle: ▲
     Triangle,
-    /// ◆
+    /// Diamond: ◆
     Diamond,
-    /// ▼
+    /// Inverted triangle: ▼
     TriangleDown,
-    /// ×
+    /// Diagonal cross: ×
     Cross,
-    /// +
+    /// Upright cross: +
     Plus,
 }
 

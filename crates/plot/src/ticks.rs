@@ -243,9 +243,9 @@ mod tests {
         // Steps of 50 would end at 200.
         let to_the_end = linear(0.0, 249.0, 11.0, None);
         assert_eq!(to_the_end.major.last().unwrap().1, "240");
-        // In a narrow axis they have no room.
+        // A narrow axis has no space for them.
         assert_eq!(labels(&linear(0.0, 249.0, 4.0, None)), ["0", "100", "200"]);
-        // ±50 lie outside, and 0 alone would not tell how long the axis is.
+        // ±50 is outside the axis, and 0 alone would not show its scale.
         assert_eq!(labels(&linear(-44.7, 44.7, 2.0, None)), ["−40", "−20", "0", "20", "40"]);
         let small = linear(-2.1e-4, 2.1e-4, 4.0, None);
         assert_eq!(labels(&small), ["−200", "0", "200"]);
@@ -261,7 +261,7 @@ mod tests {
     fn short_logarithmic_axes_are_labelled_to_their_ends() {
         let lifted = logarithmic(1.8e-5, 6e-3, 6.0);
         assert_eq!(labels(&lifted), ["2×10^{−5}", "10^{−4}", "10^{−3}", "5×10^{−3}"]);
-        // Each is drawn once, labelled or not: 17 of the three decades.
+        // Each tick is drawn once, labelled or not.
         assert_eq!(lifted.major.len() + lifted.minor.len(), 8 + 9 + 6);
         assert_eq!(
             labels(&logarithmic(20.0, 2e4, 12.0)),

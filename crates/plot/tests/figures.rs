@@ -131,7 +131,8 @@ fn a_bitmap_has_the_size_asked_for_and_something_on_it() {
     let mut pixels = vec![0; reader.output_buffer_size().expect("fits")];
     reader.next_frame(&mut pixels).expect("decodes");
     let dark = pixels.chunks(4).filter(|pixel| pixel[0] < 100).count();
-    // A frame of two panels alone is some 4,000 pixels; a blank or a black sheet would be outside.
+    // The frames of two panels alone have some 4,000 dark pixels; a blank or black sheet would be
+    // outside these limits.
     assert!((4_000..200_000).contains(&dark), "{dark} dark pixels");
     assert!(matches!(figure.to_png(1e-4), Err(PlotError::BitmapSize { .. })));
     assert!(matches!(figure.to_png(f64::NAN), Err(PlotError::BitmapSize { .. })));
@@ -222,7 +223,7 @@ fn files_are_chosen_by_their_ending_and_replaced_whole() {
 
 #[test]
 fn a_crowded_panel_gets_its_legend_above() {
-    // Noise fills the panel: no corner is free, so the legend may not stand inside the frame.
+    // Noise fills the panel: no corner is free, so the legend must not be inside the frame.
     let x: Vec<f64> = (0..4000).map(f64::from).collect();
     let y: Vec<f64> = x.iter().map(|x| (x * 12.9898).sin()).collect();
     let panel = Panel::new(Axis::linear("x", ""), Axis::linear("y", ""))
@@ -277,7 +278,7 @@ fn numbers_too_small_for_a_scale_are_drawn_as_zero() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever finite numbers are drawn, all geometry is finite and the document parses.
+    /// For any finite numbers, all geometry is finite and the document is valid XML.
     #[test]
     fn geometry_is_finite(
         points in prop::collection::vec((-1e12f64..1e12, -1e-9f64..1e9), 1..40),
@@ -298,7 +299,7 @@ proptest! {
         prop_assert!(coordinates(&svg).iter().all(|value| value.is_finite() && value.abs() <= 1e6 * PI));
     }
 
-    /// Whatever numbers come, a figure is drawn or an error says why not.
+    /// For any numbers, a figure is drawn or an error states the reason.
     #[test]
     fn no_numbers_make_it_panic(
         points in prop::collection::vec((prop::num::f64::ANY, prop::num::f64::ANY), 0..12),

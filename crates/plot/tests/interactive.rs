@@ -1,4 +1,4 @@
-//! What an interactive figure carries for its script, judged by parsing it.
+//! Contents of an interactive figure for its script, judged by parsing it.
 
 use mechid_plot::charts::{FrequencyResponse, bode};
 use mechid_plot::{
@@ -78,7 +78,8 @@ fn a_response_carries_each_list_once_and_its_phase() {
     assert_eq!(panels[0]["c"][0]["p"], panels[0]["c"][1]["p"]);
     // The script draws the phase from the curves of the magnitude.
     assert!(panels[1]["c"].as_array().unwrap().is_empty());
-    // 8 bytes in single precision, as text 4/3 of it, and 2 for the error.
+    // Single precision gives 8 bytes per point, which are 4/3 of that as text, and 2 bytes for the
+    // error.
     assert!(lists.iter().map(|list| list.len()).sum::<usize>() < 4096 * 14, "{}", svg.len());
 }
 

@@ -10,13 +10,14 @@ pub enum ProblemError {
     /// No periodic response exists, or it is not unique.
     #[error(
         "no unique periodic response over {period} s \
-         (reciprocal condition of I − Φᴺ about {reciprocal_condition:.1e}): \
-         an undamped eigenvalue lies on a spectral line of the period, or the response overflows"
+         (reciprocal condition about {reciprocal_condition:.1e} of I − Φᴺ, with the transition matrix Φᴺ over it): \
+         an undamped mode lies on a spectral line of the period, or the response overflows"
     )]
     NoPeriodicMotion {
         /// Period of the force, in seconds.
         period: f64,
-        /// Smallest singular value of I − Φᴺ relative to 1 + ‖Φᴺ‖.
+        /// Smallest singular value of I − Φᴺ relative to 1 + ‖Φᴺ‖, where Φᴺ is the transition
+        /// matrix over the period.
         reciprocal_condition: f64,
     },
     /// The step is so long that rounding leaves no correct digit of the response.

@@ -73,8 +73,8 @@ pub fn exact_foh_periodic(
 /// Periodic response to the band-limited force through the samples of one period: each line n of
 /// the response is the receptance at n·ω0 times line n of the force.
 ///
-/// At Nyquist (even length) the samples contain only the cosine of the force, which is the force
-/// applied.
+/// At the Nyquist frequency (periods of even length) the samples show only a cosine; the force
+/// applied there is that cosine.
 ///
 /// # Errors
 /// [`ProblemError::Model`] if the force does not fit, or if a line of the period (driven or not) is
@@ -155,7 +155,8 @@ fn periodic(
 ) -> Result<Response, ProblemError> {
     let transition = Transition::new(system, force.sampling().dt(), between)?;
     transition.check(force.channels())?;
-    // z(T) = Φᴺ z(0) + s, with s the state after a period from rest: (I − Φᴺ) z(0) = s.
+    // z(T) = Φᴺ z(0) + s, with s the state after a period from rest; z(T) = z(0) gives (I − Φᴺ)
+    // z(0) = s.
     let size = 2 * system.dof();
     let (_, from_rest) = run(&transition, force, DVector::zeros(size))?;
     let over_period = transition.phi.pow(u32::try_from(force.len()).expect("fits in memory"));
@@ -165,7 +166,8 @@ fn periodic(
     // An unstable system may overflow over the period; a matrix with infinite entries has no
     // singular values.
     if growth.is_finite() {
-        // The condition of I − Φᴺ would not do: without damping the whole matrix may vanish.
+        // The condition number of I − Φᴺ is no measure: without damping, the whole matrix may
+        // vanish.
         reciprocal_condition = singular_values(closing.clone())?.min() / (1.0 + growth);
     }
     // N products of matrices add rounding of about N ε to Φᴺ.

@@ -16,18 +16,18 @@ use crate::error::ProblemError;
 /// suits a force and a displacement.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fault {
-    /// Every channel shows this fraction of each other one.
+    /// Crosstalk: every channel contains a fraction of each other channel.
     Crosstalk {
         /// Fraction, a ratio.
         part: f64,
     },
-    /// The surface under the probes is not round: sines of the rotation and its multiples, with
-    /// phases drawn from the seed.
+    /// Run-out: the surface under the probes is not round. It adds sines at the rotation frequency
+    /// and its multiples, with phases drawn from the seed.
     RunOut {
         /// Speed of rotation, in Hz.
         rotation_hz: f64,
-        /// Amplitudes over the RMS value of the channel (pure numbers), one for the rotation and
-        /// each of its multiples.
+        /// Ratio of each amplitude to the RMS value of the channel (pure number): first at the
+        /// rotation frequency, then at each of its multiples.
         amplitudes: Vec<f64>,
     },
     /// Gaussian noise.
@@ -55,8 +55,8 @@ pub enum Fault {
         /// Limit as a fraction of the largest magnitude of each channel.
         part: f64,
     },
-    /// Samples are lost without a replacement: later samples come too early, and the samples at the
-    /// end continue a record of whole periods.
+    /// Samples are lost without a replacement: later samples come too early, and the samples from
+    /// the beginning of the record follow at its end, as in a record of whole periods.
     Lost {
         /// Number of samples lost, all at one position drawn from the seed.
         samples: usize,
@@ -65,12 +65,12 @@ pub enum Fault {
     Held {
         /// Number of gaps, at positions drawn from the seed.
         gaps: usize,
-        /// Samples of a gap.
+        /// Number of samples in a gap.
         samples: usize,
     },
     /// The gain, or its sign, is wrong.
     Gain {
-        /// Values over those without the fault (pure number).
+        /// Ratio of the values to those without the fault (pure number).
         factor: f64,
     },
     /// A converter quantises the values; its range to either side is 1.5 times the largest
@@ -148,8 +148,8 @@ impl Fault {
     }
 }
 
-/// Adds sines at multiples n of the rotation, at `omega(n)` rad per sample, with amplitudes in
-/// parts of `unit`.
+/// Adds sines at multiples n of the rotation frequency, at `omega(n)` rad per sample, with
+/// amplitudes relative to `unit`.
 fn add_run_out(
     column: &mut [f64],
     omega: impl Fn(i32) -> f64,

@@ -30,7 +30,7 @@ pub struct FaultyOscillator {
 }
 
 impl FaultyOscillator {
-    /// Computed samples for one of the record.
+    /// Number of computed samples per sample of the record.
     const FINER: usize = 8;
     /// Damping ratio of the hidden mass.
     const HIDDEN_DAMPING: f64 = 0.01;
@@ -53,9 +53,9 @@ impl FaultyOscillator {
     }
 
     /// Returns force (N) and displacement (m) of one window. The force repeats every `period`
-    /// samples, its lines reach up to `band` of the sampling rate and have a standard deviation of
-    /// some tens of N; the motion starts from rest, and the `skipped` first samples are no part of
-    /// the window.
+    /// samples; its lines reach up to the fraction `band` of the sampling rate, and its standard
+    /// deviation is some tens of N. The motion starts from rest, `skipped` samples before the
+    /// window begins.
     ///
     /// # Errors
     /// [`ProblemError::Signal`] if the record does not fit in memory.
@@ -86,7 +86,8 @@ impl FaultyOscillator {
         Ok([of_window(sampled)?, of_window(displacement)?])
     }
 
-    /// Displacement at every sample of the record under a force at the finer steps `dt` (s).
+    /// Returns the displacement at every sample of the record under a force with the finer step
+    /// `dt` (s).
     fn motion(&self, force: &[f64], dt: f64) -> Vec<f64> {
         let h = 2.0 * dt;
         let moved = |z: [f64; 4], d: [f64; 4], by: f64| std::array::from_fn(|i| z[i] + by * d[i]);
@@ -110,7 +111,8 @@ impl FaultyOscillator {
         all
     }
 
-    /// Rate of displacement and velocity, then of those of the hidden mass; `elapsed` is −½ to ½.
+    /// Returns the time derivatives of displacement and velocity, then those of the hidden mass;
+    /// `elapsed` rises from −½ to ½ over the record.
     fn rate(&self, force: f64, elapsed: f64, [x, v, y, w]: [f64; 4]) -> [f64; 4] {
         let omega = TAU * self.hidden_hz;
         let (spring, damper) = (omega * omega, 2.0 * Self::HIDDEN_DAMPING * omega);

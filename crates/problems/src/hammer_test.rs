@@ -65,7 +65,7 @@ struct Pulse {
 }
 
 impl HammerTest {
-    /// Number of computed samples for one of the record.
+    /// Number of computed samples per sample of the record.
     const FINER: usize = 8;
     /// Half length of the filter, in samples of the record.
     const SPAN: usize = 16;
@@ -80,7 +80,7 @@ impl HammerTest {
     /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (orthogonality of modes).
     pub fn system(&self) -> Result<SecondOrderSystem, ProblemError> {
         let inverse = self.shapes.clone().lu().try_inverse().unwrap_or_else(|| {
-            // A mass that is not finite is refused.
+            // The constructor of the system refuses a mass that is not finite.
             DMatrix::from_element(self.shapes.nrows(), self.shapes.ncols(), f64::NAN)
         });
         let of = |modal: &dyn Fn(f64, f64) -> f64| {
@@ -93,7 +93,7 @@ impl HammerTest {
     }
 
     /// Returns a record of hits on degree of freedom `dof` (counted from 0), with `faults` double
-    /// hits or overloads; each seed gives another one. The response has no noise.
+    /// hits or overloads; each seed gives another record. The response has no noise.
     ///
     /// # Errors
     /// [`ProblemError::Signal`] if the record does not fit in memory.
@@ -211,7 +211,7 @@ impl Pulse {
     }
 }
 
-/// q̈ + 2ζω q̇ + ω² q = F.
+/// Oscillator q̈ + 2ζω q̇ + ω² q = F, the equation of one mode.
 struct Oscillator {
     omega: f64,
     zeta: f64,

@@ -15,11 +15,11 @@ use crate::random::random_stable;
 /// Support of a chain of masses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
-    /// Springs as stiff as between the masses, at both ends.
+    /// Springs at both ends, as stiff as those between the masses.
     Held,
-    /// Springs at both ends of 1/500 of that stiffness.
+    /// Springs at both ends, with 1/500 of the stiffness of those between the masses.
     Soft,
-    /// None: the chain has a rigid-body mode.
+    /// No support: the chain has a rigid-body mode.
     Free,
 }
 
@@ -45,7 +45,8 @@ pub fn chain(dof: usize, support: Support, damping: f64, seed: u64) -> SecondOrd
     for left in 0..=dof {
         let spring: f64 = rng.random_range(5e3..2e4);
         let spring = if left == 0 || left == dof { ends * spring } else { spring };
-        // The masses at both ends of the spring; the last one is followed by the support.
+        // The spring connects mass `left` − 1 with mass `left`; an index without a mass is the
+        // support.
         for (i, sign) in [(left.checked_sub(1), 1.0), (Some(left), -1.0)] {
             for (j, other) in [(left.checked_sub(1), 1.0), (Some(left), -1.0)] {
                 if let (Some(i), Some(j)) = (i.filter(|i| *i < dof), j.filter(|j| *j < dof)) {
@@ -70,7 +71,7 @@ pub struct Test {
     pub system: SecondOrderSystem,
     /// True if M is known in the identification.
     pub mass_known: bool,
-    /// Lines driven, and above them as many lines without force.
+    /// Numbers of the driven lines, and of as many lines without force above them.
     pub lines: Vec<usize>,
     /// Force (N), samples × dof, one period.
     pub force: Record,
@@ -81,9 +82,9 @@ pub struct Test {
 }
 
 /// Returns machine `index` of a series of any length, each with its test: 1 to 10 degrees of
-/// freedom, damping ratios of 0.3 to 5 %, five kinds in turn. The force has lines of 10 N with
-/// random phases up to 1.3 times the highest natural frequency, at least twenty for each degree of
-/// freedom.
+/// freedom, damping ratios of 0.3 to 5 %, and five kinds of machine in turn. The force has lines of
+/// 10 N with random phases up to 1.3 times the highest natural frequency, at least twenty for each
+/// degree of freedom.
 ///
 /// # Errors
 /// [`ProblemError::Model`] if a line is an undamped resonance.
@@ -102,8 +103,8 @@ pub fn series(index: u64) -> Result<Test, ProblemError> {
 }
 
 /// Returns a steady test of a machine: `count` lines of 10 N with random phases up to 1.3 times its
-/// highest natural frequency, at every degree of freedom or only at the first, whose mass is then
-/// known.
+/// highest natural frequency. The forces act at every degree of freedom, or only at the first,
+/// whose mass is then known.
 ///
 /// # Errors
 /// [`ProblemError::Model`] if the modes cannot be found or a line is an undamped resonance.

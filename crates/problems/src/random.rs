@@ -16,13 +16,15 @@ use rand_distr::{Distribution, StandardNormal};
 /// C = L (D + G) Lᵀ,      K = L (S + N) Lᵀ
 /// ```
 ///
-/// where S has eigenvalues in 5² … 60² (1/s²), D in 2ζω with ζ in 0.05 … 0.3 over the same
-/// range, in unrelated directions, and G, N are skew-symmetric (gyroscopic and circulatory).
+/// where S has eigenvalues ω² with ω from 5 to 60 rad/s; D has eigenvalues 2ζω with ζ from 0.05 to
+/// 0.3 and ω in the same range; the eigenvectors of S and D are unrelated; and G and N are
+/// skew-symmetric (gyroscopic and circulatory forces).
 ///
-/// **Why it is stable.** An eigenvalue satisfies λ² + (d + ig) λ + (s + in) = 0 with d, s, g, n
-/// the four forms on its unit eigenvector. Both roots decay if d > 0 and d²s − d g n − n² > 0
-/// (Routh's criterion for complex coefficients). With d₀, s₀ the smallest eigenvalues of D, S,
-/// the bounds |g| ≤ √s₀ and |n| ≤ 0.4 d₀ √s₀ leave at least (1 − 0.4 − 0.16) d₀² s₀.
+/// **Why it is stable.** An eigenvalue satisfies λ² + (d + ig) λ + (s + in) = 0, where d, ig, s and
+/// in are the quadratic forms of D, G, S and N with its unit eigenvector. Both roots decay if d > 0
+/// and d²s − d g n − n² > 0 (Routh's criterion for complex coefficients). With d₀, s₀ the smallest
+/// eigenvalues of D, S, the bounds |g| ≤ √s₀ and |n| ≤ 0.4 d₀ √s₀ ensure that this expression is at
+/// least (1 − 0.4 − 0.16) d₀² s₀.
 ///
 /// # Panics
 /// If `dof` is 0.
@@ -47,12 +49,12 @@ pub fn random_stable(dof: usize, seed: u64) -> SecondOrderSystem {
     .expect("the factor of M has a diagonal of at least 1")
 }
 
-/// Log-uniform values.
+/// Returns log-uniform random values between two limits.
 fn spread(dof: usize, low: f64, high: f64, rng: &mut ChaCha8Rng) -> DVector<f64> {
     DVector::from_fn(dof, |_, _| low * (high / low).powf(rng.random::<f64>()))
 }
 
-/// A well-conditioned lower triangle.
+/// Returns a well-conditioned lower triangular matrix.
 fn mass_factor(dof: usize, rng: &mut ChaCha8Rng) -> DMatrix<f64> {
     let coupling = 0.5 / dof as f64;
     DMatrix::from_fn(dof, dof, |i, j| match i.cmp(&j) {
@@ -68,7 +70,7 @@ fn rotated(eigenvalues: &DVector<f64>, rng: &mut ChaCha8Rng) -> DMatrix<f64> {
     &q * DMatrix::from_diagonal(eigenvalues) * q.transpose()
 }
 
-/// A skew-symmetric matrix whose spectral norm is at most `bound`.
+/// Returns a skew-symmetric matrix whose spectral norm is at most `bound`.
 fn skew(dof: usize, bound: f64, rng: &mut ChaCha8Rng) -> DMatrix<f64> {
     let a = gaussian(dof, rng);
     let skew = &a - a.transpose();

@@ -41,7 +41,7 @@ impl RandomTest {
     pub fn measure(&self, seed: u64) -> Result<[Record; 2], ProblemError> {
         let samples = self.sampling.len();
         let [force, response] = self.period(seed)?;
-        // The window avoids the ends of the period, where it would close.
+        // The window does not contain the end of the period, where the record repeats.
         let first = samples / 2 + 1;
         Ok([force.window(first, samples)?, response.window(first, samples)?])
     }

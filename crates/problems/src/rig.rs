@@ -92,7 +92,7 @@ impl BearingRig {
     /// from `seed`.
     ///
     /// # Source
-    /// The error of [`BearingRig::dynamic_stiffness`].
+    /// The source of [`BearingRig::dynamic_stiffness`].
     ///
     /// # Errors
     /// [`ProblemError::Signal`] for a line beyond the Nyquist frequency.
@@ -131,7 +131,7 @@ impl BearingRig {
         for (multiple, run_out) in (1..).zip(&self.run_out) {
             let line = f64::from(multiple) * self.rotation_hz / sampling.line_spacing_hz();
             let phasor = Complex::from_polar(*run_out, rng.random_range(0.0..TAU));
-            // The probes are perpendicular.
+            // The probes are perpendicular: y lags x by a quarter of a revolution.
             displacement[(line.round() as usize, 0)] += phasor;
             displacement[(line.round() as usize, 1)] += phasor * Complex::new(0.0, -1.0);
         }

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use mechid_signal::{Record, Sampling};
 
-/// Force (first channel) and displacement (second) of a whole record, from two columns counted from
-/// 0; `None`, with a message, without the file.
+/// Returns force (first channel) and displacement (second) of a whole record, from two columns
+/// counted from 0. If the file is missing, prints a message and returns `None`.
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn channels(file: &str, columns: [usize; 2]) -> Option<Record> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/silverbox");
@@ -28,20 +28,20 @@ fn channels(file: &str, columns: [usize; 2]) -> Option<Record> {
     Some(Record::from_channels(sampling, &channels).unwrap())
 }
 
-/// The Schroeder multisine of period 1024.
+/// Returns the Schroeder multisine of period 1024.
 pub fn schroeder() -> Option<Record> {
     channels("Schroeder80mV.csv", [2, 3])
 }
 
-/// The estimation part of the benchmark: six realisations of a random odd multisine.
+/// Returns the estimation part of the benchmark: six realisations of a random odd multisine.
 pub fn realisations() -> Option<Record> {
     channels("SNLS80mV_estimation.csv", [0, 1])
 }
 
-/// Samples of a realisation's steady period.
+/// Number of samples in the steady period of a realisation.
 pub const REALISATION: usize = 8192;
 
-/// First sample of the steady period of realisation 1 to 6, counted from 0.
+/// Returns the first sample of the steady period of realisation 1 to 6, counted from 0.
 pub fn start_of(realisation: usize) -> usize {
     8692 * realisation + 337
 }

@@ -27,7 +27,8 @@ pub fn bearing() -> SecondOrderSystem {
     JournalBearing::new(14.8, film, KyxSign::Minus).unwrap().system()
 }
 
-/// Amplitudes of unit size with Schroeder's phases, each channel with its own.
+/// Force amplitudes of equal size, in the unit of `amplitude`, with Schroeder's phases, which
+/// differ from channel to channel.
 ///
 /// # Source
 /// Schroeder (1970), IEEE Transactions on Information Theory 16, 85–89.
@@ -54,7 +55,8 @@ pub fn displacements(
     displacements
 }
 
-/// Σ Re(A_n exp(i n ω0 t)) by its definition, times what makes another quantity of it.
+/// Record with samples Σ Re(h A_n exp(i n ω0 t)), summed term by term; A_n are displacement
+/// amplitudes, and the factor h converts them into the given quantity.
 ///
 /// # Source
 /// The definition of a Fourier series.
@@ -83,8 +85,7 @@ pub fn relative_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     (found - expected).abs().max() / expected.abs().max()
 }
 
-/// All entries of M, C and K in the order of the unknowns when all are free.
-/// In SI units.
+/// All entries of M, C and K, in the order of the unknowns if every entry is free. In SI units.
 pub fn all_entries(system: &SecondOrderSystem) -> DVector<f64> {
     let matrices = [system.mass(), system.damping(), system.stiffness()];
     DVector::from_iterator(
@@ -93,7 +94,8 @@ pub fn all_entries(system: &SecondOrderSystem) -> DVector<f64> {
     )
 }
 
-/// One period of 256 samples at twenty points per cycle of the fastest mode, and all its lines.
+/// Sampling of one period of 256 samples, with twenty samples per cycle of the fastest mode, and
+/// all its lines.
 pub fn sampling(system: &SecondOrderSystem) -> (Sampling, Vec<usize>) {
     let fastest = system.modes().unwrap().iter().map(|m| m.natural_frequency()).fold(0.0, f64::max);
     let sampling = Sampling::new(std::f64::consts::TAU / (20.0 * fastest), 256).unwrap();

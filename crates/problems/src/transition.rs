@@ -15,9 +15,11 @@ pub(crate) enum Between {
     Linear,
 }
 
-/// z(t+Δt) = Φ z(t) + Γ0 F(t) + Γ1 F(t+Δt) with z = [x; Δt ẋ], without discretisation error.
+/// Transition z(t+Δt) = Φ z(t) + Γ0 F(t) + Γ1 F(t+Δt) with z = [x; Δt ẋ], without discretisation
+/// error.
 ///
-/// Time in steps keeps the exponential well scaled. One matrix exponential gives all three:
+/// Time is counted in steps, which keeps the exponential well scaled. One matrix exponential gives
+/// Φ, Γ0 and Γ1, from the state matrix A and the input matrix B:
 ///
 /// ```text
 ///     ┌ A  B  0 ┐   ┌ Φ  P1  P2 ┐
@@ -66,7 +68,7 @@ impl Transition {
         Ok(Self { phi: block(0, 2 * n), from_left, from_right, mass, system: system.clone(), dt })
     }
 
-    /// State after one step from `state` under the forces at its two ends.
+    /// Returns the state after one step from `state` under the forces at the two ends of the step.
     pub(crate) fn step(
         &self,
         state: &DVector<f64>,
@@ -76,13 +78,13 @@ impl Transition {
         &self.phi * state + &self.from_left * left + &self.from_right * right
     }
 
-    /// z = [x; Δt ẋ].
+    /// Returns the state z = [x; Δt ẋ].
     pub(crate) fn state(&self, x: &DVector<f64>, v: &DVector<f64>) -> DVector<f64> {
         let n = self.system.dof();
         DVector::from_fn(2 * n, |i, _| if i < n { x[i] } else { self.dt * v[i - n] })
     }
 
-    /// x, ẋ and ẍ = M⁻¹(F − C ẋ − K x) of a state under a force.
+    /// Returns x, ẋ and ẍ = M⁻¹(F − C ẋ − K x) of a state under a force.
     pub(crate) fn motion(&self, state: &DVector<f64>, force: &DVector<f64>) -> [DVector<f64>; 3] {
         let n = self.system.dof();
         let x = state.rows(0, n).into_owned();
@@ -98,7 +100,7 @@ impl Transition {
     }
 }
 
-/// The state matrix for z = [x; Δt ẋ] and time counted in steps.
+/// Returns the state matrix for z = [x; Δt ẋ] and time counted in steps.
 fn in_steps(system: &SecondOrderSystem, dt: f64) -> DMatrix<f64> {
     let n = system.dof();
     let mut a = system.state_matrix();

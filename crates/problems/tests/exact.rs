@@ -1,4 +1,5 @@
-//! The judges judged: complex modal superposition, prescribed motions, refinement, repetition.
+//! Checks of the reference solutions: complex modal superposition, prescribed motions, refinement,
+//! repetition.
 
 use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
 use mechid_problems::{
@@ -33,7 +34,7 @@ fn gap(p: &Response, q: &Response) -> f64 {
         .max(relative(p.acceleration(), q.acceleration()))
 }
 
-/// The same force seen `times` in a row.
+/// The same force repeated `times` times.
 fn repeated(force: &Record, times: usize) -> Record {
     let (len, dof) = (force.len(), force.channels());
     let data = DMatrix::from_fn(len * times, dof, |k, j| force.data()[(k % len, j)]);
@@ -192,7 +193,8 @@ fn a_prescribed_motion_is_found_from_its_force() {
         let expected = Response::new(record(0), record(1), record(2)).unwrap();
         let found = exact_harmonic_periodic(&system, &record(3)).unwrap();
         assert!(gap(&found, &expected) < 1e-12, "len {len}");
-        // Started on the periodic motion it stays there; started elsewhere it starts there.
+        // A motion that starts on the periodic one stays there; any other starts at its given
+        // state.
         let on = InitialState::new(rows[0][0].clone(), rows[0][1].clone()).unwrap();
         assert!(gap(&exact_harmonic(&system, &record(3), &on).unwrap(), &expected) < 1e-12);
         let off = exact_harmonic(&system, &record(3), &some_state(3)).unwrap();
@@ -203,8 +205,8 @@ fn a_prescribed_motion_is_found_from_its_force() {
 
 #[test]
 fn the_three_conventions_meet_on_a_fine_grid() {
-    // One cosine, 2,000 samples a period: linear misses by (ωΔt)²/12 of the
-    // amplitude, held by ωΔt/2; the next terms are smaller by (ωΔt)² ≈ 1e-5.
+    // One cosine, 2,000 samples a period: the linear force is wrong by (ωΔt)²/12 of the amplitude,
+    // the held force by ωΔt/2; the next terms are smaller by a factor (ωΔt)² ≈ 1e-5.
     let system = steffen_rade();
     let sampling = Sampling::new(5e-4, 2000).unwrap();
     let data = DMatrix::from_fn(2000, 2, |k, j| {

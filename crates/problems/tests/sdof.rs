@@ -62,7 +62,7 @@ fn a_periodic_motion_is_where_the_recurrence_settles() {
     let sampling = Sampling::new(0.02, 100).unwrap();
     let force = Record::from_channel(sampling, period.clone()).unwrap();
     let many = Record::from_channel(Sampling::new(0.02, 500).unwrap(), period.repeat(5)).unwrap();
-    // e^{−9·8} ≈ 5e-32 of the transient is left after four periods.
+    // After four periods, e^{−9·8} ≈ 5e-32 of the transient remains.
     let settled = sdof.linear_force_response(&many, 0.3, 0.0).unwrap();
     let last = DMatrix::from_fn(100, 1, |k, _| settled.displacement().channel(0)[400 + k]);
     let periodic = exact_foh_periodic(&sdof.system(), &force).unwrap();

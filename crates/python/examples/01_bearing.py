@@ -1,10 +1,11 @@
 """A rotor in its bearing: eight coefficients, and the modes that follow from them.
 
-Two directions are coupled by a film that is not symmetric. The test drives both with multisines of
-their own lines, so that one experiment tells all entries of C and K; the mass is known from a balance.
+The film couples two directions, and its matrices are not symmetric. The test excites both
+directions with multisines on different lines, so that one experiment determines all entries of C
+and K; the mass is known from a balance.
 """
 
-# %% The rig, as a description that `mechid simulate` takes, too.
+# %% The rig, in the form that `mechid simulate` reads, too.
 import numpy as np
 
 import mechid
@@ -35,7 +36,7 @@ found = mechid.identify(
 )
 print(found)
 
-# %% Every coefficient within four standard errors of the truth.
+# %% Compare every coefficient with the truth, within four standard errors.
 for truth, letter in ((C, "c"), (K, "k")):
     for row in range(2):
         for column in range(2):
@@ -45,7 +46,7 @@ for truth, letter in ((C, "c"), (K, "k")):
             print(f"{parameter.name}: {parameter.value:12.1f} {parameter.unit}, {apart:+.1f} standard errors off")
             assert abs(apart) < 4
 
-# %% Modes with their uncertainty; one that grows would have a positive real part.
+# %% Modes with their uncertainty; an unstable mode would have a positive real part.
 for mode in found.modes:
     ratio = mode.damping_ratio
     print(f"{mode.natural_frequency_hz.value:.2f} Hz, ζ = {ratio.value:.4f} ± {ratio.std_error:.4f}")

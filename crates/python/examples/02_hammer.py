@@ -1,6 +1,7 @@
-"""A hammer test: averaged frequency responses of five blows, the machine, and a blow found again."""
+"""A hammer test: averaged frequency responses of five hits, the machine, and one hit
+reconstructed."""
 
-# %% Five blows on one mass; every record begins a little before the blow and ends at rest.
+# %% Five hits on one mass; every record begins a little before the hit and ends at rest.
 import numpy as np
 
 import mechid
@@ -23,7 +24,7 @@ force = np.concatenate(blows)
 motion = mechid.predict(machine, force, FS)["displacement"][:, 0]
 measured = motion + rng.normal(0.0, 1e-3 * motion.std(), len(motion))
 
-# %% The blows are the segments, with equal weights: each begins and ends at rest.
+# %% The hits are the segments, with equal weights: each begins and ends at rest.
 record = mechid.Measurement.from_arrays(force, measured, fs=FS)
 table = mechid.frf(
     record, segment=f"{SAMPLES}:0:rectangular", band_hz=(5.0, 60.0)
@@ -33,7 +34,7 @@ judge = machine.receptance(table.frequency_hz)[:, 0, 0]
 apart = np.abs(table.response() - judge) / np.abs(judge).max()
 assert apart.max() < 0.02, apart.max()
 
-# %% The machine behind them.
+# %% Identify the machine.
 found = mechid.identify(
     record, from_frf="h1", segment=f"{SAMPLES}:0:rectangular",
     band_hz=(5.0, 60.0),
@@ -41,7 +42,7 @@ found = mechid.identify(
 print(found)
 assert abs(found.parameters["k"].value / 5.1e4 - 1) < 0.01
 
-# %% A blow that no load cell has seen.
+# %% Reconstruct a hit that no load cell has measured.
 unseen = blow(130.0)
 response = mechid.predict(machine, unseen, FS)
 noisy = {

@@ -1,4 +1,4 @@
-"""Are the standard errors honest? Repeat an experiment with fresh noise, side by side in threads."""
+"""Are the standard errors reliable? Repeats an experiment with new noise, in parallel threads."""
 
 # %% One period of a multisine on a known machine; the response is exact.
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +15,7 @@ response = mechid.integrate(machine, drive.force, FS, scheme="exact", response="
 force, motion = np.tile(drive.force, PERIODS), np.tile(response["displacement"][:, 0], PERIODS)
 
 
-# %% Each run has a stream of noise of its own; threads share the work, for the lock is released.
+# %% Each run has different noise; threads share the work, because the interpreter's lock is released.
 def run(seed: int) -> tuple[list[float], list[float], bool]:
     noise = np.random.default_rng([1998, seed]).normal(0.0, 0.02 * motion.std(), len(motion))
     found = mechid.identify(
@@ -29,10 +29,10 @@ def run(seed: int) -> tuple[list[float], list[float], bool]:
 with ThreadPoolExecutor() as pool:
     runs = list(pool.map(run, range(RUNS)))
 values, errors, warned = (np.array(part) for part in zip(*runs, strict=True))
-print(f"{100 * warned.mean():.1f} % of the runs are warned of by chance, and state more")
+print(f"{100 * warned.mean():.1f} % of the runs have a warning by chance, and larger errors")
 assert warned.mean() <= 0.02
 
-# %% The scatter of the estimates against the standard errors that each of them stated.
+# %% Compare the scatter of the estimates with the standard errors of each estimate.
 for column, (name, truth) in enumerate(TRUTH.items()):
     scatter, stated = values[:, column].std(), np.sqrt((errors[~warned, column] ** 2).mean())
     bias = (values[:, column].mean() - truth) / (scatter / np.sqrt(RUNS))

@@ -1,7 +1,7 @@
-"""Speed and accuracy beside SciPy, in one run: prints a table.
+"""Speed and accuracy compared with SciPy, in one run: prints a table.
 
-SciPy does what it does best in each row; both answers are held against the same truth, and the least
-time of several repeats counts.
+Each row uses the best method of SciPy; both results are compared with the same truth, and the
+shortest time of several repetitions counts.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def stepping(machine: mechid.Machine, task: str, samples: int) -> None:
 def filtering(samples: int, outputs: int) -> None:
     """A force that is held between samples; SciPy by `cont2discrete` and `lfilter`.
 
-    `predict` gives displacement, velocity and acceleration; a filter gives one of them.
+    `predict` computes displacement, velocity and acceleration; a filter computes one of them.
     """
     rng = np.random.default_rng(2)
     fs = 256.0
@@ -108,9 +108,9 @@ def responses(samples: int, segment: int) -> None:
 def fitting(periods: int) -> None:
     """Output error on spectra, each line weighted by the scatter of the periods.
 
-    SciPy by `least_squares` of the same residuals, scaled and started at a tenth off, with standard
-    errors from its Jacobian. `identify` finds its start, and makes every check of the data and of the
-    residual: no part of the other's task.
+    SciPy uses `least_squares` of the same residuals, scaled, with initial values that are wrong by
+    a tenth, and standard errors from its Jacobian. `identify` also finds its initial values and
+    makes all checks of the data and of the residual.
     """
     fs, period = 128.0, 256
     truth = np.array([25.0, 188.5, 142_122.0])
@@ -142,7 +142,7 @@ def fitting(periods: int) -> None:
 
     slow, (judge, error) = timed(theirs, 10)
     fast, (found, _) = timed(ours, 10)
-    # The same minimum, to a hundredth of a standard error.
+    # Both find the same minimum, to a hundredth of a standard error.
     assert (np.abs(found - judge) < 0.01 * error).all()
     errors = [float(np.abs(values / truth - 1).max()) for values in (judge, found)]
     row(f"output error, {periods} periods of {period} (`least_squares`); with start and checks",

@@ -1,7 +1,7 @@
-"""What the package costs beyond its work: prints a table.
+"""Time that the package needs in addition to the computation: prints a table.
 
-Times of the call are least times of many; those of processes are least times of several, as ratios to
-a process that imports NumPy alone.
+Times of calls are the shortest of many repetitions. Times of processes are the shortest of several,
+as ratios to a process that only imports NumPy.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MACHINE = mechid.Machine(25.0, 188.5, 142_122.0)
 
 
 def least(work: Callable[[], object], repeats: int) -> float:
-    """Least time of a call, in s."""
+    """Return the shortest time of a call, in s."""
     best = np.inf
     for _ in range(repeats):
         begin = time.perf_counter()
@@ -34,12 +34,13 @@ def least(work: Callable[[], object], repeats: int) -> float:
 
 
 def process(words: Sequence[str], repeats: int = 15) -> float:
-    """Least time of a process, in s."""
+    """Return the shortest time of a process, in s."""
     return least(lambda: subprocess.run(words, check=True, capture_output=True), repeats)
 
 
 def call() -> None:
-    """A call of 1,024 × 2 samples: what the compiled module does of it, and what lies around that."""
+    """Measure a call of 1,024 × 2 samples: the time in the compiled module and the time around
+    it."""
     force, x = np.random.default_rng(5).standard_normal((2, 1024))
     record = mechid.Measurement.from_arrays(force, x, fs=128.0)
     told = json.dumps(mechid.identify(record, period=512, method="least-squares").settings)
@@ -69,7 +70,7 @@ def call() -> None:
 
 
 def refused(call: Callable[[], object]) -> None:
-    """A call that fails at once, as there is no such line."""
+    """Fail at once: there is no such line."""
     try:
         call()
     except mechid.MechidError:
@@ -78,7 +79,7 @@ def refused(call: Callable[[], object]) -> None:
 
 
 def work(_: int) -> float:
-    """Some ten milliseconds on one thread."""
+    """Compute for some ten milliseconds on one thread."""
     force = np.random.default_rng(6).standard_normal(100_000)
     moved = mechid.predict(MACHINE, force, 128.0)
     found = mechid.identify(
@@ -88,7 +89,7 @@ def work(_: int) -> float:
 
 
 def threads() -> None:
-    """Two threads against one, and two processes against one, which share no lock."""
+    """Compare two threads with one, and two processes, which share no lock, with one."""
 
     def by(pool: Executor) -> float:
         with pool:
@@ -100,7 +101,7 @@ def threads() -> None:
 
 
 def starts() -> None:
-    """Time to import and to start the program."""
+    """Measure the time to import the package and to start the program."""
     numpy = process([sys.executable, "-c", "import numpy"])
     bare = process([sys.executable, "-c", "pass"])
     both = process([sys.executable, "-c", "import mechid; mechid.identify"])

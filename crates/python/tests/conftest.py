@@ -1,4 +1,4 @@
-"""What several tests need: the example record, and the program beside the package."""
+"""Fixtures of several tests: the example record, and the program that belongs to the package."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ ROOT = Path(__file__).resolve().parents[3]
 
 @pytest.fixture(autouse=True)
 def in_the_repository(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Paths are those that the pages show."""
+    """Use the folder to which the paths in the pages refer."""
     monkeypatch.chdir(ROOT)
 
 
 @pytest.fixture(scope="session")
 def program() -> Callable[..., str]:
-    """The installed program: what it prints, for these arguments."""
+    """The installed program: returns its output for some arguments."""
     found = shutil.which("mechid", path=os.path.dirname(sys.executable))
     assert found is not None, "the wheel brings no program"
 

@@ -1,6 +1,6 @@
-"""Whatever comes in, an answer or an exception that says why comes out; nothing leaks.
+"""Any input gives a result or an exception with a reason, and no call leaks memory.
 
-``MECHID_CASES`` sets how many inputs and calls are tried; the check of every change tries a few.
+``MECHID_CASES`` sets the number of inputs and calls; the check of every change tries a few.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ DTYPES = ["f2", "f4", "f8", ">f8", "g", "i1", "i8", "u2", "c16", "?", "U3", "O",
 
 @st.composite
 def arrays(draw: st.DrawFn) -> Any:
-    """An array of any type, shape and layout; half of them as they should be."""
+    """An array of any type, shape and layout; half of the arrays are valid."""
     length = draw(st.integers(0, 40))
     good = draw(st.booleans())
     shape = (length,) if good else tuple(draw(st.lists(st.integers(0, 5), max_size=3)))
@@ -31,7 +31,7 @@ def arrays(draw: st.DrawFn) -> Any:
     if draw(st.integers(0, 4)) == 0:
         values = values * 10.0 ** draw(st.sampled_from([-320, -200, 0, 150, 307]))
     with np.errstate(all="ignore"):
-        # Arrays of no dimension become numbers on the way.
+        # Arrays without a dimension are converted to numbers.
         values = np.asarray(values).astype(dtype) if dtype.kind != "M" else np.zeros(shape, dtype)
     values = np.asarray(values)
     if draw(st.integers(0, 9)) == 0 and values.size and values.dtype.kind == "f":
@@ -112,5 +112,5 @@ def test_nothing_leaks() -> None:
     before = resident()
     for _ in range(CASES):
         call()
-    # A leak of one array of a call would be 4 kB each.
+    # A leak of one array per call would be 4 kB per call.
     assert resident() - before < 2**20 + 1024 * CASES

@@ -1,4 +1,4 @@
-"""What could be another machine, other samples or another exception in silence is not."""
+"""No input is silently read as another machine, other samples, or another exception."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def described(folder: Path, stiffness: float) -> None:
 def test_matrices_lie_beside_the_description(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     described(tmp_path / "sub", 1e4)
     alone = mechid.simulate(tmp_path / "sub" / "e.json")
-    # Others of the same names in the current folder are other machines.
+    # Files with the same names in the current folder describe another machine.
     described(tmp_path, 1e2)
     monkeypatch.chdir(tmp_path)
     for path in ("sub/e.json", Path("sub") / "e.json"):
         assert np.array_equal(mechid.simulate(path).displacement, alone.displacement)
     other = mechid.simulate("e.json")
     assert np.abs(other.displacement).max() > 10 * np.abs(alone.displacement).max()
-    # A mapping lies nowhere: its files are those of the current folder.
+    # A mapping has no folder, so its files are in the current folder.
     mapping = {
         "system": {"mass": "m.mtx", "damping": "c.mtx", "stiffness": "k.mtx"},
         "sampling": {"samples": 64, "rate_hz": 100}, "outputs": [1],
@@ -70,7 +70,7 @@ def test_series_of_other_labels_are_refused() -> None:
         with pytest.raises(ValueError, match="different indexes"):
             table = {"f": same[0], "x": other}
             mechid.identify(table, force="f", displacement="x", fs=128, period=256)
-    # Values without labels go together by position.
+    # Values without labels belong together by position.
     mechid.identify(same[0], later.to_numpy(), fs=128, period=256)
 
 
@@ -161,6 +161,6 @@ def test_a_poison_record_becomes_a_row(tmp_path: Path) -> None:
     assert found.left_out == (f"{day}/pipe.csv (a named pipe)",)
     short = fleet.run(day, ANALYSIS, tmp_path / "short", record_seconds=1e-6)
     assert (short.failed, short.failures[0].code) == (2, "analysis.record-time")
-    # A process that cannot begin is no fault of a record.
+    # If a process cannot start, no record is the cause.
     with pytest.raises(mechid.MechidError):
         fleet.run(day, ANALYSIS, tmp_path / "small", record_memory_gb=0.02)

@@ -1,7 +1,7 @@
-"""Codes of failures: the list in the book is every failure that the library knows.
+"""Codes of failures: the list in the book has every failure of the library.
 
-``MECHID_BLESS=1 python -m pytest crates/python -k codes`` writes the page anew. A code that is on the
-page stays: programs tell failures apart by it.
+``MECHID_BLESS=1 python -m pytest crates/python -k codes`` writes the page again. A code on the page
+must never disappear, because programs identify failures by it.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from .conftest import ROOT
 PAGE = ROOT / "docs/book/src/reference/codes.md"
 HEAD = """# Codes of failures
 
-`MechidError.code` says which failure it is: the part of the library, a dot, and the failure; by whatever call it comes, it is the same.
-Codes are stable, while messages may become clearer. `MechidError.fields` has the numbers and names that a message tells.
+`MechidError.code` identifies a failure: it is the part of the library, a dot, and the name of the failure. It is the same for every call that can fail so.
+Codes never change, while messages may become clearer. `MechidError.fields` has the numbers and names of the message.
 
 | Code | Failure |
 |---|---|
@@ -36,14 +36,14 @@ VARIANTS = re.compile(
 
 
 def failures() -> dict[str, str]:
-    """Codes of all failures of the library and what they are, from its sources."""
+    """Codes of all failures of the library with their descriptions, from its sources."""
     found: dict[str, str] = {}
     others = ["mechid/src/simulation", "modal/src/free_decay", "modal/src/ambient", "model/src/elements",
               "estimate/src/likelihood"]
     paths = [*ROOT.glob("crates/*/src/error.rs"), *(ROOT / f"crates/{at}/error.rs" for at in others)]
     for path in paths:
         for kind, body in ENUMS.findall(path.read_text(encoding="utf-8")):
-            # The package calls nothing that fails so.
+            # The package calls no function with this failure.
             if kind in ("Bearing", "Cli", "Problem"):
                 continue
             for variant in VARIANTS.finditer(body):
@@ -54,7 +54,8 @@ def failures() -> dict[str, str]:
 
 
 def part(kind: str, name: str) -> str:
-    """The part of the library that a code names, which stays when a failure moves to a crate of its own."""
+    """The part of the library that a code names; it does not change if a failure moves to another
+    crate."""
     of_model = ("EntryNotFinite", "ExponentialOverflow", "NotConverged", "NotSquare")
     if kind == "Numerics" and name in of_model:
         return "model"
@@ -87,7 +88,7 @@ def test_the_list_is_every_failure_of_the_library() -> None:
 
 
 def test_every_enum_is_read() -> None:
-    """Each variant has a message or passes another failure on; none is overlooked."""
+    """Each variant has a message or passes another failure on, and the parser finds all of them."""
     for path in Path(ROOT).glob("crates/*/src/error.rs"):
         for _, body in ENUMS.findall(path.read_text(encoding="utf-8")):
             told = body.count("#[error(")

@@ -1,4 +1,4 @@
-"""The other questions: what the program says to the last bit, and what closed forms say."""
+"""The other analyses: exactly equal to the program, and compared with closed forms."""
 
 from __future__ import annotations
 
@@ -84,14 +84,14 @@ def test_modes_of_a_roving_hammer_are_those_of_the_program(program: Callable[...
     )
     assert found.to_json() + "\n" == told
     first, second = (mode.natural_frequency_hz.value for mode in found.modes)
-    # The modes of the machine behind the example, in closed form.
+    # The modes of the machine of the example, in closed form.
     assert first == pytest.approx(12, rel=1e-4) and second == pytest.approx(31, rel=1e-4)
     assert found.participations.shape == (2, 2) and found.explained[0] > 0.99
     assert np.all(found.driven_shares > 0.98) and found.mac.shape == (2, 2)
 
 
 def test_modes_of_a_table_are_those_of_the_program(program: Callable[..., str], tmp_path: Path) -> None:
-    """Judge: two modes in closed form, as arrays and as a file."""
+    """Reference: two modes in closed form, as arrays and as a file."""
     hz = np.arange(5, 60, 0.05)
     s = 2j * np.pi * hz
     shapes = np.array([[1.0, 0.8], [-0.6, 1.0]])
@@ -129,7 +129,7 @@ def test_a_comparison_is_that_of_the_program(program: Callable[..., str], tmp_pa
     assert found.only_first == found.only_second == () and "MAC" in str(found)
     told = program("modes", "examples/hammer-1.csv", *words(options), "--compare", str(path), "--json")
     assert json.loads(told)["pairs"] == json.loads(found.to_json())["pairs"]
-    # A model as arrays, of which one mode is 5 % higher.
+    # A model given as arrays; one of its modes is 5 % higher.
     model = {"natural_frequency_hz": [12.0, 31.0 * 1.05], "shape": [[1, 0.57], [0.83, -1]], "points": ["a1", "a2"]}
     changed = mechid.compare_modes(first, model).pairs[1]["natural_frequency_hz"]
     assert changed["difference"] == pytest.approx(0.05 * 31, rel=1e-2) and changed["p_value"] < 1e-6
@@ -187,7 +187,8 @@ def test_a_bearing_is_that_of_the_program(program: Callable[..., str], options: 
 
 
 def test_a_bearing_comes_from_frequency_responses(tmp_path: Path) -> None:
-    """Closed-form responses of a housing on a film and on stingers, which the baseline has alone."""
+    """Closed-form responses of a housing on a film and on stingers; the baseline has only the
+    stingers."""
     omega = 2 * np.pi * np.arange(24.0, 200.0, 4.0)[:, None, None]
     film = [np.array(m) for m in ([[7e7, 9e7], [-1.6e7, 4e7]], [[5e5, 1.5e5], [1.4e5, 2e5]], [[3.0, 1.0], [-1.0, 2.0]])]
     stinger = [np.diag([6e6, 5e6]), np.diag([2e3, 1.5e3]), 0.4 * np.eye(2)]
@@ -253,7 +254,7 @@ def test_forces_are_those_of_the_program(
         np.testing.assert_array_equal(found.std_error[:, 0], written[:, 2])
     frequency, amplitudes = found.spectrum
     assert len(frequency) == len(amplitudes)
-    # The identification itself will do as the machine: a file keeps every bit of it.
+    # The identification itself serves as the machine, because its JSON preserves every bit.
     again = mechid.reconstruct(identified, FILE, **options)
     np.testing.assert_array_equal(again.force, found.force)
 
@@ -385,7 +386,7 @@ def test_a_large_machine_is_three_sparse_matrices(scheme: str) -> None:
         }
     )
     assert found.force.shape == (samples, 1) and found.displacement.shape == (samples, 2)
-    # Judge: the receptance at each line, by SciPy.
+    # Reference: the receptance at each line, by SciPy.
     solve = pytest.importorskip("scipy.sparse.linalg").spsolve
     m, c, k = (matrices[name] for name in ("mass", "damping", "stiffness"))
     forces, lines = np.fft.rfft(found.force[:, 0]), np.zeros((samples // 2 + 1, 2), complex)
@@ -405,7 +406,7 @@ def test_modes_of_a_large_machine() -> None:
     matrices = chain(500, 1.0)
     found = mechid.selected_modes(**matrices, count=4)
     near = mechid.selected_modes(*matrices.values(), 3, near_hz=8.0)
-    # Judge: all eigenvalues, by NumPy.
+    # Reference: all eigenvalues, by NumPy.
     m, c, k = (matrix.toarray() for matrix in matrices.values())
     rate = np.block([[np.zeros((500, 500)), np.eye(500)], [-k / m[0, 0], -c / m[0, 0]]])
     all_of_them = np.linalg.eigvals(rate)
@@ -431,7 +432,7 @@ def test_predictions_are_exact_between_samples() -> None:
     rng = np.random.default_rng(3)
     force, fs = rng.standard_normal((300, 2)), 50.0
     a, b, c, _ = TWO.state_space()
-    # Judge: the matrix exponential of the state with the force and its slope.
+    # Reference: the matrix exponential of the state with the force and its slope.
     n, m = b.shape
     augmented = np.zeros((n + 2 * m, n + 2 * m))
     augmented[:n, :n], augmented[:n, n : n + m] = a, b
@@ -598,7 +599,7 @@ def test_modes_predict_and_find_forces_as_those_of_the_program(
 
 
 def test_every_scheme_of_the_program_is_offered() -> None:
-    """The message that refuses another name has all of them."""
+    """The message that refuses an unknown name lists all known names."""
     with pytest.raises(mechid.MechidError, match="unknown variant") as caught:
         mechid.integrate(ONE, np.zeros(8), 100.0, scheme="guess")  # type: ignore[arg-type]
     known = set(re.findall("`([a-z0-9-]+)`", str(caught.value).split("expected one of")[1]))

@@ -1,4 +1,4 @@
-"""The examples run to their end, and what they assert holds."""
+"""The examples run without an error, and their assertions hold."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ ELEMENTS: dict[str, Any] = {
     "inputs": [{"kind": "force", "name": "force", "at": "displacement"}],
 }
 CHAIN = mechid.Machine(np.diag([2.0, 3.0]), [[6.0, -2.0], [-2.0, 5.0]], [[9000.0, -4000.0], [-4000.0, 6000.0]])
-# Single precision, as the page has it.
+# The page has single precision.
 SINGLE = 1e-6
 
 
@@ -152,7 +152,7 @@ def figures(result: Any, page: str) -> Mapping[str, Any]:
 
 
 def points(axes: Axes) -> list[np.ndarray]:
-    """Ordinates of everything drawn."""
+    """Ordinates of all drawn points."""
     drawn = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
     for collection in axes.collections:
         drawn.extend(path.vertices[:, 1] for path in collection.get_paths())
@@ -160,7 +160,7 @@ def points(axes: Axes) -> list[np.ndarray]:
 
 
 def has(axes: Axes, values: np.ndarray) -> bool:
-    """Whether one artist, or the stems together, have these ordinates."""
+    """Whether one artist, or all stems together, have these ordinates."""
     drawn = points(axes)
     stems = [path.vertices[1, 1] for c in axes.collections for path in c.get_paths() if len(path.vertices) == 2]
     return any(
@@ -169,7 +169,7 @@ def has(axes: Axes, values: np.ndarray) -> bool:
 
 
 def test_every_figure_of_every_page_is_drawn(results: Pages) -> None:
-    """Each curve is in the axes, with the quantity and the unit of the page on them."""
+    """Each curve is in the axes, with the quantity and the unit of the page."""
     for kind, (result, page) in results.items():
         drawn = figures(result, page)
         assert len(drawn) == page.count("<figure ") > 0, kind
@@ -188,7 +188,7 @@ def test_every_figure_of_every_page_is_drawn(results: Pages) -> None:
 
 
 def test_no_figure_of_the_pages_is_forgotten(results: Pages) -> None:
-    """Judge: the identifiers in the sources of the pages."""
+    """Reference: the identifiers in the sources of the pages."""
     known = {re.sub(r"-\d+$", "", name) for result, page in results.values() for name in plotting.figures(page)}
     sources = "".join(path.read_text("utf-8") for path in (ROOT / "crates/report/src/page").glob("*.rs"))
     named = r'(?:\bdrawn\w*\(\s*|part\.id\(|over_time\(|\bid: |format!\()"([a-z-]+)(?:-\{number\})?"(?:\.into\(\)|\)|,)'
@@ -248,7 +248,7 @@ def test_the_numbers_of_modes_forces_and_bearings_are_drawn(results: Pages) -> N
 
 
 def test_responses_are_shown_in_every_quantity_and_form(results: Pages) -> None:
-    """Judge: powers of iω, and real and imaginary part of the complex numbers."""
+    """Reference: powers of iω, and real and imaginary part of the complex numbers."""
     table: mechid.FrequencyResponses = results["frequency responses"][0]
     chart = table.figures["figure"]
     assert isinstance(chart, plotting.Chart) and len(chart.members) == len(table.pairs) == 2
@@ -287,7 +287,7 @@ def test_axes_and_panels_are_those_that_were_asked_for(results: Pages) -> None:
     assert found.plot("fit", ax=grid[:2]) == [grid[0], grid[1]] and not len(pyplot.get_fignums()) > 1
     with pytest.raises(ValueError, match="2 panels, got 3 axes"):
         found.plot("fit", ax=grid)
-    # What is drawn already stays in view.
+    # Curves that are already in the axes remain visible.
     ax = pyplot.subplots()[1]
     ax.plot([1.0, 1000.0], [1e-9, 1.0])
     found.plot(ax=ax)
@@ -396,7 +396,7 @@ def test_a_campaign_is_that_of_the_program(program: Callable[..., str], tmp_path
 
 
 def test_a_notebook_shows_pages_in_frames_of_their_own(results: Pages) -> None:
-    """Neither style nor script of a page reaches the notebook."""
+    """Style and script of a page do not affect the notebook."""
     for kind, (result, _) in results.items():
         if result is None:
             continue

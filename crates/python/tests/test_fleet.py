@@ -1,4 +1,4 @@
-"""Many records: the same table by whatever engine, and after whatever ends a worker."""
+"""Many records: every engine gives the same table, also after a worker has ended."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ def test_a_batch_makes_the_rows_that_a_run_makes(tmp_path: Path) -> None:
         | {name: [values] * 3 for name, values in cells.items()}
         | {"displacement": [rig[:, 2], broken, rig[:, 2]]}
     )
-    # The same, one sample per row, and the records in each other.
+    # The same records with one sample per row, the rows of different records mixed.
     samples = pa.table(
         {"day": np.tile(["monday", "broken", "friday"], len(rig))}
         | {name: np.repeat(values, 3) for name, values in cells.items()}
@@ -229,7 +229,7 @@ OF_RUNS = {**ANALYSIS, "reading": {"record_column": "run"}}
 
 
 def test_a_study_changes_what_it_says(tmp_path: Path) -> None:
-    """Judge: the masses of the study are found again, run by run."""
+    """Reference: the masses of the study are found again, run by run."""
     masses = np.array([20.0, 25.0, 30.0])
     text = fleet.simulate(RIG, tmp_path / "runs.parquet", {"system.mass": masses, "noise.seed": [1, 2, 3]})
     assert "3 runs, 1536 samples" in text and "system.mass, noise.seed" in text

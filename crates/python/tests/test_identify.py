@@ -1,4 +1,4 @@
-"""Identification: what the program says to the last bit, and what NumPy says by other ways."""
+"""Identification: exactly equal to the program, and compared with other methods in NumPy."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ CASES = [
 
 
 def words(kinds: dict[str, str], options: dict[str, Any]) -> list[str]:
-    """The options as the program spells them."""
+    """The options in the spelling of the program."""
     told = ["--force", "force"]
     for name, value in {**kinds, **options}.items():
         if isinstance(value, tuple):
@@ -78,7 +78,7 @@ def test_the_program_says_the_same_to_the_last_bit(
     found = mechid.identify(FILE, force="force", **kinds, **options)
     assert found.to_json() + "\n" == told
     assert found.to_dict() == json.loads(told)
-    # The settings of the result repeat it.
+    # The settings of the result repeat the analysis.
     record = {key: options[key] for key in ("start", "period", "periods", "detrend") if key in options}
     validated = {key: options[key] for key in options if key.startswith("validate")}
     again = mechid.identify(
@@ -89,7 +89,7 @@ def test_the_program_says_the_same_to_the_last_bit(
 
 def test_as_text_it_is_the_report_of_the_program(program: Callable[..., str]) -> None:
     kinds: Any = {"displacement": "displacement"}
-    # Without the period it is told, as an option there and as a setting here.
+    # Without the period a remark names the option of the program, or the setting of Python.
     told = program("identify", FILE, *words(kinds, {"period": 256}))
     assert str(mechid.identify(FILE, force="force", **kinds, period=256)) == told
 
@@ -128,7 +128,7 @@ def test_arrays_of_any_layout_and_number_type_are_the_file(columns: dict[str, np
 
 
 def test_least_squares_on_spectra_is_that_of_numpy(columns: dict[str, np.ndarray]) -> None:
-    """Judge: the equation of motion on every driven line, stacked and solved by NumPy alone."""
+    """Reference: the equation of motion on every driven line, stacked and solved by NumPy alone."""
     found = mechid.identify(
         columns["force"], columns["displacement"], fs=128.0, period=256, lines="4:60",
         method="least-squares",
@@ -165,7 +165,7 @@ def test_a_result_has_everything_as_arrays_and_numbers() -> None:
     assert not found.warnings and all(finding.text for finding in found.findings)
     assert found.remarks == tuple(told["remarks"])
     mode = found.modes[0]
-    # Judge: the eigenvalue of the characteristic polynomial.
+    # Reference: the eigenvalue of the characteristic polynomial.
     (m,), (c,), (stiffness,) = found.mass[0], found.damping[0], found.stiffness[0]
     root = np.roots([m, c, stiffness])
     eigenvalue = root[root.imag > 0][0]

@@ -15,7 +15,8 @@ TWO = mechid.Machine(np.diag([2.0, 3.0]), [[4.0, 1.0], [-2.0, 5.0]], [[900.0, -2
 
 
 def two_forces() -> tuple[mechid.Identified, np.ndarray, np.ndarray]:
-    """A machine of two degrees of freedom, each driven on lines of its own, and line 40 by both."""
+    """A machine of two degrees of freedom, each excited on separate lines, and on line 40 by both
+    forces."""
     first, second = (mechid.multisine(512, 32.0, lines=lines).force for lines in ("2:2:60,41", "3:2:61"))
     force = np.stack([first, second], axis=1)
     x = mechid.integrate(TWO, force, 32.0, scheme="exact", response="periodic")["displacement"]
@@ -50,7 +51,8 @@ def test_receptances_are_measured_where_one_force_acts() -> None:
 def test_receptances_of_open_records_are_those_of_segments(
     columns: dict[str, np.ndarray], options: Any, segment: int
 ) -> None:
-    """Judge: H1 by SciPy from the same segments; an eighth of the record each, unless said."""
+    """Reference: H1 by SciPy from the same segments; by default, a segment is an eighth of the
+    record."""
     signal = pytest.importorskip("scipy.signal")
     table = mechid.identify(FILE, **COLUMNS, **options).frf
     force, x = columns["force"], columns["displacement"]

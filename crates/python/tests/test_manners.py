@@ -1,4 +1,4 @@
-"""How the package behaves: locks, threads, processes, Ctrl-C, the time it takes to start."""
+"""Behaviour of the package: locks, threads, processes, Ctrl-C, and its starting time."""
 
 from __future__ import annotations
 
@@ -23,8 +23,7 @@ import mechid
 from .conftest import ROOT
 
 FILE = "examples/machine.csv"
-# A long call, which needs no memory to speak of.
-# Where the tests run in the background, Ctrl-C is ignored, and Python takes that over.
+# A long call that needs little memory. If the tests run in the background, Ctrl-C is ignored, and Python inherits this.
 LONG = """
 import signal
 import mechid
@@ -67,7 +66,7 @@ def test_the_lock_is_released_during_the_work() -> None:
 def test_children_work_as_the_parent_does(method: str) -> None:
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"{method} is not a way to start processes here")
-    # The parent's threads are not in a forked child.
+    # A forked child does not have the threads of its parent.
     here = stiffness()
     with multiprocessing.get_context(method).Pool(2) as pool:
         found = [pool.apply_async(stiffness).get(timeout=60) for _ in range(4)]

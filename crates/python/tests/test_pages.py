@@ -1,4 +1,4 @@
-"""The Python of the README, of the book and of the docstrings, run and compared with what it prints."""
+"""The Python code of the README, the book and the docstrings is run, and its output compared."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_there_are_pages() -> None:
 @pytest.mark.parametrize("page", PAGES)
 def test_pages_print_what_they_show(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
-    # Everything but the Python becomes empty lines, so that line numbers stay.
+    # Everything except the Python code becomes empty lines, so that line numbers do not change.
     kept, inside = [], False
     for line in text.splitlines():
         fence = re.match(r"```(\S*)", line)

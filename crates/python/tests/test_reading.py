@@ -1,4 +1,4 @@
-"""Columns as people name them, time as data frames have it, and results that travel."""
+"""Usual names of columns, time in data frames, and results that are pickled."""
 
 import copy
 import pickle
@@ -14,7 +14,7 @@ FS = 100.0
 T = np.arange(200) / FS
 W = 2 * np.pi * 5
 FORCE = np.cos(W * T) + np.cos(3 * W * T)
-# 2 kg, 30 N·s/m and 5000 N/m.
+# The machine has 2 kg, 30 N·s/m and 5000 N/m.
 ACC = sum((-(k * W) ** 2 / (5000 - 2 * (k * W) ** 2 + 30j * k * W) * np.exp(1j * k * W * T)).real for k in (1, 3))
 PERIOD = {"period": 20}
 

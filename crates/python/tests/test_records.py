@@ -1,4 +1,4 @@
-"""Records of every source."""
+"""Records from every kind of source."""
 
 from __future__ import annotations
 
@@ -80,7 +80,8 @@ def test_what_comes_in_is_copied(columns: dict[str, np.ndarray]) -> None:
 
 
 def test_responses_of_arrays_and_of_a_file_are_one(tmp_path: Path) -> None:
-    """The machine of a closed form, from arrays to rounding, and from the text that the program reads."""
+    """The machine of a closed form, from arrays (exact to rounding) and from the text for the
+    program."""
     omega = np.linspace(5.0, 90.0, 120)
     mass, damping, stiffness = np.diag([10.0, 6.0]), np.diag([30.0, 20.0]), np.array([[9e3, -4e3], [-4e3, 6e3]])
     dynamic = stiffness - omega[:, None, None] ** 2 * mass + 1j * omega[:, None, None] * damping

@@ -1,6 +1,6 @@
-"""The reference page of the book is what the package's docstrings say.
+"""The reference page of the book is written from the docstrings of the package.
 
-``MECHID_BLESS=1 python -m pytest crates/python -k reference`` writes it anew.
+``MECHID_BLESS=1 python -m pytest crates/python -k reference`` writes it again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def told(thing: Any) -> str:
 
 
 def signature(thing: Any) -> str:
-    """Name and parameters; keywords that several functions share are told by their docstring."""
+    """Name and parameters; the docstring describes keywords that several functions have in
+    common."""
     names = []
     for name, parameter in inspect.signature(thing).parameters.items():
         if name in ("self", "cls"):

@@ -1,4 +1,5 @@
-"""Types: the package and its examples under `mypy --strict`, and the stub beside what it describes."""
+"""Types: the package and its examples under `mypy --strict`, and the stub of the compiled
+module."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-//! Writes pages of known numbers into the folder given: one response, 28 × 2 responses of 4,096 lines, and mode shapes
-//! of a frame with a stabilisation diagram. A browser test reads them.
+//! Writes pages of known numbers into the given folder: one response, 28 × 2 responses of 4,096
+//! lines, and mode shapes of a frame with a stabilisation diagram. A browser test reads them.
 
 use std::f64::consts::TAU;
 use std::fs;
@@ -35,7 +35,7 @@ fn accelerance(hz: f64, response: f64, force: f64) -> Complex<f64> {
     MODES.iter().enumerate().map(term).sum()
 }
 
-/// Response to a force and its coherence, of both one figure.
+/// Returns name and figure of a response to a force, with its coherence.
 fn response(i: usize, j: usize) -> (String, Figure) {
     let hz: Vec<f64> = (1..=LINES).map(|k| 0.0625 * k as f64).collect();
     let (place, driven) = ((i + 1) as f64 / (RESPONSES + 1) as f64, 0.13 + 0.4 * j as f64);
@@ -79,7 +79,7 @@ fn response(i: usize, j: usize) -> (String, Figure) {
     )
 }
 
-/// A portal frame of five points with two bending modes and one that travels.
+/// Returns a portal frame of five points with two bending modes and a mode that travels.
 fn frame() -> Result<ModeShapes, Box<dyn std::error::Error>> {
     let table = "1,0,0,0\n2,0,0,1\n3,0.5,0,1.2\n4,1,0,1\n5,1,0,0\nline,1,2,3,4,5\n";
     let geometry = Geometry::parse("frame.csv", table)?;
@@ -134,7 +134,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// What the cursor must show at a line of the first response.
+/// Returns the values that the cursor must show at a line of the first response.
 fn known(k: usize) -> serde_json::Value {
     serde_json::json!({
         "quantity": "Accelerance",

@@ -5,8 +5,9 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mechid_signal::{CrestSearch, Multisine, Phases, Sampling, lines};
 
-/// 10⁶ samples with all 499,999 lines; the period of the dissertation, beside the plain sum of
-/// cosines; one exact value, as a Runge-Kutta stage asks for it.
+/// Times the sampling of 10⁶ values with all 499,999 lines, the sampling of the period of the
+/// dissertation beside a plain sum of cosines, and one exact value, as a Runge-Kutta stage needs
+/// it.
 fn sampling(c: &mut Criterion) {
     let sampling = Sampling::new(1e-6, 1_000_000).unwrap();
     let all = lines::full(sampling);

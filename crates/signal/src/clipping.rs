@@ -12,11 +12,12 @@ pub struct Clipping {
 }
 
 /// Returns the level at which a channel, in any unit, is clipped: its minimum or maximum, if runs
-/// of three or more samples have exactly that value and a run begins or ends with a jump. If both
-/// are, it is the level with more samples; `None` if the channel is not clipped.
+/// of three or more samples have exactly that value and a run begins or ends with a jump. If the
+/// channel is clipped at its minimum and its maximum, the level with more samples is returned;
+/// `None` if the channel is not clipped.
 ///
-/// Peaks through a coarse converter, two-level signals (binary sequences, steps), values held for
-/// several samples, and a value at rest do not count as clipping.
+/// Peaks of a signal behind a coarse converter, two-level signals (binary sequences, steps), values
+/// repeated over several samples, and a constant value at rest do not count as clipping.
 ///
 /// ```
 /// use mechid_signal::clipping;
@@ -59,7 +60,7 @@ fn steep_runs(samples: &[f64]) -> Vec<(f64, usize)> {
     if !samples.chunk_by(|a, b| a == b).any(|run| run.len() >= limits::CLIPPED_RUN) {
         return Vec::new();
     }
-    // The smallest difference of two values is a step of the converter.
+    // The smallest difference between two values is taken as one step of the converter.
     let mut levels = samples.to_vec();
     levels.sort_unstable_by(f64::total_cmp);
     let steps = levels.windows(2).map(|x| x[1] - x[0]).filter(|step| *step > 0.0);

@@ -5,17 +5,17 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::SignalError;
 use crate::measures::{peak, power_of_two};
 
-/// Correlations at a number of lags, with their p-value for noise.
+/// Correlation coefficients at several lags, and the p-value of the hypothesis that they are noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlation {
-    /// Coefficient at each lag, a pure number; see the function that made it for which lags.
+    /// Coefficient at each lag, a pure number; the function that computes them states the lags.
     pub coefficients: Vec<f64>,
-    /// Bound that 95 % of the coefficients of noise keep; 1.96/√N for white noise.
+    /// Bound within which 95 % of the coefficients of noise lie; 1.96/√N for white noise.
     pub bound: f64,
-    /// Sum of squared coefficients, each over its variance for noise; dimensionless.
+    /// Sum of the squared coefficients, each divided by its variance for noise; dimensionless.
     pub statistic: f64,
-    /// Probability that noise has a larger statistic. Below 0.01 or so the residual is hardly
-    /// noise: the model is incomplete.
+    /// Probability that noise has a larger statistic. If it is below about 0.01, the residual is
+    /// hardly noise, and the model is incomplete.
     pub p_value: f64,
 }
 
@@ -38,9 +38,9 @@ pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, SignalErr
     whiteness_beyond(residual, 0, lags)
 }
 
-/// Autocorrelation of a residual (one value per sample, any unit) at the lags `span + 1` …
-/// `span + lags`. Noise that is correlated over at most `span` lags has none there: the difference
-/// of two successive noisy samples has a span of 1.
+/// Autocorrelation of a residual (one value per sample, any unit) at the lags `span + 1` … `span +
+/// lags`. At these lags, noise that is correlated over at most `span` lags has no correlation. For
+/// example, the difference of two successive noisy samples has a span of 1.
 ///
 /// The correlation within the span, estimated from the residual itself, increases the scatter of
 /// the coefficients beyond it and correlates them; the statistic accounts for this.
@@ -63,7 +63,8 @@ pub fn whiteness_beyond(
     let covariance = correlated(&correlation[..=span], &correlation[..=span], lags);
     let weight = |lag: usize| count * (count + 2.0) / (count - lag as f64);
     let squares = (span + 1..).zip(&coefficients).map(|(lag, c)| c * c * weight(lag));
-    // Squares at two lags share parallelograms of samples, even in white noise.
+    // The squared coefficients at two lags are correlated, even for white noise, because they
+    // contain the same samples.
     let shared = 2.0 * (lags * lags) as f64 / count * covariance[0] * covariance[0];
     Ok(Correlation::tested(squares.sum(), &covariance, shared, coefficients, count))
 }
@@ -89,9 +90,9 @@ pub fn cross_correlation(
     cross_correlation_of_coloured(residual, input, lags, &[1.0])
 }
 
-/// Returns the correlation with an input of a residual that is correlated itself: `colour` has its
-/// coefficients at the lags 0, 1 …, up to the last significant one. Residual and input have one
-/// value per sample, in any units; coefficients are pure numbers.
+/// Returns the correlation of an input with a residual that is itself autocorrelated: `colour` has
+/// the autocorrelation coefficients of the residual at the lags 0, 1 …, up to the last significant
+/// one. Residual and input have one value per sample, in any units; coefficients are pure numbers.
 ///
 /// # Errors
 /// The errors of [`cross_correlation`].
@@ -117,14 +118,14 @@ pub fn cross_correlation_of_coloured(
     let covariance = correlated(colour, &input, coefficients.len());
     let weight = |at: usize| count * count / (count - at.abs_diff(lags) as f64);
     let squares = coefficients.iter().enumerate().map(|(at, c)| c * c * weight(at));
-    // The input is fixed: the coefficients are normal numbers.
+    // The input is fixed, not random, so the coefficients have a normal distribution.
     Ok(Correlation::tested(squares.sum(), &covariance, 0.0, coefficients, count))
 }
 
 impl Correlation {
-    /// Tests a sum of squares of coefficients whose covariance, times the number of samples,
-    /// depends only on their distance in lags: `covariance` at the lags 0, 1 …; half of the
-    /// variance of the sum exceeds that for normal numbers by `shared`.
+    /// Tests a sum of squared coefficients. Their covariance, multiplied by the number of samples,
+    /// depends only on their distance in lags: `covariance` has its values at the distances 0, 1 ….
+    /// Half of the variance of the sum exceeds that for normal variables by `shared`.
     fn tested(
         sum: f64,
         covariance: &[f64],
@@ -132,7 +133,7 @@ impl Correlation {
         coefficients: Vec<f64>,
         count: f64,
     ) -> Self {
-        // Coefficients hardly scatter where the spectra of input and residual hardly overlap.
+        // The coefficients hardly scatter if the spectra of input and residual hardly overlap.
         let variance = covariance[0].max(f64::EPSILON);
         let p_value = share_above(sum, coefficients.len(), covariance, shared);
         let bound = 1.96 * (variance / count).sqrt();
@@ -140,9 +141,10 @@ impl Correlation {
     }
 }
 
-/// Returns the probability that the sum of squares of `terms` normal numbers of mean zero exceeds
-/// `sum`. Their covariance depends only on their distance: `covariance` at 0, 1 …, zero beyond;
-/// `shared` as for [`Correlation::tested`].
+/// Returns the probability that the sum of squares of `terms` normal variables of mean zero exceeds
+/// `sum`. The covariance of two variables depends only on their distance: `covariance` has its
+/// values at the distances 0, 1 …, and it is zero at larger ones. Half of the variance of the sum
+/// exceeds that for normal variables by `shared`.
 ///
 /// The sum has approximately the distribution of g χ²(h) with the same mean and variance.
 fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
@@ -153,8 +155,8 @@ fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
     share_above_of(sum, terms as f64 * covariance[0], squares.sum::<f64>() + shared)
 }
 
-/// Returns the probability that a sum of squares of normal numbers is above `sum`, where their
-/// covariance has the trace `mean` and its square the trace `square`.
+/// Returns the probability that a sum of squares of normal variables of mean zero is above `sum`.
+/// Their covariance matrix has the trace `mean`, and its square has the trace `square`.
 ///
 /// # Source
 /// Box (1954), Annals of Mathematical Statistics 25, 290–302.
@@ -163,14 +165,14 @@ pub fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     let ratio = mean / unit;
     match ChiSquared::new(ratio * ratio) {
         Ok(distribution) if sum.is_finite() => distribution.sf(sum / unit * ratio),
-        // Numbers without variance exceed no sum.
+        // Variables without variance exceed no positive sum.
         _ => f64::from(!(sum > 0.0 && mean <= 0.0)),
     }
 }
 
 /// Returns Σ_k a(k) b(k + j) over all k, positive and negative, at j = 0, 1 … `lags − 1`, for two
-/// autocorrelations given at 0, 1 … and zero beyond.
-/// Each is a list of pure numbers.
+/// autocorrelations a and b. Each is a list of pure numbers at the lags 0, 1 …, and zero at later
+/// lags.
 ///
 /// # Source
 /// Bartlett (1946), Supplement to the JRSS 8, 27–41.
@@ -180,8 +182,8 @@ pub fn correlated(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
     (0..lags as isize).map(|j| (-last..=last).map(|k| at(a, k) * at(b, k + j)).sum()).collect()
 }
 
-/// Returns the coefficients of centred values at the lags 0 … `lags`, pure numbers.
-/// One value per sample.
+/// Returns the autocorrelation coefficients, pure numbers, at the lags 0 … `lags` of values with
+/// mean zero. There is one value per sample.
 pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
     let power = products(centred, centred);
     let at =
@@ -189,7 +191,8 @@ pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
     (0..=lags).map(at).collect()
 }
 
-/// Returns values minus their mean, in units of a power of two. One value per sample.
+/// Returns values minus their mean, divided by a power of two near their peak. One value per
+/// sample.
 ///
 /// # Errors
 /// [`SignalError::TooShort`] unless there are `lags + span + 2` values, [`SignalError::NotFinite`].
@@ -205,7 +208,7 @@ pub fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f64>, Sig
         return Err(SignalError::NotFinite { sample, channel: 0, value: values[sample] });
     }
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    // A power of two as the unit changes no coefficient: fourth powers stay finite.
+    // Division by a power of two changes no coefficient and keeps fourth powers finite.
     let unit = power_of_two(peak(values));
     Ok(values.iter().map(|v| (v - mean) / unit).collect())
 }

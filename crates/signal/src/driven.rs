@@ -77,8 +77,8 @@ fn scatter(record: &Record, mean: &Record, channel: usize) -> Result<Vec<f64>, S
     Ok(lines::full(mean.sampling()).iter().map(variance).collect())
 }
 
-/// Returns the smallest amplitudes of driven lines in the mean over `count` periods with this
-/// scatter.
+/// Returns the smallest amplitude of each line that counts as driven, in the mean over `count`
+/// periods with this scatter.
 fn above_scatter(scatter: &[f64], count: usize) -> Vec<f64> {
     let noise = |at: usize| {
         let around = at.saturating_sub(limits::NOISE_NEIGHBOURS)
@@ -102,8 +102,8 @@ fn fisher(probability: f64, freedom: f64) -> f64 {
     0.5 * freedom * (probability.powf(-2.0 / freedom) - 1.0)
 }
 
-/// Returns the amplitude above the gap over the noise of a single period, if it is not below
-/// `floor`; 0 without a gap.
+/// Returns the smallest amplitude above the gap that separates driven lines from the noise of a
+/// single period; 0 if there is no gap below an amplitude of at least `floor`.
 fn above_gap(amplitude: &[f64], floor: f64) -> f64 {
     let mut sorted = amplitude.to_vec();
     sorted.sort_by(f64::total_cmp);

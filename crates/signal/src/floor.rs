@@ -15,12 +15,12 @@ const HANN: f64 = 0.375;
 /// the driven band. `None` if the signal drives all lines, if their spectrum falls off slowly, or
 /// if there are too few (about 500 samples).
 ///
-/// The spectrum under Hann's window, averaged over 64 lines at a time, must be flat over at least
-/// three averages below half the sampling rate, and have less than a hundredth of the power of the
-/// band there. The noise is assumed to have the same density in the band: the result is an upper
-/// bound if another signal remains above the band, and a lower bound if a filter attenuates the
-/// noise there. If one of these averages is so small that white noise of this density is below 10⁻⁵
-/// of the RMS of the signal, it is the level, flat or not. A channel of zeros has no noise.
+/// The spectrum under Hann's window is averaged over 64 lines at a time. At least three averages,
+/// from half the sampling rate downwards, must be flat and below a hundredth of the largest
+/// average. The noise is assumed to have the same density in the band: the result is an upper bound
+/// if another signal remains above the band, and a lower bound if a filter attenuates the noise
+/// there. If the smallest average corresponds to white noise below 10⁻⁵ of the RMS of the signal,
+/// this noise is the result, even if the averages are not flat. A channel of zeros has no noise.
 ///
 /// ```
 /// use mechid_signal::{NoiseLevel, Record, Sampling, noise, noise_above_band};
@@ -59,7 +59,8 @@ pub fn noise_above_band(record: &Record) -> Result<Vec<Option<f64>>, SignalError
         let powers: Vec<f64> =
             (1..samples.div_ceil(2)).map(|n| spectrum.line(n, channel).norm_sqr()).collect();
         let deviation = |level: f64| (level * samples as f64 / (4.0 * HANN)).sqrt();
-        // White noise cannot have a lower average: an uneven spectrum is leakage.
+        // White noise is at most as strong as the lowest average; a spectrum that is uneven at such
+        // a level shows leakage.
         let rms = record.column(channel).variance().sqrt();
         let lowest = levels(&powers).into_iter().map(deviation).reduce(f64::min);
         let none = lowest.filter(|lowest| *lowest <= limits::NEGLIGIBLE_NOISE * rms);
@@ -77,7 +78,8 @@ fn levels(powers: &[f64]) -> Vec<f64> {
     powers.rchunks_exact(limits::FLOOR_LINES).map(mean).collect()
 }
 
-/// Returns the mean power of the highest lines as far as it is flat, if they are not driven.
+/// Returns the mean of the highest lines over which the power is flat, unless the signal drives
+/// them.
 fn even_level(levels: &[f64]) -> Option<f64> {
     let strongest = levels.iter().copied().fold(0.0, f64::max);
     let mut equal = 0;

@@ -33,7 +33,7 @@
 //! | uncorrelated inputs | [`multi_input`] |
 //! | impact, noise, sweep, binary sequence | [`excitation`] |
 //! | crest factor, flatness, order of excitation | [`measures`] |
-//! | mean, level and extremes of samples that are not all held | [`RunningStatistics`] |
+//! | mean, level and extremes of samples that arrive in blocks | [`RunningStatistics`] |
 //! | the period of a record that repeats | [`repetition()`] |
 //! | the level at which a channel is clipped | [`clipping()`] |
 //! | the steps of the values of a channel | [`quantisation_step()`] |
@@ -41,7 +41,7 @@
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
 //! | transforms planned once for many records | [`transform`] |
-//! | weights of the samples of a piece | [`Window`] |
+//! | weights of the samples of a segment | [`Window`] |
 //! | numbers and counts in sentences | [`message`] |
 
 mod clipping;

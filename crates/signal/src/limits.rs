@@ -5,16 +5,16 @@
 /// Minimum number of equal samples of a clipped run: the peak of a smooth signal has fewer.
 pub(crate) const CLIPPED_RUN: usize = 3;
 
-/// Smallest jump, in steps of the converter, at the end of a clipped run. A smooth peak with three
-/// equal samples falls by less than four steps in the next one; a clipped signal leaves its limit
-/// as fast as it changes.
+/// Smallest jump, in steps of the converter, at the end of a clipped run. After three equal samples
+/// at a smooth peak, the next sample is lower by less than four steps; a clipped signal leaves its
+/// limit as fast as it changes.
 pub(crate) const CLIPPED_JUMP: f64 = 6.0;
 
-/// Fraction of the time at an extreme above which a channel is at rest there.
+/// Fraction of all samples at an extreme value above which a channel is at rest at this value.
 pub(crate) const REST_FRACTION: f64 = 0.5;
 
-/// Fraction of the time at the extremes, without the rest, above which a channel is a two-level
-/// signal.
+/// Fraction of all samples at the two extremes, not counting those at rest, above which a channel
+/// is a two-level signal.
 pub(crate) const TWO_LEVEL_FRACTION: f64 = 0.9;
 
 // Excited lines
@@ -23,42 +23,44 @@ pub(crate) const TWO_LEVEL_FRACTION: f64 = 0.9;
 /// quantisation, far below any line that is driven on purpose.
 pub(crate) const EXCITED_AMPLITUDE: f64 = 1e-3;
 
-/// Ratio of the strongest line to the peak value below which a signal is constant and its spectrum
-/// rounding.
+/// Ratio of the strongest line to the peak value below which a signal counts as constant and its
+/// spectrum as rounding.
 pub(crate) const CONSTANT_SIGNAL: f64 = 1e-12;
 
 /// Probability that any undriven line of a record counts as excited.
 pub(crate) const EXCITED_LEVEL: f64 = 1e-3;
 
-/// Number of lines on either side whose scatter gives the noise level of a line.
+/// Number of lines on each side of a line whose scatter gives its noise level.
 pub(crate) const NOISE_NEIGHBOURS: usize = 16;
 
-/// Minimum number of lines that are the noise of a single period.
+/// Minimum number of weak lines that count as the noise of a single period.
 pub(crate) const NOISE_LINES: usize = 16;
 
-/// Smallest ratio of the amplitudes of excited lines to the noise of a single period: the
-/// amplitudes of noise have no such gap.
+/// Smallest ratio in amplitude of the excited lines to the noise of a single period: amplitudes of
+/// noise have no gap of this size.
 pub(crate) const NOISE_GAP: f64 = 3.0;
 
 // Noise above the driven band
 
-/// Number of lines averaged for one level.
+/// Number of lines over which the power is averaged for one level of the noise floor.
 pub(crate) const FLOOR_LINES: usize = 64;
 
-/// Minimum number of equal levels, from half the sampling rate down.
+/// Minimum number of equal levels of a noise floor, counted downwards from half the sampling rate.
 pub(crate) const FLOOR_LEVELS: usize = 3;
 
-/// Largest ratio of equal levels: more than four standard deviations of the ratio of two.
+/// Largest ratio of two levels that count as equal: more than four standard deviations of the
+/// ratio.
 pub(crate) const FLOOR_RATIO: f64 = 3.0;
 
 /// Standard deviation of the logarithm of a level of 64 lines under Hann's window, whose
 /// neighbours are correlated.
 pub(crate) const FLOOR_SCATTER: f64 = 0.17;
 
-/// Maximum difference of the upper and the lower half of the levels, in standard deviations.
+/// Maximum difference between the upper and the lower half of the equal levels, in standard
+/// deviations.
 pub(crate) const FLOOR_DEVIATION: f64 = 4.0;
 
-/// Level, relative to the largest, above which the band is driven.
+/// Level, relative to the largest, above which a group of lines counts as driven.
 pub(crate) const DRIVEN_LEVEL: f64 = 0.01;
 
 /// Standard deviation of noise, relative to the RMS of the signal, that is too small to affect a
@@ -70,11 +72,11 @@ pub(crate) const NEGLIGIBLE_NOISE: f64 = 1e-5;
 /// Fraction of its own peak above which a force belongs to the pulse of a hit.
 pub(crate) const PULSE_FRACTION: f64 = 0.1;
 
-/// Number of instants in a step at which the lobes of a ringing filter are looked at. Between two
-/// of eight, an extreme of a lobe at half the sampling rate is missed by at most 2 %.
+/// Number of instants per sampling step at which the lobes of a ringing filter are evaluated. With
+/// eight, the extreme of a lobe at half the sampling rate is missed by at most 2 %.
 pub(crate) const RINGING_STEPS: usize = 8;
 
-/// Number of samples on either side that a value between samples is interpolated from.
+/// Number of samples on either side that are used to interpolate a value between samples.
 pub(crate) const INTERPOLATION_REACH: usize = 16;
 
 /// Smallest peak of a hit, in standard deviations of the noise: the range of 10⁵ samples of
@@ -89,10 +91,11 @@ pub(crate) const HIT_OVER_STEP: f64 = 4.0;
 /// hits between the good ones.
 pub(crate) const MEDIAN_PEAK_FRACTION: f64 = 0.1;
 
-/// Smallest length of a window that ends with the next one, over the median of all windows.
+/// Smallest length of a window that ends where the next one begins, relative to the median of all
+/// windows.
 pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
 
-/// Default number of samples before a pulse, over the samples of the pulse.
+/// Default number of samples before a pulse, as a multiple of the number of samples in the pulse.
 pub(crate) const PRE_TRIGGER: usize = 2;
 
 // Repetition and quantisation
@@ -104,15 +107,15 @@ pub(crate) const PERIODIC_MISMATCH: f64 = 0.125;
 /// Largest ratio of the squared mismatches of equally good lags.
 pub(crate) const EQUAL_LAGS: f64 = 2.0;
 
-/// Ratio of the squared mismatch to that of [`PERIODIC_MISMATCH`] that ends the first similarity
-/// of a slow signal with itself: more than the ratio of any two equally good lags.
+/// Factor on the square of [`PERIODIC_MISMATCH`]; at a larger squared mismatch a slow signal no
+/// longer resembles itself. It is larger than the ratio of any two equally good lags.
 pub(crate) const SLOW_SIGNAL: f64 = 2.0 * EQUAL_LAGS;
 
 /// Squared mismatch due to rounding in the Fourier transforms.
 pub(crate) const MISMATCH_ROUNDING: f64 = 1e-12;
 
-/// Minimum number of pairs of samples in a fit of growth: two terms would explain any difference
-/// of fewer.
+/// Minimum number of pairs of samples in a fit of growth: with fewer, the two terms of the fit
+/// would explain any difference.
 pub(crate) const GROWTH_PAIRS: usize = 20;
 
 /// Smallest fraction of the difference that counts as growth; a smaller one may be rounding.
@@ -121,12 +124,12 @@ pub(crate) const GROWTH_FRACTION: f64 = 0.01;
 /// Number of samples examined for the step of a converter.
 pub(crate) const QUANTISATION_SAMPLES: usize = 8192;
 
-/// Minimum number of different values; a signal with fewer may have few values without a
-/// converter.
+/// Minimum number of different values for a step of a converter; a signal may have fewer values for
+/// other reasons.
 pub(crate) const QUANTISATION_LEVELS: usize = 16;
 
-/// Deviation of the distance of two values from a whole number of steps, in steps: the rounding of
-/// printed digits.
+/// Largest deviation of the distance of two values from a whole number of steps, in steps: the
+/// rounding of printed digits.
 pub(crate) const QUANTISATION_DEVIATION: f64 = 0.05;
 
 // Excitation
@@ -140,10 +143,11 @@ pub(crate) const PHASE_CHANGE: f64 = 1e-2;
 /// Damping of the first step, as a multiple of the mean curvature.
 pub(crate) const FIRST_DAMPING: f64 = 1e-2;
 
-/// Maximum number of steps per exponent, far more than needed.
+/// Maximum number of Newton steps for each exponent of the norm, far more than needed.
 pub(crate) const CREST_STEPS: usize = 400;
 
-/// Relative reduction of the norm by two successive steps at which an exponent ends.
+/// Relative reduction of the norm by two successive steps below which the search at one exponent
+/// ends.
 pub(crate) const CREST_GAIN: f64 = 1e-5;
 
 /// Largest damping; above it the norm is stationary to rounding.
@@ -153,7 +157,7 @@ pub(crate) const LARGEST_DAMPING: f64 = 1e6;
 /// applied. At this number the two cost the same.
 pub(crate) const DENSE_HESSIAN: usize = 400;
 
-/// Residual, relative to the gradient, at which conjugate gradients stop.
+/// Residual, relative to the gradient, below which conjugate gradients stop.
 pub(crate) const CG_RESIDUAL: f64 = 0.05;
 
 /// Maximum number of steps of conjugate gradients.

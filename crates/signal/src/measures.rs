@@ -1,4 +1,4 @@
-//! Quantities to choose an excitation by.
+//! Quantities that help to choose an excitation.
 //!
 //! ```
 //! use mechid_signal::{Multisine, Phases, Sampling, Spectrum, measures};
@@ -40,7 +40,7 @@ pub fn peak(samples: &[f64]) -> f64 {
     samples.iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Peak over RMS of the samples, a pure number: 1 for a two-level signal, √2 for a sine.
+/// Ratio of peak to RMS of the samples, a pure number: 1 for a two-level signal, √2 for a sine.
 ///
 /// It uses only the samples; [`Multisine::crest_factor`](crate::Multisine::crest_factor) also
 /// covers the values between them.
@@ -61,8 +61,8 @@ pub fn crest_factor(record: &Record, channel: usize) -> Result<f64, SignalError>
     Ok(peak / rms(samples))
 }
 
-/// Half the range over √2 times the RMS about the mean, 1 for a sine: Schroeder's relative peak
-/// factor.
+/// Half the range of the samples divided by √2 times their RMS about the mean, a pure number, 1 for
+/// a sine: Schroeder's relative peak factor.
 ///
 /// # Errors
 /// [`SignalError::Silent`] if the channel is constant, [`SignalError::NoSuchChannel`].
@@ -101,7 +101,8 @@ pub fn aperiodic_autocorrelation(x: &[f64]) -> Vec<f64> {
     correlate(x, fast_length(2 * x.len()))
 }
 
-/// The first N lags of the correlation of a sequence padded to `period`, over N.
+/// Returns the first N lags of the circular correlation of a sequence of N values, padded with
+/// zeros to `period` values, divided by N.
 fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     if x.is_empty() {
         return Vec::new();
@@ -136,8 +137,8 @@ pub fn power_of_two(level: f64) -> f64 {
     f64::from_bits(level.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
 }
 
-/// Geometric over arithmetic mean of the power of some lines, a pure number: 1 if all are equal, 0
-/// if one is missing.
+/// Ratio of the geometric to the arithmetic mean of the power of some lines, a pure number: 1 if
+/// all are equal, 0 if one is missing.
 ///
 /// # Errors
 /// [`SignalError::NoLines`] for an empty choice, [`SignalError::Range`] for a line outside the

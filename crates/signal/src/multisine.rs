@@ -202,8 +202,8 @@ impl Multisine {
     }
 
     /// Largest absolute value over a period, from samples at least
-    /// [`OVERSAMPLING`](Self::OVERSAMPLING) times as dense as the Nyquist rate and parabolas
-    /// through three of them.
+    /// [`OVERSAMPLING`](Self::OVERSAMPLING) times as dense as the Nyquist rate, and from a parabola
+    /// through three samples at each maximum.
     pub fn peak(&self) -> f64 {
         let x = self.fine_period();
         let n = x.len();
@@ -211,7 +211,7 @@ impl Multisine {
         (0..n).map(highest).fold(0.0, f64::max)
     }
 
-    /// Peak over RMS; 1 is a square wave, √2 a sine.
+    /// Ratio of peak to RMS, a pure number: 1 for a square wave, √2 for a sine.
     ///
     /// # Errors
     /// [`SignalError::Silent`] if all amplitudes are zero.
@@ -236,7 +236,7 @@ impl Multisine {
     }
 }
 
-/// Checks that amplitudes are finite and not negative, as are their sums.
+/// Checks that amplitudes and their sums are finite and not negative.
 fn check_amplitudes(amplitudes: &[f64]) -> Result<(), SignalError> {
     for a in amplitudes {
         not_negative("amplitude", *a)?;

@@ -19,7 +19,8 @@ use crate::spectrum::Spectrum;
 pub enum NoiseLevel {
     /// Standard deviation, in the unit of the signal, the same in every channel.
     StandardDeviation(f64),
-    /// Signal-to-noise ratio in dB: 20 log10 of RMS of the channel over standard deviation.
+    /// Signal-to-noise ratio in dB: 20 log10 of the RMS of the channel divided by the standard
+    /// deviation.
     SnrDb(f64),
     /// Standard deviation as a fraction of the RMS of the channel (0.05 is "5 % noise").
     FractionOfRms(f64),
@@ -140,8 +141,8 @@ pub fn add(
     Record::new(record.sampling(), data)
 }
 
-/// White noise shaped in frequency, from a period twice as long: the ends of a record of noise do
-/// not match.
+/// Returns white noise shaped in frequency. It is half of a period twice as long, because the two
+/// ends of a record of noise do not match.
 fn power_law(
     sampling: Sampling,
     exponent: f64,
@@ -164,7 +165,7 @@ fn power_law(
     Ok(shaped.channel(0)[..sampling.len()].to_vec())
 }
 
-/// The stationary first-order process, with exact steps.
+/// Returns the stationary first-order process, computed by exact steps.
 fn low_pass(
     sampling: Sampling,
     corner_hz: f64,
@@ -180,7 +181,7 @@ fn low_pass(
     Ok(noise)
 }
 
-/// Independent draws of one channel.
+/// Returns independent normal numbers of one channel.
 pub(crate) fn white_channel(
     sampling: Sampling,
     standard_deviation: f64,
@@ -193,7 +194,7 @@ pub(crate) fn white_channel(
     (0..sampling.len()).map(draw).collect()
 }
 
-/// The generator of one channel.
+/// Returns the random generator of one channel.
 pub(crate) fn stream(seed: u64, channel: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(channel as u64);

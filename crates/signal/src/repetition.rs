@@ -91,8 +91,8 @@ fn valleys(
     })
 }
 
-/// Returns whether more than half of the difference of samples one period apart is the same shape,
-/// larger or smaller by a factor for each period.
+/// Returns whether more than half of the difference of samples one period apart is growth or decay:
+/// the same shape, larger or smaller by a factor for each period.
 fn grows_or_decays(x: &[f64], period: usize) -> bool {
     let (early, late) = (&x[..x.len() - period], &x[period..]);
     let sum: Vec<f64> = early.iter().zip(late).map(|(a, b)| b + a).collect();
@@ -111,7 +111,7 @@ fn grows_or_decays(x: &[f64], period: usize) -> bool {
         let [of_sum, of_difference] =
             [s, d].map(|values| if tt > 0.0 { product(values, t) / tt } else { 0.0 });
         shift += of_difference * of_difference * tt;
-        // The shift explains a part of both, which is removed.
+        // A shift in time explains a part of the sum and of the difference; this part is removed.
         let ss = product(s, s) - of_sum * of_sum * tt;
         let ds = product(d, s) - of_difference * of_sum * tt;
         growth += if ss > limits::MISMATCH_ROUNDING * product(s, s) { ds * ds / ss } else { 0.0 };
@@ -124,8 +124,8 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Returns the squared mismatch for the lags 0 … ⌊N/2⌋, from the autocorrelation: exact to
-/// rounding.
+/// Returns the squared mismatch for the lags 0 … ⌊N/2⌋, computed from the autocorrelation with an
+/// error of the size of rounding.
 fn squared_mismatches(x: &[f64]) -> Vec<f64> {
     let len = x.len();
     let products = aperiodic_autocorrelation(x);

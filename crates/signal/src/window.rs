@@ -11,11 +11,13 @@ use std::fmt;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Window {
-    /// ½ − ½ cos: the usual choice for a random excitation.
+    /// ½ − ½ cos θ, with θ = 2πk/N at sample k of N: the usual choice for a random excitation.
     Hann,
-    /// 0.54 − 0.46 cos: a narrower peak, more leakage from far away.
+    /// 0.54 − 0.46 cos θ, with θ = 2πk/N at sample k of N: a narrower peak, more leakage from far
+    /// away.
     Hamming,
-    /// 0.42 − 0.5 cos + 0.08 cos 2: the least leakage, a wider peak.
+    /// 0.42 − 0.5 cos θ + 0.08 cos 2θ, with θ = 2πk/N at sample k of N: the least leakage, a wider
+    /// peak.
     Blackman,
     /// Equal weights: for segments that begin and end at rest, such as bursts.
     Rectangular,

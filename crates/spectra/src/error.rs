@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SpectraError {
-    /// Two arguments that must have the same size differ in it.
+    /// Two arguments that must have the same size differ in size.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
         /// Name of the items counted.
@@ -36,12 +36,11 @@ pub enum SpectraError {
     NotFinite {
         /// Row of the line, counted from 0.
         row: usize,
-        /// The value.
-        /// In its unit.
+        /// The value, in its unit.
         value: f64,
     },
     /// The step between segments is zero, or larger than a segment.
-    #[error("segments of {} cannot start {} apart: from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
+    #[error("segments of {} cannot start {} apart: the step must be from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
     Hop {
         /// Number of samples in a segment.
         len: usize,
@@ -86,7 +85,9 @@ pub enum SpectraError {
         right: f64,
     },
     /// A ratio or covariance needs more averages than there are.
-    #[error("signal cannot be told from noise: at least {needed} averages are needed, got {got}")]
+    #[error(
+        "signal and noise cannot be separated: at least {needed} averages are needed, got {got}"
+    )]
     TooFewAverages {
         /// Number of averages.
         got: usize,
@@ -115,14 +116,14 @@ pub enum SpectraError {
         value: f64,
     },
     /// A coherence is outside (0, 1].
-    #[error("a coherence lies above 0 and at most at 1, got {value}")]
+    #[error("a coherence must be above 0 and at most 1, got {value}")]
     Coherence {
         /// The given value, a pure number.
         value: f64,
     },
     /// The response is not coherent with the force.
     #[error(
-        "the motion at {frequency_hz} Hz has nothing in common with the force: H2 does not exist there"
+        "the motion at {frequency_hz} Hz is not coherent with the force: H2 does not exist there"
     )]
     IncoherentMotion {
         /// Frequency, in Hz.

@@ -32,8 +32,8 @@ pub struct FrequencyData {
     /// Variances of the force noise, rows × n, in N², for data whose displacement noise is not
     /// known.
     force_variance: DMatrix<f64>,
-    /// Displacements that correspond to 1 and s³ in the measured quantity: two columns for each
-    /// open record, zero on the rows of other records.
+    /// Basis of the transients: displacements that correspond to the terms 1 and s³ in the measured
+    /// quantity, two columns for each open record, zero on the rows of other records.
     transient: DMatrix<Complex<f64>>,
     /// Time axis of each open record.
     open: Vec<Sampling>,
@@ -126,12 +126,11 @@ impl FrequencyData {
         })
     }
 
-    /// Creates data from frequency responses of the quantity `measured` per unit force, one matrix
-    /// responses × forces for each of `omega` (rad/s): each force is one experiment with unit force
-    /// at its degree of freedom (`force_dof`, one per column, counted from 0). `variance`, if it is
-    /// known, is E|ΔH|² of every entry, in the square of its unit; errors of different entries are
-    /// independent.
-    ///
+    /// Creates data from frequency responses of the quantity `measured` per unit force. For each of
+    /// `omega` (rad/s) there is one matrix, responses × forces: each force is one experiment with
+    /// unit force at its degree of freedom (`force_dof`, one per column, counted from 0).
+    /// `variance`, if it is known, is E|ΔH|² of every entry, in the square of its unit; errors of
+    /// different entries are independent.
     /// # Errors
     /// [`NumericsError::Size`] if the shapes differ or a degree of freedom does not exist, and the
     /// errors of [`FrequencyData::from_amplitudes`] and [`NoiseSpectrum::new`].
@@ -202,9 +201,10 @@ impl FrequencyData {
     }
 
     /// Returns the same data with white noise of known standard deviation (N) on the samples of
-    /// each force channel, for a record of this many samples that does not show the noise. The
-    /// spectrum of the response noise is then estimated from the residual, and the force is no
-    /// longer taken as exact. Noise stated by [`FrequencyData::with_noise`] has priority.
+    /// each force channel, for a record of this many samples. It serves data that do not show the
+    /// noise of the force: the spectrum of the response noise is then estimated from the residual,
+    /// and the force is no longer taken as exact. Noise stated by [`FrequencyData::with_noise`] has
+    /// priority.
     ///
     /// # Errors
     /// [`NumericsError::Size`] unless there is one deviation per degree of freedom,
@@ -278,19 +278,20 @@ impl FrequencyData {
     /// Returns the same data, read from an open record with this time axis: its initial and final
     /// states differ, so that it is not a whole period.
     ///
-    /// The difference acts on the lines like a force, the transient. For displacements it is M(iω
-    /// Δx + Δv) + C Δx over the duration. Sampling folds its components above half the sampling
-    /// rate back into the band, which the higher powers of s = iω describe:
+    /// The difference acts on the lines like a force; this is the transient. For displacements it
+    /// is M(iω Δx + Δv) + C Δx, divided by the duration, with the differences Δx and Δv between the
+    /// two states. Sampling folds its components above half the sampling rate back into the band,
+    /// which the higher powers of s = iω describe:
     ///
     /// ```text
     /// (K + s C + s² M) X + (τ₀ + τ₁ s + … + τ₅ s⁵) Z = F
     /// ```
     ///
-    /// with unknown real τ for every degree of freedom, and Z = 1, 1/s or 1/s² if displacement,
-    /// velocity or acceleration was measured. The maximum-likelihood estimator estimates them
-    /// together with the system. The rows must be all lines of a band, because neighbouring lines
-    /// distinguish the transient from the force; the band should end at about 0.4 of the sampling
-    /// rate.
+    /// with unknown real τ for every degree of freedom, the displacements X, the forces F, and Z =
+    /// 1, 1/s or 1/s² if displacement, velocity or acceleration was measured. The
+    /// maximum-likelihood estimator estimates the τ together with the system. The rows must be all
+    /// lines of a band, because neighbouring lines distinguish the transient from the force; the
+    /// band should end at about 0.4 of the sampling rate.
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
@@ -307,8 +308,9 @@ impl FrequencyData {
         self
     }
 
-    /// Returns the displacements that correspond to 1 and s³ in the measured quantity, in m: two
-    /// columns for each open record, zero on the rows of other records.
+    /// Returns the basis of the transients: displacements, in m, that correspond to the terms 1 and
+    /// s³ in the measured quantity; two columns for each open record, zero on the rows of other
+    /// records.
     pub fn transient(&self) -> &DMatrix<Complex<f64>> {
         &self.transient
     }
@@ -322,7 +324,8 @@ impl FrequencyData {
         Some(OpenRecord { sampling, rows: first..last + 1 })
     }
 
-    /// Returns the rows of both: several experiments on one system.
+    /// Returns the rows of this data followed by the rows of `other`: several experiments on one
+    /// system.
     ///
     /// The noise is kept if it is known for both.
     ///
@@ -428,7 +431,7 @@ impl FrequencyData {
     }
 }
 
-/// Returns the rows of one matrix below those of another matrix.
+/// Returns the rows of the matrix `upper` followed by the rows of `lower`.
 fn stacked<T: nalgebra::Scalar>(upper: &DMatrix<T>, lower: &DMatrix<T>) -> DMatrix<T> {
     let rows = upper.nrows();
     DMatrix::from_fn(rows + lower.nrows(), upper.ncols(), |row, column| {

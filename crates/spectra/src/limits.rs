@@ -1,9 +1,9 @@
-//! Limits that decide something in this crate.
+//! Limits of this crate: what counts as noise, rounding or excitation, and when a search ends.
 
 /// Maximum noise-to-signal ratio (RMS) that counts as rounding.
 pub(crate) const SCATTER_ROUNDING: f64 = 1e-10;
 
-/// Maximum amplitude ratio, to the strongest force, of a force channel that may be unexcited;
+/// Maximum amplitude of a force channel that may be unexcited, relative to the strongest force;
 /// stronger channels always count as forces.
 pub(crate) const AVERAGE_IDLE: f64 = 0.1;
 
@@ -15,7 +15,7 @@ pub(crate) const MEAN_EVIDENCE: f64 = 3.0;
 /// probability of 10⁻³.
 pub(crate) const LARGEST_EVIDENCE: f64 = 6.9;
 
-/// Maximum power ratio, to the strongest line of the same force, of a line that may be unexcited.
+/// Maximum power of a line that may be unexcited, relative to the strongest line of the same force.
 pub(crate) const AVERAGE_WEAK: f64 = 0.01;
 
 /// Number of neighbouring lines over which the evidence for coherence is averaged: over this many,
@@ -29,12 +29,12 @@ pub(crate) const AVERAGE_PEAK: usize = 2;
 /// dependent.
 pub(crate) const FORCE_TOLERANCE: f64 = 1e-10;
 
-/// Minimum probability of a coherence with the force on interleaved lines that is attributed to
-/// noise of the channel.
+/// Minimum probability of an observed coherence between two forces on interleaved lines at which it
+/// is attributed to noise of the channel.
 pub(crate) const INTERLEAVED_CHANCE: f64 = 1e-4;
 
-/// Maximum amplitude ratio, to the force that excites the lines, of a force that counts as
-/// rounding.
+/// Maximum amplitude of a force that counts as rounding, relative to the force that excites the
+/// lines.
 pub(crate) const INTERLEAVED_ROUNDING: f64 = 1e-9;
 
 /// Number of iterations that subtract the responses to the other forces: each reduces the remaining
@@ -65,27 +65,27 @@ pub(crate) const SMOOTHING_STEPS: usize = 4;
 /// Number of lines to either side over which a window smooths.
 pub(crate) const SMOOTHED_LINES: usize = 6;
 
-/// Maximum ratio, to the largest sample, of a line that counts as rounding.
+/// Maximum amplitude of a line that counts as rounding, relative to the largest sample.
 pub(crate) const LINE_ROUNDING: f64 = 1e-12;
 
 /// Maximum number of consecutive periods whose spectrum is taken as the spectrum of one record.
 pub(crate) const MAX_PERIODS: usize = 16;
 
-/// Minimum number of such periods: with two, the only line between has the same distance to both
-/// neighbouring lines of a period.
+/// Minimum number of consecutive periods whose spectrum is taken as the spectrum of one record:
+/// with two, the only line between two lines of a period is equally distant from both.
 pub(crate) const MIN_PERIODS: usize = 3;
 
 /// Maximum number of buffered samples over all channels: 8 MB.
 pub(crate) const MAX_HELD: usize = 1 << 20;
 
-/// Maximum number of Fisher scoring steps; a few are usually enough.
+/// Maximum number of Fisher scoring steps for the level of white noise; a few are usually enough.
 pub(crate) const LEVEL_ROUNDS: usize = 60;
 
-/// Relative change of the variance that ends the search.
+/// Relative change of the variance of white noise that ends the search for its level.
 pub(crate) const LEVEL_SETTLED: f64 = 1e-6;
 
-/// Minimum variance relative to the mean power of the residual: a channel without noise must not
-/// get all the weight.
+/// Minimum variance of white noise relative to the mean power of the residual: a channel without
+/// noise must not get all the weight.
 pub(crate) const LEVEL_LEAST: f64 = 1e-12;
 
 /// Minimum number of complex deviations behind a covariance, in addition to the number of channels,
@@ -96,29 +96,30 @@ pub(crate) const POOLING_SPARE: f64 = 6.0;
 /// data per complex deviation of all data; below it the smooth spectrum is chosen.
 pub(crate) const POOLING_MARGIN: f64 = 4.0;
 
-/// Maximum order of the polynomial of log power in log frequency.
+/// Maximum order of the polynomial of a smooth noise spectrum: log power over log frequency.
 pub(crate) const MAX_ORDER: usize = 6;
 
 /// Maximum number of lines on which the form of a spectrum is searched; with more lines, neighbours
 /// are averaged, because the search tries hundreds of forms.
 pub(crate) const SMOOTH_SEARCHED: usize = 4096;
 
-/// Minimum number of lines per order.
+/// Minimum number of lines per order of the polynomial of a smooth noise spectrum.
 pub(crate) const LINES_PER_ORDER: usize = 8;
 
 /// Maximum number of bumps on a smooth spectrum.
 pub(crate) const MAX_BUMPS: usize = 24;
 
-/// Minimum number of complex deviations behind a level below the neighbouring lines: a few
-/// lines may be low by chance, and would then get all the weight.
+/// Minimum number of complex deviations behind a noise level that is lower than on the neighbouring
+/// lines: a few lines may be low by chance, and would then get all the weight.
 pub(crate) const QUIET_DEVIATIONS: f64 = 12.0;
 
-/// Maximum leverage of a line, without bumps and per complex deviation of its sample, at which a
-/// polynomial may be lower there than a polynomial of lower order: only a few lines determine it at
-/// the ends of the band.
+/// Maximum leverage of a line (per complex deviation of its sample, without the leverage of bumps)
+/// at which the polynomial of a noise spectrum is always used. Above it, the line has at least the
+/// level of the polynomial of the next lower order, because only a few lines determine the ends of
+/// a band.
 pub(crate) const END_LEVERAGE: f64 = 0.25;
 
-/// Maximum number of steps of the search for the log power.
+/// Maximum number of steps of the search for the log power of a smooth noise spectrum.
 pub(crate) const SMOOTH_STEPS: usize = 200;
 
 /// Change of the log power (RMS) that ends the search for the final fit.
@@ -128,16 +129,17 @@ pub(crate) const SMOOTH_TOLERANCE: f64 = 1e-9;
 /// log likelihood is its square.
 pub(crate) const SMOOTH_COMPARED: f64 = 1e-4;
 
-/// Smallest initial power, relative to the mean over the lines.
+/// Smallest initial power of a smooth noise spectrum, relative to the mean over the lines.
 pub(crate) const SMOOTH_FLOOR: f64 = 1e-9;
 
-/// Initial power of a peak relative to the floor.
+/// Initial power of a resonance peak on a noise spectrum, relative to the floor.
 pub(crate) const BUMP_PEAK: f64 = 100.0;
 
-/// Factor for variations of the width of a peak.
+/// Factor between the widths of a peak that are tried.
 pub(crate) const BUMP_WIDER: f64 = 1.3;
 
-/// Factor for variations of the power of a peak relative to the floor, with unchanged flanks.
+/// Factor between the powers of a peak, relative to the floor, that are tried with unchanged
+/// flanks.
 pub(crate) const BUMP_HIGHER: f64 = 3.0;
 
 /// Distance at which a peak is truncated, relative to the distance at which it is as high as the
@@ -156,31 +158,31 @@ pub(crate) const HEIGHT_STEPS: usize = 10;
 /// Change of the height of a bump that ends the search.
 pub(crate) const HEIGHT_TOLERANCE: f64 = 1e-4;
 
-/// Maximum height, as the logarithm of the power.
+/// Maximum height of a bump, as the logarithm of the power.
 pub(crate) const BUMP_HIGHEST: f64 = 30.0;
 
 /// Maximum RMS difference between the periods of a force and their mean, relative to the mean, at
 /// which the force counts as exactly repeated.
 pub(crate) const PERIODS_REPEATS: f64 = 1e-12;
 
-/// Number of terms of the series of a sawtooth.
+/// Number of terms of the Fourier series of the rounding error, which is a sawtooth.
 pub(crate) const PERIODS_TERMS: i32 = 64;
 
-/// Number of bisections in the search for the noise level.
+/// Number of bisections in the search for the noise level of quantised samples.
 pub(crate) const PERIODS_HALVINGS: usize = 50;
 
 /// Minimum power of a line under Hann's window, relative to the level around it, at which a
-/// sinusoid is searched for: noise exceeds it on one of 10⁷ lines if the level comes from 20
+/// sinusoid is searched for. Noise exceeds it on one of 10⁷ lines if the level comes from 20
 /// independent lines.
 pub(crate) const SINUSOID_CONSPICUOUS: f64 = 30.0;
 
 /// Number of lines to either side whose median is the level around a line.
 pub(crate) const SINUSOID_AROUND: usize = 24;
 
-/// Number of nearest lines to either side that are excluded from this median.
+/// Number of nearest lines to either side that are excluded from the median around a line.
 pub(crate) const SINUSOID_NEXT: usize = 3;
 
-/// Minimum number of lines for a level.
+/// Minimum number of lines that determine the level around a line.
 pub(crate) const SINUSOID_FEWEST: usize = 16;
 
 /// Number of lines to either side to which a sinusoid is fitted; under Hann's window it is
@@ -190,8 +192,8 @@ pub(crate) const SINUSOID_FITTED: usize = 4;
 /// Number of lines to either side whose power above the level a sinusoid must explain.
 pub(crate) const SINUSOID_EXPLAINED: usize = 8;
 
-/// Maximum unexplained fraction of this power: a band of noise, or a changing frequency, leaves
-/// more.
+/// Maximum fraction of the power above the level that a sinusoid may leave unexplained: it is
+/// exceeded for a band of noise or a changing frequency.
 pub(crate) const SINUSOID_LEFT: f64 = 0.25;
 
 /// Minimum power of further sinusoids of one search relative to the strongest one: the residual of
@@ -204,14 +206,14 @@ pub(crate) const SINUSOID_MOST: usize = 16;
 /// Maximum number of candidate lines in the search for sinusoids.
 pub(crate) const LOOKED_AT: usize = 96;
 
-/// Number of frequencies per line at which receptances are averaged.
+/// Number of frequencies per line at which receptances are averaged for the level around a line.
 pub(crate) const GAINS_PER_LINE: usize = 16;
 
 /// Number of rounds in which each sinusoid is fitted again with all others subtracted.
 pub(crate) const SINUSOID_ROUNDS: usize = 2;
 
-/// Number of frequencies tried between the two neighbouring lines.
+/// Number of frequencies of a sinusoid that are tried between the two lines next to its peak.
 pub(crate) const SINUSOID_FREQUENCIES: usize = 20;
 
-/// Number of golden-section steps after that.
+/// Number of golden-section steps in the search for the frequency of a sinusoid.
 pub(crate) const SINUSOID_SECTIONS: usize = 40;

@@ -201,14 +201,12 @@ impl LineData {
         &self.omega
     }
 
-    /// Returns the inputs, lines × q.
-    /// In their units.
+    /// Returns the inputs in their units, lines × q.
     pub fn inputs(&self) -> &DMatrix<Complex<f64>> {
         &self.inputs
     }
 
-    /// Returns the outputs, lines × p.
-    /// In their units.
+    /// Returns the outputs in their units, lines × p.
     pub fn outputs(&self) -> &DMatrix<Complex<f64>> {
         &self.outputs
     }
@@ -218,7 +216,7 @@ impl LineData {
         self.noise.as_ref()
     }
 
-    /// Returns the rows of each record and the effect of its ends.
+    /// Returns the rows of each record and its transient.
     pub fn records(&self) -> &[(Range<usize>, Transient)] {
         &self.records
     }

@@ -42,8 +42,8 @@ impl LineNoise {
         Ok(Self { covariance, degrees_of_freedom: known, total_degrees_of_freedom: known })
     }
 
-    /// Returns the same noise as sample covariances, each averaged from `each` complex deviations;
-    /// all of them together come from `total` deviations, which is less than their sum if rows
+    /// Returns the same noise as sample covariances, each averaged from `each` complex deviations.
+    /// All of them together come from `total` deviations, which is less than their sum if rows
     /// share deviations.
     #[must_use]
     pub fn with_degrees_of_freedom(self, each: f64, total: f64) -> Self {

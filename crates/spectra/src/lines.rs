@@ -110,7 +110,8 @@ impl Lines {
         Ok(self.read_window(record, 0))
     }
 
-    /// Reads as [`Lines::read`] does, from the samples starting at `start` of a longer record.
+    /// Reads the lines as [`Lines::read`] does, from the samples starting at `start` of a longer
+    /// record.
     pub(crate) fn read_window(&self, record: &Record, start: usize) -> DMatrix<Complex<f64>> {
         let mut amplitudes = DMatrix::zeros(self.lines.len(), record.channels());
         let mut reader = self.reader();
@@ -121,7 +122,7 @@ impl Lines {
         amplitudes
     }
 
-    /// Returns a reader with buffers that are used for one window after the other.
+    /// Returns a reader whose buffers are used for one window after another.
     pub(crate) fn reader(&self) -> LineReader<'_> {
         let plan = &self.plan;
         LineReader {
@@ -142,7 +143,7 @@ pub(crate) struct LineReader<'a> {
 }
 
 impl LineReader<'_> {
-    /// Reads the amplitudes of the samples that `fill` writes, one per line.
+    /// Reads the amplitudes, one per line, of the samples that `fill` writes.
     pub(crate) fn read<'z>(
         &mut self,
         fill: impl FnOnce(&mut [f64]),

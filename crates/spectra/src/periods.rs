@@ -40,7 +40,7 @@ pub struct RepeatedPeriods {
     scatter: Vec<DMatrix<Complex<f64>>>,
     /// Periods that are not included in the scatter yet.
     together: BetweenLines,
-    /// Sum of these periods.
+    /// Sum of the periods in `together`.
     together_sum: DMatrix<Complex<f64>>,
     /// Quantisation step of each channel, 2n; zero without quantisation.
     steps: Vec<f64>,
@@ -184,7 +184,7 @@ impl RepeatedPeriods {
     }
 
     /// Adds the scatter of the last `periods`: the noise between their lines, and the deviation of
-    /// their mean from the mean of all before.
+    /// their mean from the mean of all earlier periods.
     ///
     /// # Source
     /// Welford (1962), Technometrics 4, 419–420: the scatter about the mean in one pass.
@@ -384,7 +384,7 @@ mod tests {
 
     use super::*;
 
-    /// Judge: rounded samples themselves.
+    /// Judge: the rounded samples themselves.
     #[test]
     fn rounding_alike_is_found_from_the_scatter() {
         const SAMPLES: usize = 4000;
@@ -401,7 +401,8 @@ mod tests {
                 let own =
                     all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (PERIODS - 1) as f64;
                 scatter += own / SAMPLES as f64;
-                // The mean has the scatter of a period over their number beside what is alike.
+                // The mean has the scatter of a period divided by their number, and the part that
+                // is equal in all.
                 together += ((mean - exact).powi(2) - own / PERIODS as f64) / SAMPLES as f64;
             }
             let found = common_rounding(scatter);

@@ -53,11 +53,11 @@ impl Sinusoid {
     }
 }
 
-/// Returns the amplitudes at a line of e^{iωt} and e^{−iωt}, each halved as in a cosine of
+/// Returns the amplitudes of e^{iωt} and e^{−iωt} at a line, each halved as in a cosine of
 /// amplitude 1.
 fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
     let samples = sampling.len() as f64;
-    // A geometric series, divided by its number of terms, has this sum.
+    // This is the sum of a geometric series, divided by its number of terms.
     let mean = |turn: f64| {
         let half = 0.5 * turn;
         match half.sin() {
@@ -72,8 +72,8 @@ fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
 }
 
 impl FrequencyData {
-    /// Returns the rows of open records with the sinusoids of each, as the maximum-likelihood
-    /// estimator estimated them, subtracted from the displacement.
+    /// Returns the rows of open records with the sinusoids of each record subtracted from the
+    /// displacement, as the maximum-likelihood estimator estimated them.
     #[must_use]
     pub fn without_sinusoids(&self, sinusoids: &[Vec<Sinusoid>]) -> Self {
         let mut displacement = self.displacement().clone();
@@ -101,8 +101,8 @@ impl FrequencyData {
 /// of the data; the sinusoids `known` from a previous residual are fitted first.
 ///
 /// Lines with a peak of the force are excluded, because the residual there may come from the
-/// system. At a resonance, the threshold is higher by the ratio of the squared receptance of the
-/// `system`, if it is given, because a disturbance of the force has that shape.
+/// system. If the `system` is given, the threshold is higher at its resonances, by the ratio of the
+/// squared receptance, because a disturbance of the force has the shape of the receptance.
 ///
 /// # Source
 /// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a
@@ -232,8 +232,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Raises the level around a line, once, by the ratio of the mean squared receptance near it
-    /// and around it.
+    /// Raises the level around a line, once, by the ratio of the mean squared receptance near the
+    /// line to that around it.
     fn allow_for_receptance(&mut self, at: usize) {
         if std::mem::replace(&mut self.is_resonant[at], true) {
             return;

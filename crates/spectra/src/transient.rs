@@ -61,7 +61,7 @@ pub fn index(n: usize, column: usize, matrix: Matrix, dof: usize) -> usize {
     (Matrix::ALL.len() * column + matrix as usize) * n + dof
 }
 
-/// Returns s², s and 1 with s = iω (rad/s), in the order of the matrices.
+/// Returns s², s and 1 with s = iω (rad/s), in the order M, C, K.
 pub fn powers(omega: f64) -> [Complex<f64>; 3] {
     let mut powers = [Complex::from(1.0); 3];
     powers[Matrix::Mass as usize] = Complex::from(-omega * omega);

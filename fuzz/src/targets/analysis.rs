@@ -1,4 +1,4 @@
-//! Calls of `mechid-analysis`: whole analyses with settings of any kind.
+//! Calls of `mechid-analysis`: complete analyses with settings drawn at random.
 
 use std::fmt::Display;
 
@@ -67,7 +67,7 @@ fn window(d: &mut Draw, measurement: Measurement) -> Result<Option<Measurement>,
     passed(measurement.window(window))
 }
 
-/// A setting that is written as text, as users write it.
+/// Returns a setting that is parsed from text, as users write it.
 fn written<T: std::str::FromStr<Err: Display>>(
     d: &mut Draw,
     texts: &[&str],
@@ -127,7 +127,7 @@ fn samples(d: &mut Draw) -> SampleFit {
 const LINES: [&str; 7] = ["all", "odd", "1,2,3", "2..5", "1:2:9", "0", "99999999999999999999"];
 
 fn open_noise(d: &mut Draw) -> OpenNoise {
-    // JSON, which settings are saved in, has finite numbers only.
+    // The settings are saved as JSON, which has only finite numbers.
     let force = d.one_in(4).then(|| {
         let mut levels = d.numbers(3);
         levels.retain(|level| level.is_finite());
@@ -220,7 +220,7 @@ fn machine(d: &mut Draw, first: Measurement) -> Result<(), String> {
     used(d, &identified, &records[0])
 }
 
-/// What is asked of an identified machine.
+/// Uses an identified machine for its modes and for a prediction.
 fn used(d: &mut Draw, identified: &Identified, record: &Measurement) -> Result<(), String> {
     let Some(machine) = passed(identified.machine())? else { return Ok(()) };
     if let Some(modes) = passed(ModalSummary::from_machine(&machine))? {

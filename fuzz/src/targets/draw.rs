@@ -23,12 +23,12 @@ impl<'a> Draw<'a> {
         Self(Unstructured::new(bytes))
     }
 
-    /// One of `0..count`.
+    /// Returns one of the numbers `0..count`.
     pub fn below(&mut self, count: usize) -> usize {
         self.0.int_in_range(0..=count - 1).unwrap_or(0)
     }
 
-    /// True in one of `count` cases.
+    /// Returns true in one of `count` cases.
     pub fn one_in(&mut self, count: usize) -> bool {
         self.below(count) == 1
     }
@@ -41,7 +41,7 @@ impl<'a> Draw<'a> {
         self.0.arbitrary().unwrap_or(0)
     }
 
-    /// A number as measurements have: 10⁻⁴ … 10⁷ in magnitude.
+    /// Returns a number as in measurements: 10⁻⁴ to 10⁷ in magnitude.
     pub fn ordinary(&mut self) -> f64 {
         let exponent = self.below(12) as i32 - 4;
         let mantissa = 1.0 + f64::from(self.0.arbitrary::<u16>().unwrap_or(0)) / 65536.0 * 9.0;
@@ -49,7 +49,7 @@ impl<'a> Draw<'a> {
         sign * mantissa * 10f64.powi(exponent)
     }
 
-    /// Any number, mostly ordinary.
+    /// Returns an ordinary number in most cases, otherwise an extreme or any number.
     pub fn number(&mut self) -> f64 {
         const EDGES: [f64; 16] = [
             0.0,
@@ -80,7 +80,7 @@ impl<'a> Draw<'a> {
         (0..self.below(most + 1)).map(|_| self.number()).collect()
     }
 
-    /// A small number of things, or one that no memory holds.
+    /// Returns a size: a small one, or one that fits into no memory.
     pub fn size(&mut self) -> usize {
         match self.below(24) {
             1 => usize::MAX,
@@ -94,7 +94,7 @@ impl<'a> Draw<'a> {
         (0..self.below(most + 1)).map(|_| self.size()).collect()
     }
 
-    /// Spectral lines in order, most of them within a record of `len` samples.
+    /// Returns spectral lines: in most cases ordered and within a record of `len` samples.
     pub fn lines(&mut self, len: usize) -> Vec<usize> {
         if self.one_in(8) {
             return self.indices(6);
@@ -115,7 +115,7 @@ impl<'a> Draw<'a> {
         self.of(&[Extent::Open, Extent::WholePeriod])
     }
 
-    /// A matrix, mostly of ordinary numbers.
+    /// Returns a matrix: in most cases of ordinary numbers.
     pub fn matrix(&mut self, rows: usize, columns: usize) -> DMatrix<f64> {
         let hostile = self.one_in(4);
         DMatrix::from_fn(
@@ -125,7 +125,7 @@ impl<'a> Draw<'a> {
         )
     }
 
-    /// Number of degrees of freedom, and mostly the same one for all that goes with it.
+    /// Returns a number of degrees of freedom: `of` in most cases, so that arguments match.
     pub fn dof(&mut self, of: usize) -> usize {
         if self.one_in(12) { self.below(5) } else { of }
     }
@@ -133,11 +133,11 @@ impl<'a> Draw<'a> {
     pub fn sampling(&mut self) -> Result<Option<Sampling>, String> {
         let dt = if self.one_in(8) { self.number() } else { 1e-3 * (1 + self.below(9)) as f64 };
         let len = if self.one_in(16) { self.size() } else { 1 + self.below(MOST_SAMPLES) };
-        // Longer ones are only described, never held.
+        // Longer samplings are only constructed; no record is made with them.
         Ok(passed(Sampling::new(dt, len))?.filter(|s| s.len() <= MOST_SAMPLES))
     }
 
-    /// A record; its channels are noise, a sine, a ramp, constant, or anything.
+    /// Returns a record; each channel is noise, a sine, a ramp, a constant, or arbitrary numbers.
     pub fn record(
         &mut self,
         sampling: Sampling,
@@ -163,7 +163,7 @@ impl<'a> Draw<'a> {
                 3 => level * (turn * k as f64).sin() * (-0.05 * k as f64).exp(),
                 4 => f64::from(u8::from(k == 3)) * level,
                 _ => {
-                    // Knuth's linear congruential generator: noise enough for a case.
+                    // Knuth's linear congruential generator is good enough for the noise.
                     state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                     level * ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5)
                 }
@@ -176,14 +176,14 @@ impl<'a> Draw<'a> {
         channel
     }
 
-    /// A system of ordinary or of any numbers.
+    /// Returns a system with ordinary or with arbitrary numbers.
     pub fn system(&mut self, dof: usize) -> Result<Option<SecondOrderSystem>, String> {
         let mut matrices = [0; 3].map(|_| {
             let rows = self.dof(dof);
             self.matrix(rows, rows)
         });
         if !self.one_in(4) {
-            // As machines are: the diagonals are positive and large.
+            // In most machines the diagonals are positive and large.
             for matrix in &mut matrices {
                 for i in 0..matrix.nrows() {
                     let row: f64 = matrix.row(i).iter().map(|v| v.abs()).sum();
@@ -207,7 +207,7 @@ impl<'a> Draw<'a> {
     }
 }
 
-/// Passes a value on, and looks at the message of an error.
+/// Returns the value, if any, and checks the message of an error.
 pub fn passed<T, E: Display>(result: Result<T, E>) -> Result<Option<T>, String> {
     let error = match result {
         Ok(value) => {
@@ -223,7 +223,7 @@ pub fn passed<T, E: Display>(result: Result<T, E>) -> Result<Option<T>, String> 
     Ok(None)
 }
 
-/// Passes a value on whose numbers must be finite.
+/// Returns the record, if any; its numbers must be finite.
 pub fn finite<E: Display>(record: Result<Record, E>) -> Result<Option<Record>, String> {
     let record = passed(record)?;
     match &record {

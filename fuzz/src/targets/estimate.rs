@@ -60,7 +60,7 @@ fn hold(d: &mut Draw) -> Discretisation {
     d.of(&[Discretisation::Euler, Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold])
 }
 
-/// Uses all that is known of an estimate.
+/// Calls all methods of an estimate.
 fn found<E: std::fmt::Display>(
     d: &mut Draw,
     estimate: Result<Estimate, E>,
@@ -105,7 +105,8 @@ fn rows(d: &mut Draw) -> Result<(), String> {
     Ok(())
 }
 
-/// Force and response of one experiment; mostly of the same length and number of channels.
+/// Draws force and response of one experiment, in most cases of the same length and number of
+/// channels.
 fn experiment(d: &mut Draw, dof: usize) -> Result<Option<[Record; 2]>, String> {
     let Some(sampling) = d.sampling()? else { return Ok(None) };
     let Some(other) = (if d.one_in(12) { d.sampling()? } else { Some(sampling) }) else {
@@ -116,7 +117,7 @@ fn experiment(d: &mut Draw, dof: usize) -> Result<Option<[Record; 2]>, String> {
     Ok(force.zip(response).map(|(force, response)| [force, response]))
 }
 
-/// The same period so many times over, with other noise each.
+/// Repeats a period `count` times, each time with other noise.
 fn periods(d: &mut Draw, one: &Record, count: usize) -> Result<Option<Record>, String> {
     let Some(all) = passed(one.repeated(count))? else { return Ok(None) };
     let Some(noise) = d.record(all.sampling(), all.channels())? else { return Ok(Some(all)) };
@@ -217,7 +218,7 @@ fn responses(d: &mut Draw) -> Result<(), String> {
         passed(mean.push(&force, &response))?;
         passed(mean.frf(estimator))?;
     }
-    // A table that someone else has made.
+    // The table comes from another program.
     let omega = d.numbers(5);
     let tables: Vec<DMatrix<Complex<f64>>> =
         (0..d.dof(omega.len())).map(|_| d.matrix(dof, dof).map(|v| Complex::new(v, 1.0))).collect();

@@ -1,4 +1,4 @@
-//! From the bytes of a record to a fit: every format, every question that is asked of a record.
+//! Targets that read a record from bytes and analyse it: every format and every analysis.
 
 use std::fmt::Display;
 use std::fs;
@@ -18,11 +18,11 @@ use mechid_io::{FrequencyResponses, RecordFile, escaped};
 use crate::depth::{Depth, reached};
 use crate::{Input, Target};
 
-/// Words that records of several formats have in common.
+/// Words that occur in records of several formats.
 const WORDS: &[&str] =
     &["0", "1e-9", "-", "NaN", "1e308", "\n", ",", "force", "x", "    -1\n", "\0\0\0\0"];
 
-/// Words of nonlinear terms.
+/// Words that occur in nonlinear terms.
 const TERMS: &[&str] = &[
     "x1",
     "v1",
@@ -41,7 +41,7 @@ const TERMS: &[&str] = &[
     ";",
 ];
 
-/// Words of tables of frequency responses.
+/// Words that occur in tables of frequency responses.
 const TABLES: &[&str] = &[
     "frequency_hz",
     "omega",
@@ -89,12 +89,13 @@ pub const TARGETS: [Target; 10] = [
     fit("fleet", fleet),
 ];
 
-/// A target whose input is a record, of which few bytes are changed: most of them reach the work.
+/// Returns a target whose input is a record with few changed bytes, so that most cases reach the
+/// analysis.
 const fn fit(name: &'static str, run: fn(&[u8]) -> Result<(), String>) -> Target {
     Target { name, corpus: "records", input: Input::Few(WORDS), memory: [256 << 20, 4000], run }
 }
 
-/// Looks at a result of an analysis.
+/// Returns the result, if any, and checks the message of an error.
 fn passed<T>(result: Result<T, AnalysisError>) -> Result<Option<T>, String> {
     match result {
         Ok(value) => Ok(Some(value)),
@@ -117,13 +118,13 @@ fn printed<T: Display + serde::Serialize>(result: &T) -> Result<(), String> {
     serde_json::to_string(result).map(drop).map_err(|error| error.to_string())
 }
 
-/// A record in a file, and the settings with which it is read: a number of them follows from the bytes.
+/// A record in a file, and the settings with which it is read.
 struct Record {
     folder: tempfile::TempDir,
     path: PathBuf,
     columns: Vec<String>,
     reading: Reading,
-    /// A number that follows from the input.
+    /// Number computed from the input; it selects the settings.
     choice: usize,
 }
 
@@ -150,7 +151,7 @@ impl Record {
         Ok(Some(Self { folder, path, columns, reading, choice }))
     }
 
-    /// The last columns as a force, unless none acts, and a response of some kind.
+    /// Reads the last two columns as force and response, or the last as a response without a force.
     fn measurement(&self, forced: bool) -> Result<Option<Measurement>, String> {
         let [.., force, response] = self.columns.as_slice() else { return Ok(None) };
         let kind = ResponseQuantity::ALL[self.choice % 3];
@@ -239,7 +240,7 @@ fn predicted(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Modes of the identified matrices.
+/// Computes the modes of the identified matrices.
 fn modes_of_matrices(bytes: &[u8]) -> Result<(), String> {
     let Some(record) = Record::new(bytes)? else { return Ok(()) };
     let Some(measurement) = record.measurement(true)? else { return Ok(()) };
@@ -251,12 +252,12 @@ fn modes_of_matrices(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Modes of a structure under the force, with a number of modes that ends in time.
+/// Identifies modes under a measured force; the number of modes is small enough for the time limit.
 fn modal(bytes: &[u8]) -> Result<(), String> {
     fitted_modes(bytes, true, ModalTest::default())
 }
 
-/// Modes of a structure under forces that are not measured.
+/// Identifies modes under forces that are not measured.
 fn ambient(bytes: &[u8]) -> Result<(), String> {
     let without_hz = Vec::new();
     fitted_modes(bytes, false, ModalTest::Ambient { without_hz, without_harmonics: false })
@@ -274,7 +275,7 @@ fn fitted_modes(bytes: &[u8], forced: bool, test: ModalTest) -> Result<(), Strin
     }
 }
 
-/// A table of frequency responses, of which the matrices and the modes are asked for.
+/// Identifies the matrices or the modes from a table of frequency responses.
 fn tables(bytes: &[u8]) -> Result<(), String> {
     let table = match FrequencyResponses::parse("a\u{1b}", bytes) {
         Ok(table) => table,
@@ -310,7 +311,7 @@ fn tables(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Nonlinear terms as text, fitted to a record of the example.
+/// Parses nonlinear terms and fits them to the record of the example.
 fn terms(bytes: &[u8]) -> Result<(), String> {
     let Ok(terms) = String::from_utf8_lossy(bytes).parse::<Nonlinear>() else { return Ok(()) };
     reached(Depth::Read);
@@ -325,7 +326,7 @@ fn terms(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// A fleet of the record and a good one: each has a row, whatever is in it.
+/// Analyses a fleet of the record and a good one: each has a row, even if the record is damaged.
 fn fleet(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let records = folder.path().join("records");

@@ -1,4 +1,4 @@
-//! What is tried.
+//! The targets.
 
 mod analysis;
 mod calls;
@@ -13,7 +13,7 @@ mod signal;
 
 use crate::Target;
 
-/// All targets.
+/// Returns all targets.
 pub fn all() -> Vec<Target> {
     [&readers::TARGETS[..], &fits::TARGETS, &calls::TARGETS].concat()
 }

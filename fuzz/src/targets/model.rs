@@ -11,7 +11,7 @@ use nalgebra::Complex;
 
 use super::draw::{Draw, finite, passed};
 
-/// Texts that terms are made of.
+/// Texts of nonlinear terms, valid and invalid.
 const TERMS: [&str; 12] = [
     "k3: x1^3",
     "k2: x1^2, k3: x1^3",
@@ -64,7 +64,7 @@ fn one_degree_of_freedom(d: &mut Draw) -> Result<(), String> {
     Ok(())
 }
 
-/// A motion whose numbers must be finite.
+/// Checks that all numbers of a motion are finite.
 fn motion<E: std::fmt::Display>(response: Result<Response, E>) -> Result<(), String> {
     if let Some(response) = passed(response)? {
         for quantity in [
@@ -219,7 +219,7 @@ fn bearings(d: &mut Draw) -> Result<(), String> {
     Ok(())
 }
 
-/// A system of one degree of freedom that the other targets can rely on.
+/// Returns a valid system of one degree of freedom for the other targets.
 pub fn oscillator() -> SecondOrderSystem {
     Sdof::new(2.0, 5.0, 8_000.0).expect("a machine").system()
 }

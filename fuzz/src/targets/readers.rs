@@ -235,7 +235,7 @@ const OPTIONS: ReadOptions = ReadOptions {
 /// Longest message, in bytes: a name may be as long as a row.
 const LONGEST_MESSAGE: usize = 1 << 20;
 
-/// What is shown to a person must be one line without characters that a terminal obeys.
+/// Checks a text for the user: it must be short and contain no control characters.
 fn shown(text: &str) -> Result<(), String> {
     if escaped(text) != text {
         return Err(format!("a message is not escaped: {text:?}"));
@@ -246,7 +246,7 @@ fn shown(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Passes a value on, and looks at the message of an error.
+/// Returns the value, if any, and checks the message of an error.
 fn told<T>(result: Result<T, IoError>) -> Result<Option<T>, String> {
     match result {
         Ok(value) => Ok(Some(value)),
@@ -258,7 +258,7 @@ fn ensure(holds: bool, what: &str) -> Result<(), String> {
     if holds { Ok(()) } else { Err(what.into()) }
 }
 
-/// Reads a matrix.
+/// Reads a matrix and checks its shape and its number of entries.
 fn matrix(bytes: &[u8]) -> Result<(), String> {
     let Some(matrix) = told(parse_matrix_market("k\u{1b}.mtx", bytes, &OPTIONS.limits))? else {
         return Ok(());
@@ -268,7 +268,7 @@ fn matrix(bytes: &[u8]) -> Result<(), String> {
     ensure(matrix.nnz() <= 2 * bytes.len(), "there are more entries than can stand in the file")
 }
 
-/// Reads a record, and uses all that is known of it.
+/// Reads a record and calls all methods of its table.
 fn record(bytes: &[u8]) -> Result<(), String> {
     let Some(table) = told(Table::parse_with("a\u{1b}.csv", bytes, &OPTIONS))? else {
         return Ok(());
@@ -312,7 +312,7 @@ fn record(bytes: &[u8]) -> Result<(), String> {
     shown(&table.position(0).to_string())
 }
 
-/// A text that is not held says what the one in memory says.
+/// Checks that a text read in chunks gives the same numbers as one held in memory.
 fn chunks(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let path = folder.path().join("a.csv");
@@ -343,7 +343,7 @@ fn chunks(bytes: &[u8]) -> Result<(), String> {
                         Ok::<_, IoError>(())
                     });
                     told(read)?;
-                    ensure(all.len() == len, "blocks have another number of samples")?;
+                    ensure(all.len() == len, "the blocks have a different number of samples")?;
                     sums.push(format!("{all:?}"));
                 }
                 Err(error) => {
@@ -356,15 +356,15 @@ fn chunks(bytes: &[u8]) -> Result<(), String> {
     }
     let [a, b] = sums;
     match a.iter().zip(&b).find(|(a, b)| a != b) {
-        Some((a, b)) => Err(format!("held {a}, in chunks {b}")),
-        None => ensure(a.len() == b.len(), "there are more results"),
+        Some((a, b)) => Err(format!("{a} from memory, {b} in chunks")),
+        None => ensure(a.len() == b.len(), "one way gives more results than the other"),
     }
 }
 
 /// Largest number of samples of a period that is computed.
 const MOST_SAMPLES: usize = 1 << 12;
 
-/// Reads a description as all that it may be.
+/// Parses a text as every kind of description: of a system, an experiment, and others.
 fn descriptions(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let path = folder.path().join("a.json");
@@ -388,23 +388,26 @@ fn described(path: &Path) -> Result<(), String> {
     if experiment.samples() <= MOST_SAMPLES && experiment.periods <= 4 {
         for force in [experiment.force(), experiment.force_within_steps(0.5)] {
             if let Some(force) = told(force)? {
-                ensure(force.len() == experiment.samples(), "the force has another length")?;
+                ensure(force.len() == experiment.samples(), "the force has a different length")?;
             }
         }
     }
     Ok(())
 }
 
-/// Reads a choice of spectral lines.
+/// Parses a choice of spectral lines.
 fn lines(bytes: &[u8]) -> Result<(), String> {
     let text = String::from_utf8_lossy(bytes);
     let Some(lines) = told(text.parse::<LineSpec>())? else { return Ok(()) };
     reached(Depth::Fitted);
-    ensure(lines.to_string() == text, "it is written in another way")?;
+    ensure(lines.to_string() == text, "the choice is written differently from how it was read")?;
     for len in [1, 2, 3, 16, 1000] {
         let period = Sampling::new(0.01, len).map_err(|e| e.to_string())?;
         if let Some(lines) = told(lines.lines(period))? {
-            ensure(lines.is_sorted() && lines.iter().all(|n| 2 * n < len), "a line is not one")?;
+            ensure(
+                lines.is_sorted() && lines.iter().all(|n| 2 * n < len),
+                "the lines are not sorted, or one is not below the Nyquist frequency",
+            )?;
         }
     }
     Ok(())

@@ -7,7 +7,7 @@ import openseespy.opensees as ops
 DT, STEPS = 0.01, 60
 FORCE = [30 * math.sin(18 * k * DT) + 12 * math.sin(47 * k * DT) for k in range(STEPS + 2)]
 STOREYS = [(2.0, 5000.0, 6.0), (3.0, 4000.0, 4.0), (1.5, 3000.0, 5.0)]
-# One step of TRBDF2 is two of the analysis.
+# TRBDF2 needs two steps of the analysis, of half the length, for each of its steps.
 INTEGRATORS = [
     ("Newmark 1/2 1/4", 1, ("Newmark", 0.5, 0.25)),
     ("Newmark 1/2 1/6", 1, ("Newmark", 0.5, 1 / 6)),

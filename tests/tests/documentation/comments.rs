@@ -1,5 +1,5 @@
-//! Comments of every kind, public, private and between the lines: whole sentences of plain words,
-//! wrapped.
+//! Comments of every kind, public, private and inside functions: they are whole sentences of plain
+//! words, and wrapped.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,23 +7,23 @@ use std::path::{Path, PathBuf};
 /// Longest line of a comment, in columns.
 const WIDTH: usize = 100;
 
-/// First words of fragments, in documentation and between the lines.
+/// First words that mark a fragment, in documentation and in comments inside functions.
 const FRAGMENTS: &[&str] = &[
     "As", "Both", "By", "Counted", "From", "How", "Its", "Not", "Nothing", "Of", "So", "Such",
     "Than", "That", "Their", "These", "Those", "What", "Where", "Whether", "Which", "Who", "Whose",
     "Why",
 ];
 
-/// One comment: neighbouring lines that begin alike.
+/// One comment: consecutive lines with the same comment mark.
 pub struct Comment {
     /// File and line.
     pub place: String,
     pub lines: Vec<String>,
-    /// Columns of the longest line, without code of examples and tables.
+    /// Columns of the longest line; code of examples and tables do not count.
     pub width: usize,
 }
 
-/// The comments of the sources below a folder, without those of tests.
+/// Returns the comments of the sources below a folder, except those of tests.
 pub fn below(folder: &Path) -> Vec<Comment> {
     let mut files = Vec::new();
     sources(folder, &mut files);
@@ -44,7 +44,7 @@ fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// The comments of a source; `mod tests` is the last item of its file.
+/// Returns the comments of a source; `mod tests` is the last item of its file.
 pub fn read(text: &str, file: &str) -> Vec<Comment> {
     let mut comments: Vec<Comment> = Vec::new();
     let (mut before, mut is_code) = (None, false);
@@ -77,7 +77,7 @@ pub fn read(text: &str, file: &str) -> Vec<Comment> {
 }
 
 impl Comment {
-    /// Returns the first word of a fragment that the comment begins with.
+    /// Returns the first word of the comment if it marks a fragment.
     pub fn fragment(&self) -> Option<&str> {
         let first = self.lines.first()?;
         let word = first.split(|c: char| !c.is_alphabetic() && c != '\'').next()?;
@@ -89,7 +89,7 @@ impl Comment {
         self.width > WIDTH
     }
 
-    /// Returns the first of these phrases that the comment has.
+    /// Returns the first of these phrases that occurs in the comment.
     pub fn phrase<'a>(&self, phrases: &[&'a str]) -> Option<&'a str> {
         let words = self.lines.join(" ").to_lowercase();
         let plain = |c: char| !c.is_alphabetic() && c != '\'';
@@ -102,7 +102,7 @@ impl Comment {
     }
 }
 
-/// The phrases of the list beside this file: what is before two spaces.
+/// Returns the phrases of `phrases.txt` beside this file: the text of each line up to two spaces.
 pub fn phrases() -> Vec<&'static str> {
     let lines = include_str!("phrases.txt").lines().filter(|line| !line.starts_with('#'));
     lines.filter_map(|line| line.split("  ").next()).map(str::trim).collect()

@@ -9,34 +9,34 @@ use syn::{
 };
 use syn::{Visibility, spanned::Spanned};
 
-/// A crate as text that was read.
+/// Sources of a crate, parsed.
 pub struct Source {
     modules: Vec<Module>,
-    /// Names that some `pub use` brings to where they are reached.
+    /// Names that some `pub use` exports.
     exported: BTreeSet<String>,
 }
 
 struct Module {
     file: String,
-    /// Whether every module on the way is public.
+    /// True if the module and all modules around it are public.
     open: bool,
-    /// What the head of the file says.
+    /// Documentation at the head of the file.
     docs: String,
     items: Vec<syn::Item>,
 }
 
-/// What an item is.
+/// Kind of an item.
 pub enum Kind {
     Function {
         signature: Box<Signature>,
         body: Option<Box<Block>>,
         of: Option<String>,
     },
-    /// A public field or one of a public variant.
+    /// A public field, or a field of a public variant.
     Field(Box<Type>),
-    /// A type; its fields are items of their own.
+    /// A type; its fields are separate items.
     Type,
-    /// A variant of a public enum; its fields are items of their own.
+    /// A variant of a public enum; its fields are separate items.
     Variant,
     /// A constant, in a module or of a type.
     Constant,
@@ -44,26 +44,26 @@ pub enum Kind {
     Head,
 }
 
-/// A public item with what is said about it.
+/// A public item with its documentation.
 pub struct Item {
     pub place: String,
     pub docs: String,
-    /// What the type it belongs to says; of a field, its variant.
+    /// Documentation of the type that it belongs to, or of the variant if it is a field of one.
     pub around: String,
-    /// What the head of its file says.
+    /// Documentation at the head of its file.
     pub file: String,
     pub kind: Kind,
 }
 
 impl Source {
-    /// The crate whose `lib.rs` is in this folder.
+    /// Reads the crate whose `lib.rs` is in this folder.
     pub fn of(folder: &Path) -> Self {
         let mut source = Self { modules: Vec::new(), exported: BTreeSet::new() };
         source.read(&folder.join("lib.rs"), folder, true);
         source
     }
 
-    /// A crate of one file.
+    /// Reads a crate of one file from its text.
     pub fn of_text(text: &str) -> Self {
         let mut source = Self { modules: Vec::new(), exported: BTreeSet::new() };
         let file = syn::parse_file(text).unwrap();
@@ -118,7 +118,7 @@ impl Source {
         }
     }
 
-    /// Everything that can be named from outside, with its fields and methods.
+    /// Returns all items that other crates can name, with their fields and methods.
     pub fn items(&self) -> Vec<Item> {
         let mut types = BTreeMap::new();
         let mut found = Vec::new();
@@ -225,7 +225,7 @@ impl Item {
     }
 }
 
-/// The methods of a block without a trait.
+/// Collects the public methods and constants of an `impl` block without a trait.
 fn methods(
     module: &Module,
     block: &syn::ItemImpl,
@@ -295,7 +295,7 @@ fn docs(attributes: &[Attribute]) -> String {
     lines.collect()
 }
 
-/// What an error says when it is shown.
+/// Returns the message of an error, from its attribute `error`.
 fn message(attributes: &[Attribute]) -> String {
     let shown = attributes.iter().filter(|a| a.path().is_ident("error"));
     shown

@@ -1,8 +1,9 @@
-//! Every public item says what its reader needs: errors, units, shapes, and where a formula comes
-//! from. Every comment is a sentence of plain words.
+//! Every public item documents what its reader needs: errors, units, shapes, and the source of a
+//! formula. Every comment is a sentence of plain words.
 //!
-//! The rules read the sources: what a crate's root reaches is public, and a sentence may stand at
-//! the item, at the type it belongs to, or at the head of its file.
+//! The rules read the sources. An item is public if it can be reached from the root of its crate.
+//! The documentation that a rule asks for may stand at the item, at the type that it belongs to, or
+//! at the head of its file.
 
 mod comments;
 mod items;
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 use comments::Comment;
 use items::{Item, Source};
 
-/// The crates whose every item others call.
+/// The crates whose public items other programs use.
 const LIBRARIES: [&str; 15] = [
     "signal",
     "numerics",
@@ -32,7 +33,7 @@ const LIBRARIES: [&str; 15] = [
     "mechid",
 ];
 
-/// The sources whose private comments are clean, too: all crates and the tasks.
+/// The sources whose private comments follow the rules, too: all crates and `xtask`.
 const CLEAN: [&str; 20] = [
     "crates/analysis",
     "crates/bearing",
@@ -60,7 +61,7 @@ fn folder(library: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates").join(library).join("src")
 }
 
-/// Places of the items of these crates that break a rule.
+/// Returns the places of the items of these crates that break a rule.
 fn breaches(libraries: &[&str], breaks: impl Fn(&Item) -> bool) -> Vec<String> {
     let mut found = Vec::new();
     for library in libraries {
@@ -103,7 +104,7 @@ fn lists_and_matrices_have_shapes() {
     none(&breaches(&LIBRARIES, rules::hides_its_shape), "public items without a shape");
 }
 
-/// Places and faults of the comments of the clean sources.
+/// Returns the places and faults of the comments of the sources in `CLEAN`.
 fn faults(fault: impl Fn(&Comment) -> Option<String>) -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let of_one = |name: &&str| {
@@ -134,7 +135,7 @@ fn comments_have_plain_words() {
     none(&faults, "comments with a phrase of `phrases.txt`");
 }
 
-/// The judge of the rules: comments of each kind, with each fault and without.
+/// The rules find each fault in comments of each kind, and none in good comments.
 #[test]
 fn faults_of_comments_are_found() {
     let source = "//! Force that is told.\n\n/// Whether it is so.\nfn f() {\n    // Level of noise.\n    \
@@ -153,7 +154,8 @@ fn faults_of_comments_are_found() {
     assert!(comments::phrases().contains(&"up to which"));
 }
 
-/// What `cargo test --doc` runs there does something, and says what must come out.
+/// The front page of every library has an example that `cargo test --doc` runs and that checks a
+/// result.
 #[test]
 fn front_pages_have_an_example_that_is_run() {
     for library in LIBRARIES {
@@ -168,7 +170,7 @@ fn front_pages_have_an_example_that_is_run() {
     }
 }
 
-/// The judge of the rules: sentences that a reader would miss.
+/// The rules find the sentences that documentation lacks, and accept complete documentation.
 #[test]
 fn the_rules_tell_good_from_bad() {
     let read = |text: &str| Source::of_text(text).items();
@@ -211,7 +213,7 @@ fn the_rules_tell_good_from_bad() {
         let items = read(&format!("/// {docs}\npub const LEVEL: f64 = 1.0;"));
         assert_eq!(rules::begins_with_a_fragment(&items[0]), fragment, "{docs}");
     }
-    // What is only told on, converted or compared needs no source.
+    // A function that only returns, converts or compares a value needs no source.
     for plain in ["self.dt", "1.0 / self.dt", "if self.dt > x { x } else { self.dt }"] {
         let text =
             format!("pub struct S; impl S {{ pub fn f(&self, x: f64) -> f64 {{ {plain} }} }}");

@@ -1,18 +1,19 @@
-//! What the documentation of an item must hold.
+//! Rules for the documentation of an item.
 
 use syn::visit::{self, Visit};
 use syn::{BinOp, Block, FnArg, GenericArgument, PathArguments, ReturnType, Signature, Type};
 
 use crate::items::{Item, Kind};
 
-/// A function that may fail says when.
+/// Returns true if a function that returns a `Result` has no section `# Errors`.
 pub fn hides_its_errors(item: &Item) -> bool {
     let Kind::Function { signature, .. } = &item.kind else { return false };
     let ReturnType::Type(_, returned) = &signature.output else { return false };
     name(returned).is_some_and(|name| name == "Result") && !has_section(&item.docs, "Errors")
 }
 
-/// A function that computes with numbers says after whom, or its type or file does.
+/// Returns true if a function that computes with numbers has no section `# Source`, and neither its
+/// type nor the head of its file has one.
 pub fn hides_its_source(item: &Item) -> bool {
     let Kind::Function { signature, body: Some(body), .. } = &item.kind else { return false };
     computes(signature, body)
@@ -21,13 +22,15 @@ pub fn hides_its_source(item: &Item) -> bool {
         && !has_section(&item.file, "Source")
 }
 
-/// Where bare numbers come or go, units are named, or that there are none.
+/// Returns true if an item has bare numbers, but its documentation names no unit and does not say
+/// that they have none.
 pub fn hides_its_units(item: &Item) -> bool {
     let carries = |ty: &Type| mentions(ty, &["f64", "DVector", "DMatrix", "DMatrixView"]);
     carries_some(item, carries) && !says(item, UNITS)
 }
 
-/// Where lists and matrices of numbers come or go, their length or shape is named.
+/// Returns true if an item has lists or matrices of numbers, but its documentation does not state
+/// their length or shape.
 pub fn hides_its_shape(item: &Item) -> bool {
     let slice =
         |ty: &Type| matches!(ty, Type::Reference(of) if matches!(&*of.elem, Type::Slice(_)));
@@ -38,16 +41,17 @@ pub fn hides_its_shape(item: &Item) -> bool {
     carries_some(item, shaped) && !says(item, SHAPES)
 }
 
-/// A summary begins with a verb in the third person ("Returns …") or with a noun of the field: a
-/// question, a pronoun, a conjunction or a preposition is the beginning of a fragment.
+/// Returns true if the first line of the documentation is a fragment. It must begin with a verb in
+/// the third person (“Returns …”) or with a noun, not with a question word, a pronoun, a
+/// conjunction or a preposition.
 pub fn begins_with_a_fragment(item: &Item) -> bool {
     let word = item.docs.split(|c: char| !c.is_alphabetic() && c != '\'').find(|w| !w.is_empty());
-    // A formula, a symbol or a name in code is a noun.
+    // A formula, a symbol or a name in code counts as a noun.
     let is_word = item.docs.trim_start().starts_with(|c: char| c.is_alphabetic());
     is_word && word.is_some_and(|word| FRAGMENTS.contains(&word))
 }
 
-/// First words of fragments.
+/// First words that mark a fragment.
 const FRAGMENTS: &[&str] = &[
     "Above",
     "After",
@@ -113,7 +117,7 @@ const FRAGMENTS: &[&str] = &[
     "Without",
 ];
 
-/// Words of which one stands for a unit, or for none.
+/// Words that name a unit, or say that there is none; one of them suffices.
 const UNITS: &[&str] = &[
     "N",
     "m",
@@ -156,7 +160,7 @@ const UNITS: &[&str] = &[
     "pixels",
 ];
 
-/// Words of which one tells a length or a shape.
+/// Words that state a length or a shape; one of them suffices.
 const SHAPES: &[&str] = &[
     "×", "row", "rows", "column", "columns", "each", "per", "square", "length", "samples",
     "sample", "channels", "channel", "lines", "line", "entries", "n", "one for", "diagonal",
@@ -169,7 +173,7 @@ fn says(item: &Item, words: &[&str]) -> bool {
     let parts: Vec<&str> =
         text.split(|c: char| c.is_whitespace() || ",;:()[]`.".contains(c)).collect();
     let is = |part: &str, word: &str| match word.chars().all(char::is_lowercase) {
-        // A sentence may begin with it; units are written one way.
+        // A longer word may begin a sentence with a capital letter; a unit has one spelling only.
         true if word.len() > 3 => part.eq_ignore_ascii_case(word),
         _ => part == word,
     };
@@ -213,7 +217,7 @@ fn name(ty: &Type) -> Option<String> {
     }
 }
 
-/// Whether one of these names is the type or stands in it.
+/// Returns true if the type has one of these names, or contains a type that has.
 fn mentions(ty: &Type, names: &[&str]) -> bool {
     match ty {
         Type::Reference(inner) => mentions(&inner.elem, names),
@@ -232,14 +236,16 @@ fn mentions(ty: &Type, names: &[&str]) -> bool {
     }
 }
 
-/// Arithmetic that a reader sees through: a conversion, a ratio, a sum of two.
+/// Number of operations that need no source in a body of several statements: a conversion, a ratio,
+/// a sum of two terms.
 const PLAIN: usize = 2;
 
-/// The same of a body that is one expression: a formula that stands there as it is read.
+/// Number of operations that need no source in a body that is one expression, because
+/// the formula is read from the code itself.
 const FORMULA: usize = 4;
 
-/// Whether a function with numbers in its signature does more than hand on, compare, convert or
-/// pick.
+/// Returns true if a function with numbers in its signature does more than pass on, compare,
+/// convert or select.
 fn computes(signature: &Signature, body: &Block) -> bool {
     let numbers = ["f64", "DVector", "DMatrix", "Complex", "Record", "Spectrum", "Response"];
     if !types(signature).iter().any(|ty| mentions(ty, &numbers)) || picks(signature) {
@@ -251,14 +257,15 @@ fn computes(signature: &Signature, body: &Block) -> bool {
     work.operations > if formula { FORMULA } else { PLAIN }
 }
 
-/// Whether a function returns places, words, a yes or no, or a view of what is there.
+/// Returns true if a function returns indices, words, true or false, or a reference to existing
+/// data.
 fn picks(signature: &Signature) -> bool {
     let ReturnType::Type(_, returned) = &signature.output else { return false };
     let counts = mentions(returned, &["usize", "bool", "String"]) && !mentions(returned, &["f64"]);
     counts || matches!(&**returned, Type::Reference(_))
 }
 
-/// Arithmetic on the way through a body.
+/// Counter of the arithmetic operations in the body of a function.
 #[derive(Default)]
 struct Work {
     operations: usize,
@@ -286,7 +293,7 @@ impl<'ast> Visit<'ast> for Work {
         visit::visit_expr_for_loop(self, expression);
     }
 
-    /// Which entry is picked is no formula.
+    /// The arithmetic of an index does not count.
     fn visit_expr_index(&mut self, expression: &'ast syn::ExprIndex) {
         self.visit_expr(&expression.expr);
     }

@@ -9,7 +9,7 @@ use crate::thesis::results::Results;
 use crate::thesis::verdict::Verdict;
 
 const DIGITS: &str =
-    "one unit of the last printed place: a number may have been cut off or rounded twice";
+    "one unit of the last printed place: a number may have been truncated or rounded twice";
 
 /// Tables with modes in place of parameters.
 const MODAL: [&str; 3] = ["E1", "E2", "E-steffen-rade-2"];

@@ -10,7 +10,8 @@ use super::{Judge, Row, Status};
 /// Names of the coefficients in the columns of the table.
 const COEFFICIENTS: [&str; 7] = ["Kxx", "Kxy", "Kyx", "Kyy", "Bxx", "Bxy", "Byy"];
 
-/// Printed attitude that is taken for a misprint, and what its neighbours ask for, in degrees.
+/// Printed attitude angle that counts as a misprint, and the angle that follows from its
+/// neighbours, in degrees.
 const MISPRINT: (&str, f64) = ("83.29", 85.29);
 
 /// Lund and Thomsen's 14 rows of finite bearings.
@@ -30,7 +31,7 @@ pub(super) fn lund_thomsen(root: &Path) -> Result<Judge, String> {
     })
 }
 
-/// Rows of a line of the table; `None` where it is damaged.
+/// Returns the rows of a line of the table; `None` if the line is damaged.
 fn printed_row(line: &str) -> Option<Result<Vec<Row>, String>> {
     let cells: Vec<&str> = line.split(',').collect();
     let [name, numbers @ ..] = cells.as_slice() else { return None };
@@ -82,7 +83,8 @@ fn printed_row(line: &str) -> Option<Result<Vec<Row>, String>> {
     Some(Ok(rows))
 }
 
-/// The eight coefficients of the short bearing as they are printed, x along the load.
+/// Returns the eight coefficients of the short bearing by the printed formulas, with x along the
+/// load.
 fn printed_formulas(e: f64) -> [(&'static str, f64); 8] {
     let (s, p) = (e * e, PI * PI);
     let g = 1.0 - s;

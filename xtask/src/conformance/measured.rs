@@ -1,4 +1,4 @@
-//! Measured records of others: what was printed about them beside the pages of the gallery.
+//! Measured records of others: published numbers compared with those on the pages of the gallery.
 //!
 //! The records are not part of the project. Our numbers are those that the pages show, which the
 //! book's test compares with the program wherever the records are; so this page is the same with

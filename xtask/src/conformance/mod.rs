@@ -1,4 +1,4 @@
-//! Numbers of this workspace that somebody else printed or that have a closed form, on one page.
+//! Numbers of this workspace that others have printed or that have a closed form, on one page.
 //!
 //! No row is judged by a simulator of this workspace.
 
@@ -16,19 +16,19 @@ use serde::Serialize;
 use crate::thesis::published::Published;
 use crate::thesis::results::Results;
 
-/// Agreement of a number with what judges it.
+/// Agreement of a number with its reference.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// The difference is within the tolerance.
     Met,
-    /// The printed number is wrong, and why that is believed.
+    /// The printed number is wrong, with the reason for this conclusion.
     Misprint(String),
     /// The difference has no known reason.
     Open,
 }
 
-/// A number and what judges it.
+/// A number and its reference.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
     /// Quantity.
@@ -37,7 +37,7 @@ pub struct Row {
     pub expected: String,
     /// The number of this workspace.
     pub ours: String,
-    /// Difference over the tolerance; `None` for text that is compared as such.
+    /// Ratio of the difference to the tolerance; `None` for text, which is compared literally.
     pub difference_over_tolerance: Option<f64>,
     /// Agreement.
     pub status: Status,
@@ -57,16 +57,16 @@ impl Row {
     }
 }
 
-/// Rows of one judge.
+/// Rows with the same reference: a publication or a formula.
 #[derive(Debug, Clone, Serialize)]
 pub struct Judge {
-    /// Name of the judge.
+    /// Name of the reference.
     pub name: &'static str,
     /// Publication with its pages, or the formula.
     pub source: &'static str,
-    /// Tolerance, and why it is that.
+    /// Tolerance, with its reason.
     pub tolerance: &'static str,
-    /// File of the test that holds the rows.
+    /// File of the test that computes the rows.
     pub test: &'static str,
     /// Rows.
     pub rows: Vec<Row>,
@@ -86,7 +86,7 @@ impl Judge {
     }
 }
 
-/// Computes all rows, judge by judge.
+/// Computes all rows, reference by reference.
 ///
 /// # Errors
 /// The message of the computation that fails.
@@ -108,8 +108,8 @@ pub fn judges(root: &Path) -> Result<Vec<Judge>, String> {
     Ok(judges)
 }
 
-/// Writes the page into the book; where a folder is named, the page and the rows as JSON there
-/// instead.
+/// Writes the page into the book. If a folder is given, writes the page, and the rows as JSON, into
+/// this folder instead.
 ///
 /// # Errors
 /// The message of the computation or of the file that fails.

@@ -5,23 +5,24 @@ use std::path::{Path, PathBuf};
 
 use super::{Judge, Row, Status};
 
-/// Difference of a ratio of the page from today's that another processor may make.
+/// Maximum difference of a ratio on the page from the computed ratio that rounding on another
+/// processor explains.
 const ROUNDING: f64 = 0.2;
 
-/// Place of the page.
+/// Returns the path of the page.
 pub(super) fn place(root: &Path) -> PathBuf {
     root.join("docs/book/src/studies/conformance.md")
 }
 
-/// The page, in Markdown.
+/// Returns the page, in Markdown.
 pub(super) fn markdown(judges: &[Judge]) -> String {
     let mut text = String::from(
-        "# Who else says so\n\n\
-         Numbers of this workspace beside numbers that somebody else printed, or that have a closed form; \
-         none is judged by a simulator of its own.\n\
+        "# Comparison with published numbers\n\n\
+         This page compares numbers of this workspace with numbers that others have printed, or that have a closed \
+         form. No number is judged by a simulator of this workspace.\n\
          Made by `cargo xtask conformance`, and compared by `cargo xtask conformance --check`; do not edit.\n\n\
-         *Met* is a difference of no more than the tolerance. A *misprint* is believed only where the number that \
-         should stand there is the one computed. What is *open* has no known reason.\n\n\
+         *Met* means that the difference is at most the tolerance. A printed number counts as a *misprint* only if the \
+         corrected number is the one computed here. A difference is *open* if its reason is not known.\n\n\
          | Judge | Rows | Met | Misprints | Open |\n|---|---|---|---|---|\n",
     );
     let mut sum = [0; 3];
@@ -42,10 +43,10 @@ pub(super) fn markdown(judges: &[Judge]) -> String {
     let _ =
         writeln!(text, "| **all** | {} | {met} | {misprints} | {open} |", met + misprints + open);
     text.push_str(
-        "\nMeasured records are not part of this repository. Ours about them are the numbers that the [gallery](../gallery/index.md) \
-         shows; its test compares them with the program wherever the records are, and this page is the same with and without them.\n\n\
-         Judged elsewhere, for it needs thousands of seeded experiments: the coverage of all intervals \
-         ([estimators](estimators.md), [checks](checks.md), [modes](modes.md), [forces](force.md)).\n",
+        "\nMeasured records are not part of this repository. Our numbers for them are those that the [gallery](../gallery/index.md) \
+         shows. Its test compares them with the program if the records are present; this page is the same with and without them.\n\n\
+         The coverage of the intervals needs thousands of seeded experiments, so it is judged on other pages: \
+         [estimators](estimators.md), [checks](checks.md), [modes](modes.md), [forces](force.md).\n",
     );
     for judge in judges {
         section(&mut text, judge);
@@ -62,7 +63,7 @@ fn section(text: &mut String, judge: &Judge) {
     );
     for Row { quantity, expected, ours, difference_over_tolerance, status } in &judge.rows {
         let ratio = match difference_over_tolerance {
-            // Rounding alone has no sign to show.
+            // A ratio that is only rounding has no sign.
             Some(ratio) if ratio.abs() < 0.005 => "0.00".to_owned(),
             Some(ratio) => format!("{ratio:.2}"),
             None => "–".to_owned(),

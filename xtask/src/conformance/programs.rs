@@ -23,7 +23,7 @@ const DT: f64 = 0.01;
 /// Steps that are compared; the records have one more, which schemes that look ahead need.
 const STEPS: usize = 60;
 
-/// Value of another program with the words that say which.
+/// Value of another program, with the words that identify its quantity.
 struct Value {
     words: [String; 3],
     value: f64,
@@ -81,8 +81,8 @@ fn displacements(values: &[Value], name: &str, step: &str) -> Vec<f64> {
     values.iter().filter(of).map(|value| value.value).collect()
 }
 
-/// The scheme of a name of OpenSees, which starts Houbolt's at rest and knows no other start: its
-/// first two steps are given here.
+/// Returns the scheme with a name of OpenSees. Houbolt's scheme of OpenSees always starts at rest,
+/// so its first two steps are given to ours.
 fn scheme(name: &str, values: &[Value]) -> Result<Box<dyn Scheme>, String> {
     Ok(match name {
         "Newmark 1/2 1/4" => Box::new(Newmark::AVERAGE_ACCELERATION),
@@ -141,7 +141,8 @@ fn machine() -> Result<SecondOrderSystem, String> {
     .map_err(words)
 }
 
-/// Numbers between −½ and ½ of a linear congruence, the same in every language.
+/// Returns numbers between −½ and ½ from a linear congruential generator, the same in every
+/// language.
 fn congruence(seed: u64, count: usize) -> Vec<f64> {
     let mut state = seed;
     let mut next = || {
@@ -151,7 +152,7 @@ fn congruence(seed: u64, count: usize) -> Vec<f64> {
     (0..count).map(|_| next()).collect()
 }
 
-/// Averaged frequency response of a recursive filter under noise.
+/// Returns the averaged frequency response of a recursive filter under noise.
 fn averaged() -> Result<Frf, String> {
     let force = congruence(12345, 2048);
     let noise = congruence(54321, 2048);
@@ -177,17 +178,17 @@ fn averaged() -> Result<Frf, String> {
     .map_err(words)
 }
 
-/// Part of a complex number by the last word of its name.
+/// Returns the part of a complex number that the last word of its name states.
 fn part(value: Complex<f64>, name: &str) -> f64 {
     if name.ends_with("real") { value.re } else { value.im }
 }
 
-/// Index of a number that counts from 1.
+/// Returns the index, from 0, of a number that is counted from 1.
 fn index(word: &str) -> Result<usize, String> {
     parsed::<usize>(word)?.checked_sub(1).ok_or_else(|| format!("{word} counts from 1"))
 }
 
-/// Results of this workspace that SciPy has, too.
+/// Results of this workspace that are compared with SciPy.
 struct Ours {
     system: SecondOrderSystem,
     modes: Vec<Mode>,

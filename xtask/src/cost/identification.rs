@@ -1,4 +1,5 @@
-//! Every entry of M, C and K from displacements, all masses of a chain driven.
+//! Time to identify every entry of M, C and K of a chain from its displacements, with a force on
+//! each mass.
 
 use mechid::estimate::frequency_domain::output_error;
 use mechid::estimate::{EquationOfMotion, Unknowns};
@@ -10,9 +11,9 @@ use nalgebra::DMatrix;
 
 use super::measure::{Growth, shortest};
 
-/// Rows of the least squares.
+/// Number of samples for least squares.
 const ROWS: usize = 2048;
-/// Lines of the maximum likelihood, and periods.
+/// Number of lines for maximum likelihood; the following number is that of its periods.
 const LINES: usize = 500;
 const PERIODS: usize = 4;
 
@@ -28,7 +29,7 @@ pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     Ok(vec![least_squares, likelihood])
 }
 
-/// Numbers between −½ and ½, the same on every run.
+/// Returns numbers between −½ and ½, the same in every run.
 fn scattered(rows: usize, columns: usize) -> DMatrix<f64> {
     let mut seed = 1_u64;
     DMatrix::from_fn(rows, columns, |_, _| {

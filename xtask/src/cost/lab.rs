@@ -1,4 +1,4 @@
-//! Time and memory of the program on tests as a laboratory records them.
+//! Time and memory of the program for typical tests of a laboratory.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -17,7 +17,7 @@ use nalgebra::DMatrix;
 /// Time after which a case is ended, in s.
 const MOST_SECONDS: f64 = 120.0;
 
-/// Time between two looks at the memory of a program.
+/// Time between two readings of the memory of a program.
 const POLL: Duration = Duration::from_millis(20);
 
 /// One case: its name, the arguments of the program, and the file that they read.
@@ -32,7 +32,7 @@ struct Cost {
     name: &'static str,
     /// `None` if it was ended after [`MOST_SECONDS`].
     seconds: Option<f64>,
-    /// Largest memory in GB; `None` where the system does not tell it.
+    /// Largest memory in GB; `None` if the system does not report it.
     memory: Option<f64>,
 }
 

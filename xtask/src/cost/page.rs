@@ -7,10 +7,10 @@ use super::measure::Growth;
 
 const BEGIN: &str = "# What it costs
 
-How time grows with degrees of freedom and with samples, on the machine that `measure-cost`, \
-a task of `cargo xtask`, ran on last.
-It writes this page and its figure; other machines have other times and nearly the same slopes.
-Each point is the shortest of several runs; what else the machine did can only have added to it.
+How the computation time grows with the number of degrees of freedom and of samples.
+`measure-cost`, a task of `cargo xtask`, writes this page and its figure; the times are those of the computer on which it ran last.
+Other computers have other times, but nearly the same slopes.
+Each point is the shortest of several runs, because other programs can only lengthen a run.
 
 ![Time over degrees of freedom and over samples](cost.svg)
 
@@ -18,13 +18,13 @@ The power of n is fitted to the larger half of the sizes.
 
 ";
 
-const END: &str = "A dense step has two products and a solve, n² each; its preparation is a factorisation, n³.
-A step of a chain or a grid goes through the non-zero entries and those of the factors: n of a chain, \
-n log n of a grid in the order of minimum degree.
-Least squares factors the rows once for all equations; maximum likelihood searches every equation by itself \
-with what they have in common computed once.
-Over samples everything is linear beyond what a run costs at all.
-Where time grows faster than that, the numbers have left the caches of the processor, or others used it.
+const END: &str = "A dense step has two products of matrix and vector and one solution with the factors, n² operations each; its preparation is a factorisation, n³ operations.
+A step of a chain or a grid uses the non-zero entries of the matrices and of their factors: n of a chain, \
+n log n of a grid with minimum-degree ordering.
+Least squares factors the rows once for all equations; maximum likelihood searches for the parameters of each equation \
+separately, and computes the common part of the equations once.
+For long records the time is proportional to the number of samples, apart from the constant cost of a run.
+A time that grows faster shows that the numbers no longer fit into the caches of the processor, or that other programs ran.
 ";
 
 /// Load of the machine, if the system reports it.
@@ -34,20 +34,20 @@ fn load() -> String {
     let average = average.as_deref().and_then(|text| text.split_whitespace().next());
     average.map_or(String::new(), |load| {
         format!(
-            "At the end of the run {load} programs on average wanted its {cores} processors.\n\n"
+            "At the end of the run, on average {load} programs competed for the {cores} processors.\n\n"
         )
     })
 }
 
-/// Heading of the tests of a laboratory, up to their table.
+/// Heading and text of the tests of a laboratory, above their table.
 const LAB: &str = "## Tests of a laboratory
 
-The program as it is called with its defaults, on records that it makes itself; `measure-cost --lab` \
-measures these alone.
+Time and memory of the program with its default settings, on simulated records; `measure-cost --lab` \
+measures only these.
 
 ";
 
-/// Heading after them.
+/// Heading below the table of these tests.
 const AFTER_LAB: &str = "## What the numbers follow from\n\n";
 
 /// Returns the page with another table of the tests of a laboratory; `None` if it has none.

@@ -35,7 +35,7 @@ pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     Ok(vec![step, read, solve])
 }
 
-/// The bearing of the dissertation under two forces of many frequencies.
+/// Returns the response of the bearing of the dissertation to two forces with many frequencies.
 fn stepped(samples: usize) -> Result<(Record, Response), String> {
     let system = dissertation_bearing(KyxSign::Minus).system();
     let sampling = Sampling::new(1e-3, samples).map_err(|e| e.to_string())?;

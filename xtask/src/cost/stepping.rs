@@ -69,7 +69,7 @@ fn both<S: System, E: std::fmt::Display>(
     Ok([step, prepare])
 }
 
-/// Difference of the times of a long and a short record.
+/// Returns the time per step: the difference of the times of a long and a short record.
 fn per_step(system: &dyn System, seconds: f64) -> Result<f64, String> {
     let n = system.dof();
     let steps = (20_000_000 / (n * n.min(100))).clamp(20, 200_000);

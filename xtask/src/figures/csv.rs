@@ -47,7 +47,7 @@ fn name(panel: &Panel, curve: &Curve) -> String {
     if curve.label().is_empty() { panel.y_axis().caption() } else { curve.label().to_owned() }
 }
 
-/// The curves of a panel, those on one set of abscissae together.
+/// Returns the curves of a panel in groups with the same abscissae.
 fn same_abscissae(panel: &Panel) -> Vec<Vec<&Curve>> {
     let mut groups: Vec<Vec<&Curve>> = Vec::new();
     for curve in panel.data() {

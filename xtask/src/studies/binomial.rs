@@ -1,21 +1,21 @@
-//! Limits of the number of intervals that hold, and their power.
+//! Limits of the number of intervals that contain the true value, and the power of these limits.
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// Probability that the intervals hold, as they state.
+/// Stated probability that an interval contains the true value.
 pub const STATED: f64 = 0.95;
-/// Loss of coverage that the short form is made to notice.
+/// Loss of coverage that the short form can detect.
 pub const LOSS: f64 = 0.02;
-/// Probability of an alarm, and of calling intervals wide, where they hold as they state; for each
-/// parameter.
+/// Probability, for each parameter, of a false alarm and of a false report of wide intervals, if
+/// the coverage is the stated one.
 pub const FALSE_ALARM: f64 = 0.001;
 
-/// Limits of the number of independent intervals that hold.
+/// Limits of the number of independent intervals that contain the true value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Fewer that hold raise an alarm.
+    /// Smallest number without an alarm.
     pub fewest: u64,
-    /// More that hold are intervals wider than they need be.
+    /// Largest number without a report that the intervals are wider than necessary.
     pub most: u64,
 }
 
@@ -57,7 +57,7 @@ pub fn power(experiments: u64, loss: f64) -> Result<f64, String> {
 mod tests {
     use super::*;
 
-    /// Twenty throws, by hand: P(X ≤ 14) = 0.00033 and P(X ≤ 15) = 0.0026 at 95 %.
+    /// Checks twenty experiments by hand: P(X ≤ 14) = 0.00033 and P(X ≤ 15) = 0.0026 at 95 %.
     #[test]
     fn limits_and_power_of_twenty_experiments() {
         let limits = Limits::new(20).unwrap();

@@ -1,4 +1,5 @@
-//! Seeded experiments on a known oscillator, cheap enough for thousands: which intervals hold?
+//! Seeded experiments on a known oscillator, fast enough for thousands of them: coverage of the
+//! intervals.
 
 use mechid::analysis::identify::{Method, Source};
 use mechid::analysis::{Identified, Identify, Measurement, identify};
@@ -16,7 +17,7 @@ const PERIOD: usize = 128;
 const LAST: usize = 40;
 /// Line of the resonance.
 const RESONANCE: f64 = 12.0;
-/// RMS of the noise over that of its channel.
+/// Ratio of the RMS of the noise to the RMS of its channel.
 const LEVEL: f64 = 0.02;
 
 /// A kind of experiment.
@@ -83,7 +84,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Returns true if the interval holds the truth.
+    /// Returns true if the interval contains the true value.
     pub fn holds(&self) -> bool {
         self.estimate.is_some_and(|[_, low, high]| (low..=high).contains(&self.truth))
     }

@@ -1,4 +1,4 @@
-//! The examples that are studies, each for its share of the time.
+//! Long studies: examples that print tables, each with an equal share of the time.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use super::{Plan, page, results};
 
-/// A study takes this many shares of the time at most; then it is stopped.
+/// Maximum number of shares of the time that a study may take before it is stopped.
 const PATIENCE: u32 = 4;
-/// Time between two looks at a study that runs.
+/// Time between two checks of a running study.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// An example that prints its tables in Markdown.
@@ -18,15 +18,16 @@ pub(super) struct Study {
     example: &'static str,
     /// Arguments before and after the number of experiments.
     around: [&'static [&'static str]; 2],
-    /// Experiments of the first run, by whose time the second is chosen.
+    /// Number of experiments of the first run, whose time determines the number of the second run.
     probe: u64,
     page: Option<Page>,
 }
 
-/// Page of the book whose tables a study writes anew.
+/// Page of the book whose tables a study updates.
 struct Page {
     path: &'static str,
-    /// Experiments that the page states: no run has more, and fewer leave the page as it is.
+    /// Number of experiments stated on the page: no run has more; with fewer, the page is not
+    /// changed.
     experiments: u64,
 }
 
@@ -65,9 +66,9 @@ pub(super) fn chosen(only: &str) -> Result<Vec<&'static Study>, String> {
     Ok(chosen)
 }
 
-/// Runs studies in equal shares of the time; writes what each prints as text, the cells of all
-/// tables as Parquet, and the tables of the book that state this number of experiments. Gives a line
-/// for each, and those that failed.
+/// Runs studies in equal shares of the time; writes the printed output of each as text, the cells
+/// of all tables as Parquet, and the tables of the book for which there are enough experiments.
+/// Returns a line for each study, and the failed studies.
 pub(super) fn run(
     root: &Path,
     out: &Path,

@@ -15,9 +15,10 @@ use coverage::{Interval, KINDS};
 
 pub use page::differences;
 
-/// Experiments of each kind in the short form; `short_power` has what they notice.
+/// Number of experiments of each kind in the short form; [`short_power`] is their power to detect a
+/// loss.
 pub const SHORT: u64 = 4096;
-/// Experiments between two looks at the clock.
+/// Number of experiments between two checks of the time.
 const BLOCK: u64 = 1024;
 /// Share of the time budget for the coverage of the known oscillator.
 const COVERAGE_SHARE: f64 = 0.2;
@@ -46,7 +47,7 @@ pub struct Coverage {
     pub parameter: &'static str,
     /// Number of experiments.
     pub experiments: u64,
-    /// Number of intervals that hold the truth.
+    /// Number of intervals that contain the true value.
     pub held: u64,
     /// Number of identifications that failed.
     pub failed: u64,
@@ -64,7 +65,8 @@ impl Coverage {
         }
     }
 
-    /// Sentence about a coverage below the stated one; `None` where it may be the stated one.
+    /// Returns a sentence about a coverage below the stated one; `None` if the coverage may be the
+    /// stated one.
     ///
     /// # Errors
     /// A message without experiments.
@@ -87,8 +89,8 @@ pub fn short(seed: u64) -> Result<Vec<(Coverage, Vec<Interval>)>, String> {
     coverages(seed, true, |done, _| done >= SHORT)
 }
 
-/// Runs blocks of experiments of each kind until `is_enough` of the number done, and of the time
-/// that the kind has taken.
+/// Runs blocks of experiments of each kind until `is_enough` is true for their number and for the
+/// time of this kind.
 fn coverages(
     seed: u64,
     is_short: bool,
@@ -113,7 +115,7 @@ fn coverages(
     Ok(all)
 }
 
-/// Sentences about coverages below the stated one.
+/// Returns sentences about coverages below the stated one.
 ///
 /// # Errors
 /// A message without experiments.
@@ -122,8 +124,8 @@ pub fn alarms<'a>(all: impl IntoIterator<Item = &'a Coverage>) -> Result<Vec<Str
     Ok(each?.into_iter().flatten().collect())
 }
 
-/// Runs the studies of a plan, writes their results as Parquet and the tables of the book made from
-/// them; gives what to tell, and the alarms.
+/// Runs the studies of a plan, writes their results as Parquet and the tables of the book; returns
+/// the report and the alarms.
 ///
 /// # Errors
 /// The message of the study or of the file that fails.
@@ -141,7 +143,7 @@ pub fn run(root: &Path, plan: &Plan) -> Result<(String, Vec<String>), String> {
     results::write(&out.join("coverage.parquet"), &all)?;
     let coverages: Vec<Coverage> = all.into_iter().map(|(coverage, _)| coverage).collect();
     let mut told = page::table(&coverages)?;
-    // The page has the short form's numbers, which everybody can repeat in seconds.
+    // The page has the numbers of the short form, which anyone can repeat in seconds.
     if plan.out.is_none() && plan.budget.is_none() {
         page::write(root, &coverages)?;
     }
@@ -155,7 +157,7 @@ pub fn run(root: &Path, plan: &Plan) -> Result<(String, Vec<String>), String> {
     Ok((told, alarms))
 }
 
-/// Probability that the short form notices [`LOSS`] in one parameter.
+/// Returns the probability that the short form detects [`LOSS`] in one parameter.
 ///
 /// # Errors
 /// None in practice.

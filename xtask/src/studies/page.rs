@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use super::binomial::{FALSE_ALARM, LOSS, Limits, STATED};
 use super::{Coverage, SHORT, short_power};
 
-/// Intervals that hold here and not on another processor, at most.
+/// Maximum number of intervals that contain the true value here but, because of rounding, not on
+/// another processor.
 const ROUNDING: u64 = 3;
 
 fn place(root: &Path) -> PathBuf {
@@ -33,8 +34,8 @@ pub(super) fn table(coverages: &[Coverage]) -> Result<String, String> {
 
 fn power_sentence() -> Result<String, String> {
     Ok(format!(
-        "Where the intervals hold as they state, in {:.0} % of all experiments, a parameter raises an alarm with a probability of {FALSE_ALARM}. \
-         Where {:.0} % fewer hold, {SHORT} experiments notice it with a probability of {:.1} %.\n",
+        "If the coverage of the intervals is the stated one, {:.0} %, a parameter raises an alarm with a probability of {FALSE_ALARM}. \
+         If it is {:.0} percentage points lower, {SHORT} experiments detect this with a probability of {:.1} %.\n",
         100.0 * STATED,
         100.0 * LOSS,
         100.0 * short_power()?

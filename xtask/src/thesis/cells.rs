@@ -6,7 +6,7 @@ use super::published::{Cell, Method, Published};
 use super::results::{Key, Results};
 use super::verdict::{Verdict, compare};
 
-/// A printed number and ours.
+/// A printed number and the recomputed one.
 #[derive(Debug, Clone)]
 pub struct Judged {
     /// Value as printed.
@@ -30,11 +30,11 @@ pub struct Row {
     pub error: Judged,
     /// The same estimator without slips.
     pub correct: f64,
-    /// Error of that, in per cent.
+    /// Error of the estimate without slips, in per cent.
     pub correct_error: f64,
-    /// Our best estimator.
+    /// Estimate of our best estimator.
     pub best: f64,
-    /// Error of that, in per cent.
+    /// Error of our best estimator, in per cent.
     pub best_error: f64,
 }
 
@@ -71,8 +71,8 @@ fn row(cell: &Cell, results: &Results) -> Option<Row> {
     })
 }
 
-/// A listed misprint is believed only if the number it ought to be is the one we compute: for a
-/// cell its corrected digits, for a column the printed digits under the other sign.
+/// Judges a number. A listed misprint is accepted only if the corrected number is the computed one:
+/// for a cell its corrected digits, for a column the printed digits with the other sign.
 fn judge(value: f64, printed: &str, misprint: Option<&'static Misprint>, reversed: f64) -> Judged {
     let plain = compare(value, printed);
     let (verdict, reason) = match misprint {
@@ -92,7 +92,7 @@ fn judge(value: f64, printed: &str, misprint: Option<&'static Misprint>, reverse
     Judged { printed: printed.to_owned(), value, verdict, reason }
 }
 
-/// An error may also have been formed from the printed, already shortened estimate.
+/// Judges an error, which may have been computed from the printed, already rounded estimate.
 fn judge_error(
     value: f64,
     reversed: f64,
@@ -148,9 +148,9 @@ pub fn means(table: &str, published: &Published, rows: &[Row]) -> Vec<Mean> {
         .collect()
 }
 
-/// Judges a mean: as for a cell, a listed misprint is believed only if a mean of the column
-/// confirms the number it ought to be: of the errors as printed, as printed but for their own
-/// misprints, or as we compute them.
+/// Judges a mean. As for a cell, a listed misprint is accepted only if a mean of the column
+/// confirms the corrected number: of the printed errors, of the printed errors with their own
+/// misprints corrected, or of the computed errors.
 fn judge_mean(column: &[&Row], printed: &str, listed: Option<&'static MeanMisprint>) -> Judged {
     let digits = |r: &&Row| r.error.printed.parse::<f64>().ok();
     let value = average(column.iter().filter_map(digits));
@@ -167,7 +167,7 @@ fn judge_mean(column: &[&Row], printed: &str, listed: Option<&'static MeanMispri
     Judged { printed: printed.to_owned(), value, verdict, reason }
 }
 
-/// The error that a misprinted one ought to be.
+/// Returns the correct error for a misprinted one.
 fn right_error(row: &Row) -> Option<f64> {
     let cell = &row.cell;
     let misprint = misprints::find(&cell.table, cell.method, cell.npi, Field::Error)?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Difference of two coordinates, in px, that rounding on another processor may make.
+/// Maximum difference of two coordinates, in px, that rounding on another processor explains.
 const PIXELS: f64 = 0.1;
 
 /// Returns whether two texts have the same words, and two drawings points that differ by rounding
@@ -21,7 +21,7 @@ pub fn agree(ours: &str, committed: &str) -> bool {
         })
 }
 
-/// A drawing cut into numbers and the text between them.
+/// Returns a drawing as numbers and the text between them.
 fn parts(svg: &str) -> Vec<&str> {
     let mut parts = Vec::new();
     let mut remaining = svg;
@@ -35,7 +35,7 @@ fn parts(svg: &str) -> Vec<&str> {
     parts
 }
 
-/// Files of these kinds in a folder of the repository that no task makes.
+/// Returns the files of these kinds in a folder of the repository that no task writes.
 ///
 /// # Errors
 /// A message with the folder that cannot be read.

@@ -27,7 +27,8 @@ pub fn frequency(sequences: &Sequences) -> Listed {
     fit(sequences, &data)
 }
 
-/// The same with the harmonic offset: harmonic n at (n + 1)·ω0, the mean among the harmonics.
+/// Least squares on the spectra with the harmonic offset: harmonic n at (n + 1)·ω0, including the
+/// mean.
 pub fn frequency_offset(sequences: &Sequences) -> Listed {
     let (omega, force, displacement) = amplitudes(sequences, 1);
     let data =
@@ -42,7 +43,7 @@ pub fn frequency_offset_free_force(sequences: &Sequences) -> Listed {
     free_force(sequences, 1)
 }
 
-/// The free coefficient of the force alone: harmonics n ≥ 1 at n·ω0.
+/// Least squares on the spectra with a free coefficient of the force: harmonics n ≥ 1 at n·ω0.
 pub fn frequency_free_force(sequences: &Sequences) -> Listed {
     free_force(sequences, 0)
 }
@@ -66,7 +67,8 @@ fn free_force(sequences: &Sequences, offset: usize) -> Listed {
 
 type Amplitudes = (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f64>>);
 
-/// Harmonic n at (n + offset)·ω0; the mean is among the harmonics where its frequency is not zero.
+/// Returns the amplitudes of harmonics n at (n + offset)·ω0; they include the mean if its frequency
+/// is not zero.
 fn amplitudes(sequences: &Sequences, offset: usize) -> Amplitudes {
     let (x, f) = (
         Spectrum::from_record(sequences.response.displacement()),

@@ -8,7 +8,8 @@ const TOLERANCE: f64 = 1e-9;
 /// Largest difference, relative to the largest number of its column, that is rounding.
 const NOISE: f64 = 1e-12;
 
-/// The same for errors in per cent: a relative change of a value by 1e-9 changes its error by this.
+/// Largest difference of errors in per cent that is rounding: a relative change of a value by 1e-9
+/// changes its error by this number.
 const PERCENT_NOISE: f64 = 100.0 * TOLERANCE;
 
 /// Path of the golden file of a table or figure.
@@ -27,7 +28,8 @@ pub fn bless(root: &Path, name: &str, csv: &str) -> Result<(), String> {
     std::fs::write(&path, csv).map_err(words)
 }
 
-/// Every difference between the data of a table or figure and its golden file, one sentence each.
+/// Returns every difference between the data of a table or figure and its golden file, a sentence
+/// each.
 pub fn differences(root: &Path, name: &str, csv: &str) -> Vec<String> {
     let path = path(root, name);
     let golden = match std::fs::read_to_string(&path) {

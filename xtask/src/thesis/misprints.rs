@@ -182,7 +182,7 @@ pub const MEANS: &[MeanMisprint] = &[
     },
 ];
 
-/// The misprint that covers a printed number, if there is one.
+/// Returns the misprint that a printed number belongs to, if there is one.
 pub fn find(
     table: &str,
     method: Method,

@@ -14,7 +14,7 @@ use nalgebra::{Complex, DMatrix};
 use super::published::{Cell, Method, Published};
 use super::verdict::{Verdict, compare};
 
-/// Choices that the text does not state.
+/// Settings that the text does not state.
 pub const SETTING: &str = "Nt = 2048, amplitude 1 N on the first mass, NPI = 20 on the larger damped frequency, RK4 with a linear mid-step force";
 
 /// A printed modal parameter and ours.
@@ -89,8 +89,8 @@ pub fn theory() -> Result<Modal, String> {
     modal(&steffen_rade())
 }
 
-/// The force on the first mass and the motion it causes, with the settings of [`SETTING`] but for
-/// NPI.
+/// Returns the force on the first mass and the resulting motion, with the settings of [`SETTING`]
+/// except NPI.
 ///
 /// # Errors
 /// The message of the integrator.

@@ -159,7 +159,7 @@ fn natural(name: &str) -> (bool, Vec<(usize, String)>) {
 }
 
 impl Reproduction {
-    /// Keeps only the tables and figures of that number or part.
+    /// Keeps only the tables and figures with that number, or of that part.
     ///
     /// # Errors
     /// A message with the names that exist.

@@ -58,7 +58,7 @@ impl Key {
         }
     }
 
-    /// The simulation behind it.
+    /// Returns the simulation of this key.
     pub fn case(self) -> Case {
         let machine = if self.bearing {
             Machine::Bearing { kyx: mechid::model::KyxSign::Minus }
@@ -74,7 +74,7 @@ impl Key {
 pub struct Estimates {
     /// Estimates with the slips of the original programs.
     pub slipped: Vec<f64>,
-    /// The same estimator on the same scheme, without them.
+    /// Estimates of the same estimator on the same scheme, without slips.
     pub correct: Vec<f64>,
     /// Our best estimator on the response without slips.
     pub best: Vec<f64>,
@@ -110,7 +110,8 @@ impl Results {
         keys
     }
 
-    /// The same results with one slip undone in the replay, to count the cells that need it.
+    /// Returns the results with one slip undone in the replay, to count the cells that need this
+    /// slip.
     ///
     /// # Errors
     /// The message of the first estimation that fails.
@@ -146,7 +147,8 @@ fn estimate(key: Key) -> Result<Estimates, String> {
     })
 }
 
-/// The printed estimate of a key from the slips of the original programs, all or all but one.
+/// Returns the printed estimate of a key with the slips of the original programs, all of them or
+/// all but one.
 fn replay(key: Key, undone: Option<Slip>) -> Listed {
     let sequences = slipped_but(key.case(), key.method, undone)?;
     let offset = undone != Some(Slip::HarmonicOffset);

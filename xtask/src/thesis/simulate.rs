@@ -56,7 +56,8 @@ pub fn slipped(case: Case, method: Method) -> Result<Sequences, String> {
     slipped_but(case, method, None)
 }
 
-/// The same with one slip undone, to find the cells that need it.
+/// Returns the sequences of the original programs with one slip undone, to find the cells that need
+/// this slip.
 ///
 /// # Errors
 /// The message of the integrator.
@@ -88,12 +89,12 @@ pub fn slipped_but(case: Case, method: Method, undone: Option<Slip>) -> Result<S
     Ok(Sequences { machine, response, force })
 }
 
-/// The displacement alone stored one sample early.
+/// Returns the response with only the displacement stored one sample early.
 fn lead(response: &Response) -> Response {
     stored(response, response.velocity().clone(), response.acceleration().clone())
 }
 
-/// The whole response stored one sample early.
+/// Returns the response with all quantities stored one sample early.
 fn lag(response: &Response) -> Response {
     let (velocity, acceleration) = (response.velocity(), response.acceleration());
     stored(response, one_sample_early(velocity), one_sample_early(acceleration))

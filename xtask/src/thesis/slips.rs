@@ -72,7 +72,7 @@ impl Slip {
         }
     }
 
-    /// Returns the printed numbers that it belongs to.
+    /// Returns the printed numbers that the slip affects.
     pub fn printed_numbers(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "all central-difference columns",
@@ -148,7 +148,8 @@ pub fn stage_loads(force: &Record) -> (Record, Record) {
     (record(samples), record(middles))
 }
 
-/// The record one sample early: sample k of the result is sample k + 1 of the input, cyclically.
+/// Returns the record one sample early: sample k of the result is sample k + 1 of the input,
+/// cyclically.
 pub fn one_sample_early(record: &Record) -> Record {
     let n = record.len();
     let data = DMatrix::from_fn(n, record.channels(), |k, c| record.channel(c)[(k + 1) % n]);

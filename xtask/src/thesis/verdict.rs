@@ -18,7 +18,7 @@ impl Verdict {
     pub const ALL: [Verdict; 4] =
         [Verdict::ToTheDigit, Verdict::Rounding, Verdict::Misprint, Verdict::Unexplained];
 
-    /// The message of the tables.
+    /// Returns the word for the verdict in the tables.
     pub fn words(self) -> &'static str {
         match self {
             Verdict::ToTheDigit => "to the digit",

@@ -19,11 +19,12 @@ use crate::identify::left_out::LineRule;
 use crate::identify::tabulated::response_data;
 use crate::measurement::{Block, CHUNK_SAMPLES, Channels, Hold, Measurement, Windowed};
 
-/// Minimum number of degrees of freedom of a noise covariance for a weight: the loss of information
-/// is then less than 3 %.
+/// Minimum number of degrees of freedom of a noise covariance that weights the rows: with at least
+/// this number, the weights lose less than 3 % of the information.
 const WELL_KNOWN: usize = 40;
 
-/// Spectra of f − M_s a and d, of all tests of one condition.
+/// Spectra of the film force f − M_s a and of the displacement d of the housing relative to the
+/// shaft, of all tests of one condition.
 #[derive(Debug, Clone)]
 pub struct BearingData {
     /// Names of the tests.
@@ -195,7 +196,7 @@ impl BearingData {
         })
     }
 
-    /// Concatenates the rows of both.
+    /// Returns the data with the rows of `other` added.
     fn and(mut self, other: Self) -> Result<Self, AnalysisError> {
         self.data = self.data.and(&other.data)?;
         self.noise = self.noise.and(other.noise);
@@ -331,7 +332,7 @@ pub(super) fn rotates(hz: f64, rotation_hz: Option<f64>, spacing_hz: f64) -> boo
     rotation_hz.is_some_and(|rotation| Disturbance::rotation(rotation).reaches(hz, spacing_hz))
 }
 
-/// Returns f − M_s a and d of consecutive samples.
+/// Returns the film force f − M_s a and the relative displacement d of consecutive samples.
 fn force_and_motion(block: &Block, mass: f64) -> Result<(Record, Record), AnalysisError> {
     let missing = |setting| AnalysisError::Setting {
         setting,

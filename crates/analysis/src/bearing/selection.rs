@@ -109,7 +109,8 @@ mod tests {
         assert!((low - expected[0]).abs() < 1e-9 && (high - expected[1]).abs() < 1e-9);
     }
 
-    /// Of estimates that a test at 5 % has chosen, usual intervals hold in few, these in 95 %.
+    /// If a test at 5 % chooses the model, usual intervals contain the true value too rarely, and
+    /// these in 95 % of the cases.
     #[test]
     fn intervals_after_a_choice_hold() {
         let rng = &mut ChaCha8Rng::seed_from_u64(7);
@@ -124,7 +125,7 @@ mod tests {
                 let values = &truth + &mix * noise;
                 let tested = values.rows(1, 4).into_owned();
                 let block = covariance.view((1, 1), (4, 4)).into_owned();
-                // 95 % of chi-squared with four degrees of freedom.
+                // The limit is the 95 % quantile of chi-squared with four degrees of freedom.
                 if tested.dot(&block.lu().solve(&tested).unwrap()) < 9.4877 {
                     continue;
                 }
@@ -143,7 +144,7 @@ mod tests {
                 }
             }
             for count in inside {
-                // Three standard errors of 1,500.
+                // The tolerance is three standard errors of a fraction of 1,500.
                 assert!((0.933..=0.967).contains(&(count as f64 / 1500.0)), "{size}: {inside:?}");
             }
             assert!(size > 0.0 || usual[1..].iter().any(|count| *count < 1275), "{usual:?}");

@@ -30,7 +30,7 @@ pub struct BearingPlan {
     pub window: Window,
     /// Settings; each point replaces their speed and load.
     pub settings: IdentifyBearing,
-    /// Baseline tests for every point without other ones.
+    /// Baseline tests for every point that has no baseline tests itself.
     pub baseline: Vec<PathBuf>,
     /// `true` if the files are tables of frequency responses, alternately of displacement and
     /// acceleration.

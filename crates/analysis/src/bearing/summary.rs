@@ -220,7 +220,7 @@ impl BearingSummary {
                 significant(film.excess, 3)
             )),
             Some(scale) if scale > 1.0 => remarks.push(format!(
-                "the standard errors are {} × those of the noise, as the residual is",
+                "the standard errors are {0} × those that the noise gives, because the residual is {0} × the noise",
                 significant(scale, 3)
             )),
             Some(_) => {}
@@ -328,7 +328,7 @@ impl BearingSummary {
             self.lines,
             match self.left_out_hz.len() {
                 0 => String::new(),
-                count => format!(", {count} with rotation left out"),
+                count => format!(", {count} at multiples of the rotation left out"),
             }
         );
         let table = |what: &str, rows: &[CoefficientRow]| {

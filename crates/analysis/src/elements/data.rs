@@ -1,4 +1,5 @@
-//! The data of a fit of a machine: lines, their noise, and what the result says of them.
+//! Data of the fit of a machine: spectral lines, their noise, and descriptions of both for the
+//! result.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +14,7 @@ use crate::hits::HitRow;
 use crate::identify::rows::WindowRow;
 use crate::measurement::Channels;
 
-/// Lines of all tests of a machine, and what is known of their noise.
+/// Spectral lines of all tests of a machine, with their noise if it is known.
 #[derive(Debug, Clone)]
 pub struct ElementData {
     /// Lines of all tests, one below the other.
@@ -22,15 +23,15 @@ pub struct ElementData {
     pub(super) tests: Vec<TestRow>,
     /// Source of the noise, if the data state it.
     pub(super) source: Option<NoiseSource>,
-    /// Noise in words.
+    /// Description of the noise, in words.
     pub(super) noise: String,
-    /// Findings on the channels, each with the test that it belongs to.
+    /// Findings on the channels, each with the index of its test.
     pub(super) findings: Vec<(usize, Finding)>,
     /// Names of the channels, for the findings.
     pub(super) channels: Channels,
     /// Hits of a hammer, used or left out.
     pub(super) hits: Vec<HitRow>,
-    /// Remarks on what was read.
+    /// Remarks on the data that were read.
     pub(super) remarks: Vec<String>,
     /// Part of the machine whose receptance was measured.
     pub(super) part: Option<MeasuredReceptance>,
@@ -54,7 +55,7 @@ pub struct TestRow {
 pub enum TestKind {
     /// Mean of whole periods.
     Periods,
-    /// Open record, with the transient of its ends.
+    /// Open record, with its transient.
     Open,
     /// Hit of a hammer, as an open record.
     Hit,
@@ -75,7 +76,7 @@ impl ElementData {
         &self.tests
     }
 
-    /// Takes the lines of one test.
+    /// Creates the data of one test from its lines.
     pub(super) fn from_test(lines: LineData, test: TestRow, channels: Channels) -> Self {
         Self {
             lines,
@@ -90,7 +91,8 @@ impl ElementData {
         }
     }
 
-    /// Returns the tests of both; the noise is known where it is of both.
+    /// Returns the data with the tests of `other` added; the noise is known if it is known for
+    /// both.
     pub(super) fn followed_by(mut self, other: Self) -> Result<Self, SpectraError> {
         let before = self.tests.len();
         self.lines = self.lines.followed_by(&other.lines)?;
@@ -106,7 +108,7 @@ impl ElementData {
         Ok(self)
     }
 
-    /// Leaves out what the settings exclude.
+    /// Removes the lines that the settings exclude.
     pub(super) fn kept(
         lines: LineData,
         spacing_hz: f64,
@@ -116,12 +118,12 @@ impl ElementData {
             |hz: f64| how.without_hz.iter().any(|disturbance| disturbance.reaches(hz, spacing_hz));
         lines.retained(|omega| !excluded(omega / TAU)).ok_or_else(|| AnalysisError::Setting {
             setting: "without_hz",
-            why: format!("no line is left of {}", lines.len()),
+            why: format!("all lines are excluded: {0} of {0}", lines.len()),
         })
     }
 }
 
-/// Joins the tests one after the other.
+/// Concatenates the data of several tests.
 pub(super) fn joined(
     tests: impl IntoIterator<Item = Result<ElementData, AnalysisError>>,
 ) -> Result<ElementData, AnalysisError> {

@@ -1,4 +1,4 @@
-//! The identified machine with its covariance, for other questions.
+//! Identified machine with its covariance, for force reconstruction, prediction and modes.
 
 use mechid_estimate::likelihood::machine::{MachineEstimate, UncertainEntries};
 use mechid_io::ParameterCovariance;
@@ -11,14 +11,14 @@ use crate::identify::rows::MOST_WITH_COVARIANCE;
 use crate::machine::Machine;
 use crate::measurement::Channels;
 
-/// M, C, K and the covariance of their entries as a result states them, with what is missing.
+/// M, C, K and the covariance of their entries for the result, with notes on their limits.
 pub(super) struct StatedMachine {
     pub system: Option<SecondOrderSystem>,
     pub covariance: Option<ParameterCovariance>,
     pub notes: Vec<ElementNote>,
 }
 
-/// M, C and K of an estimate from this number of equations.
+/// Returns M, C and K of an estimate from this number of real equations.
 pub(super) fn stated(
     estimate: &MachineEstimate,
     equations: usize,
@@ -49,7 +49,8 @@ pub(super) fn stated(
     Ok(StatedMachine { system, covariance, notes })
 }
 
-/// Degrees of freedom behind the covariance; where the noise is known, as many as the fit left.
+/// Returns the degrees of freedom of the covariance; if the noise is known, the number of equations
+/// minus the number of parameters.
 pub(super) fn freedom(estimate: &MachineEstimate, equations: usize) -> usize {
     let spare = equations.saturating_sub(estimate.likelihood.parameters.len()).max(1);
     match estimate.likelihood.degrees_of_freedom {
@@ -58,7 +59,7 @@ pub(super) fn freedom(estimate: &MachineEstimate, equations: usize) -> usize {
     }
 }
 
-/// The machine with its covariance.
+/// Returns the machine with its covariance.
 pub(super) fn machine(
     estimate: &MachineEstimate,
     equations: usize,

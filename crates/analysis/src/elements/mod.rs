@@ -3,13 +3,13 @@
 //! | File | What it does |
 //! |---|---|
 //! | `settings` | settings, as values |
-//! | `data` | the data of a fit: lines, their noise, what the result says of them |
+//! | `data` | the data of a fit: spectral lines, their noise, and descriptions of both |
 //! | `records` | lines of records: whole periods with their noise, or open records |
 //! | `responses` | tables of frequency responses, of the machine and of its measured parts |
 //! | `speeds` | tables of synchronous responses over the speed of the rotor |
-//! | `notes` | what to know of the numbers, as values |
+//! | `notes` | notes on the numbers, as values |
 //! | `summary`, `text` | the result: numbers, checks, notes; the same as text |
-//! | `machine` | the identified machine with its covariance, for other questions |
+//! | `machine` | the identified machine with its covariance, for forces, predictions and modes |
 
 mod data;
 mod machine;
@@ -65,9 +65,9 @@ pub fn identify_elements(
     Ok(IdentifiedElements { estimate, summary, spectrum: ElementSpectrum::new(data) })
 }
 
-/// The identified coefficients of a machine, and what they were identified from.
+/// Identified coefficients of a machine, with the data of the fit.
 ///
-/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+/// [`Display`](fmt::Display) writes the result for people, `serde` for programs.
 #[derive(Debug)]
 pub struct IdentifiedElements {
     estimate: MachineEstimate,
@@ -118,12 +118,13 @@ impl IdentifiedElements {
         &self.summary
     }
 
-    /// Returns the estimate with everything that likelihood and covariance say.
+    /// Returns the estimate with its likelihood and covariance.
     pub fn estimate(&self) -> &MachineEstimate {
         &self.estimate
     }
 
-    /// Returns M, C (with Ω G) and K with their covariance, for `force`, `predict` and `modes`.
+    /// Returns M, C (with the gyroscopic matrix Ω G) and K with their covariance, for `force`,
+    /// `predict` and `modes`.
     ///
     /// # Errors
     /// [`AnalysisError::Likelihood`] if a degree of freedom has no mass,

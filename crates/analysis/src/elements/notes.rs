@@ -35,7 +35,7 @@ pub enum ElementNote {
         /// Reason.
         reason: String,
     },
-    /// Structural damping has no place in M, C and K.
+    /// Structural damping cannot be a part of M, C and K.
     Hysteresis,
     /// M, C and K are those of the rotor at rest, because the speed differs from line to line.
     AtRest,
@@ -58,7 +58,7 @@ impl fmt::Display for ElementNote {
         match self {
             Self::AtBound { parameter, bound } => write!(
                 f,
-                "{parameter} lies at its bound {}: the data would have it beyond; its interval is one-sided",
+                "{parameter} lies at its bound {}: without the bound the estimate would lie beyond it; its interval is one-sided",
                 compact(*bound, 6)
             ),
             Self::ScaledErrors { factor } => f.write_str(&scaled_errors(*factor, "misfit")),
@@ -70,7 +70,7 @@ impl fmt::Display for ElementNote {
             Self::NoSystem { reason } => write!(f, "the result has no M, C and K: {reason}"),
             Self::Hysteresis => f.write_str("structural damping is not in M, C and K"),
             Self::AtRest => f.write_str(
-                "M, C and K are those at rest, without Ω G: each line had a speed of its own",
+                "M, C and K are those of the rotor at rest, without Ω G, because each line has a different speed",
             ),
             Self::NoCovariance { most } => write!(
                 f,

@@ -1,4 +1,5 @@
-//! Lines of records: whole periods with the noise that they show, or open records.
+//! Spectral lines of records: of whole periods, with the noise from their scatter, or of open
+//! records.
 
 use mechid_checks::NoiseSource;
 use mechid_model::ResponseQuantity;
@@ -22,15 +23,16 @@ use crate::modes::driven_band;
 
 /// Inputs and outputs of one record, in the order of the instruments.
 struct Signals {
-    /// Samples × q, in the units of the inputs.
+    /// Input samples, one row per sample and one column per input, in the units of the inputs.
     inputs: Record,
-    /// Samples × p, in the units of the sensors.
+    /// Output samples, one row per sample and one column per sensor, in the units of the sensors.
     outputs: Record,
 }
 
 impl ElementData {
-    /// Takes records with the columns of [`IdentifyElements::channels`]: their hits if there is a
-    /// rule for them, whole periods where the window has a period, otherwise open records.
+    /// Reads records with the columns of [`IdentifyElements::channels`]: as hits if the settings
+    /// have a rule for hits, as whole periods if the window has a period, otherwise as open
+    /// records.
     ///
     /// # Errors
     /// [`AnalysisError::NoRecord`], [`AnalysisError::NoHit`] if no hit of a record is good,
@@ -47,7 +49,8 @@ impl ElementData {
     }
 }
 
-/// The good hits of a record, each an open record of its own under the pulse alone.
+/// Reads the good hits of a record, each as a separate open record with only the force of its
+/// pulse.
 fn from_hits(
     measurement: &Measurement,
     rule: &HitRule,
@@ -140,7 +143,7 @@ impl Signals {
         TestRow { file: block.file.clone(), kind, window: Some(WindowRow::from_block(block)) }
     }
 
-    /// The mean of the periods with the noise that their scatter shows.
+    /// Returns the mean of the periods with the noise from their scatter.
     fn periods(&self, block: &Block, how: &IdentifyElements) -> Result<ElementData, AnalysisError> {
         let choice = how.band.map_or(LineChoice::Driven, LineChoice::Band);
         let without = LeftOut { lines: None, frequencies: how.without_hz.clone() };
@@ -149,8 +152,8 @@ impl Signals {
         let chosen = rule.lines(&self.inputs, period)?;
         let lines = Lines::new(self.inputs.sampling().with_len(period)?, chosen)?;
         let (p, q) = (self.outputs.channels(), self.inputs.channels());
-        // Periods of a machine have as many forces as responses; columns of zeros make up for the
-        // others.
+        // The data of periods have as many forces as responses; columns of zeros replace missing
+        // ones.
         let channels = p.max(q);
         let padded = |record: &Record| {
             let data = record.data().rows(0, period * count);
@@ -183,7 +186,7 @@ impl Signals {
         Ok(ElementData { source, noise, ..of_test })
     }
 
-    /// All lines of a band, without a window.
+    /// Returns all lines of a band of an open record, without a window function.
     fn open(
         &self,
         block: &Block,
@@ -211,8 +214,8 @@ impl Signals {
     }
 }
 
-/// The mean over the periods, with the noise that they show and its model in words; without, if
-/// there is one period or they differ by rounding only.
+/// Returns the mean over the periods, with its noise and the noise model in words; without noise if
+/// there is one period, or if the periods differ only by rounding.
 fn with_noise(
     periods: &RepeatedPeriods,
     noise: Pooling,

@@ -17,7 +17,7 @@ use crate::limits::SAME_FREQUENCY;
 use crate::measurement::Channels;
 
 impl ElementData {
-    /// Takes tables of frequency responses, whose points have the names of the sensors and of the
+    /// Reads tables of frequency responses, whose points have the names of the sensors and of the
     /// inputs.
     ///
     /// # Errors
@@ -32,9 +32,9 @@ impl ElementData {
         joined(tables.iter().map(|table| from_table(table, how)))
     }
 
-    /// Returns the same for a machine with parts that are known by their measured receptances, in
-    /// tables whose points have the names of the degrees of freedom `measured` of the machine. Each
-    /// table is one part, free of all others.
+    /// Returns the data with the measured receptances of some parts of the machine. Each table has
+    /// the receptance of one part, measured while it was not connected to the others; the points of
+    /// the tables have the names of the degrees of freedom `measured` of the machine.
     ///
     /// # Errors
     /// [`AnalysisError::NoResponse`] if a response between two degrees of freedom of a part is
@@ -101,7 +101,7 @@ fn from_table(
     Ok(data)
 }
 
-/// The response of a sensor, which has its name and quantity.
+/// Returns the response at the point of a sensor, and checks its quantity.
 fn response<'a>(
     table: &'a FrequencyResponses,
     sensor: &Sensor,
@@ -127,7 +127,7 @@ fn response<'a>(
     }
 }
 
-/// Noise of standard errors of the real and the imaginary part alike.
+/// Returns the noise for standard errors that real and imaginary part have in common.
 fn noise(errors: &[&Vec<f64>], rows: &[usize], inputs: usize) -> Result<LineNoise, AnalysisError> {
     let covariance = rows.iter().map(|row| {
         let variances = errors.iter().map(|error| Complex::from(2.0 * error[*row] * error[*row]));
@@ -140,7 +140,7 @@ fn noise(errors: &[&Vec<f64>], rows: &[usize], inputs: usize) -> Result<LineNois
     Ok(LineNoise::new(covariance.collect())?)
 }
 
-/// Smallest distance of two frequencies of a table, in Hz.
+/// Returns the smallest distance between two frequencies of a table, in Hz.
 fn spacing_hz(table: &FrequencyResponses) -> f64 {
     let mut sorted = table.frequency_hz.clone();
     sorted.sort_by(f64::total_cmp);
@@ -148,7 +148,7 @@ fn spacing_hz(table: &FrequencyResponses) -> f64 {
     gaps.fold(f64::INFINITY, f64::min)
 }
 
-/// Receptance of parts that do not touch one another, at the lines of the data.
+/// Returns the receptance of parts that are not connected to each other, at the lines of the data.
 fn receptance_of(
     parts: &[FrequencyResponses],
     lines: &LineData,
@@ -188,7 +188,8 @@ fn receptance_of(
     Ok(MeasuredReceptance { receptance, variance: is_stated.then_some(variance) })
 }
 
-/// The response between two points of a part, in one direction or, by reciprocity, in the other.
+/// Returns the response between two points of a part, in one direction or, by reciprocity, in the
+/// other.
 fn between<'a>(
     part: &'a FrequencyResponses,
     response: &str,
@@ -207,7 +208,7 @@ fn between<'a>(
     })
 }
 
-/// Rows of a table at the frequencies of the data.
+/// Returns the rows of a table at the frequencies of the data.
 fn rows_at(part: &FrequencyResponses, omega: &[f64]) -> Result<Vec<usize>, AnalysisError> {
     let row = |omega: &f64| {
         let hz = omega / TAU;

@@ -14,14 +14,14 @@ use crate::measurement::Channels;
 
 /// Settings of the identification of a machine of named elements.
 ///
-/// Whether a record is taken as whole periods or as an open one follows from its window: whole
-/// periods where `period` is given. With `hits` every good hit of a hammer is an open record.
+/// A record is read as whole periods if its window has a `period`, otherwise as an open record.
+/// With `hits`, every good hit of a hammer is an open record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IdentifyElements {
     /// The machine with its sensors and inputs.
     pub machine: InstrumentedMachine,
-    /// Frequencies to use; without, those that the inputs drive.
+    /// Frequencies to use; `None`: those that the inputs excite.
     #[serde(default)]
     pub band: Option<Band>,
     /// Frequencies of excluded lines.
@@ -57,7 +57,7 @@ fn usual_confidence() -> f64 {
 }
 
 impl IdentifyElements {
-    /// Takes a machine with its sensors and inputs, and the usual settings.
+    /// Creates the default settings for a machine with its sensors and inputs.
     pub fn new(machine: InstrumentedMachine) -> Self {
         Self {
             machine,
@@ -100,7 +100,7 @@ impl IdentifyElements {
         Ok(channels)
     }
 
-    /// The settings of the likelihood.
+    /// Returns the settings of the likelihood.
     pub(super) fn likelihood(&self, data: &ElementData) -> Settings {
         let noise = match (data.lines.noise(), self.noise) {
             (None, Pooling::AllLines) => NoiseSource::WhiteResidual,

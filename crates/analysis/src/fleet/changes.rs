@@ -11,7 +11,7 @@ const LEAST: usize = 4;
 /// Maximum number of random permutations for a p-value; its inverse is about the smallest p-value.
 const ORDERS: usize = 9999;
 
-/// Number of permutations with at least the same change that end the test; the p-value is then
+/// Number of permutations with at least the observed change that ends the test; the p-value is then
 /// about the ratio of this number to the number of permutations.
 ///
 /// # Source
@@ -59,7 +59,7 @@ pub(super) struct Change {
     pub size: f64,
 }
 
-/// Detects the changes in a list of values: the largest one, then the changes within its parts.
+/// Detects the changes in a list of values: the largest one, then the changes before and after it.
 /// `tests` is the number of tested lists, for the adjustment of p-values.
 pub(super) fn find(values: &[f64], tests: usize) -> Vec<Change> {
     let mut changes = Vec::new();
@@ -261,7 +261,8 @@ mod tests {
         let changes = find(&values, 10);
         let drift = changes.last().unwrap();
         assert_eq!(drift.kind, ChangeKind::Drift, "{changes:?}");
-        // Half the noise of a value is the rise of three to four records; ten of them.
+        // The drift rises by 0.15 standard deviations of the noise per record: the noise hides its
+        // beginning within some records.
         assert!(drift.begins.abs_diff(50) <= 12, "{drift:?}");
         assert!((drift.size - 0.15 * (119 - drift.begins) as f64).abs() < 2.0, "{drift:?}");
         let levels = baseline(&values, &changes);
@@ -269,12 +270,12 @@ mod tests {
         assert!((levels[119] - 0.15 * 69.0).abs() < 1.5, "{}", levels[119]);
     }
 
-    /// Judge: of lists of noise, the share of p-values below a limit is that limit.
+    /// The p-values of noise have a uniform distribution: the share below a limit equals the limit.
     #[test]
     fn p_values_of_noise_are_even() {
         let below =
             (0..400).filter(|seed| largest(&noise(40, seed + 1)).unwrap().p_value < 0.1).count();
-        // 40 are expected, ± 6; four standard deviations.
+        // The expected number is 40 ± 6; the limits are four standard deviations away.
         assert!((16..=64).contains(&below), "{below} of 400");
     }
 

@@ -46,7 +46,7 @@ mod tests {
         assert_eq!(read(&mut rest).unwrap().unwrap(), b"");
         assert_eq!(read(&mut rest).unwrap().unwrap(), b"\0\x01");
         assert_eq!(read(&mut rest).unwrap(), None);
-        // Cut off within a message, and a length that nothing has.
+        // The first message is cut off, and the second has an impossible length.
         assert!(read(&mut &pipe[..6]).is_err());
         assert!(read(&mut &[0xff; 8][..]).is_err());
     }

@@ -79,8 +79,8 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Divides records into parts of `records_per_part`, by rising path. A folder is replaced by
-    /// its files, and a file with a
+    /// Divides records into parts of `records_per_part`, in the order of their paths. A folder is
+    /// replaced by its files, and a file with a
     /// [`Reading::record_column`](crate::measurement::Reading::record_column) by its records, in
     /// the order of its rows; duplicates are removed. Named pipes, sockets and devices are ignored.
     ///

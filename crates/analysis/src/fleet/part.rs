@@ -150,15 +150,15 @@ impl Part {
             failures: FailureCount::from_rows(&rows),
             computed: true,
         };
-        // The file has the values for a later run.
+        // The file stores the summary as a later run reports it: not computed in that run.
         let later = PartDone { computed: false, ..done.clone() };
         let later = serde_json::to_string(&later).unwrap_or_default();
         write_parquet(&path, &columns(&rows), &[(DONE, later)])?;
         Ok(done)
     }
 
-    /// Returns what the existing file says of itself; `None` if there is none, or it is no part of
-    /// a fleet.
+    /// Returns the summary in the existing file; `None` if there is no file, or if it is not a part
+    /// of a fleet.
     fn done(&self, path: &Path) -> Option<PartDone> {
         let pairs = read_parquet_metadata(path).ok()?;
         let (_, done) = pairs.iter().find(|(key, _)| key == DONE)?;

@@ -34,7 +34,7 @@ pub(super) fn rows_of<E>(
     Ok(())
 }
 
-/// Divides records of a file into those that are read together.
+/// Divides records of a file into groups that are read together.
 fn read_together(records: &[RecordRows]) -> impl Iterator<Item = &[RecordRows]> {
     let mut remaining = records;
     std::iter::from_fn(move || {

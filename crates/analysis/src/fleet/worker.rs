@@ -1,5 +1,5 @@
-//! Processes that work for a fleet, so that a record that exhausts memory, aborts or hangs ends
-//! only its own.
+//! Worker processes of a fleet: a record that exhausts memory, aborts or hangs ends only its own
+//! process.
 
 use std::ffi::OsString;
 use std::io::{self, Read as _};
@@ -17,26 +17,27 @@ use super::results::Cells;
 use super::serve::{Order, READY, Task};
 use crate::{AnalysisError, ResultRow, SavedAnalysis};
 
-/// Memory that a record may take unless it is said, in GB.
+/// Default limit of the memory for a record, in GB.
 pub const RECORD_MEMORY_GB: f64 = 8.0;
 
-/// Time that a record may take unless it is said, in s.
+/// Default limit of the time for a record, in s.
 pub const RECORD_SECONDS: f64 = 600.0;
 
-/// Maximum number of bytes of what a process says on its error stream that are kept.
+/// Maximum number of bytes kept from the error stream of a process.
 const LONGEST_MESSAGE: u64 = 4096;
 
-/// Time that a process has to begin. One that does not is no fault of a record.
+/// Maximum time for the start of a process; no record causes a failure before that.
 const START: Duration = Duration::from_secs(120);
 
-/// Time that a process has to end after its output, and between two looks at it.
+/// Maximum time from the end of the output of a process to its exit, and time between two checks.
 const FAREWELL: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(5);
 
-/// Words with which an allocation that fails ends a process.
+/// Beginning of the message with which a failed allocation ends a process.
 const OUT_OF_MEMORY: &str = "memory allocation of";
 
-/// Separation of records: the program that identifies them, and what each may take.
+/// Isolation of records in separate processes: the program that identifies them, and the limits for
+/// each record.
 ///
 /// The program reads its orders from standard input and ends with [`serve`](super::serve).
 #[derive(Debug, Clone, PartialEq)]
@@ -45,8 +46,8 @@ pub struct Isolation {
     pub program: PathBuf,
     /// Arguments of the program.
     pub arguments: Vec<OsString>,
-    /// Memory that a record may take, in units of GB, with what the program itself takes; Linux
-    /// alone limits it.
+    /// Memory that a record and the program itself may take, in units of GB; only Linux enforces
+    /// it.
     pub record_memory_gb: f64,
     /// Time that a record may take, in s.
     pub record_seconds: f64,
@@ -81,7 +82,7 @@ impl Isolation {
     }
 }
 
-/// Somebody who identifies records in a process, and starts another one where a record ended it.
+/// Identifies records in a separate process, and starts a new process if a record has ended it.
 #[derive(Debug)]
 pub struct Worker {
     isolation: Isolation,
@@ -109,7 +110,8 @@ impl Worker {
         Ok(Self { isolation, analysis, running: None })
     }
 
-    /// Returns the rows of records of a file, all of it if there are none, in their order.
+    /// Returns the rows of some records of a file, in their order, or of the whole file if no
+    /// records are given.
     ///
     /// A process that ends while it reads several records together is started again for each of
     /// them: the row of a record is an error only where the record alone ends the process.
@@ -139,7 +141,8 @@ impl Worker {
         Ok(rows)
     }
 
-    /// Has records identified; returns why not all of them were.
+    /// Sends records to the process and receives their rows; returns the error if some rows are
+    /// missing.
     fn ask(
         &mut self,
         path: &Path,
@@ -225,7 +228,7 @@ impl Worker {
             let _ = child.wait();
             failed(error)
         })?;
-        // Saturates where no address space is as large.
+        // The conversion saturates, at a size above any address space.
         let memory_bytes = Some((record_memory_gb * 1e9) as u64);
         let task = Task { analysis: self.analysis.clone(), memory_bytes };
         let _ = frames::write(&mut orders, &serde_json::to_vec(&task).unwrap_or_default());
@@ -255,7 +258,7 @@ impl Running {
 
     /// Returns the reason for the end of a process that may use `memory_gb` GB of memory.
     fn cause_of_end(mut self, memory_gb: f64) -> AnalysisError {
-        // The end of its output shows that the process ends, too.
+        // No further orders: the process ends at the end of its input.
         self.orders = None;
         let begun = Instant::now();
         while matches!(self.child.try_wait(), Ok(None)) && begun.elapsed() < FAREWELL {
@@ -272,7 +275,7 @@ impl Running {
     }
 }
 
-/// Reads a row that a process has sent; `None` if it is none.
+/// Reads a row that a process has sent; `None` if the bytes are not a row.
 fn row_of(bytes: Vec<u8>) -> Option<ResultRow> {
     let mut rows = parse_parquet_rows("a row", bytes, &Limits::DEFAULT).ok()?;
     Some(Cells::new(rows.pop()?).row())

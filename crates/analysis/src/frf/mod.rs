@@ -443,7 +443,7 @@ impl Responses {
         let following = self.following.iter().map(|one| {
             let (force, driver) = (one.force + 1, one.driver + 1);
             format!(
-                "{of_record}force {force} is coherent with force {driver} ({} % of it) and has no independent part: the responses to force {driver} contain this part of those to force {force}; a record in \
+                "{of_record}force {force} is coherent with force {driver} ({} % of it) and has no independent part: the responses to force {driver} include this percentage of the responses to force {force}; a record in \
                  which force {force} dominates separates them",
                 significant(100.0 * one.share, 2)
             )

@@ -190,7 +190,7 @@ impl FrfTable {
             let name = |force: usize| &table.force_names[parts[force].driven[0]];
             let [force, driver] = [one.force, one.driver].map(name);
             format!(
-                "{force} has {} % of {driver} on the lines of the latter: its part of the response was subtracted, with its responses interpolated between its own lines",
+                "on the lines of {driver}, {force} has {} % of the amplitude of {driver}: the response to {force} was subtracted there, interpolated between the lines of {force}",
                 significant(100.0 * one.share, 2)
             )
         }));

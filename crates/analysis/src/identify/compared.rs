@@ -8,9 +8,9 @@ use nalgebra::DMatrix;
 /// Comparison of a fit with its parts and with larger models.
 #[derive(Default)]
 pub(super) struct Compared {
-    /// Findings of both.
+    /// Findings of both comparisons.
     pub(super) parts: Vec<Finding>,
-    /// Mean square that a term left out adds to the covariance of the parameters.
+    /// Mean square error that an omitted term adds to the covariance of the parameters.
     pub(super) omitted: Option<DMatrix<f64>>,
 }
 

@@ -18,7 +18,8 @@ pub struct Prepared {
     pub velocity: Record,
     pub acceleration: Option<Record>,
     pub force: Record,
-    /// `true` if all of these are second derivatives of the quantities that they are named after.
+    /// `true` if all samples, of the force too, are second derivatives of the quantities in the
+    /// names.
     pub twice_differentiated: bool,
 }
 

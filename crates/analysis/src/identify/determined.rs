@@ -50,14 +50,16 @@ pub(super) fn check(
     let condition = estimate.condition();
     if condition * f64::EPSILON >= 1.0 {
         let number = significant(condition, 2);
-        return refused(format!("the condition number of the fit is {number}, beyond rounding"));
+        return refused(format!(
+            "the condition number of the fit is {number}: the equations are singular to rounding"
+        ));
     }
     let frequencies = determined(modes);
     if is_open(estimate) && (estimate.dof() == 1 || frequencies.is_empty()) {
         let modes = if frequencies.is_empty() {
             "and so do those of all natural frequencies".to_owned()
         } else {
-            format!("which leaves {} a peak of the noise", frequencies.join(", "))
+            format!("so that {} may be only a peak of the noise", frequencies.join(", "))
         };
         return refused(format!("{} contain zero, {modes}", intervals(estimate)));
     }

@@ -123,7 +123,7 @@ impl LeftOut {
         };
         lines.retain(|line| !reached(line));
         if lines.is_empty() && count > 0 {
-            let why = format!("no line is left of {count}");
+            let why = format!("all lines are excluded: {count} of {count}");
             return Err(AnalysisError::Setting { setting: "without", why });
         }
         Ok(lines)
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(kept(None, &["4:multiples"]).unwrap(), [1, 2, 3, 5, 6, 7, 9, 10, 11]);
         assert_eq!(kept(None, &["4:1:multiples", "2"]).unwrap(), [1, 6, 10]);
         let error = kept(None, &["1:multiples"]).unwrap_err().to_string();
-        assert!(error.contains("no line is left of 12"), "{error}");
+        assert!(error.contains("all lines are excluded: 12 of 12"), "{error}");
         assert!(kept(Some("60"), &[]).is_err());
     }
 

@@ -6,8 +6,8 @@
 //! | `lines`, `left_out` | spectral lines to use and to leave out |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `open_records` | lines of records that are no periods, with the loads of their ends |
-//! | `tables`, `tabulated` | frequency responses that were measured elsewhere, and such tables as data |
-//! | `other_models` | delay, structural damping, another quantity: models that may explain such tables better |
+//! | `open_records` | open records (windows that are not whole periods), with their transients |
+//! | `tables`, `tabulated` | tables of frequency responses that were measured elsewhere, and their conversion to data |
 //! | `nonlinear`, `open_terms` | whole periods and open records with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
@@ -16,12 +16,12 @@
 //! | `validation` | prediction of a record that was not fitted |
 //! | `mass`, `structure` | what is known of M, C and K |
 //! | `coherence` | coherence of the records that were fitted |
-//! | `fitted` | a fit: the estimate, how it came about, its residual |
+//! | `fitted` | a fit: the estimate, its data and settings, its residual |
 //! | `acquisition` | force between samples and AC coupled channels of open records |
 //! | `force_noise` | noise of the forces, stated or as the record shows it |
-//! | `sinusoids` | sinusoids beside the response to the forces, in open records |
+//! | `sinusoids` | sinusoids in open records that are not responses to the forces |
 //! | `fitted_lines` | the lines of a fit one by one, with standard errors and residual |
-//! | `unscaled` | equations of motion that the data fix up to factors only |
+//! | `unscaled` | equations of motion that the data determine only up to factors |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
 pub mod acquisition;
@@ -102,7 +102,7 @@ use crate::measurement::{Block, Channels, Hold, Measurement, Windowed};
 use crate::modes::resonances;
 pub use mechid_nonlinear::RestoringForce;
 
-/// Unexplained part of the response above which the result says so.
+/// Maximum unexplained part of the response without a remark, a ratio of RMS values.
 pub const CONSPICUOUS: f64 = 0.05;
 
 /// Identifies the machine behind one or several records.
@@ -207,7 +207,7 @@ fn with_few_lines(failure: AnalysisError, records: &[Windowed], how: &Identify) 
 
 /// An identified machine with its records.
 ///
-/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+/// [`Display`](fmt::Display) writes the result for people, `serde` for programs.
 #[derive(Debug)]
 pub struct Identified {
     measurements: Vec<Measurement>,

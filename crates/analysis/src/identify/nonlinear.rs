@@ -222,7 +222,7 @@ fn remarks(first: &Block, estimated: &NonlinearEstimate) -> Vec<String> {
     if estimated.standard_errors() == StandardErrors::White {
         remarks.push(
             "the record is too short for standard errors from the scatter of blocks of time: they \
-             take the residual as white"
+             assume a white residual"
                 .into(),
         );
     }

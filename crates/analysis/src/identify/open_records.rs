@@ -36,12 +36,14 @@ const LEVEL: f64 = 1e-3;
 /// Ratio of transient power to force power that counts as rounding; a larger one is a transient.
 const ROUNDING: f64 = 1e-20;
 
-/// Maximum number of lines for which a record without settings is tried as an open one. An eighth
-/// of the product of all three limits, with two forces, takes ten seconds of one processor.
+/// Maximum number of lines for which a record without settings is tried as an open record. With two
+/// forces, an eighth of [`SENSITIVITIES`] takes ten seconds of one processor.
 const LINES: usize = 1 << 19;
-/// Maximum number of unknown parameters for such a trial.
+/// Maximum number of unknown parameters for which a record without settings is tried as an open
+/// one.
 const PARAMETERS: usize = 100;
-/// Maximum product of lines and unknown parameters for such a trial.
+/// Maximum product of lines and unknown parameters for which a record without settings is tried as
+/// an open one.
 const SENSITIVITIES: usize = 100 << 17;
 
 /// Ratio of sampling rate to the highest frequency that an anti-aliasing filter passes: the upper
@@ -70,7 +72,7 @@ pub(super) struct How<'a> {
     pub(super) excitation: Excitation<'a>,
 }
 
-/// A fit of open records, and whether their ends show at all.
+/// Fit of open records, and whether it shows a transient at their ends.
 pub(super) struct OpenFit {
     pub(super) fitted: Fitted,
     pub(super) ends_show: bool,

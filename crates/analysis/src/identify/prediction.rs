@@ -106,7 +106,7 @@ impl Prediction {
         let (force, rest) = (&measured.force, InitialState::rest(system.dof()));
         match self {
             Prediction::Steady => predict_periodic(system, force),
-            // The first part of a long period does not close on itself either.
+            // The first part of a long period is not periodic, either.
             Prediction::Sampled { discretisation, extent }
                 if extent == Extent::Open || measured.held_to().is_some() =>
             {

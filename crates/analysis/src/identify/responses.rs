@@ -125,7 +125,7 @@ fn average_remarks(records: &[Windowed], responses: &[Responses]) -> Vec<String>
     of_segments.into_iter().chain(of_channels).collect()
 }
 
-/// The responses of all records, one after the other.
+/// Returns the responses of all records, concatenated.
 fn joined(responses: &[Responses]) -> Result<FrequencyData, AnalysisError> {
     let mut remaining: Vec<FrequencyData> =
         responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
@@ -138,7 +138,7 @@ struct Outcome {
     /// The estimator in words.
     name: &'static str,
     estimate: Estimate,
-    /// Residual against the coherence.
+    /// Ratio of the residual power to the noise power that follows from the coherence.
     misfit: Option<Misfit>,
     remark: Option<String>,
     /// `true` if the bias of the window was separated from the system.

@@ -460,7 +460,7 @@ fn preferred(
     let unknown = likely.estimate.unknowns().independent() as f64;
     let equations = 2.0 * (data.dof() * data.len()) as f64;
     // Two measures per parameter, in units of the residual of maximum likelihood: with equal
-    // weights, and with its own.
+    // weights, and with the weights of maximum likelihood.
     let unweighted = ((of_plain / of_likely).powi(2) - 1.0) * equations;
     let weighted = likely.estimate.squared_distance(&plain.estimate).unwrap_or(0.0);
     let excess = unweighted.max(weighted) / unknown;
@@ -485,7 +485,7 @@ fn preferred(
     Ok(SpectralEstimate { remark, ..likely })
 }
 
-/// The rows of all records.
+/// Returns the rows of all records, concatenated.
 fn together(
     spectra: &[Spectra],
     of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, SpectraError>,

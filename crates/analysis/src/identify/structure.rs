@@ -103,7 +103,7 @@ impl<'de> Deserialize<'de> for Form {
 impl FromStr for Structure {
     type Err = String;
 
-    /// Statements with spaces between them.
+    /// Reads statements that are separated by spaces.
     fn from_str(text: &str) -> Result<Self, String> {
         Ok(Self { forms: text.split_whitespace().map(str::parse).collect::<Result<_, _>>()? })
     }

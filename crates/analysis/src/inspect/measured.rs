@@ -60,7 +60,7 @@ impl Span {
         (self.hold < self.len).then_some((self.start + 1, self.start + self.hold))
     }
 
-    /// Returns the same in words.
+    /// Returns the samples used for period and lines in words; `None` if all are used.
     pub fn looked_at(self, file: &str) -> Option<String> {
         let end = self.start + self.len;
         self.held().map(|(first, last)| {

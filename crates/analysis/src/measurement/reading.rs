@@ -25,9 +25,10 @@ pub struct Reading {
     pub sample_rate_hz: Option<f64>,
     /// Constant to subtract from every channel.
     pub detrend: Detrend,
-    /// Column whose value names the record of each row, in a Parquet file with many records.
+    /// Column that names the record of each row, in a Parquet file with many records.
     pub record_column: Option<String>,
-    /// Record of such a file to read, by its value in this column; `None`: the only one.
+    /// Record to read from a file with many records, by its name in `record_column`; `None`: the
+    /// only one.
     pub record_id: Option<String>,
     /// Units of columns, by their names or numbers; they replace those in the headers: `g`, `lbf`,
     /// `ms`.

@@ -247,10 +247,11 @@ mod tests {
         coarse_time(&table, &time, sampling)
     }
 
-    /// Judge: half a unit of the last digit at either end, over the duration of the record.
+    /// Reference: the uncertainty is half a unit of the last digit at either end, over the duration
+    /// of the record.
     #[test]
     fn instants_that_leave_the_rate_open_are_told() {
-        // A millisecond in 7.8125 s.
+        // The instants have three decimals, so that the uncertainty is a millisecond in 7.8125 s.
         let coarse = told(512.0, 4000, 3).unwrap();
         assert!(coarse.contains("0.013 %"), "{coarse}");
         assert_eq!(told(512.0, 4096, 7), None);

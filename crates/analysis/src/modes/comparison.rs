@@ -22,7 +22,7 @@ pub struct ModeComparison {
     pub sets: [String; 2],
     /// Common points of both sets, by their names in the first.
     pub points: Vec<String>,
-    /// Pairs of equal modes of both sets, by rising frequency of the first set.
+    /// Pairs of corresponding modes of both sets, by rising frequency of the first set.
     pub pairs: Vec<PairRow>,
     /// Modes of the first set without a partner.
     pub only_first: Vec<LoneRow>,

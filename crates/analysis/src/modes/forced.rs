@@ -148,7 +148,7 @@ pub(super) fn modes_of_tables(
 /// Number of channels that a message lists by their names.
 const LISTED: usize = 8;
 
-/// Returns a failure with the names of the channels that it counts.
+/// Returns a failure that names the channels instead of their numbers.
 fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisError {
     let list = |numbers: &[usize], name: &dyn Fn(usize) -> String| {
         message::list(numbers.iter().map(|at| name(*at)), ", ", LISTED)

@@ -11,19 +11,19 @@ use crate::measurement::Block;
 /// Number of samples whose equations are gathered at a time.
 const SAMPLES_AT_ONCE: usize = 256;
 
-/// Free motion of the modes, Σ_r Re(a_r φ_r exp λ_r t), from the first sample on.
+/// Free motion of the modes r from the first sample on, Σ_r Re(a_r φ_r exp λ_r t), with amplitudes
+/// a_r, shapes φ_r and poles λ_r.
 pub(super) struct FreeMotion {
     /// Samples × outputs.
     pub motion: DMatrix<f64>,
-    /// RMS over the judged samples of what the errors of the amplitudes a cause, one for each
-    /// output.
+    /// RMS of the error that the uncertainty of the amplitudes a_r causes, over the samples that
+    /// count in the errors, one for each output.
     pub standard_error: Vec<f64>,
 }
 
 impl FreeMotion {
     /// Fits the amplitudes by least squares to the difference between the first `settle` samples of
-    /// the measured channels and a response from rest; a constant of each channel is fitted beside
-    /// them.
+    /// the measured channels and a response from rest, together with a constant for each channel.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if these samples do not determine every amplitude.

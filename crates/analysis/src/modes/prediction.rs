@@ -90,7 +90,8 @@ pub fn predict_with_modes(
 struct Response {
     /// Samples × outputs.
     record: Record,
-    /// RMS over the samples of what the errors of the modes cause, one for each output.
+    /// RMS over the samples of the error that the uncertainty of the modes causes, one for each
+    /// output.
     standard_error: Vec<f64>,
 }
 
@@ -140,7 +141,8 @@ impl Response {
         }
         let motion = Spectrum::from_lines(sampling, lines)?.to_record()?;
         let record = if steady { repeated(&motion, block)? } else { motion.window(0, len)? };
-        // The response to an open record lies in its first part.
+        // The power is a mean over the record and the zeros behind it; the response is in the
+        // record.
         let share = if steady { 1.0 } else { sampling.len() as f64 / len as f64 };
         let standard_error = power.into_iter().map(|power| (power * share).sqrt()).collect();
         Ok(Self { record, standard_error })
@@ -200,8 +202,8 @@ impl Response {
     }
 }
 
-/// Returns the forces followed by zeros, until the slowest mode has decayed, so that the response
-/// does not run into its own beginning.
+/// Returns the forces followed by zeros, until the slowest mode has decayed, so that the end of the
+/// response does not wrap around to its beginning.
 fn followed_by_rest(system: &ModalSystem, force: &Record) -> Result<Record, AnalysisError> {
     let slowest = system.model.terms.iter().map(|term| -term.pole[0]).fold(f64::INFINITY, f64::min);
     let (len, rate_hz) = (force.len(), force.sampling().rate_hz());
@@ -213,7 +215,7 @@ fn followed_by_rest(system: &ModalSystem, force: &Record) -> Result<Record, Anal
     Ok(Record::new(sampling, data)?)
 }
 
-/// Returns a period as often as the window has it.
+/// Returns a period repeated as often as the window contains it.
 fn repeated(period: &Record, block: &Block) -> Result<Record, AnalysisError> {
     let data = DMatrix::from_fn(block.force.len(), period.channels(), |k, column| {
         period.data()[(k % period.len(), column)]

@@ -230,7 +230,7 @@ impl SavedModes {
         !self.outputs.is_empty() && self.inputs.len() > self.outputs.len()
     }
 
-    /// Returns the names of the responses as their columns have them; empty for a machine.
+    /// Returns the names of the responses, those of their columns; empty for a machine.
     pub fn columns(&self) -> Vec<String> {
         self.responses().iter().map(|response| response.column.clone()).collect()
     }

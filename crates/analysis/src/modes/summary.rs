@@ -274,7 +274,8 @@ impl ModesSummary {
         text_table(&rows)
     }
 
-    /// Modulus and phase of every entry: of shapes by response, of participations by force.
+    /// Returns a table of the magnitude and phase of every entry: of shapes by response, of
+    /// participations by force.
     fn entries(
         &self,
         what: &str,
@@ -288,7 +289,7 @@ impl ModesSummary {
             let cell = |mode: &ModalModeRow| {
                 let [re, im] = of(mode)[at].value;
                 let phase = im.atan2(re).to_degrees();
-                // No minus sign before a zero.
+                // A rounded phase of zero has no minus sign.
                 let phase = if phase.abs() < 0.5 { 0.0 } else { phase };
                 format!("{} ∠{phase:.PHASE_DECIMALS$}°", significant(re.hypot(im), 3))
             };
@@ -315,8 +316,8 @@ impl ModesSummary {
         text_table(&rows)
     }
 
-    /// A line for each candidate in the band, and one for all others, which no one would take for
-    /// modes.
+    /// Returns a line for each rejected candidate in the band, and one line for all others, which
+    /// are obviously not modes.
     fn dropped_lines(&self) -> String {
         let [low, high] = self.band_hz;
         let (inside, outside): (Vec<_>, Vec<_>) = self.dropped.iter().partition(|row| {
@@ -369,7 +370,7 @@ impl fmt::Display for ModesSummary {
     }
 }
 
-/// Value and standard error; a dash where the record is too short for an interval.
+/// Returns value and standard error; a dash if the record is too short for an interval.
 fn cells(value: &Uncertain) -> [String; 2] {
     if value.standard_error.is_none() {
         return [significant(value.value, 4), "–".into()];

@@ -31,8 +31,8 @@ pub struct ModalSystem {
     pub model: ModalModel,
 }
 
-/// Quantity of a measured response, its column among those of the quantity, and its output of the
-/// modes.
+/// Quantity of a measured response, index of its column among the columns of this quantity, and
+/// index of its output in the modal model.
 pub(crate) type MeasuredChannel = (ResponseQuantity, usize, usize);
 
 /// A saved result of modes, as far as a system needs it.
@@ -110,8 +110,8 @@ impl ModalSystem {
         Self::from_json(&files.join(", "), json)
     }
 
-    /// Returns the input of each force column: by its name, or in order if all are there and a name
-    /// is another.
+    /// Returns the input of each force column: by its name, or by its order if there is a column
+    /// for every force and a name is unknown.
     pub(crate) fn inputs_of(&self, columns: &[String]) -> Result<Vec<usize>, AnalysisError> {
         let find = |column: &String| self.inputs.iter().position(|input| input == column);
         if let Some(all) = columns.iter().map(find).collect::<Option<Vec<_>>>() {
@@ -130,7 +130,7 @@ impl ModalSystem {
     }
 
     /// Returns the output of each response column of a record, quantity by quantity: by its name,
-    /// or in order if all of this quantity are there.
+    /// or by its order if there is a column for every response of this quantity.
     pub(crate) fn outputs_of(
         &self,
         channels: &Channels,

@@ -26,7 +26,8 @@ pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> b
 pub type Take<'a> =
     dyn FnMut(&Measurement, &IdentifiedForce, Range<usize>) -> Result<(), AnalysisError> + 'a;
 
-/// Reconstructs the force by such a method, chunk by chunk.
+/// Reconstructs the force of an open record, chunk by chunk, by a method that needs neighbouring
+/// samples only.
 pub fn find(
     request: &Request,
     machine: &Machine,

@@ -320,7 +320,7 @@ fn filtered(
     if let Some(lambda) = regular.parameter {
         chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
     }
-    chosen.push(("unknowns let through".into(), regular.unknowns, ""));
+    chosen.push(("effective number of unknowns".into(), regular.unknowns, ""));
     chosen.extend(noise_levels(motion, &regular.noise_std, request.averaged));
     let unexplained = force.unexplained().map(<[_]>::to_vec);
     let method = match filter {

@@ -145,7 +145,7 @@ impl Recorded {
         self.blocks(samples, advance, &mut |block| take(&self.measurement(block)?))
     }
 
-    /// Passes the same chunks as samples × channels in SI units.
+    /// Passes the chunks of the window to the callback as samples × channels in SI units.
     fn blocks(
         &self,
         samples: usize,

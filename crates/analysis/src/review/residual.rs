@@ -39,7 +39,7 @@ pub enum OwnCorrelation {
     Samples {
         /// Autocorrelation.
         correlation: Correlation,
-        /// Number of lags that noise on the response correlates.
+        /// Number of lags at which noise on the response correlates the residual.
         span: usize,
     },
     /// Correlation from line to line: real and imaginary part at the distances 1, 2 …

@@ -78,7 +78,7 @@ pub struct SweptParameter {
     pub true_value: Option<f64>,
 }
 
-/// Failure at a setting, or at all that take the same samples.
+/// Failure at a setting, or at all settings that use the same samples.
 pub type Failure = Arc<AnalysisError>;
 
 /// Returns the reason why a setting (a pure number, or Hz) gave no estimate.

@@ -1,4 +1,5 @@
-//! Forces that are held or linear between samples, and AC coupled channels, judged by exact responses.
+//! Forces that are constant or linear between samples, and AC-coupled channels; the reference is
+//! the exact response.
 
 use std::f64::consts::TAU;
 
@@ -11,13 +12,14 @@ use mechid_signal::{NoiseLevel, Record, Sampling, Spectrum, noise};
 use nalgebra::Complex;
 use rayon::prelude::*;
 
-/// 3 kg at 8 Hz with a damping ratio of 0.05.
+/// Oscillator of 3 kg at 8 Hz with a damping ratio of 0.05.
 fn light() -> Sdof {
     let omega = TAU * 8.0;
     Sdof::new(3.0, 2.0 * 0.05 * omega * 3.0, 3.0 * omega * omega).unwrap()
 }
 
-/// White force of 30 s at 100 Hz from rest, held or linear between its samples, and a response with 0.3 % noise.
+/// White force of 30 s at 100 Hz, constant or linear between its samples, and the response from
+/// rest with 0.3 % noise.
 fn simulated(between: Discretisation, kind: ResponseQuantity, seed: u64) -> Measurement {
     let sampling = Sampling::from_rate_hz(100.0, 3000).unwrap();
     let force = noise::white(sampling, 1, 100.0, seed).unwrap();
@@ -44,7 +46,7 @@ fn cause(found: &Identified) -> Option<Cause> {
     causes.next()
 }
 
-/// Number of parameters whose 95 % interval holds.
+/// Number of parameters whose 95 % interval contains the true value.
 fn held(found: &Identified, truth: [f64; 3]) -> usize {
     let holds = |(name, exact): (&str, f64)| {
         let [low, high] = found.estimate().parameter(name).unwrap().interval(0.95).unwrap();
@@ -59,7 +61,8 @@ fn open(between: Option<Discretisation>, coupled: &[&str]) -> Identify {
     Identify::from(Source::Open(OpenFit { acquisition, ..OpenFit::default() }))
 }
 
-/// Of 24 intervals of 95 %, fewer than 20 hold with a probability of 0.006.
+/// If the intervals are right, fewer than 20 of 24 intervals of 95 % contain the true value with a
+/// probability of 0.006.
 #[test]
 fn a_simulated_force_is_named_and_allowed_for() {
     let truth = [light().mass(), light().damping(), light().stiffness()];
@@ -81,13 +84,14 @@ fn a_simulated_force_is_named_and_allowed_for() {
     }
 }
 
-/// 10 kg at 22 Hz with a damping ratio of 0.015, sampled at 512 Hz for 10 s.
+/// Oscillator of 10 kg at 22 Hz with a damping ratio of 0.015, sampled at 512 Hz for 10 s.
 fn heavy() -> Sdof {
     let omega = TAU * 22.0;
     Sdof::new(10.0, 2.0 * 0.015 * omega * 10.0, 10.0 * omega * omega).unwrap()
 }
 
-/// The steady state through a first-order high-pass at `hz`, exact on the lines of its period.
+/// Steady state after a first-order high-pass filter with the corner `hz`, exact on the lines of
+/// its period.
 fn coupled(record: &Record, hz: f64) -> Record {
     let spectrum = Spectrum::from_record(record);
     let spacing = TAU * record.sampling().rate_hz() / record.len() as f64;
@@ -111,8 +115,9 @@ fn random_test(response_hz: Option<f64>, force_hz: Option<f64>, seed: u64) -> Me
     Measurement::from_records(&force, &[(quantity, &noisy)]).unwrap()
 }
 
-/// Of 24 intervals of 95 %, fewer than 20 hold with a probability of 0.006. Without the corner the
-/// intervals are those of a model that leaves something out: they hold, and are wider.
+/// If the intervals are right, fewer than 20 of 24 intervals of 95 % contain the true value with a
+/// probability of 0.006. Without the corner frequency the model lacks a term: the intervals still
+/// contain the true values, but are wider.
 #[test]
 fn an_ac_coupled_response_is_allowed_for() {
     let truth = [heavy().mass(), heavy().damping(), heavy().stiffness()];

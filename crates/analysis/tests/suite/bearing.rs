@@ -1,4 +1,4 @@
-//! Bearing tests on a rig whose film is known.
+//! Bearing tests on a simulated rig with known film coefficients.
 
 use std::f64::consts::TAU;
 
@@ -19,12 +19,13 @@ fn sampling() -> Sampling {
     Sampling::from_rate_hz(1024.0, PERIOD).unwrap()
 }
 
-/// 24 to 200 Hz, none of them a multiple of 50 Hz but two.
+/// Lines from 24 to 200 Hz, 8 Hz apart.
 fn lines() -> Vec<usize> {
     (6..=50).step_by(2).collect()
 }
 
-/// The third row of Lund and Thomsen's table at 3000 rev/min, with or without inertia of the fluid.
+/// Coefficients from the third row of Lund and Thomsen's table at 3000 rev/min, with or without
+/// inertia of the fluid.
 fn film(inertia: f64) -> [Matrix2<f64>; 3] {
     let load = 2500.0;
     let k = load / 100e-6;
@@ -62,7 +63,7 @@ pub(super) fn measurement(test: &RigTest) -> Measurement {
     Measurement::from_records(&test.force, &responses).unwrap().period(PERIOD).unwrap()
 }
 
-/// Tests with the shakers in turn, without noise.
+/// Periods of tests without noise; the shakers act one after the other.
 pub(super) fn periods(rig: &BearingRig, amplitude: f64) -> Vec<RigTest> {
     let one = |(shakers, seed)| rig.period(sampling(), &lines(), amplitude, shakers, seed).unwrap();
     [(Shakers::X, 1), (Shakers::Y, 2)].map(one).to_vec()
@@ -85,7 +86,7 @@ fn values(found: &IdentifiedBearing) -> Vec<f64> {
     found.summary().coefficients.iter().map(|c| c.estimate.value).collect()
 }
 
-/// Largest error over the largest coefficient of its kind.
+/// Largest error of a coefficient, divided by the largest coefficient of its matrix.
 fn worst(found: &IdentifiedBearing, film: &[Matrix2<f64>; 3]) -> f64 {
     let kinds = [found.stiffness(), found.damping(), found.mass()];
     let error = |(a, b): (&Matrix2<f64>, &Matrix2<f64>)| (a - b).amax() / b.amax();
@@ -119,7 +120,7 @@ fn without_noise_twelve_coefficients_are_exact() {
             }
         }
     }
-    // A baseline, run-out, and the lines that it stands on.
+    // With a baseline and run-out, the lines of the run-out are excluded.
     let whole = BearingRig { run_out: vec![2e-6, 1e-6, 5e-7], ..quiet(with_baseline(3.0)) };
     let rig_test = of(&whole, &periods(&whole, 20.0));
     let dry = of(&whole.dry(), &periods(&whole.dry(), 20.0));
@@ -128,7 +129,8 @@ fn without_noise_twelve_coefficients_are_exact() {
     assert_eq!(found.summary().left_out_hz, [48.0, 152.0, 200.0]);
 }
 
-/// d/f and a/f of a rig at 24, 28 … 200 Hz.
+/// Frequency responses d/f and a/f of a rig at 24, 28 … 200 Hz: relative displacement and
+/// acceleration over force.
 fn tables(rig: &BearingRig) -> [FrequencyResponses; 2] {
     let frequency_hz: Vec<f64> = (0..45).map(|k| 24.0 + 4.0 * f64::from(k)).collect();
     [ResponseQuantity::Displacement, ResponseQuantity::Acceleration].map(|quantity| {
@@ -187,15 +189,15 @@ fn tables_of_frequency_responses_give_the_same() {
     refused(&tables, &still, "every frequency is a multiple of the rotation");
 }
 
-/// Results of `count` periods in x and as many in y, and of the tables of d/f and a/f made from them as
-/// `mechid frf` writes them.
+/// Results from records of `count` periods in x and as many in y, and results from the tables of
+/// d/f and a/f that `mechid frf` would write for these records.
 fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [IdentifiedBearing; 2] {
     let mut tables = Vec::new();
     let mut tests = Vec::new();
     for (at, period) in (0..).zip(&periods(rig, 20.0)) {
         let test = rig.measured(period, count, 10 * seed + at).unwrap();
         tests.push(measurement(&test));
-        // The shaker at rest measures its noise, which no table is made of.
+        // The load cell of the shaker at rest measures only noise, so no table is made from it.
         let mut force = test.force.data().clone();
         force.fill_column(1 - at as usize, 0.0);
         let force = Record::new(test.force.sampling(), force).unwrap();
@@ -208,15 +210,17 @@ fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [Identi
             tables.push(FrequencyResponses::parse("h.csv", table.csv().as_bytes()).unwrap());
         }
     }
-    // Lines beside those of the rotation are not the same in a record and in a table of every second line.
+    // Without a rotation frequency both use the same lines; a record and its table differ in the
+    // neighbours of excluded lines.
     let twelve = Coefficients::Twelve;
     let how = IdentifyBearing { rotation_hz: None, coefficients: twelve, ..settings(rig) };
     [BearingData::from_records(&tests, &how), BearingData::from_responses(&tables, &how)]
         .map(|data| identify_bearing(&data.unwrap(), None, &how).unwrap())
 }
 
-/// Where the force is measured without noise and the weights are well known, a record and its tables are
-/// the same data. Noise on the force is common to both responses, which the tables do not tell.
+/// If the force is measured without noise and the weights are accurate, a record and its tables
+/// give the same results. Noise on the force affects both responses alike, which the tables do not
+/// state.
 #[test]
 fn records_and_their_tables_agree() {
     let rig = rig(3.0);
@@ -233,14 +237,14 @@ fn records_and_their_tables_agree() {
                 apart += difference.powi(2) / (12 * runs) as f64;
             }
         }
-        // In standard errors.
+        // The RMS of the differences is given in standard errors.
         assert!(apart.sqrt() < allowed, "{}", apart.sqrt());
-        // Of 360 correlated intervals with standard errors from sixteen periods.
+        // The 360 intervals are correlated, and their standard errors follow from sixteen periods.
         assert!(runs < 30 || (0.88..=0.985).contains(&inside), "{inside}");
     }
 }
 
-/// Share of 95 % intervals that hold the true value.
+/// Share of the 95 % intervals that contain the true value.
 fn share(found: &IdentifiedBearing, film: &[Matrix2<f64>; 3]) -> f64 {
     let rows = &found.summary().coefficients;
     let truth = truth(film, rows.len());
@@ -251,8 +255,8 @@ fn share(found: &IdentifiedBearing, film: &[Matrix2<f64>; 3]) -> f64 {
     inside.count() as f64 / rows.len() as f64
 }
 
-/// Coefficients of one test are correlated: the pooled coverage of 80 tests scatters by about 1 %. The
-/// example `bearing_study` has thousands.
+/// Coefficients of one test are correlated, so the mean coverage of 80 tests scatters by about 1 %.
+/// The example `bearing_study` uses thousands of tests.
 #[test]
 fn intervals_hold_with_the_baseline_subtracted_and_not_without() {
     let runs = 80;
@@ -275,7 +279,7 @@ fn intervals_hold_with_the_baseline_subtracted_and_not_without() {
         assert!(without < 0.7, "{coefficients:?}: {without}");
         let false_alarms = rejected as f64 / runs as f64;
         match coefficients {
-            // Four standard errors of 80 tests are 10 %.
+            // At a rate of 5 %, four standard errors of 80 tests are 10 %.
             Coefficients::Eight => assert!(false_alarms < 0.15, "{false_alarms}"),
             _ => assert!(false_alarms > 0.95, "{false_alarms}"),
         }
@@ -296,7 +300,7 @@ fn a_result_tells_what_a_bearing_engineer_asks() {
     let found = identify_bearing(&tests(20.0), None, &how).unwrap();
     let summary = found.summary();
     let scaled = summary.dimensionless.as_ref().unwrap();
-    // 2.93 and 6.79 in the table.
+    // The table of Lund and Thomsen has 2.93 for kxx and 6.79 for cxx.
     for (name, exact) in [("kxx", 2.93), ("kyx", -0.34), ("cxx", 6.79)] {
         let row = scaled.coefficients.iter().find(|row| row.name == name).unwrap();
         let error = row.estimate.standard_error.unwrap();

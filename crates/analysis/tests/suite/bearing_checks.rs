@@ -1,4 +1,4 @@
-//! Checks of bearing tests, on right data and on wrong data.
+//! Checks of bearing tests on correct data and on faulty data.
 
 use mechid_analysis::bearing::{BearingTable, Coefficients};
 use mechid_analysis::{BearingData, IdentifiedBearing, IdentifyBearing, identify_bearing};
@@ -6,7 +6,7 @@ use mechid_problems::rig::{BearingRig, RigTest};
 
 use super::bearing::{data, measurement, periods, rig, settings, with_baseline};
 
-/// Eight periods of each test, analysed with settings that may differ from those of the rig.
+/// Result of eight periods of each test; the settings may differ from those of the rig.
 fn analysed(
     rig: &BearingRig,
     tests: &[RigTest],
@@ -45,7 +45,7 @@ fn right_tests_pass_their_checks() {
             );
         }
     }
-    // 2 % of 60.
+    // With a rate of 2 %, 1.2 alarms in 60 tests are expected.
     assert!(alarms <= 2, "{alarms}");
 }
 
@@ -66,7 +66,7 @@ fn run_out_under_a_wrong_speed_is_named_and_no_interval_is_given() {
     assert!(numbers[0] <= 50.0 && 50.0 <= numbers[1] && numbers[1] < 55.0, "{found}");
     assert!(summary.coefficients.iter().all(|c| c.estimate.interval.is_none()), "{found}");
     assert!(found.to_string().contains("withheld"), "{found}");
-    // Errors that are withheld are empty cells, and not zero.
+    // A standard error that is not given is an empty cell, not zero.
     let table = BearingTable::new([found]).csv();
     assert!(table.lines().nth(1).unwrap().contains(",,,,,,,,"), "{table}");
 }
@@ -97,8 +97,8 @@ fn eight_coefficients_of_a_fluid_with_inertia_are_a_warning() {
     assert!(!warnings(&found).iter().any(|text| text.contains("inertia")), "{found}");
 }
 
-/// Where the test chooses twelve coefficients of a small inertia, intervals that do not allow for the choice hold
-/// some 70 %.
+/// If the fluid inertia is small and the test chooses twelve coefficients, intervals that ignore
+/// this choice contain the true value in only about 70 % of the cases.
 #[test]
 fn intervals_of_masses_hold_after_the_choice() {
     let rig = rig(0.4);

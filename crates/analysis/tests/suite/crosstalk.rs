@@ -1,4 +1,5 @@
-//! Forces that are seen or act in the place of one another, and sensors with another gain.
+//! Forces with crosstalk between their channels or between the shakers, and sensors with a wrong
+//! gain.
 
 use mechid_analysis::{
     FrfSettings, FrfTable, Identify, Measurement, ResponseQuantity, Segmentation, frf, identify,
@@ -13,7 +14,8 @@ use nalgebra::DMatrix;
 
 const PERIOD: usize = 256;
 
-/// One shaker beside a second channel that has a part of its force, with noise of this part of the force in both.
+/// One shaker and a second force channel that shows `part` of its force; both channels have noise
+/// of `level` times the force.
 fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
     let system = chain(2, Support::Held, 0.02, 3);
@@ -33,8 +35,9 @@ fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -
     if periodic { measured.period(PERIOD).unwrap() } else { measured }
 }
 
-/// Judge: (K − ω²M + iωC)⁻¹. Nothing tells what a force does that is nothing but a part of another one and noise: its
-/// responses would be those to the noise, a hundred times those of the machine.
+/// Reference: (K − ω²M + iωC)⁻¹. If a force channel shows only a part of another force and noise,
+/// the responses to it cannot be determined: an estimate would be the response to the noise, a
+/// hundred times too large.
 #[test]
 fn a_force_that_follows_another_has_no_responses_and_is_told() {
     let system = chain(2, Support::Held, 0.02, 3);
@@ -68,7 +71,8 @@ fn a_force_that_follows_another_has_no_responses_and_is_told() {
     }
 }
 
-/// A second shaker of a twentieth of the force is one, and so is one that half follows the first.
+/// A second shaker with a twentieth of the force counts as a force of its own; so does one that is
+/// half coherent with the first.
 #[test]
 fn a_weak_shaker_of_its_own_is_kept() {
     let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
@@ -101,8 +105,8 @@ fn a_weak_shaker_of_its_own_is_kept() {
     }
 }
 
-/// Two shakers with every second line each, of which a part of the force of each acts at the other too, with noise
-/// of this part of the RMS value in all channels.
+/// Two shakers, each with every second line. A part of each force also acts at the other shaker.
+/// All channels have noise of `level` times the RMS value.
 fn interleaved_shakers(crosstalk: f64, level: f64, seed: u64) -> (SecondOrderSystem, FrfTable) {
     let period = Sampling::new(0.008, PERIOD).unwrap();
     let system = chain(2, Support::Held, 0.02, 3);
@@ -127,8 +131,9 @@ fn interleaved_shakers(crosstalk: f64, level: f64, seed: u64) -> (SecondOrderSys
     (system, frf(&measured, &FrfSettings::default()).unwrap())
 }
 
-/// Judge: (K − ω²M + iωC)⁻¹. Two shakers with every second line each, 1 % of noise in all channels: each
-/// response is given on the lines of its force alone, and there it is the machine's.
+/// Reference: (K − ω²M + iωC)⁻¹. Two shakers have every second line each, with 1 % noise in all
+/// channels. Each response is given only on the lines of its own force, and agrees with the
+/// machine.
 #[test]
 fn responses_to_interleaved_forces_are_those_on_their_own_lines() {
     let (system, table) = interleaved_shakers(0.0, 0.01, 1);
@@ -154,8 +159,8 @@ fn responses_to_interleaved_forces_are_those_on_their_own_lines() {
     assert!(table.to_responses(&[]).is_err());
 }
 
-/// Errors of responses on the lines of their own force, over their standard errors: RMS and largest, and the RMS of
-/// what a part of the other force would make of them.
+/// RMS and largest error of the responses on the lines of their own force, divided by the standard
+/// errors; and the RMS of the error that crosstalk of `part` would cause.
 fn errors_on_own_lines(system: &SecondOrderSystem, table: &FrfTable, part: f64) -> [f64; 3] {
     let (mut errors, mut parts) = (Vec::new(), Vec::new());
     for response in &table.responses {
@@ -173,11 +178,11 @@ fn errors_on_own_lines(system: &SecondOrderSystem, table: &FrfTable, part: f64) 
     [rms(&errors), errors.iter().copied().fold(0.0, f64::max), rms(&parts)]
 }
 
-/// Judge: (K − ω²M + iωC)⁻¹. Noise in the channels alone is no crosstalk, and what 2 % of it would do is no longer in
-/// the responses.
+/// Reference: (K − ω²M + iωC)⁻¹. Noise alone is not reported as crosstalk, and the effect of 2 %
+/// crosstalk is subtracted from the responses.
 #[test]
 fn crosstalk_between_interleaved_forces_is_told_and_taken_off() {
-    let told = |table: &FrfTable| table.to_string().matches("of the latter").count();
+    let told = |table: &FrfTable| table.to_string().matches("was subtracted there").count();
     for seed in 0..10 {
         let (_, table) = interleaved_shakers(0.0, 0.002, seed);
         assert_eq!(told(&table), 0, "{seed}: {table}");
@@ -189,8 +194,9 @@ fn crosstalk_between_interleaved_forces_is_told_and_taken_off() {
     }
 }
 
-/// Judge: the machine, and the factor. One sensor in mm beside one in m, or 20 % off, leaves nothing in the residual and
-/// M diagonal; a bearing, whose C and K are not symmetric either, is no such case, nor is a right record.
+/// Reference: the machine and the factor. A sensor in mm next to one in m, or one with a gain 20 %
+/// too large, changes neither the residual nor the diagonal of M, only the symmetry of C and K. A
+/// bearing, whose C and K are not symmetric either, is not reported, nor is a correct record.
 #[test]
 fn a_sensor_with_another_gain_is_told_by_damping_and_stiffness() {
     let period = Sampling::new(0.002, 1024).unwrap();

@@ -1,4 +1,4 @@
-//! Free decays from record to result, judged by an exact sum of decays.
+//! Free decays from record to result; the reference is an exact sum of decays.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,8 @@ use serde_json::Value;
 
 const RELEASE: f64 = 0.5;
 
-/// Two channels at 500 Hz, pulled until [`RELEASE`], then decays of 6 Hz and 1 % and of 30 Hz and 2 %.
+/// Two channels at 500 Hz: a static pull until [`RELEASE`], then decays of a mode at 6 Hz with 1 %
+/// damping and one at 30 Hz with 2 %.
 fn record() -> (Sampling, [Vec<f64>; 2]) {
     let sampling = Sampling::from_rate_hz(500.0, 2000).unwrap();
     let noise = noise::white(sampling, 2, 2e-6, 4).unwrap();
@@ -65,7 +66,7 @@ fn modes_and_their_release_are_found() {
     assert!(text.contains("2 modes; ± is one standard error"), "{text}");
 }
 
-/// The settings that a result carries repeat it, and unknown ones are refused.
+/// The settings in a result repeat the analysis, and unknown settings are refused.
 #[test]
 fn settings_are_saved_and_read_back() {
     let how = DecaySettings { from_s: Some(0.6), to_s: Some(3.0), ..DecaySettings::default() };
@@ -77,7 +78,7 @@ fn settings_are_saved_and_read_back() {
     assert_eq!(again, how);
     assert!(serde_json::from_str::<DecaySettings>(r#"{"mode": 2}"#).is_err());
     assert_eq!(serde_json::from_str::<DecaySettings>("{}").unwrap(), DecaySettings::default());
-    // The window counts first.
+    // The time of release counts from the start of the window.
     let window = Window { start: 101, ..Window::default() };
     let later = measurement().window(window).unwrap();
     let how = DecaySettings { from_s: Some(0.4), to_s: Some(2.8), ..DecaySettings::default() };
@@ -91,13 +92,13 @@ fn what_speaks_against_a_fit_is_told() {
         assert!(remarks.iter().any(|remark| remark.contains(what)), "{what}: {remarks:?}");
     };
     let from_s = Some(RELEASE);
-    // A mode too few is a coloured residual: an autoregression can pass for it.
+    // With one mode too few the residual is coloured; it then looks like autoregressive noise.
     told(DecaySettings { modes: Some(1), from_s, ..DecaySettings::default() }, "coloured");
-    // A hundredth of a second before the release: a mode that is none, or what the right modes leave.
+    // A start a hundredth of a second before the release gives a false mode, or a large residual.
     let early = DecaySettings { from_s: Some(RELEASE - 0.01), ..DecaySettings::default() };
     told(early, "hardly an oscillation");
     told(DecaySettings { modes: Some(2), ..early }, "first samples");
-    // Less than two cycles.
+    // The section has less than two cycles.
     let how = DecaySettings {
         from_s,
         to_s: Some(RELEASE + 0.25),
@@ -130,7 +131,7 @@ fn what_cannot_be_analysed_is_refused() {
     assert!(matches!(decay(&none, &default), Err(AnalysisError::NoMotion)));
 }
 
-/// The same record without noise in steps of a converter, which leave a square wave of the last cycles.
+/// The same record without noise, quantised: the last cycles of the decay are a square wave.
 #[test]
 fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
     for bits in [8, 10, 12] {
@@ -162,7 +163,7 @@ fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
             let off = (damping.value - zeta / (1.0 + zeta * zeta).sqrt()).abs();
             assert!(off < 4.0 * damping.standard_error.unwrap(), "{bits}: {damping:?}");
         }
-        // The whole of it shows more modes than there are.
+        // The whole record shows more modes than the structure has.
         let whole = DecaySettings { to_s: Some(sampling.duration()), ..DecaySettings::default() };
         assert!(decay(&test, &whole).unwrap().summary().modes.len() > 2, "{bits}");
     }

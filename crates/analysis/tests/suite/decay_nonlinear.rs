@@ -1,4 +1,4 @@
-//! Free decays that no sum of decaying oscillations describes, and those that it does.
+//! Free decays that are not a sum of decaying oscillations, and free decays that are.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,7 +20,8 @@ fn told(found: &Decayed, words: &str) -> bool {
     found.summary().remarks.iter().any(|remark| remark.contains(words))
 }
 
-/// Solution of ẍ = f(x, ẋ) from rest at `first`, by the Runge–Kutta method with 50 steps a sample.
+/// Solution of ẍ = f(x, ẋ) from rest at `first`, by the Runge–Kutta method with 50 steps per
+/// sample.
 fn solved(sampling: Sampling, first: f64, force: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     const STEPS: usize = 50;
     let h = sampling.dt() / STEPS as f64;
@@ -42,7 +43,8 @@ fn solved(sampling: Sampling, first: f64, force: impl Fn(f64, f64) -> f64) -> Ve
     samples
 }
 
-/// ẍ + 2·0.005 ω ẋ + 3 |ẋ| ẋ + ω² x = 0: the mean power of the drag makes ζ(a) = 0.005 + 4·3 a/(3π).
+/// The oscillator ẍ + 2·0.005 ω ẋ + 3 |ẋ| ẋ + ω² x = 0: the mean power of the drag gives ζ(a) =
+/// 0.005 + 4·3 a/(3π) at the amplitude a.
 #[test]
 fn quadratic_drag_is_damping_over_amplitude() {
     let sampling = Sampling::from_rate_hz(100.0, 1200).unwrap();
@@ -56,7 +58,7 @@ fn quadratic_drag_is_damping_over_amplitude() {
         let zeta = 0.005 + 4.0 * point.amplitude / PI;
         let off = point.damping_ratio.value - zeta;
         let error = point.damping_ratio.standard_error.unwrap();
-        // The slow flow itself errs by the square of the damping.
+        // The formula itself has an error of the order of the squared damping ratio.
         assert!(off.abs() < 4.0 * error + 1.5 * zeta * zeta, "{found}");
         assert!(error < 0.1 * zeta, "{found}");
         let frequency = point.frequency_hz.value;
@@ -66,7 +68,8 @@ fn quadratic_drag_is_damping_over_amplitude() {
     assert!(first > 0.035 && last < 0.01, "{found}");
 }
 
-/// ẍ + 2·0.01 ω ẋ + ω² x (1 + κ x²) = 0 oscillates at ω (1 + 3/8 κ a²), to first order.
+/// The oscillator ẍ + 2·0.01 ω ẋ + ω² x (1 + κ x²) = 0 has the frequency ω (1 + 3/8 κ a²) at the
+/// amplitude a, to first order.
 #[test]
 fn a_duffing_oscillator_is_frequency_over_amplitude() {
     let sampling = Sampling::from_rate_hz(200.0, 2000).unwrap();
@@ -76,7 +79,7 @@ fn a_duffing_oscillator_is_frequency_over_amplitude() {
     let backbone = found.summary().backbone.as_ref().unwrap();
     for point in &backbone.points {
         let square = point.amplitude * point.amplitude;
-        // Damped by 1 %.
+        // The damping ratio of 1 % lowers the frequency to 0.99995 of the undamped one.
         let exact = 5.0 * (0.99995 + 0.375 * kappa * square);
         let error = point.frequency_hz.standard_error.unwrap();
         let off = (point.frequency_hz.value - exact).abs();
@@ -86,7 +89,7 @@ fn a_duffing_oscillator_is_frequency_over_amplitude() {
     assert!(told(&found, "does not fall exponentially"), "{found}");
 }
 
-/// Sum of decays of frequency, damping ratio and amplitude.
+/// Sum of decays, each given by frequency, damping ratio and amplitude.
 fn decays(sampling: Sampling, modes: &[[f64; 3]]) -> Vec<f64> {
     let value = |t: f64| {
         let each = modes.iter().map(|[hz, zeta, size]| {
@@ -104,7 +107,7 @@ fn linear_decays_have_no_backbone_no_harmonic_and_no_second_hit() {
     let sets: [&[[f64; 3]]; 4] = [
         &[[5.0, 0.01, 1.0]],
         &[[5.0, 0.01, 1.0], [17.0, 0.02, 0.5]],
-        // A close pair, and two of one frequency of which one decays faster.
+        // The next case has two close modes, the last two nearly equal frequencies.
         &[[5.0, 0.01, 1.0], [5.1, 0.008, 0.7]],
         &[[5.0, 0.004, 1.0], [5.05, 0.02, 0.8], [23.0, 0.01, 0.4]],
     ];
@@ -117,7 +120,7 @@ fn linear_decays_have_no_backbone_no_harmonic_and_no_second_hit() {
             || summary.modes.iter().any(|mode| mode.harmonic.is_some());
         false_alarms += u32::from(is_wrong);
     }
-    // 2 % of 60.
+    // With a rate of 2 %, 1.2 false alarms in 60 records are expected.
     assert!(false_alarms <= 1, "{false_alarms}");
 }
 

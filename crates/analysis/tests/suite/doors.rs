@@ -1,5 +1,5 @@
-//! The analysis as a caller in Rust meets it: files and arrays, units, windows, saved settings, and
-//! errors, judged by exact steady states.
+//! The analysis as a Rust program uses it: files and arrays, units, windows, saved settings, and
+//! errors. The references are exact steady states.
 
 use mechid_analysis::identify::{KnownMass, Method, ValidationWindow};
 use mechid_analysis::reconstruct::reconstruct_in_chunks;
@@ -83,7 +83,7 @@ fn a_column_in_a_unit_of_another_quantity_is_refused() {
 #[test]
 fn every_kind_of_fit_is_a_value_that_survives_json() {
     let (force, exact) = steady_state();
-    // Maximum likelihood refuses periods without any noise.
+    // The noise is needed because maximum likelihood refuses periods without noise.
     let noisy = |(seed, exact): (u64, &Record)| {
         let level = 1e-7 * exact.data().norm() / (exact.len() as f64).sqrt();
         let noise = noise::white(exact.sampling(), 1, level, seed).unwrap();
@@ -109,7 +109,7 @@ fn every_kind_of_fit_is_a_value_that_survives_json() {
         let [first, second] =
             [&how, &again].map(|how| identify(std::slice::from_ref(&test), how).unwrap());
         assert_eq!(serde_json::to_string(&first).unwrap(), serde_json::to_string(&second).unwrap());
-        // A result repeats itself.
+        // A result contains the settings that repeat it.
         assert_eq!(first.summary().analysis, how);
         let free = first.estimate().parameter("k").unwrap().value;
         assert!((free / 142_000.0 - 1.0).abs() < 1e-5, "{saved}: {free}");
@@ -156,7 +156,7 @@ fn the_force_of_an_identified_machine_counts_its_covariance() {
     let period = truth.window(0, PERIOD).unwrap();
     let apart = (force.force().record().data() - period.data()).norm() / period.data().norm();
     assert!(apart < 1e-3, "{apart}");
-    // A known machine has nothing to count.
+    // A known machine has no covariance, so its uncertainty is not included.
     let known = Machine::known(machine().system());
     let force = reconstruct(&test, &known, &Reconstruct::auto()).unwrap();
     assert!(!force.summary().machine_uncertainty);
@@ -207,7 +207,7 @@ fn what_does_not_fit_together_is_refused_by_name() {
     assert!(matches!(mixed, Err(AnalysisError::DegreesOfFreedom { got: 2, dofs: 1, .. })));
     assert!(matches!(identify(&[], &Identify::default()), Err(AnalysisError::NoRecord)));
 
-    // A reference of another number of degrees of freedom.
+    // The reference has another number of degrees of freedom.
     let sweep = SweepSettings {
         kind: mechid_analysis::sweep::Kind::Decimation,
         settings: "1".parse().unwrap(),
@@ -237,7 +237,7 @@ fn a_window_outside_the_record_says_what_there_is() {
     }
 }
 
-/// A response that is the force itself leaves no residual at all.
+/// A response that equals the force has no residual; the analysis must not panic.
 #[test]
 fn a_response_equal_to_the_force_is_no_panic() {
     for periods in [1, 2, 4] {
@@ -249,7 +249,7 @@ fn a_response_equal_to_the_force_is_no_panic() {
         for kind in [ResponseQuantity::Displacement, ResponseQuantity::Acceleration] {
             let test = Measurement::from_records(&force, &[(kind, &force)]).unwrap();
             for how in [Identify::default(), Identify::spectra(Method::LeastSquares)] {
-                // A machine or a reason why not.
+                // The result is a machine, or an error.
                 if let Ok(found) = identify(&[test.clone().period(24).unwrap()], &how) {
                     assert!(found.checks().iter().all(|check| !check.text.contains("NaN")));
                 }
@@ -258,7 +258,8 @@ fn a_response_equal_to_the_force_is_no_panic() {
     }
 }
 
-/// A grounded chain of 26 masses, a force on each: 2,028 parameters, whose covariance has four million entries.
+/// A grounded chain of 26 masses with a force on each has 2,028 parameters, whose covariance has
+/// four million entries.
 #[test]
 fn the_covariance_of_very_many_parameters_is_there_for_those_who_ask() {
     let n = 26;
@@ -294,7 +295,7 @@ fn the_covariance_of_very_many_parameters_is_there_for_those_who_ask() {
     }
 }
 
-/// A spreadsheet of Windows writes names in Latin-1: `µ` and `²` are one byte each.
+/// Spreadsheets on Windows write names in Latin-1, in which `µ` and `²` are one byte each.
 #[test]
 fn units_are_read_in_names_that_are_not_utf8() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! One error rate for all checks: on records that the model fits, at most one in fifty shows any warning.
+//! Rate of false alarms of all checks together: on records that fit the model, at most one in fifty
+//! shows a warning.
 
 use mechid_analysis::identify::{Method, SampleFit, Source};
 use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};
@@ -6,7 +7,7 @@ use mechid_model::{Discretisation, Sdof};
 use mechid_problems::{exact_harmonic_periodic, exact_zoh_periodic};
 use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 
-/// Records of each kind.
+/// Number of records of each kind.
 const RECORDS: u64 = 1000;
 
 const PERIOD: usize = 128;
@@ -21,7 +22,7 @@ fn force(seed: u64) -> Record {
     Multisine::flat(1..=40, 10.0, Phases::Random { seed }).unwrap().sample(period).unwrap()
 }
 
-/// Number of records with any warning.
+/// Number of records with at least one warning.
 fn warned(how: &Identify, record: impl Fn(u64) -> Measurement) -> u64 {
     let is_warned = |seed: &u64| {
         let found = identify(&[record(*seed)], how).unwrap();
@@ -31,7 +32,7 @@ fn warned(how: &Identify, record: impl Fn(u64) -> Measurement) -> u64 {
     (0..RECORDS).filter(is_warned).count() as u64
 }
 
-/// Several periods of a steady state, with noise on the force, the displacement, or both.
+/// Several periods of a steady state with noise on the force, the displacement, or both.
 fn periods(seed: u64, [on_force, on_response]: [bool; 2]) -> Measurement {
     let force = force(seed);
     let system = Sdof::new(10.0, 180.0, 9000.0).unwrap().system();
@@ -46,8 +47,9 @@ fn periods(seed: u64, [on_force, on_response]: [bool; 2]) -> Measurement {
     Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap()
 }
 
-/// Displacement, velocity and acceleration under a held force with a disturbance; the force that is
-/// measured lacks the disturbance, or the response does.
+/// Displacement, velocity and acceleration under a force that is constant between samples, with a
+/// disturbance. If `disturbed`, the disturbance acts but is not measured; otherwise it is measured
+/// but does not act.
 fn samples(seed: u64, disturbed: bool) -> Measurement {
     let clean = force(seed).repeated(PERIODS).unwrap();
     let disturbed_force = noisy(&clean, seed);
@@ -63,8 +65,8 @@ fn samples(seed: u64, disturbed: bool) -> Measurement {
     Measurement::from_records(measured, &responses).unwrap()
 }
 
-/// Limit from the binomial distribution: with a rate of 1 in 50 more than 35 of 1,000 records warn with a
-/// probability below 0.001; the rate stated is 1 in 100.
+/// Limit from the binomial distribution: at a rate of 1 in 50, more than 35 of 1,000 records warn
+/// with a probability below 0.001. The stated rate is 1 in 100.
 fn assert_few_warned(how: &Identify, record: impl Fn(u64) -> Measurement) {
     let count = warned(how, record);
     assert!(count <= RECORDS / 50, "{count} of {RECORDS}");

@@ -1,4 +1,4 @@
-//! Faults of measuring chains, made by a generator: each is told, and nothing else is.
+//! Simulated faults of measuring chains: each fault is reported, and no other.
 
 use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};
 use mechid_model::SecondOrderSystem;
@@ -17,7 +17,7 @@ fn machine() -> SecondOrderSystem {
     SecondOrderSystem::new(mass, damping, stiffness).unwrap()
 }
 
-/// A record with a fault put on the forces, on the responses, or on both.
+/// A record with a fault on the forces, on the responses, or on both.
 fn record(fault: Option<&Fault>, on: [bool; 2], seed: u64) -> Measurement {
     let sampling = Sampling::new(0.002, PERIOD).unwrap();
     let of = |channel: u64| {
@@ -40,14 +40,14 @@ fn record(fault: Option<&Fault>, on: [bool; 2], seed: u64) -> Measurement {
     Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap()
 }
 
-/// Subjects warned of in such a record.
+/// Subjects of the warnings on such a record.
 fn warnings(fault: Option<&Fault>, on: [bool; 2], seed: u64) -> Vec<String> {
     let found = identify(&[record(fault, on, seed)], &Identify::default()).unwrap();
     let warned = found.checks().iter().filter(|check| check.is_conspicuous());
     warned.map(|check| check.subject.to_string()).collect()
 }
 
-/// Judge: the generator, which knows what is wrong.
+/// Reference: the generator, which knows the fault.
 #[test]
 fn every_fault_is_told_by_a_check_that_is_meant_for_it() {
     let (force, response, both) = ([true, false], [false, true], [true, true]);
@@ -74,8 +74,9 @@ fn every_fault_is_told_by_a_check_that_is_meant_for_it() {
     }
 }
 
-/// Forces read in steps of a converter of 8 bits, alike in all periods: the mean square of 480 errors over their standard
-/// errors, of which those of one record are not independent, is known to some 0.12.
+/// Forces quantised by a converter of 8 bits, with the same error in all periods. The mean square
+/// of 480 errors over their standard errors is known to about 0.12, because the errors of one
+/// record are correlated.
 #[test]
 fn intervals_hold_beside_forces_in_steps() {
     let machine = machine();
@@ -95,7 +96,8 @@ fn intervals_hold_beside_forces_in_steps() {
     assert!((0.65..1.35).contains(&mean), "{mean}");
 }
 
-/// Judge: the generator. The modes of such a machine are right, and only the sign of its mass is impossible.
+/// Reference: the generator. The modes of such a machine are correct, and only the sign of its mass
+/// is impossible.
 #[test]
 fn a_response_of_the_wrong_sign_is_told() {
     for seed in 0..8 {
@@ -104,8 +106,8 @@ fn a_response_of_the_wrong_sign_is_told() {
     }
 }
 
-/// Judge: the error rate of 1 % of each of two families of tests; of 150 records more than 8 warn with a probability
-/// below 0.01.
+/// Reference: two families of tests with an error rate of 1 % each. More than 8 of 150 records warn
+/// with a probability below 0.01.
 #[test]
 fn records_without_a_fault_seldom_warn() {
     let warned = |seed: &u64| !warnings(None, [true, true], *seed).is_empty();

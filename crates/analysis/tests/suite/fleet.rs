@@ -1,5 +1,5 @@
-//! Many records by one analysis: rows judged by single identifications, and parts that are neither
-//! lost nor made twice.
+//! Analysis of many records with the same settings: each row equals that of a single
+//! identification, and no part is lost or computed twice.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -28,7 +28,7 @@ fn analysis() -> SavedAnalysis {
     }
 }
 
-/// Records that can be identified, each with another force, and four that cannot.
+/// Records that can be identified, each with another force, and four records that cannot.
 fn records(home: &TempDir) -> Vec<PathBuf> {
     let rig = fs::read_to_string(RIG).unwrap();
     let mut all = Vec::new();
@@ -133,19 +133,19 @@ fn parts_are_the_same_for_any_number_of_workers_and_made_once() {
     assert_eq!(table.len(), 4);
     assert!(table == contents(&two));
 
-    // Again: nothing is computed, and the summary is the same.
+    // A second run computes no part again, and its summary is the same.
     let again = run(&records, &one, 2);
     assert_eq!(again.computed_records, 0);
     assert_eq!((again.failed, &again.failures), (first.failed, &first.failures));
 
-    // A part that is lost, or damaged, is made again as it was.
+    // A part that is lost or damaged is computed again with the same content.
     let names: Vec<&String> = table.keys().collect();
     fs::remove_file(one.join(names[0])).unwrap();
     fs::write(one.join(names[1]), &table[names[1]][..100]).unwrap();
     assert_eq!(run(&records, &one, 2).computed_parts, 2);
     assert!(table == contents(&one));
 
-    // A record that changes makes another part; the old one is told.
+    // A changed record gives a new part; the old part is reported.
     fs::write(&records[0], fs::read_to_string(RIG).unwrap()).unwrap();
     let changed = run(&records, &one, 2);
     assert_eq!((changed.computed_parts, changed.other_parts), (1, 1));
@@ -168,7 +168,8 @@ fn an_analysis_that_fits_no_record_is_refused_at_once() {
     assert_ne!(analysis().hash(), SavedAnalysis::default().hash());
 }
 
-/// One file with records of the example record: complete, cut short, not finite in a sample, complete.
+/// One file with four records made from the example record: a complete one, one cut short, one with
+/// a sample that is not finite, and another complete one.
 fn one_file(home: &TempDir) -> PathBuf {
     let rig = Table::read(RIG).unwrap();
     let rig = rig.record(&TimeAxis::Column("time"), &["force", "displacement"]).unwrap();
@@ -217,7 +218,7 @@ fn a_file_of_many_records_makes_a_row_for_each() {
     assert!(failure("io.not-finite").message.contains("(record broken), sample 8"));
     assert!(failure("analysis.window").message.contains("(record cut) has 100"));
 
-    // A record chosen alone gives the same numbers as in its part, and as its own file.
+    // A single record gives the same numbers as in its part and as in its own file.
     let alone = |id: &str| {
         let reading = Reading { record_id: Some(id.into()), ..analysis.reading.clone() };
         SavedAnalysis { reading, ..analysis.clone() }
@@ -242,7 +243,7 @@ fn a_file_of_many_records_makes_a_row_for_each() {
         error.ends_with("holds 4 records (monday, cut, broken, friday), none of which is sunday"),
         "{error}"
     );
-    // A column that does not tell records apart is the error of the file's row.
+    // If the column does not identify records, the row of the file has the error.
     let reading = Reading { record_column: Some("force".into()), ..Reading::default() };
     let wrong = SavedAnalysis { reading, ..self::analysis() };
     let summary = Fleet::new(wrong, &[path], &folder, 3).unwrap().run(1, &|_| ()).unwrap();
@@ -265,7 +266,8 @@ fn a_folder_of_results_is_read_back_as_it_was_computed() {
 #[test]
 fn trends_find_what_stands_out_and_nothing_else() {
     let rig = analysis().row("rig", || analysis().open(RIG));
-    // Normal values around 25 kg, and one far from them; numbers in the names run against their order.
+    // The values are normal around 25 kg, except one far from them; the numbers in the names
+    // decrease with the index.
     let noise = noise::white(Sampling::new(1.0, 2000).unwrap(), 1, 0.2, 7).unwrap();
     let rows: Vec<_> = (0..)
         .zip(noise.channel(0))
@@ -292,9 +294,9 @@ fn trends_find_what_stands_out_and_nothing_else() {
     assert_eq!(mass.points[0].at, 3001.0);
     let outliers: Vec<&str> = mass.outliers().map(|point| point.record.as_str()).collect();
     assert!(outliers.contains(&"speed-3766.csv"));
-    // 3.5 standard deviations leave one normal value in two thousand.
+    // One of two thousand normal values lies beyond 3.5 standard deviations.
     assert!(outliers.len() <= 4, "{outliers:?}");
-    // The interval is that of the record.
+    // The interval is the one that the record's row states.
     let interval = mass.points[0].interval.unwrap();
     let error = mass.points[0].standard_error.unwrap();
     assert!(interval[1] - interval[0] > 3.9 * error);

@@ -1,4 +1,4 @@
-//! Hammer tests of two masses whose response is known in closed form.
+//! Hammer tests of two masses; the reference is their response in closed form.
 
 use mechid_analysis::identify::{Band, LineChoice};
 use mechid_analysis::{
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 const ACCELERATION: ResponseQuantity = ResponseQuantity::Acceleration;
 
-/// Two masses at 24 and 61 Hz, five hits in 2.5 s.
+/// Two masses with modes at 24 and 61 Hz, struck five times in 2.5 s.
 fn rig(quantity: ResponseQuantity) -> HammerTest {
     HammerTest {
         frequencies_hz: vec![24.0, 61.0],
@@ -39,7 +39,7 @@ fn measured(rig: &HammerTest, record: &HammerRecord, dof: usize) -> Measurement 
     test.named(&format!("point {}", dof + 1))
 }
 
-/// Hits on one of the masses, two of five of them bad, with noise on the response.
+/// Hits on one of the masses with noise on the response; two of the five hits are bad.
 fn hammer(rig: &HammerTest, dof: usize, seed: u64) -> Measurement {
     let record = rig.measure(dof, 2, 2 * seed + dof as u64).unwrap();
     let level = match rig.quantity {
@@ -67,8 +67,8 @@ fn roving(quantity: ResponseQuantity, seed: u64) -> Identified {
     identify(&[hammer(&rig, 0, seed), hammer(&rig, 1, seed)], &settings()).unwrap()
 }
 
-/// The same test with a column for the force on each mass, that of the mass which is not struck being noise and a part
-/// of the other.
+/// The same test with a force channel for each mass. The channel of the mass that is not struck has
+/// noise and a part of the other force.
 fn with_both_forces(rig: &HammerTest, dof: usize, noise_n: f64, part: f64) -> Measurement {
     let record = rig.measure(dof, 2, dof as u64).unwrap();
     let level = NoiseLevel::StandardDeviation(0.05);
@@ -83,7 +83,8 @@ fn with_both_forces(rig: &HammerTest, dof: usize, noise_n: f64, part: f64) -> Me
     Measurement::from_records(&force, &[(rig.quantity, &response)]).unwrap()
 }
 
-/// Judge: the same test with zero in the column. A few per cent of the blow in the other column are a force.
+/// Reference: the same test with zeros in this channel. If the channel shows a few per cent of the
+/// blow, that is a force.
 #[test]
 fn a_column_that_shows_noise_alone_is_no_second_hammer() {
     let rig = rig(ACCELERATION);
@@ -107,8 +108,8 @@ fn a_column_that_shows_noise_alone_is_no_second_hammer() {
     }
 }
 
-/// Of 72 and 36 intervals of 95 %, which depend on one another by twelves, fewer than 85 % are not to be expected; damping
-/// ratios scatter by some thousandths.
+/// At least 85 % of 72 or of 36 intervals of 95 % must contain the true value; groups of twelve are
+/// correlated. The damping ratios scatter by some thousandths.
 #[test]
 fn a_roving_hammer_finds_the_machine() {
     for (quantity, runs) in [(ACCELERATION, 6), (ResponseQuantity::Displacement, 3)] {
@@ -138,8 +139,9 @@ fn a_roving_hammer_finds_the_machine() {
     }
 }
 
-/// The spectra drawn of hits are the response to the one force that acts, on every line: the acceleration is that of the
-/// machine but for six times the noise (0.05 m/s² on a sample, 2/√N of it on a line).
+/// The spectra of hits in the figures are the response to the only force that acts. On every line
+/// the acceleration agrees with the machine to six times the noise (0.05 m/s² on a sample, 2/√N of
+/// it on a line of N samples).
 #[test]
 fn the_receptance_of_hits_is_that_of_the_machine() {
     let truth = rig(ACCELERATION).system().unwrap();
@@ -186,13 +188,13 @@ fn hits_that_are_left_out_are_told_with_their_reasons() {
     assert_eq!(json["file"], "point 1");
     assert_eq!(json["hits"].as_array().unwrap().len(), 10);
     assert_eq!(json["analysis"]["hits"]["trigger_percent"], 0.5);
-    // What is not said is as before.
+    // Settings without hits do not mention them.
     let one = serde_json::to_value(Identify::default()).unwrap();
     assert!(one.get("hits").is_none());
 }
 
-/// A tap of 3 % of the usual force between two hits, too light to be a double hit: without it in the force the response
-/// that it leaves would be fitted as that to the hit before.
+/// A tap of 3 % of the usual force between two hits is too light to be a double hit. If the force
+/// left the tap out, the response to it would be attributed to the hit before.
 #[test]
 fn light_taps_between_hits_are_listed_and_cost_no_good_hit() {
     let rig = rig(ACCELERATION);
@@ -213,7 +215,7 @@ fn light_taps_between_hits_are_listed_and_cost_no_good_hit() {
         let of_tap = rows.iter().find(|row| (row.time_s - at).abs() < 0.01);
         match of_tap {
             Some(row) => assert!(row.reasons[0].starts_with("weak hit"), "seed {seed}: {row}"),
-            // Soon after the hit it is part of it.
+            // A tap soon after a hit counts as part of that hit.
             None => assert!(apart < 0.12, "seed {seed}: {apart} s"),
         }
         let used = rows.iter().filter(|row| row.used).count();
@@ -230,7 +232,7 @@ fn light_taps_between_hits_are_listed_and_cost_no_good_hit() {
     assert!(all >= 14 && inside + 2 >= all, "{inside} of {all}");
 }
 
-/// A record of hits that is not cut into them says so, and one that is no hammer test does not.
+/// A hammer test that is not cut into hits shows a warning; a record of another test does not.
 #[test]
 fn a_hammer_test_that_is_not_cut_is_told_of() {
     let rig = rig(ACCELERATION);
@@ -252,7 +254,8 @@ fn a_hammer_test_that_is_not_cut_is_told_of() {
     assert!(!found.to_string().contains("`hits`"), "{found}");
 }
 
-/// Records without a period are cut into segments, several as one, unless they end at rest.
+/// Several records without a period are cut into segments like a single one, unless they end at
+/// rest.
 #[test]
 fn several_random_records_are_not_averaged_whole() {
     let sampling = Sampling::from_rate_hz(256.0, 3000).unwrap();
@@ -261,7 +264,7 @@ fn several_random_records_are_not_averaged_whole() {
         if still {
             force[1500..].fill(0.0);
         }
-        // A mass of 2 kg, exactly.
+        // The response is exactly that of a mass of 2 kg.
         let response: Vec<f64> = force.iter().map(|f| 0.5 * f).collect();
         let channels = Channels::new("f", ACCELERATION, "a");
         Measurement::from_columns(sampling, &[("f", &force), ("a", &response)], &channels).unwrap()
@@ -276,7 +279,7 @@ fn several_random_records_are_not_averaged_whole() {
     assert_eq!(window(&[0, 0, 0].map(|seed| of(seed, false))).0, None);
 }
 
-/// Lines at which the force channel shows its noise alone are no response to it.
+/// Frequency responses have no lines at which the force channel shows only noise.
 #[test]
 fn lines_without_force_are_left_out_of_segments() {
     let sampling = Sampling::from_rate_hz(256.0, 8192).unwrap();
@@ -297,14 +300,14 @@ fn lines_without_force_are_left_out_of_segments() {
         assert!((56.0..=66.0).contains(&last), "{last} Hz");
         let largest = table.responses[0].magnitude.iter().copied().fold(0.0, f64::max);
         assert!((largest - 0.5).abs() < 0.02, "{largest}");
-        // Lines that were asked for stand.
+        // All lines that the user chose are kept.
         let how = FrfSettings { lines: "1:20".parse().unwrap(), ..FrfSettings::default() };
         assert_eq!(frf(&test, &how).unwrap().frequency_hz.len(), 20);
     }
 }
 
-/// Under an exponential window the response at iω is that at iω + σ; without one the response that is left at the end
-/// is told.
+/// Under an exponential window e^(−σt) the response at iω is that of the machine at iω + σ. Without
+/// a window a remark reports the response that has not decayed at the end.
 #[test]
 fn frequency_responses_are_those_of_the_machine_with_the_decay_of_the_window() {
     let sampling = Sampling::from_rate_hz(1024.0, 5 * 4096).unwrap();
@@ -338,7 +341,7 @@ fn frequency_responses_are_those_of_the_machine_with_the_decay_of_the_window() {
         }
         assert!(apart < 0.01 * largest, "{number}: {apart} of {largest}");
     }
-    // The table that is written states its window and what was measured; a universal file, too.
+    // A written table states its window and the measured quantity; so does a universal file.
     let written = [
         ("a.csv", table.csv()),
         ("a.unv", table.to_responses(&[]).unwrap().to_universal_file().unwrap()),
@@ -358,7 +361,7 @@ fn frequency_responses_are_those_of_the_machine_with_the_decay_of_the_window() {
         let error = error.unwrap_err().to_string();
         assert!(error.contains("states acceleration, not velocity"), "{error}");
     }
-    // Nothing is averaged over bad hits.
+    // Only the good hits are averaged.
     assert_eq!((table.hits.len(), table.segments.averages), (5, 5.0));
 
     let plain = frf(&test, &FrfSettings { exponential_percent: None, ..how.clone() }).unwrap();
@@ -379,7 +382,7 @@ fn what_hits_cannot_be_found_in_is_refused() {
         other => panic!("{other}"),
     };
     refused(&hits(HitRule { trigger_percent: -1.0, ..HitRule::default() }));
-    // Every hit is weak beside the median of all, or has too little room.
+    // With windows of 2,000 samples no hit has enough room.
     let how = hits(HitRule { samples: Some(2000), ..HitRule::default() });
     let error = identify(std::slice::from_ref(&test), &how).unwrap_err();
     assert!(matches!(error, AnalysisError::NoHit { .. }), "{error}");
@@ -393,7 +396,7 @@ fn what_hits_cannot_be_found_in_is_refused() {
     assert!(Channels::new("f,g", ACCELERATION, "x1,x2").struck(&[1], 1).is_err());
 }
 
-/// Records in memory all have the same name.
+/// Records in memory all have the same name, but their hits must be counted once each.
 #[test]
 fn hits_of_records_with_one_name_are_counted_once() {
     let rig = rig(ACCELERATION);

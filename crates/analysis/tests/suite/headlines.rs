@@ -1,4 +1,4 @@
-//! Headline figures against the checks beside them: neither says that all is well where the other knows better.
+//! Headline figures and checks of a result must not contradict each other.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ fn oscillator() -> Sdof {
     Sdof::from_modal(10.0, 0.03, HZ * TAU).unwrap()
 }
 
-/// Steady states in closed form under a multisine of 256 samples, with noise of 1 % on every response.
+/// Exact steady states under a multisine of 256 samples, with 1 % noise on every response.
 fn steady(periods: usize) -> (Record, Response) {
     let period = Sampling::new(1.0 / 512.0, 256).unwrap();
     let lines = Multisine::flat(2..=100, 10.0, Phases::Random { seed: 1 }).unwrap();
@@ -47,7 +47,7 @@ fn from_frf() -> Identify {
     Identify::responses(Default::default(), Segmentation::default())
 }
 
-/// All ways that take periods.
+/// All kinds of identification that use periods.
 fn ways() -> [Identify; 4] {
     let of = Identify::spectra;
     [Identify::default(), of(Method::MaximumLikelihood), of(Method::LeastSquares), from_frf()]
@@ -80,8 +80,8 @@ fn a_wrong_period_has_no_misfit_to_show() {
     }
 }
 
-/// Eight strokes of other strengths, a second apart, each of which has died out: the response to a half-sine, by a sum
-/// over 16 parts of each sample.
+/// Eight strokes of different strengths, one second apart, so that each response decays before the
+/// next stroke. The response to a half-sine is a sum over 16 parts of each sample.
 fn strokes(strengths: [f64; 8]) -> Measurement {
     const RATE: f64 = 1024.0;
     const PERIOD: usize = 1024;
@@ -131,12 +131,12 @@ fn strokes_of_unequal_strength_are_no_periods() {
     let largest = strengths.map(|s| (s / mean - 1.0).abs()).into_iter().fold(0.0, f64::max);
     let test = strokes(strengths);
     let found = identify(std::slice::from_ref(&test), &how(Identify::default())).unwrap();
-    // The pulse has a constant part, without which its RMS is a little smaller.
+    // The check ignores the constant part of the pulse, so it divides by a smaller RMS.
     let told = unequal(&found).unwrap();
     assert!(told > largest && told < 1.1 * largest, "{told} for {largest}");
     assert_eq!(found.summary().fit.misfit_ratio, None);
     assert!(!tells(&found, Subject::Misfit), "{found}");
-    // Frequency responses are averaged over strokes of any strength.
+    // Frequency responses may be averaged over strokes of different strength.
     let found = identify(&[test], &how(from_frf())).unwrap();
     assert_eq!(unequal(&found), None);
     let equal = identify(&[strokes([1.0; 8])], &how(Identify::default())).unwrap();
@@ -144,7 +144,8 @@ fn strokes_of_unequal_strength_are_no_periods() {
     assert!(tells(&equal, Subject::Misfit), "{equal}");
 }
 
-/// Noise of a load cell is followed by no response.
+/// Noise of a load cell differs from period to period, but no response follows it, so it must not
+/// be reported.
 #[test]
 fn noise_on_the_force_is_no_difference_of_the_periods() {
     let (force, response) = steady(10);
@@ -156,7 +157,7 @@ fn noise_on_the_force_is_no_difference_of_the_periods() {
     assert!(!found.checks().iter().any(|check| unequal(&check.finding)), "{found}");
 }
 
-/// The frequency beside which the step is judged is the one that was found.
+/// The check of the sampling step uses the highest frequency that was identified.
 #[test]
 fn the_highest_mode_is_that_of_the_fit() {
     let (force, response) = steady(2);
@@ -178,7 +179,7 @@ fn the_highest_mode_is_that_of_the_fit() {
     }
 }
 
-/// Judge: the receptance in closed form.
+/// Reference: the receptance in closed form.
 #[test]
 fn the_lines_of_a_fit_are_given_on_request() {
     let test = displacements(10).period(256).unwrap();
@@ -199,10 +200,11 @@ fn the_lines_of_a_fit_are_given_on_request() {
             let error = line.measured_standard_error.as_ref().unwrap()[0];
             of_noise += (measured - exact).norm_sqr() / (2.0 * error * error) / 99.0;
             of_fit = of_fit.max((fitted - exact).norm() / line.fitted_standard_error[0]);
-            // Three parameters from 198 numbers: the fit is better than the measurement.
+            // Three parameters from 198 numbers: the fit is more accurate than the measurement.
             assert!(line.fitted_standard_error[0] < error, "{line:?}");
         }
-        // 198 squares of standard errors, of frequency responses from nine degrees of freedom each; 4σ is 1 ± 0.6.
+        // The mean of 198 squared errors, whose standard errors have nine degrees of freedom each,
+        // lies in 1 ± 0.6 with 4σ.
         assert!((0.5..1.7).contains(&of_noise), "{of_noise}");
         assert!(of_fit < 5.0, "{of_fit}");
         assert!(

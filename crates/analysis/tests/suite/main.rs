@@ -1,6 +1,7 @@
-//! The analysis as a caller in Rust meets it, judged by closed forms and seeded experiments.
+//! The analysis as a Rust program uses it. The references are closed forms and seeded experiments.
 //!
-//! One program of many modules: each test program of its own would compile and link all crates below anew.
+//! All modules are one test program, because each separate test program would have to be linked
+//! with all crates.
 
 mod acquisition;
 mod bearing;

@@ -1,4 +1,4 @@
-//! Modes of a machine: instability is told, rounding is not taken for it.
+//! Modes of a machine: instability is reported, and rounding errors are not taken for instability.
 
 use mechid_analysis::{Machine, ModalSummary};
 use mechid_model::SecondOrderSystem;
@@ -11,7 +11,7 @@ fn summary(mass: DMatrix<f64>, damping: DMatrix<f64>, stiffness: DMatrix<f64>) -
 
 #[test]
 fn an_unstable_mode_is_told_with_its_growth() {
-    // ẍ − ẋ + 100 x = 0 grows as e^(t/2).
+    // The solution of ẍ − ẋ + 100 x = 0 grows as e^(t/2).
     let found = summary(
         DMatrix::identity(2, 2),
         dmatrix![-1.0, 0.0; 0.0, 3.0],
@@ -40,7 +40,7 @@ fn a_free_or_undamped_machine_is_not_called_unstable() {
     }
 }
 
-/// Judge: λ² + 10 λ + 1 = 0 has ζ = 5 and the poles −5 ± √24.
+/// Reference: λ² + 10 λ + 1 = 0 has ζ = 5 and the poles −5 ± √24.
 #[test]
 fn an_overdamped_pair_shows_both_poles_and_its_damping_ratio() {
     let found = summary(dmatrix![1.0], dmatrix![10.0], dmatrix![1.0]);

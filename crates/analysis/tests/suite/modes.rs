@@ -1,4 +1,4 @@
-//! Modes of tables of frequency responses in closed form, their checks, comparison and export.
+//! Modes from tables of frequency responses in closed form: their checks, comparison and export.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,13 +20,13 @@ type C = Complex<f64>;
 /// Natural frequencies, in Hz, and damping ratios.
 const MODES: [(f64, f64); 3] = [(20.0, 0.01), (41.0, 0.015), (66.0, 0.008)];
 
-/// Mass-normalised shapes at four points, a row a mode, in 1/√kg.
+/// Mass-normalised shapes at four points, one row per mode, in 1/√kg.
 const SHAPES: [[f64; 4]; 3] = [[0.3, 0.5, 0.4, 0.2], [0.4, 0.1, -0.5, -0.3], [0.5, -0.4, 0.2, 0.6]];
 
-/// Points of the forces among the four.
+/// Points at which the forces act.
 pub const FORCES: [usize; 2] = [0, 3];
 
-/// Receptance at s, 4 × 2, of modes whose frequencies are multiplied by `factors`.
+/// Receptance at s as a 4 × 2 matrix; the frequencies of the modes are multiplied by `factors`.
 pub fn receptance(s: C, factors: [f64; 3]) -> DMatrix<C> {
     DMatrix::from_fn(4, 2, |i, j| {
         let of_mode = |mode: usize| {
@@ -39,7 +39,7 @@ pub fn receptance(s: C, factors: [f64; 3]) -> DMatrix<C> {
     })
 }
 
-/// A table from 5 to 90 Hz with white noise of a part of the RMS of each response.
+/// A table from 5 to 90 Hz with white noise, given as a part of the RMS of each response.
 fn table(
     quantity: ResponseQuantity,
     spacing_hz: f64,
@@ -81,7 +81,8 @@ pub fn modes(table: &FrequencyResponses) -> Modes {
     modes_of_responses(std::slice::from_ref(table), &ModesSettings::default()).unwrap()
 }
 
-/// Asserts frequencies and damping ratios within five standard errors, plus `bias` times the damping ratio.
+/// Asserts that frequencies and damping ratios are within five standard errors plus `bias` times
+/// the damping ratio.
 fn are_true(rows: &[ModalModeRow], bias: f64) {
     assert_eq!(rows.len(), MODES.len());
     for (row, (hz, zeta)) in rows.iter().zip(MODES) {
@@ -120,7 +121,7 @@ fn a_table_gives_modes_masses_and_good_checks() {
     assert!(MODES.iter().any(|(hz, _)| (peak - hz).abs() < 0.2), "{peak}");
 }
 
-/// Judge: under the window e^(−σt) the response is that at s = jω + σ.
+/// Reference: under the window e^(−σt) the response is that at s = jω + σ.
 #[test]
 fn the_decay_of_an_exponential_window_is_subtracted() {
     const RATE: f64 = 2.5;
@@ -138,8 +139,8 @@ fn the_decay_of_an_exponential_window_is_subtracted() {
     assert!(wrong > 2.0 * MODES[0].1, "{wrong}");
 }
 
-/// Judge: averages over Hann segments of a random force give the response smoothed by |W|², which has a
-/// closed form.
+/// Reference: an average over Hann segments of a random force gives the response smoothed by |W|²,
+/// where W is the spectrum of the window; this has a closed form.
 #[test]
 fn what_a_hann_window_blunts_is_subtracted() {
     const SPACING: f64 = 0.2;
@@ -195,7 +196,8 @@ fn a_wrong_gain_and_a_wrong_sign_are_named() {
     assert!(signs.contains(&"driving_point") && signs.contains(&"reciprocity"), "{found}");
 }
 
-/// Under the hypothesis the probability of the reciprocity check is rarely small: it is cautious.
+/// On correct tables the p-value of the reciprocity check is rarely small, because the check is
+/// conservative.
 #[test]
 fn right_tables_rarely_fail_the_tests() {
     for seed in 10..16 {
@@ -220,7 +222,8 @@ fn a_force_that_drives_nothing_is_named() {
     assert!(idle.len() == 1 && idle[0].text.contains("force 4+Z"), "{found}");
 }
 
-/// Judge: the second mode of the second structure is 1 % higher; everything else is the same.
+/// Reference: the second mode of the second structure is 1 % higher, and everything else is the
+/// same.
 #[test]
 fn a_comparison_names_the_mode_that_changed() {
     let first = modes(&plain([1.0; 3], 7));
@@ -239,7 +242,8 @@ fn a_comparison_names_the_mode_that_changed() {
     }
     let text = comparison.to_string();
     assert!(text.contains("modes 2 – 2: different frequency"), "{text}");
-    // The saved result says the same as the result, and other points have nothing in common.
+    // A saved result is compared like the result itself; results without a common point are
+    // refused.
     let saved = ModeSet::from_json("saved", serde_json::to_value(&second).unwrap()).unwrap();
     assert_eq!(compare_modes(&a, &saved).unwrap().pairs.len(), 3);
     let mut elsewhere = saved;
@@ -248,8 +252,8 @@ fn a_comparison_names_the_mode_that_changed() {
     assert_eq!(error.code(), "analysis.no-common-point");
 }
 
-/// Judge: shapes of a model without errors, in nodes and directions of which the test has some, one of
-/// them against its direction.
+/// Reference: the exact shapes of a model with more nodes and directions than the test; one sensor
+/// of the test points against its direction.
 #[test]
 fn a_finite_element_model_is_compared_at_the_common_points() {
     let mut file = String::new();
@@ -271,7 +275,7 @@ fn a_finite_element_model_is_compared_at_the_common_points() {
     let model = ModeSet::from_nodal(&nodal).unwrap();
     let comparison = compare_modes(&test, &model).unwrap();
     assert_eq!(comparison.points, ["1+Z", "2+Z", "3+Z", "4-Z"]);
-    // With the fourth entry turned the shapes are others; turned back they are the same.
+    // If the sign of the fourth entry is wrong, the shapes differ; if it is right, they agree.
     assert!(comparison.mac[0][0] < 0.95, "{:?}", comparison.mac);
     test.points[3] = "4+Z".into();
     let comparison = compare_modes(&test, &model).unwrap();
@@ -283,7 +287,7 @@ fn a_finite_element_model_is_compared_at_the_common_points() {
     }
 }
 
-/// Judge: the responses that were fitted, read back from the file.
+/// Reference: the fitted responses, read back from the file.
 #[test]
 fn the_synthesis_is_read_back_from_a_universal_file() {
     let measured = plain([1.0; 3], 11);
@@ -308,7 +312,8 @@ fn hammer(file: &str) -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(file)
 }
 
-/// Judge: the machine behind the examples, 12 Hz and 31 Hz; one accelerometer of two shows both.
+/// Reference: the structure of the examples with modes at 12 Hz and 31 Hz; one of the two
+/// accelerometers shows both.
 #[test]
 fn a_modal_test_is_an_analysis_of_many_records() {
     let analysis = SavedAnalysis {
@@ -347,7 +352,7 @@ fn modes_predict_a_record_that_was_not_fitted() {
     let open = |file: &str| Measurement::open(hammer(file), &channels).unwrap();
     let mut found = mechid_analysis::modes(&[open("hammer-1.csv")], &settings).unwrap();
     let same = found.predict(&[open("hammer-1.csv")]).unwrap()[0];
-    // The second record is of another struck point: what was fitted to the first does not predict it.
+    // The second record was struck at another point, so the fit to the first does not predict it.
     let other = found.predict(&[open("hammer-2.csv")]).unwrap()[0];
     assert!(same > 0.999 && other < 0.9, "{same} {other}");
     found.add_validation(&[open("hammer-1.csv")]).unwrap();

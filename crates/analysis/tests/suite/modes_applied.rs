@@ -1,4 +1,5 @@
-//! Modes of a test that predict other records and find their forces, judged by the closed form.
+//! Modes of a test that predict other records and reconstruct their forces; the reference is the
+//! closed form.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +19,7 @@ type C = Complex<f64>;
 const RATE_HZ: f64 = 256.0;
 const SAMPLES: usize = 8192;
 
-/// Two pulses of 30 and 50 Hz, which last a tenth of a second and begin at rest.
+/// Two pulses of 30 and 50 Hz that last a tenth of a second; the force begins at zero.
 fn pulses() -> Record {
     let pulse = |k: usize, at: f64, hz: f64| {
         let t = k as f64 / RATE_HZ - at;
@@ -31,7 +32,8 @@ fn pulses() -> Record {
     Record::new(Sampling::from_rate_hz(RATE_HZ, SAMPLES).unwrap(), data).unwrap()
 }
 
-/// Exact response to pulses whose decays end within the record: that of a period.
+/// Exact response to pulses whose decay ends within the record, so that it equals the periodic
+/// response.
 fn response(forces: &Record) -> Record {
     let spectrum = Spectrum::from_record(forces);
     let mut lines = DMatrix::<C>::zeros(spectrum.len(), 4);
@@ -52,7 +54,7 @@ fn measurement(forces: &Record, motion: &Record) -> Measurement {
     Measurement::from_columns(forces.sampling(), &columns, &channels).unwrap()
 }
 
-/// Root of the mean square of the errors over their stated standard errors, each an RMS of a
+/// Root mean square of the ratios of error and stated standard error; both are the RMS over a
 /// record.
 fn ratio(pairs: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     let squares: Vec<f64> =
@@ -83,13 +85,12 @@ fn predictions_and_forces_err_as_they_state() {
             found.push((error, row.standard_error.unwrap()));
         }
     }
-    // 6 experiments of some 15 parameters each: the ratio scatters by a fifth.
+    // The ratio of 6 experiments with about 15 parameters each scatters by a fifth.
     assert!((0.5..2.0).contains(&ratio(predicted.iter().copied())), "{predicted:?}");
     assert!((0.5..2.0).contains(&ratio(found.iter().copied())), "{found:?}");
 }
 
-/// The same record from the middle of a decay on: the motion at its beginning is fitted to the
-/// first samples.
+/// A record that begins during a decay: the motion at its start is fitted to the first samples.
 #[test]
 fn a_record_that_begins_in_motion_is_predicted_from_its_first_samples() {
     let forces = pulses();
@@ -132,7 +133,7 @@ fn one_of_the_forces_is_found_from_some_of_the_responses() {
     for channel in &force.summary().channels {
         assert!(channel.unexplained.unwrap() < 0.02, "{force}");
     }
-    // The wrong place: the responses cannot be explained.
+    // A force at the wrong position cannot explain the responses.
     let how = Reconstruct { at_rest: true, ..Reconstruct::default().forced([1]) };
     let wrong = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
     assert!(wrong.to_string().contains("force does not explain"), "{wrong}");
@@ -156,5 +157,5 @@ fn what_modes_cannot_do_is_refused() {
         predict_with_modes(&record, &system, &settle).unwrap_err().to_string()
     };
     assert!(refused(2).contains("do not determine the motion of all modes"), "{}", refused(2));
-    assert!(refused(SAMPLES).contains("settles within 2 to 8191"), "{}", refused(SAMPLES));
+    assert!(refused(SAMPLES).contains("fitted to 2 to 8191"), "{}", refused(SAMPLES));
 }

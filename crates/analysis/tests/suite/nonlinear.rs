@@ -1,4 +1,4 @@
-//! Machines with nonlinear terms through the doors of the analysis. The response is prescribed and the
+//! Machines with nonlinear terms in all kinds of analysis. The response is prescribed, and the
 //! force follows from the equation of motion in closed form.
 
 use mechid_analysis::identify::{Nonlinear, Source, TermEstimator, TermFit};
@@ -16,14 +16,14 @@ use std::f64::consts::TAU;
 
 const PERIOD: usize = 256;
 
-/// Mass, damping, stiffness, and 8·10⁴ x² and 4·10⁶ x³ beside them.
+/// Machine with mass, damping, stiffness and the terms 8·10⁴ x² and 4·10⁶ x³.
 fn machine() -> NonlinearSystem {
     let linear = Sdof::new(10.0, 40.0, 5000.0).unwrap().system();
     NonlinearSystem::new(linear, "k2: x1^2, k3: x1^3".parse().unwrap(), vec![8e4, 4e6]).unwrap()
 }
 
-/// Two periods of a displacement on odd lines up to 21, of some centimetres, and the force it takes:
-/// its lines end at 63.
+/// Two periods of a displacement of some centimetres on odd lines up to 21, and the force that it
+/// needs, whose lines end at 63.
 fn steady_state() -> (Record, Record) {
     let sampling = Sampling::new(0.02, PERIOD).unwrap();
     let record = |order: i32| {
@@ -36,7 +36,7 @@ fn steady_state() -> (Record, Record) {
         Spectrum::from_lines(sampling, lines).unwrap().to_record().unwrap()
     };
     let response = Response::new(record(0), record(1), record(2)).unwrap();
-    // The mean of the force stays: x² pushes one way.
+    // The mean of the force is kept, because the force of x² has one direction.
     let force = machine().force(&response).unwrap();
     (force.repeated(2).unwrap(), response.displacement().repeated(2).unwrap())
 }
@@ -72,7 +72,7 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
         assert!(text.contains(part), "{part}: {text}");
     }
 
-    // What was saved is read back, with the covariance of its linear part.
+    // The saved machine is read back with the covariance of its linear part.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("machine.json");
     std::fs::write(&path, serde_json::to_string(&found).unwrap()).unwrap();
@@ -91,23 +91,23 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
 
     let steady = predict(&test, &read, &Predict::default()).unwrap();
     assert!(steady.summary().channels[0].nrmse < 1e-4, "{steady}");
-    // An open record: its start, which is not at rest, from the first samples.
+    // In an open record the initial state, which is not rest, is fitted to the first samples.
     let open = predict(&test_of(&force, &x), &read, &Predict { settle: Some(100) }).unwrap();
     assert!(open.summary().channels[0].nrmse < 1e-2, "{open}");
     assert_eq!((open.summary().first_judged, open.columns().len()), (101, 1));
-    // The linear part alone does not predict it.
+    // The linear part alone does not predict the record.
     let linear = Machine { nonlinear: None, ..read.clone() };
     let blind = predict(&test, &linear, &Predict::default()).unwrap();
     assert!(blind.summary().channels[0].nrmse > 0.05, "{blind}");
 
     let modes = ModalSummary::from_machine(&read).unwrap().to_string();
     assert!(modes.contains("the linear part; the nonlinear terms are k2: x1^2"), "{modes}");
-    // The displacement alone is not enough for its force.
+    // The displacement alone does not determine the force of a nonlinear machine.
     let refused = reconstruct(&test, &read, &Reconstruct::auto()).unwrap_err();
     assert!(matches!(refused, AnalysisError::NonlinearMachine { .. }), "{refused}");
 }
 
-/// A derivative of two periods of a displacement.
+/// Derivative of order `order` of two periods of a displacement.
 fn derivative(x: &Record, order: i32) -> Record {
     let mut lines = Spectrum::from_record(&x.window(0, PERIOD).unwrap()).lines().clone();
     for (n, mut row) in lines.row_iter_mut().enumerate() {
@@ -118,7 +118,7 @@ fn derivative(x: &Record, order: i32) -> Record {
     Spectrum::from_lines(period, lines).unwrap().to_record().unwrap().repeated(2).unwrap()
 }
 
-/// Displacement, velocity and acceleration with the force, open.
+/// An open record of displacement, velocity and acceleration, and the force.
 fn complete_motion() -> (Measurement, Record) {
     let (force, x) = steady_state();
     let (v, a) = (derivative(&x, 1), derivative(&x, 2));
@@ -130,8 +130,8 @@ fn complete_motion() -> (Measurement, Record) {
     (Measurement::from_records(&force, &responses).unwrap(), force)
 }
 
-/// Judge: the force that was prescribed. The machine is identified from a force with noise, so that
-/// its error is what its covariance says.
+/// Reference: the prescribed force. The machine is identified from a noisy force, so its covariance
+/// describes its error.
 #[test]
 fn the_force_of_a_spring_that_hardens_is_found_with_its_error() {
     let (force, x) = steady_state();
@@ -147,18 +147,18 @@ fn the_force_of_a_spring_that_hardens_is_found_with_its_error() {
     let scores: Vec<f64> =
         both.zip(error.channel(0)).map(|((found, truth), error)| (found - truth) / error).collect();
     let mean_square = scores.iter().map(|z| z * z).sum::<f64>() / scores.len() as f64;
-    // Five parameters make all of it: chi-square of few degrees of freedom.
+    // Only five parameters cause the error, so its mean square has few degrees of freedom.
     assert!((0.02..4.0).contains(&mean_square), "{mean_square}");
     assert!(scores.iter().all(|z| z.abs() < 5.0));
     let rms = |record: &Record| record.column(0).norm();
     assert!(rms(error) < 0.02 * rms(&truth), "{} of {}", rms(error), rms(&truth));
 
-    // The linear part alone gives another force.
+    // The linear part alone does not give this force.
     let linear = Machine { nonlinear: None, ..machine.clone() };
     let blind = reconstruct(&run, &linear, &Reconstruct::auto()).unwrap();
     let missed = (blind.force().record().data() - truth.data()).norm() / truth.data().norm();
     assert!(missed > 0.1, "{missed}");
-    // In chunks, and with noise stated.
+    // The force is also found in chunks, with stated noise of the responses.
     let noise = vec![1e-5, 1e-4, 1e-3];
     let stated = Reconstruct { noise, ..Reconstruct::auto() };
     let whole = reconstruct(&run, &machine, &stated).unwrap();
@@ -178,8 +178,8 @@ fn the_force_of_a_spring_that_hardens_is_found_with_its_error() {
     assert!(larger.channel(0).iter().zip(error.channel(0)).all(|(with, without)| with > without));
 }
 
-/// Judge: ω² ≈ k + ¾ k₃ A², less the shift of the even term, is left to the tests of the model; here
-/// that the program's numbers are those of the model, with a band that holds the truth.
+/// Reference: the backbone of the true model, which the tests of the model compare with ω² ≈ k + ¾
+/// k₃ A². The interval of the program's backbone must contain it.
 #[test]
 fn a_backbone_holds_that_of_the_truth() {
     let (force, x) = steady_state();
@@ -214,7 +214,8 @@ fn output_error_takes_noise_on_the_response() {
     assert!(cubic.standard_error < 0.05 * 4e6, "{cubic:?}");
 }
 
-/// Judge: the terms of the machine. Of one that is linear none is added, and the result is read back.
+/// Reference: the terms of the machine. For a linear machine no term is added. The result can be
+/// saved and read back.
 #[test]
 fn terms_are_chosen_from_candidates() {
     let candidates: Nonlinear = Nonlinear {
@@ -271,7 +272,7 @@ fn a_fifth_power_is_told_to_extrapolate_badly() {
     let test = test_of(&force, &x).period(PERIOD).unwrap();
     let how = Identify::nonlinear("k2: x1^2, k3: x1^3, k5: x1^5".parse().unwrap());
     let found = identify(&[test], &how).unwrap();
-    // The machine has none: its share is nothing, and nothing is told.
+    // The machine has no fifth power, so the term has no share of the force and no warning appears.
     assert!(!found.to_string().contains("extrapolates badly"), "{found}");
     let linear = machine().linear().clone();
     let terms = "k3: x1^3, k5: x1^5".parse().unwrap();
@@ -326,8 +327,9 @@ fn settings_of_terms_survive_json() {
     assert!(!serde_json::to_string(&Identify::default()).unwrap().contains("nonlinear"));
 }
 
-/// Two masses, the first on a spring that hardens by `cubic` x1³, shaken at one mass after the other: x1 is given, so
-/// that each of the two equations of motion has one unknown, x2 or the force, line by line. Noise of 0.5 % on the response.
+/// Two masses, the first on a hardening spring with the force `cubic` x1³. The shaker acts on one
+/// mass after the other. As x1 is prescribed, each of the two equations of motion has one unknown
+/// per line, x2 or the force. The response has 0.5 % noise.
 fn one_shaker_at_a_time(cubic: f64, seed: u64) -> Vec<Measurement> {
     let sampling = Sampling::new(0.02, PERIOD).unwrap();
     let [m, c, k] = [
@@ -371,7 +373,8 @@ fn one_shaker_at_a_time(cubic: f64, seed: u64) -> Vec<Measurement> {
     vec![shaken(0), shaken(1)]
 }
 
-/// Judge: the machine in closed form. No record alone determines it, both do, with the term and without.
+/// Reference: the machine in closed form. One record does not determine it, both together do, with
+/// the term and without.
 #[test]
 fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
     let term = "cubic stiffness of x1 (hardening)";
@@ -391,8 +394,9 @@ fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
     }
 }
 
-/// A window of 2,048 samples out of a random motion eight times as long, of 1 to 8 Hz, and the force that it takes of
-/// 10 kg at 3.6 Hz with a cubic spring; noise of 0.5 % on the displacement.
+/// A window of 2,048 samples from a random motion eight times as long, from 1 to 8 Hz, and the
+/// force that it needs in an oscillator of 10 kg at 3.6 Hz with a cubic spring. The displacement
+/// has 0.5 % noise.
 fn random_motion(cubic: f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.01, 8 * 2048).unwrap();
     let draw = noise::white(Sampling::new(1.0, sampling.lines()).unwrap(), 2, 1.0, seed).unwrap();
@@ -416,8 +420,8 @@ fn random_motion(cubic: f64, seed: u64) -> Measurement {
     test_of(&force, &noise::add_white(&x, level, seed + 1000).unwrap())
 }
 
-/// Judge: the force by the equation of motion. What a cubic spring leaves of a random motion looks like the response
-/// to a force that was not measured, and is not passed for it.
+/// Reference: the force by the equation of motion. The residual of a cubic spring under a random
+/// motion looks like the response to an unmeasured force, but must not be taken for one.
 #[test]
 fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
     let warned = |cubic: f64, seed: u64| {
@@ -433,7 +437,7 @@ fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
     }
 }
 
-/// The terms may be found in a window that is no period all the same, with a warning of its ends.
+/// In a window that is not a period the terms may be found, but then a warning names its ends.
 #[test]
 fn a_window_that_is_no_period_is_named_where_nonlinear_terms_do_not_fit_it() {
     let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
@@ -446,7 +450,7 @@ fn a_window_that_is_no_period_is_named_where_nonlinear_terms_do_not_fit_it() {
             }
             Err(error) => {
                 let is_named = error.to_string().contains("its end does not meet its beginning");
-                // By chance the ends of some windows meet.
+                // The ends of some windows meet by chance.
                 assert!(is_named || matches!(error, AnalysisError::Diverges { .. }), "{error}");
                 refused += usize::from(is_named);
             }
@@ -455,8 +459,8 @@ fn a_window_that_is_no_period_is_named_where_nonlinear_terms_do_not_fit_it() {
     assert!(refused > 0);
 }
 
-/// Judge: the machine in closed form. Noise on the force colours what the mean period leaves, of a right model, too:
-/// residuals that were tested for whiteness warned nearly always.
+/// Reference: the machine in closed form. Noise on the force makes the residual of the mean period
+/// coloured, even for a correct model, so a test for whiteness would nearly always warn.
 #[test]
 fn noise_on_the_force_is_no_fault_of_a_right_model() {
     let (force, x) = steady_state();
@@ -480,8 +484,9 @@ fn noise_on_the_force_is_no_fault_of_a_right_model() {
     assert_eq!(wrong, 6);
 }
 
-/// A motion whose frequency rises from 1 to 7 Hz in 20 s, and the force that it takes of 10 kg at 3.6 Hz with a law of
-/// displacement and velocity beside the spring; noise of 0.5 % on the displacement.
+/// A motion whose frequency rises from 1 to 7 Hz in 20 s, and the force that it needs in an
+/// oscillator of 10 kg at 3.6 Hz with the additional force `law` of displacement and velocity. The
+/// displacement has 0.5 % noise.
 fn sweep(law: impl Fn(f64, f64) -> f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.01, 2000).unwrap();
     let motion = |t: f64| {
@@ -504,7 +509,7 @@ fn open(terms: Nonlinear) -> Identify {
     Identify::from(Source::Terms(TermFit { terms, extent, ..TermFit::default() }))
 }
 
-/// Judge: the force in closed form. No band is given.
+/// Reference: the force in closed form. No frequency band is given.
 #[test]
 fn terms_are_found_in_open_records() {
     let cubic = |x: f64, _: f64| 6e6 * x.powi(3);
@@ -530,12 +535,13 @@ fn terms_are_found_in_open_records() {
     let candidates = "k3: x1^3".parse().unwrap();
     let how = open(Nonlinear { candidates, ..Nonlinear::default() });
     assert!(refused(how).contains("`candidates`"));
-    // Without that a window has to be a period.
+    // Without the setting for open records, a window must be a period.
     let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
     assert!(refused(how).contains("unless `extent` is open"));
 }
 
-/// A million terms beside 256 samples: neither read nor refused in a time that grows with their square.
+/// A million terms for 256 samples are refused within a time that does not grow with the square of
+/// their number.
 #[test]
 fn a_million_terms_are_refused_before_any_work() {
     let (force, x) = steady_state();

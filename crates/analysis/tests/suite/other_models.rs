@@ -1,4 +1,5 @@
-//! Tables of frequency responses that another model explains, judged by closed-form receptances and seeded noise.
+//! Tables of frequency responses that another model explains better; the references are closed-form
+//! receptances with seeded noise.
 
 use std::f64::consts::TAU;
 
@@ -12,14 +13,15 @@ type Receptance<'a> = dyn Fn(f64) -> Complex<f64> + 'a;
 
 const LINES: usize = 160;
 
-/// 5 kg at 18 Hz with a damping ratio of 0.03.
+/// Receptance of 5 kg at 18 Hz with a damping ratio of 0.03.
 fn viscous(omega: f64) -> Complex<f64> {
     let resonance = TAU * 18.0;
     let damping = 2.0 * 0.03 * resonance * omega;
     (5.0 * Complex::new(resonance * resonance - omega * omega, damping)).inv()
 }
 
-/// A table of accelerances from 0.25 to 40 Hz with 0.5 % noise, which it states if asked to.
+/// A table of accelerances from 0.25 to 40 Hz with 0.5 % noise; if `is_stated`, the table states
+/// the noise.
 fn table(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> FrequencyResponses {
     let frequency_hz: Vec<f64> = (1..=LINES).map(|line| 0.25 * line as f64).collect();
     let size = 0.005 / 2_f64.sqrt();
@@ -43,7 +45,7 @@ fn table(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> FrequencyRe
     FrequencyResponses { file: "table".into(), frequency_hz, functions, ..Default::default() }
 }
 
-/// What an identification says of a table: warnings, notes, and the parameters m, c, k.
+/// Results of an identification from a table: warnings, remarks, and the parameters m, c and k.
 struct Told {
     warnings: Vec<(Subject, Finding)>,
     remarks: Vec<String>,
@@ -80,7 +82,7 @@ fn told(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> Told {
     Told::of(table(receptance, seed, is_stated), IdentifyResponses::default())
 }
 
-/// More than 5 of 120 right tables warn with a probability of 0.004 if 1 in 100 does.
+/// At a rate of 1 in 100, more than 5 of 120 correct tables warn with a probability of 0.004.
 #[test]
 fn right_tables_pass() {
     let warned = (0..60).flat_map(|seed| [false, true].map(|stated| told(&viscous, seed, stated)));
@@ -109,7 +111,8 @@ fn modes_beyond_the_degrees_of_freedom_are_told() {
     }
 }
 
-/// A driving point with two modes far apart, of which one degree of freedom takes the lower: nothing else explains it.
+/// A driving point with two modes far apart, fitted with one degree of freedom: it takes the lower
+/// mode, and only a second mode explains the rest.
 #[test]
 fn a_second_mode_is_not_taken_for_damping_or_a_delay() {
     for (hz, size) in [(26.0, 0.2), (33.0, 0.5), (60.0, 0.3)] {
@@ -167,7 +170,7 @@ fn another_quantity_is_told() {
     }
 }
 
-/// Levels of responses whose magnitudes are all below or all above one.
+/// Levels in decibels whose magnitudes are all below or all above one.
 #[test]
 fn decibels_read_as_magnitudes_are_told() {
     for gain in [1e-3, 1e6] {
@@ -190,7 +193,8 @@ fn a_table_without_phase_is_told() {
     assert!(told.warnings.iter().any(is_named), "{:?}", told.warnings);
 }
 
-/// Parameters and their errors are those of the same table without a coherence, which says nothing.
+/// Parameters and their errors equal those of the same table without a coherence, because a
+/// coherence of one gives no information on the noise.
 #[test]
 fn a_coherence_of_one_states_no_noise() {
     let silent = told(&viscous, 6, false);

@@ -1,4 +1,4 @@
-//! Parts of the data that disagree, and fits that determine nothing.
+//! Parts of the data that disagree, and fits that do not determine the machine.
 
 use mechid_analysis::identify::{OpenFit, Source};
 use mechid_analysis::{
@@ -62,7 +62,7 @@ fn parts_of_a_linear_machine_agree_and_nothing_is_scaled() {
     }
 }
 
-/// One of two records has 2 % more mass: both k and c are alike, and m is off by a percent on either side.
+/// One of two records has 2 % more mass: k and c agree, and m is 1 % off in each record.
 #[test]
 fn a_weight_added_for_one_record_is_named_and_in_the_interval() {
     let linear = FaultyOscillator::linear();
@@ -106,7 +106,7 @@ fn a_stiffness_that_drifts_is_seen_in_time() {
     );
 }
 
-/// A residual that exceeds the noise widens the intervals, whatever the parts say.
+/// A residual that exceeds the noise widens the intervals, even if the parts of the data agree.
 #[test]
 fn a_residual_beyond_the_noise_widens_the_intervals() {
     let hiding = FaultyOscillator { hidden_mass: 1.0, ..FaultyOscillator::linear() };
@@ -119,7 +119,7 @@ fn a_residual_beyond_the_noise_widens_the_intervals() {
     assert!(scale >= misfit.unwrap().sqrt() && scale > 3.0, "{found}");
 }
 
-/// Noise that has nothing to do with the force.
+/// The response is noise and has no relation to the force.
 #[test]
 fn a_response_that_is_noise_is_no_result() {
     let [force, _] =
@@ -135,7 +135,8 @@ fn a_response_that_is_noise_is_no_result() {
     assert!(refused.to_string().starts_with("the data do not determine the machine: "));
 }
 
-/// What a term left out changes is in the intervals, though no part of the data disagrees with another.
+/// The intervals include the effect of a missing term, even if no part of the data disagrees with
+/// another.
 #[test]
 fn a_term_that_the_model_leaves_out_is_named_and_counted() {
     let linear = FaultyOscillator::linear();
@@ -165,7 +166,8 @@ fn a_term_that_the_model_leaves_out_is_named_and_counted() {
     }
 }
 
-/// Chain of three masses under a force at the first, with another damper from the first mass to the third.
+/// Chain of three masses with a force on the first, and an additional damper from the first mass to
+/// the third.
 fn bridged_chain(damper: f64, seed: u64) -> (SecondOrderSystem, Measurement) {
     let held = chain(3, Support::Held, 0.02, 1);
     let mut damping = held.damping().clone();
@@ -191,7 +193,7 @@ fn bridged_chain(damper: f64, seed: u64) -> (SecondOrderSystem, Measurement) {
     (system, record.period(1024).unwrap())
 }
 
-/// An entry that the structure holds at zero is tested as other terms are.
+/// An entry that the structure sets to zero is tested like other missing terms.
 #[test]
 fn an_entry_that_the_structure_leaves_out_is_named_and_counted() {
     let how = Identify { structure: "chain".parse().unwrap(), ..Identify::default() };

@@ -1,4 +1,5 @@
-//! Random tests: windows cut out of the closed-form steady state under a random force of a far longer period.
+//! Random tests: windows cut from the exact steady state under a random force with a much longer
+//! period.
 
 use mechid_analysis::frf::{Estimator, frf};
 use mechid_analysis::identify::{Method, OpenFit, OpenNoise, Source};
@@ -21,7 +22,7 @@ use rayon::prelude::*;
 const SAMPLES: usize = 2048;
 const KIND: ResponseQuantity = ResponseQuantity::Displacement;
 
-/// 10 kg at 25 Hz with a damping ratio of 0.01, sampled at 500 Hz.
+/// Oscillator of 10 kg at 25 Hz with a damping ratio of 0.01, sampled at 500 Hz.
 fn rig() -> RandomTest {
     let omega = 25.0 * std::f64::consts::TAU;
     let system = Sdof::new(10.0, 0.02 * 10.0 * omega, 10.0 * omega * omega).unwrap().system();
@@ -29,7 +30,7 @@ fn rig() -> RandomTest {
     RandomTest { system, sampling, quantity: KIND, force: 100.0 }
 }
 
-/// A measurement with noise of 1 % on the response.
+/// A measurement with 1 % noise on the response.
 fn measured([force, response]: [Record; 2], seed: u64) -> Measurement {
     let noisy = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), seed + 100_000);
     Measurement::from_records(&force, &[(KIND, &noisy.unwrap())]).unwrap()
@@ -58,8 +59,8 @@ fn is_open(identified: &Identified) -> bool {
     fitted.drawn.is_some() && fitted.coherence.is_none()
 }
 
-/// Fewer than 42 of 50 intervals of 95 % hold with a probability of 0.002; a warning on right data is to be
-/// seen in 1 of 50 records.
+/// If the intervals are right, fewer than 42 of 50 intervals of 95 % contain the true value with a
+/// probability of 0.002. Of correct records, 1 in 50 may warn.
 #[test]
 fn a_random_test_needs_no_settings() {
     const RUNS: u64 = 50;
@@ -85,7 +86,7 @@ fn several_records_have_ends_of_their_own() {
     let one = identify(&tests[..1], &Identify::default()).unwrap();
     let error = |found: &Identified| found.estimate().parameter("k").unwrap().standard_error;
     assert!(is_open(&all) && !warns(&all), "{all}");
-    // The coherence is that which a frequency response of the record has, in the band of the fit.
+    // In the band of the fit the coherence equals that of a frequency response of the record.
     let coherence = one.coherence().unwrap().unwrap();
     let table = frf(&tests[0], &FrfSettings::default()).unwrap();
     let skipped =
@@ -95,12 +96,13 @@ fn several_records_have_ends_of_their_own() {
         assert_eq!(coherence.frequency_hz[at], table.frequency_hz[skipped + at]);
         assert!((value - table.coherence[0].values[skipped + at]).abs() < 1e-12);
     }
-    // Three times the data.
+    // Three times the data reduce the error by about √3.
     let gain = error(&one) / error(&all);
     assert!((1.2..2.4).contains(&gain), "{gain}");
 }
 
-/// Judge: the generator. An amplitude of a tenth of the RMS value is a share of 0.1/√2.
+/// Reference: the generator. The amplitude is a tenth of the RMS value, so the share of the RMS is
+/// 0.1/√2.
 #[test]
 fn run_out_is_taken_off_and_told_once() {
     let tests: Vec<Measurement> = (0..2)
@@ -127,7 +129,8 @@ fn run_out_is_taken_off_and_told_once() {
     assert!(right.summary().fit.sinusoids.is_empty());
 }
 
-/// Judge: the generator, which makes all of the period late, of which the record is a window.
+/// Reference: the generator, which delays the response over its whole period; the record is a
+/// window of it.
 #[test]
 fn a_late_response_is_told_by_its_delay() {
     let late = |samples: f64, seed: u64| {
@@ -165,12 +168,13 @@ fn a_period_stays_one() {
     };
     let wrong = (0..16).into_par_iter().filter(|seed| open(*seed)).count();
     assert_eq!(wrong, 0, "of 16");
-    // Nor is a period that was given.
+    // If the user states the period, the record is not taken for an open one.
     let periods = random_test(0).period(SAMPLES).unwrap();
     assert!(!is_open(&identify(&[periods], &Identify::default()).unwrap()));
 }
 
-/// Noise biases least squares: where it shows, one period is fitted by maximum likelihood, too. 48 intervals of 95 %.
+/// Noise biases least squares, so a single period with visible noise is fitted by maximum
+/// likelihood. The test has 48 intervals of 95 %.
 #[test]
 fn noise_on_one_period_biases_nothing() {
     let each: Vec<(usize, bool)> = (0..16)
@@ -207,8 +211,8 @@ fn an_open_record_has_no_period() {
     assert!(matches!(error, AnalysisError::Setting { setting: "noise", .. }), "{error}");
 }
 
-/// The share of the intervals of 95 % that hold, of `runs` records with noise on force and response, and how many
-/// of the records warn.
+/// For `runs` records with noise on force and response: the share of the 95 % intervals that
+/// contain the true value, the number of records with a warning, and the results.
 fn judged(
     rig: &RandomTest,
     force_noise: f64,
@@ -248,14 +252,15 @@ fn with_force_noise(force: Option<Vec<f64>>) -> Identify {
     }
 }
 
-/// Fewer than 88 % of 180 intervals of 95 %, three of a record that go together, hold with a probability below 0.01.
-/// Taken for exact, noise of 1 % makes a third of them miss.
+/// If the intervals are right, fewer than 88 % of 180 intervals of 95 %, in correlated groups of
+/// three, contain the true value with a probability below 0.01. If the noise of 1 % is ignored, a
+/// third of them miss it.
 #[test]
 fn noise_on_the_force_is_read_above_its_band() {
     let (share, warned, all) = judged(&rig(), 0.01, &with_force_noise(None), 30);
     assert!(share >= 0.88, "{share}");
     assert!(warned <= 3, "{warned} of 30 warn");
-    // 1 % of 84 N, what is left of 100 N in the band; of 256 lines to 1/16 in the root.
+    // The noise is 1 % of 84 N, the part of 100 N within the band; 256 lines give it to about 1/16.
     let levels = all.iter().map(|found| found.summary().fit.force_noise[0].levels_n[0].unwrap());
     let mean = levels.sum::<f64>() / 30.0;
     assert!((mean / 0.837 - 1.0).abs() < 0.03, "{mean}");
@@ -271,7 +276,7 @@ fn a_force_noise_that_is_far_too_large_warns() {
         let misfit = found.checks().iter().find(|check| check.subject == Subject::Misfit).unwrap();
         assert!(misfit.is_conspicuous(), "{found}");
     }
-    // One level for two forces is each one's; three are none.
+    // Three levels for one force are refused.
     let refused = identify(&[random_test(0)], &with_force_noise(Some(vec![1.0, 2.0, 3.0])));
     let error = refused.unwrap_err();
     assert!(matches!(error, AnalysisError::Setting { setting: "force_noise", .. }), "{error}");
@@ -280,14 +285,16 @@ fn a_force_noise_that_is_far_too_large_warns() {
     assert!(matches!(error, AnalysisError::Setting { setting: "force_noise", .. }), "{error}");
 }
 
-/// 10 kg at 25 Hz with a damping ratio of 0.05: 2.6 lines of segments of 512 samples.
+/// Oscillator of 10 kg at 25 Hz with a damping ratio of 0.05; in segments of 512 samples the
+/// resonance is 2.6 lines wide.
 fn damped() -> RandomTest {
     let omega = 25.0 * std::f64::consts::TAU;
     let system = Sdof::new(10.0, 0.1 * 10.0 * omega, 10.0 * omega * omega).unwrap().system();
     RandomTest { system, ..rig() }
 }
 
-/// The window blunts the resonance by several standard errors of the damping's mean, and ties lines together.
+/// The window widens the resonance, which biases the damping by several standard errors of its
+/// mean, and makes neighbouring lines correlated; the intervals must allow for both.
 #[test]
 fn intervals_of_frequency_responses_hold() {
     let how = Identify::responses(Estimator::H1, Segmentation::with_samples(512));
@@ -320,8 +327,8 @@ fn resonances_narrower_than_a_line_warn() {
     assert!(!wide.iter().any(leaks));
 }
 
-/// Judge: the half-power width 2ζf, under a line of 1 % damping in segments of 256 samples and five of 5 % in those of
-/// 1,024.
+/// Reference: the half-power width 2ζf. It is less than one line for 1 % damping in segments of 256
+/// samples, and five lines for 5 % in segments of 1,024.
 #[test]
 fn frequency_responses_tell_of_a_peak_that_the_window_blunts() {
     let told = |rig: RandomTest, samples: usize| {
@@ -341,14 +348,14 @@ fn the_length_of_segments_is_chosen() {
     assert!(samples.is_power_of_two() && (128..=512).contains(&samples), "{samples}");
     assert!(table.segments.averages >= 6.0, "{}", table.segments.averages);
     assert!(table.remarks.iter().any(|remark| remark.contains("were chosen")), "{table}");
-    // Whole periods stay whole.
+    // A record of whole periods is not cut into segments.
     let period = random_test(0).period(512).unwrap();
     assert_eq!(frf(&period, &FrfSettings::default()).unwrap().segments.window, None);
     let how = Identify::responses(Estimator::H1, Segmentation::default());
     assert!(identify(&[random_test(0)], &how).unwrap().to_string().contains("were chosen"));
 }
 
-/// A file of averaged responses states enough of its segments to take off what their window blunts.
+/// A file of averaged responses states enough of its segments to correct the bias of their window.
 #[test]
 fn a_table_of_segments_is_fitted_as_its_record() {
     let test = random_test(3);
@@ -364,7 +371,8 @@ fn a_table_of_segments_is_fitted_as_its_record() {
             identify_responses(std::slice::from_ref(read), &IdentifyResponses::default()).unwrap();
         for (p, own) in found.estimate().parameters().zip(own.estimate().parameters()) {
             let apart = (p.value - own.value).abs() / own.standard_error;
-            // A file has no spectrum of the force, over which neighbouring lines would be averaged for their weights.
+            // A file has no spectrum of the force, so neighbouring lines cannot be averaged for the
+            // weights.
             assert!(apart < 0.1, "{p} {own}");
             assert!((p.standard_error / own.standard_error - 1.0).abs() < 0.1, "{p} {own}");
         }
@@ -376,7 +384,7 @@ fn a_table_of_segments_is_fitted_as_its_record() {
         let remarks = &found.summary().remarks;
         assert!(remarks.iter().any(|remark| remark.contains("bias of the window")), "{found}");
     }
-    // A file that does not say what it is an average over shows the damping of the window.
+    // If a file does not state its segments, the damping includes the effect of the window.
     let silent = FrequencyResponses { segments: None, ..text };
     let found = identify_responses(&[silent], &IdentifyResponses::default()).unwrap();
     let damping = |found: &Estimate| found.parameter("c").unwrap().value;
@@ -384,8 +392,8 @@ fn a_table_of_segments_is_fitted_as_its_record() {
     assert!(found > 1.3 * own, "{found} {own}");
 }
 
-/// Displacement of the machine of [`rig`] with dry friction, by Runge–Kutta steps of a sixteenth of a sample between
-/// which the force is linear.
+/// Displacement of the machine of [`rig`] with dry friction, by Runge–Kutta with 16 steps per
+/// sample; the force is linear between samples.
 fn with_friction(force: &Record, friction: f64) -> Record {
     const FINER: usize = 16;
     let [m, c, k] = [rig().system.mass(), rig().system.damping(), rig().system.stiffness()]
@@ -412,8 +420,9 @@ fn with_friction(force: &Record, friction: f64) -> Record {
     Record::from_channel(force.sampling(), out).unwrap()
 }
 
-/// The linear fit takes friction of 3 % of the RMS force for damping, and leaves a few per cent of the motion; what it
-/// leaves has the sign of the velocity. The same records without friction have nothing of it.
+/// The linear fit takes friction of 3 % of the RMS force for damping, and leaves a residual of a
+/// few per cent of the motion that has the sign of the velocity. The same records without friction
+/// must not warn.
 #[test]
 fn dry_friction_under_a_random_force_is_named() {
     let long = RandomTest { sampling: Sampling::new(0.002, 2 * SAMPLES).unwrap(), ..rig() };
@@ -436,8 +445,9 @@ fn dry_friction_under_a_random_force_is_named() {
     assert_eq!((0..4_u64).into_par_iter().filter(|seed| told(seed, 0.0).is_some()).count(), 0);
 }
 
-/// Judge: the generator. A window cut out of a steady state begins in motion; a machine at rest does not, even where the
-/// model is not quite the right one and the force acts at the beginning alone.
+/// Reference: the generator. A window cut from a steady state begins in motion. A machine that
+/// starts from rest must not be reported, even if the model is not quite correct and the force acts
+/// only at the beginning.
 #[test]
 fn a_record_that_begins_in_motion_is_told_by_its_prediction() {
     let machine = |stiffer: f64| {

@@ -1,5 +1,5 @@
-//! Units of records as they reach the results: converted, or a warning among the checks. Judge: a machine of 12 kg
-//! whose exact steady state is written in the units of the header.
+//! Units of records: they are converted, or a check warns. Reference: an oscillator of 12 kg whose
+//! exact steady state is written in the units of the header.
 
 use mechid_analysis::{
     Channels, Identify, IdentifyResponses, Measurement, Reading, ResponseQuantity, Window,
@@ -15,7 +15,7 @@ const RATE_HZ: f64 = 128.0;
 const G: f64 = 9.80665;
 const POUND: f64 = 4.448_221_615_260_5;
 
-/// Force, displacement and acceleration of two periods, in SI units.
+/// Two periods of force, displacement and acceleration, in SI units.
 fn record() -> [Vec<f64>; 3] {
     let period = Sampling::from_rate_hz(RATE_HZ, PERIOD).unwrap();
     let force = Multisine::flat(lines::band(period, 3.0, 40.0), 2.0, Phases::Schroeder).unwrap();
@@ -26,7 +26,7 @@ fn record() -> [Vec<f64>; 3] {
         .map(|record| record.repeated(2).unwrap().channel(0).to_vec())
 }
 
-/// Writes three columns of numbers below a header, and opens them by their numbers.
+/// Writes three columns of numbers below a header, and opens them by their column numbers.
 fn open(
     header: &str,
     response: ResponseQuantity,
@@ -49,7 +49,7 @@ fn open(
     record.window(Window { start: 1, period: Some(PERIOD), periods: None }).unwrap()
 }
 
-/// Mass in kg, and the warnings of the subject `unit`.
+/// Identified mass in kg, and the warnings with the subject `unit`.
 fn mass(measurement: Measurement) -> (f64, Vec<String>) {
     let found = identify(&[measurement], &Identify::default()).unwrap();
     let warnings =
@@ -106,7 +106,8 @@ fn a_unit_or_a_factor_that_is_stated_counts() {
     assert!(warnings.is_empty(), "{warnings:?}");
 }
 
-/// A dataset 58 of an accelerance, its label, and the direction of its force.
+/// A dataset 58 of an accelerance with this label and this direction of the force; `per_si` is the
+/// number of its units in one SI unit.
 fn accelerance(label: &str, per_si: f64, direction: i32) -> String {
     let hz: Vec<f64> = (1..=60).map(f64::from).collect();
     let mut text = format!(
@@ -179,7 +180,7 @@ fn labels_and_directions_of_universal_files_are_read() {
     }
 }
 
-/// Judge: the table of the same record with zeros in the place of the forces that do not act.
+/// Reference: the table of the same record with zeros as the forces that do not act.
 #[test]
 fn frequency_responses_take_one_force_and_several_responses() {
     use mechid_analysis::{FrfSettings, frf};

@@ -1,4 +1,4 @@
-//! Records as real rigs make them: one shaker at a time, and disturbances with lines of their own.
+//! Records as on real test rigs: one shaker at a time, and disturbances at lines of their own.
 
 use mechid_analysis::identify::{Disturbance, KnownMass, LeftOut, Method};
 use mechid_analysis::{
@@ -21,7 +21,7 @@ fn machine() -> SecondOrderSystem {
     chain(DOFS, Support::Held, 0.02, 3)
 }
 
-/// A period of the force at one degree of freedom and the steady motion that it makes, in closed form.
+/// One period of the force at one degree of freedom, and the steady response in closed form.
 fn test(driven: usize, seed: u64) -> (Record, Response) {
     let period = Sampling::new(0.008, PERIOD).unwrap();
     let lines = Multisine::flat(1..=70, 10.0, Phases::Random { seed }).unwrap();
@@ -39,8 +39,8 @@ fn test(driven: usize, seed: u64) -> (Record, Response) {
     (force, motion)
 }
 
-/// Records of the displacement, one for each shaker, with noise on response and on every channel of
-/// the force, as parts of their RMS and of that of the shaker.
+/// Displacement records, one for each shaker. The noise on the response is a part of its RMS, that
+/// on every force channel a part of the RMS of the shaker's force.
 fn records(seed: u64, [on_response, on_force]: [f64; 2]) -> Vec<Measurement> {
     let record = |driven: usize| {
         let (force, motion) = test(driven, 10 * seed + driven as u64);
@@ -108,7 +108,7 @@ fn noise_in_idle_channels_is_no_cause_for_warnings() {
             all += 1;
         }
     }
-    // With a rate of 1 in 50 more than four of fifty warn with a probability of 0.003.
+    // At a rate of 1 in 50, more than four of fifty records warn with a probability of 0.003.
     assert!(warned <= 4, "{warned} of {RUNS} warn");
     let coverage = held as f64 / f64::from(all);
     assert!((0.93..0.97).contains(&coverage), "{coverage}");
@@ -118,26 +118,28 @@ fn from_frf() -> Identify {
     Identify::responses(Default::default(), Segmentation::default())
 }
 
-/// A load cell where no force acts shows noise, to which nothing responds.
+/// The load cell of a shaker at rest shows only noise, which must not count as a force.
 #[test]
 fn noise_in_idle_channels_is_no_force_of_frequency_responses() {
     const RUNS: u64 = 40;
     let (mut warned, mut kept) = (0, 0);
     for seed in 0..RUNS {
         let found = identify(&records(seed, [0.005, 0.002]), &from_frf()).unwrap();
-        // All lines of all shakers, and hardly ever those of a channel of noise.
+        // All lines of the acting shakers are used, and hardly ever those of a channel with only
+        // noise.
         kept += found.summary().fit.equations / (2 * 70) - DOFS;
         let of_idle = |remark: &&String| remark.contains("taken as noise of the channel");
         assert_eq!(found.summary().remarks.iter().filter(of_idle).count(), DOFS, "{found}");
         warned += u64::from(found.checks().iter().any(|check| check.is_conspicuous()));
     }
-    // Of 240 channels one in a thousand is kept: more than three with a probability of 10⁻⁴.
+    // If one in a thousand of 240 channels is kept, more than three are kept with a probability of
+    // 10⁻⁴.
     assert!(kept <= 3, "{kept} channels are kept");
-    // With a rate of 1 in 50 more than four of forty warn with a probability of 0.001.
+    // At a rate of 1 in 50, more than four of forty records warn with a probability of 0.001.
     assert!(warned <= 4, "{warned} of {RUNS} warn");
 }
 
-/// A shaker of which nothing is known but its noisy channel, and no mass: the modes are left.
+/// If a force channel has only noise and no mass is known, only the modes are given.
 #[test]
 fn a_channel_of_noise_is_no_force_that_scales_an_equation() {
     let test = records(7, [0.005, 0.002]).swap_remove(0);
@@ -146,12 +148,12 @@ fn a_channel_of_noise_is_no_force_that_scales_an_equation() {
     for (mode, exact) in found.summary().modes.iter().zip(machine().modes().unwrap()) {
         let estimate = mode.row.natural_frequency_hz;
         let apart = estimate.value - exact.natural_frequency() / std::f64::consts::TAU;
-        // Noise on the driving force is taken for none.
+        // The method ignores the noise on the driving force, so the limit is wide.
         assert!(apart.abs() < 6.0 * estimate.standard_error.unwrap(), "{found}");
     }
 }
 
-/// Judges: the same periods in one record, and the receptance in closed form.
+/// References: the same periods in one record, and the receptance in closed form.
 #[test]
 fn records_are_averaged_together() {
     let whole = &records(3, [0.005, 0.0])[0];
@@ -174,7 +176,7 @@ fn records_are_averaged_together() {
             assert!(apart < 1e-9 * largest, "{apart} of {largest}");
         }
     }
-    // One shaker at a time, and H whole.
+    // Records with one shaker at a time give the complete matrix H.
     let table = frf_of_records(&records(4, [0.0, 0.0]), &how).unwrap();
     assert_eq!((table.responses.len(), table.records.len()), (DOFS * DOFS, DOFS));
     for response in &table.responses {
@@ -204,7 +206,7 @@ fn how_many_segments_each_record_has_is_told() {
     assert_eq!(found.summary().fit.equations, 2 * 70 * DOFS);
 }
 
-/// The lines that the misfit of a fit names.
+/// Lines that the check of the misfit names.
 fn named(found: &Identified) -> Option<Concentration> {
     found.checks().iter().find_map(|check| match &check.finding {
         Finding::Misfit(Misfit { concentration, .. }) => concentration.clone(),
@@ -212,7 +214,8 @@ fn named(found: &Identified) -> Option<Concentration> {
     })
 }
 
-/// One mass with lines 1 Hz apart, four periods, its displacement with 1 % of noise and what is added.
+/// Four periods of one mass with lines 1 Hz apart; the displacement has 1 % noise, and `added` is
+/// added to it.
 fn single(seed: u64, added: impl Fn(f64) -> f64) -> Measurement {
     let period = Sampling::from_rate_hz(512.0, 512).unwrap();
     let force = Multisine::flat(1..=150, 10.0, Phases::Random { seed }).unwrap();
@@ -231,8 +234,9 @@ fn single(seed: u64, added: impl Fn(f64) -> f64) -> Measurement {
     Measurement::from_records(&force, &responses).unwrap().period(512).unwrap()
 }
 
-/// Of 50 seeded records each with mains (50 and 100 Hz) and with run-out (24 and 48 Hz) of 1 % of the
-/// response all are named; of 150 right records, and 50 fitted with a wrong known mass, none.
+/// In 50 records with mains interference (50 and 100 Hz) and 50 with run-out (24 and 48 Hz), each 1
+/// % of the response, all these lines are named. In 150 correct records and 50 with a wrong known
+/// mass no line is named.
 #[test]
 fn the_misfit_names_the_few_lines_that_hold_it() {
     let how = Identify::spectra(Method::MaximumLikelihood);
@@ -255,7 +259,8 @@ fn the_misfit_names_the_few_lines_that_hold_it() {
 
 #[test]
 fn lines_of_a_disturbance_are_left_out() {
-    // Lines are 1/(256 · 0.008 s) = 0.488 Hz apart; run-out at lines 12, 24, 36 … repeats like a response.
+    // Lines are 1/(256 · 0.008 s) = 0.488 Hz apart; the run-out at lines 12, 24, 36 … is periodic,
+    // too.
     let line_hz = 1.0 / (PERIOD as f64 * 0.008);
     let shaken = |seed: u64| {
         let records = records(seed, [0.002, 0.0]);

@@ -1,5 +1,5 @@
-//! Identification from tables of frequency responses, judged by closed-form receptances and by the
-//! records that the tables were made from.
+//! Identification from tables of frequency responses. The references are closed-form receptances,
+//! and the records of the tables.
 
 use std::f64::consts::TAU;
 
@@ -20,13 +20,13 @@ fn oscillator() -> SecondOrderSystem {
     Sdof::new(25.0, 188.0, 142_000.0).unwrap().system()
 }
 
-/// Two degrees of freedom with C and K as of an oil film, not symmetric.
+/// Two degrees of freedom with C and K that are not symmetric, as of an oil film.
 fn coupled() -> SecondOrderSystem {
     let (c, k) = (dmatrix![900.0, 300.0; 200.0, 1500.0], dmatrix![3e5, 2e5; -1e5, 5e5]);
     SecondOrderSystem::new(dmatrix![20.0, 0.5; -0.3, 21.0], c, k).unwrap()
 }
 
-/// Exact responses at 5, 7 … 83 Hz, the forces one after another.
+/// Exact responses at 5, 7 … 83 Hz to each of the forces.
 fn exact(system: &SecondOrderSystem, quantity: ResponseQuantity) -> FrequencyResponses {
     let frequency_hz: Vec<f64> = (0..40).map(|k| 5.0 + 2.0 * f64::from(k)).collect();
     let at = |hz: &f64| {
@@ -69,7 +69,8 @@ fn exact_tables_give_the_machine_whatever_was_measured() {
     }
 }
 
-/// Under a window exp(−σt) the response at iω is that of the machine at iω + σ, whatever was measured.
+/// Under a window exp(−σt) the response at iω is that of the machine at iω + σ, for every measured
+/// quantity.
 #[test]
 fn the_decay_that_a_window_adds_is_taken_off() {
     let sigma = 4.3;
@@ -103,7 +104,7 @@ fn the_decay_that_a_window_adds_is_taken_off() {
             assert!(worst(&table) < 1e-8, "{quantity}: {}", worst(&table));
         }
     }
-    // Known entries are those of the machine; a known damping needs a known mass.
+    // Known entries of the structure are those of the machine; a known damping needs a known mass.
     let mut table = exact(&oscillator(), ResponseQuantity::Displacement);
     table.added_decay = Some(sigma);
     let known = |form: &str| {
@@ -118,8 +119,8 @@ fn the_decay_that_a_window_adds_is_taken_off() {
     assert!(matches!(error, AnalysisError::Setting { .. }), "{error}");
 }
 
-/// Frequency responses in a text and in a universal file, from sixteen noisy periods: the fit of the
-/// periods themselves, of the text and of the universal file agree.
+/// Frequency responses of sixteen noisy periods in a text file and in a universal file: the fits of
+/// the periods and of both files agree.
 #[test]
 fn a_record_and_its_table_agree() {
     let period = Sampling::from_rate_hz(128.0, 128).unwrap();
@@ -130,7 +131,7 @@ fn a_record_and_its_table_agree() {
     let x = noise::add_white(&x, NoiseLevel::FractionOfRms(0.05), 7).unwrap();
     let responses = [(ResponseQuantity::Displacement, &x)];
     let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
-    // Line by line, as the coherence weighs.
+    // The noise is estimated for each line, as the coherence does.
     let estimator = Some(PeriodEstimator::MaximumLikelihood(Pooling::PerLine));
     let how = Identify::from(Source::Periods(PeriodFit { estimator, ..PeriodFit::default() }));
     let of_record = identify(std::slice::from_ref(&test), &how).unwrap();
@@ -150,10 +151,11 @@ fn a_record_and_its_table_agree() {
     for found in [of_text.estimate(), of_universal.estimate()] {
         for (a, b) in of_record.estimate().parameters().zip(found.parameters()) {
             let apart = (a.value - b.value).abs() / a.standard_error;
-            // Both weigh by levels of 15 deviations, of the noise on different lines: an estimate moves by 1/√15 of its
-            // standard error with either, at random.
+            // The two fits estimate the noise from 15 deviations on different lines; either way an
+            // estimate moves at random by 1/√15 of its standard error.
             assert!(apart < 0.8, "{a} against {b}");
-            // Those of the record allow for such weights, by 7 %; of the few lines that decide, both are known to some 15 %.
+            // The standard errors of the record are 7 % larger, because they allow for uncertain
+            // weights. Both are known to about 15 %, because few lines decide.
             let ratio = a.standard_error / b.standard_error;
             assert!((0.8..1.35).contains(&ratio), "{ratio}");
         }
@@ -162,8 +164,9 @@ fn a_record_and_its_table_agree() {
     assert!(!checks.is_empty() && checks.iter().all(|check| !check.is_conspicuous()));
 }
 
-/// Three periods weigh a line by two deviations, which neighbouring lines have to share: the mean square of 180 errors over
-/// their standard errors, of which those of one record are not independent, is known to some 0.15.
+/// Three periods give two deviations per line, so neighbouring lines share their noise levels. The
+/// mean square of 180 errors over their standard errors is known to about 0.15, because the errors
+/// of one record are correlated.
 #[test]
 fn tables_of_three_periods_know_their_noise() {
     let period = Sampling::from_rate_hz(128.0, 128).unwrap();
@@ -186,13 +189,13 @@ fn tables_of_three_periods_know_their_noise() {
     assert!((0.55..1.5).contains(&mean), "{mean}");
 }
 
-/// Numbers of a complex normal distribution with E|z|² = 1.
+/// Numbers with a complex normal distribution and E|z|² = 1.
 fn normal(count: usize, seed: u64) -> Vec<Complex<f64>> {
     let both = noise::white(Sampling::new(1.0, count).unwrap(), 2, 0.5_f64.sqrt(), seed).unwrap();
     (0..count).map(|k| Complex::new(both.channel(0)[k], both.channel(1)[k])).collect()
 }
 
-/// Share of 95 % intervals that hold the true value, all parameters together.
+/// Share of the 95 % intervals that contain the true value, over all parameters.
 fn coverage(
     system: &SecondOrderSystem,
     runs: u64,
@@ -214,13 +217,13 @@ fn coverage(
     all.sum::<usize>() as f64 / (runs as usize * truth.len()) as f64
 }
 
-/// 500 runs of 12 parameters scatter by about 0.4 %.
+/// The share of 500 runs with 12 parameters scatters by about 0.4 %.
 #[test]
 fn intervals_from_standard_errors_hold() {
     let measure = |mut table: FrequencyResponses, seed: u64| {
         let count = table.frequency_hz.len();
         for (at, function) in table.functions.iter_mut().enumerate() {
-            // Larger at one end, as of an accelerometer below its range.
+            // The noise grows towards low frequencies, as for an accelerometer below its range.
             let size = |row: usize| 1e-4 * (1.0 + 20.0 / (1.0 + row as f64));
             for (row, z) in normal(count, 10 * seed + at as u64).into_iter().enumerate() {
                 function.values[row] += z * size(row);
@@ -234,7 +237,7 @@ fn intervals_from_standard_errors_hold() {
     assert!((0.935..=0.965).contains(&share), "{share}");
 }
 
-/// Sixty-four averages with noise on the response alone, and the coherence that they have.
+/// An average over 64 responses with noise only on the response, and its coherence.
 #[test]
 fn intervals_from_coherence_hold() {
     let measure = |mut table: FrequencyResponses, seed: u64| {
@@ -281,7 +284,7 @@ fn what_a_table_lacks_is_told() {
         "table has no response at 2 to a force at 1: every point needs one to every force, and every \
          force one at its own point (choose `points`)"
     );
-    // One point alone is another machine, but its table is whole.
+    // With a single point the table is complete, although the machine is another one.
     let alone = IdentifyResponses { points: vec!["2".into()], ..usual.clone() };
     assert_eq!(identify_responses(&[gap], &alone).unwrap().estimate().dof(), 1);
     let mut coherent = table.clone();

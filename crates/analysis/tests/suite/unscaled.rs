@@ -1,4 +1,5 @@
-//! Modes where no force acts on some degrees of freedom and no mass is known: all that the data give then.
+//! Modes of a machine when no force acts on some degrees of freedom and no mass is known: other
+//! results are not given.
 
 use std::f64::consts::TAU;
 
@@ -22,8 +23,8 @@ fn machine() -> SecondOrderSystem {
     chain(DOFS, Support::Held, 0.02, 3)
 }
 
-/// The steady displacements, in closed form, under a multisine at the first of the masses, with noise on them as a
-/// part of their RMS.
+/// Exact steady displacements under a multisine at the first mass, with noise as a part of their
+/// RMS.
 fn record(seed: u64, on_response: f64) -> Measurement {
     let period = Sampling::new(0.008, PERIOD).unwrap();
     let lines = Multisine::flat(1..=70, 10.0, Phases::Random { seed }).unwrap();
@@ -45,7 +46,7 @@ fn from_frf() -> Identify {
     Identify::responses(Default::default(), Segmentation::default())
 }
 
-/// Natural frequencies in Hz and damping ratios.
+/// Natural frequencies in Hz, and damping ratios.
 fn truth(system: &SecondOrderSystem) -> Vec<[f64; 2]> {
     let modes = system.modes().unwrap();
     modes.iter().map(|mode| [mode.natural_frequency() / TAU, mode.damping_ratio()]).collect()
@@ -55,7 +56,7 @@ fn equations(found: &Identified) -> Vec<usize> {
     found.summary().unscaled.clone().map_or(Vec::new(), |unscaled| unscaled.equations)
 }
 
-/// Judge: the eigenvalues and shapes of the machine itself.
+/// Reference: the eigenvalues and shapes of the machine.
 #[test]
 fn modes_are_those_of_the_machine_and_nothing_else_is_given() {
     let exact = machine();
@@ -65,7 +66,7 @@ fn modes_are_those_of_the_machine_and_nothing_else_is_given() {
         assert_eq!(equations(&found), [1, 2, 3]);
         let told = found.summary();
         assert!(told.parameters.is_empty() && told.system.is_none(), "{found}");
-        // Rows of unknown factors are no symmetric matrix.
+        // Rows with unknown factors cannot be tested for symmetry.
         assert!(told.checks.iter().all(|check| check.subject.to_string() != "symmetry"));
         assert!(told.covariance.as_ref().unwrap().parameters.is_empty());
         for (mode, exact) in told.modes.iter().zip(exact.modes().unwrap()) {
@@ -95,8 +96,8 @@ fn modes_are_those_of_the_machine_and_nothing_else_is_given() {
     }
 }
 
-/// With masses on a diagonal the equation of the struck mass has its scale. A mass that is stated for another one,
-/// right or wrong, changes its own equation alone.
+/// With a diagonal mass matrix the equation of the driven mass has its scale. A stated mass of
+/// another degree of freedom, right or wrong, changes only its own equation.
 #[test]
 fn a_stated_mass_scales_its_own_equation_and_no_mode() {
     let test = record(2, 0.01);
@@ -135,7 +136,7 @@ fn a_stated_mass_scales_its_own_equation_and_no_mode() {
             ] {
                 let error =
                     |u: mechid_analysis::identify::rows::Uncertain| u.standard_error.unwrap();
-                // The search ends within a small part of a standard error.
+                // The search stops when a step is a small part of a standard error.
                 assert!((a.value - b.value).abs() < 1e-2 * error(a), "{none}\n{other}");
                 assert!((error(a) / error(b) - 1.0).abs() < 1e-2, "{none}\n{other}");
             }
@@ -143,7 +144,7 @@ fn a_stated_mass_scales_its_own_equation_and_no_mode() {
     }
 }
 
-/// Runs whose interval holds, of how many.
+/// Number of intervals that contain the true value, and number of all intervals.
 fn held(all: &[Identified], system: &SecondOrderSystem) -> (usize, usize) {
     let truth = truth(system);
     let (mut held, mut total) = (0, 0);
@@ -161,7 +162,8 @@ fn held(all: &[Identified], system: &SecondOrderSystem) -> (usize, usize) {
     (held, total)
 }
 
-/// 100 runs of six numbers that hardly depend on one another: 91.5 to 98 % lie within four standard deviations.
+/// The share of 100 runs with six nearly independent numbers lies between 91.5 and 98 %, within
+/// four standard deviations.
 #[test]
 fn intervals_of_the_modes_hold() {
     for how in [from_frf(), Identify::spectra(Method::MaximumLikelihood)] {
@@ -197,7 +199,8 @@ fn struck(seed: u64) -> (HammerTest, Measurement) {
     (rig, test)
 }
 
-/// Of 48 numbers, fewer than 40 are held by 95 % intervals in one of a thousand such tests.
+/// If the intervals are right, fewer than 40 of 48 intervals of 95 % contain the true value in one
+/// of a thousand such tests.
 #[test]
 fn a_hammer_at_one_point_gives_the_modes() {
     let band = LineChoice::Band(Band { low_hz: 2.0, high_hz: 150.0 });
@@ -208,7 +211,7 @@ fn a_hammer_at_one_point_gives_the_modes() {
     assert!(total == 48 && held >= 40, "{held} of {total}");
 }
 
-/// The response to the force that acted is known, to any other it is not.
+/// The response can be predicted for the same forces as in the test, but not for others.
 #[test]
 fn a_record_is_predicted_if_its_forces_are_those_that_acted() {
     let found = identify(&[record(3, 0.001)], &from_frf()).unwrap();

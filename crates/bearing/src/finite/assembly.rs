@@ -1,14 +1,15 @@
 //! Reynolds' equation on the mesh of a film, and its derivatives.
 //!
-//! In dimensionless form, with h = H c, z = ζ R, p = 6 μ Ω (R/c)² P and τ = Ω t,
+//! In dimensionless form, the film thickness is h = H c, the axial coordinate z = ζ R, the pressure
+//! p = 6 μ Ω (R/c)² P, the time τ = Ω t, and the journal is at (X, Y) clearances:
 //!
 //! ```text
 //! ∂/∂θ(H³ ∂P/∂θ) + ∂/∂ζ(H³ ∂P/∂ζ) = ∂H/∂θ + 2 ∂H/∂τ ,   H = 1 − X cos θ − Y sin θ
 //! ```
 //!
-//! Galerkin's equations with bilinear pressure, ∫ H³ ∇P·∇N + (∂H/∂θ + 2 ∂H/∂τ) N = 0, balance the
-//! flow at an inner node. At a node on the end of the film they make the slope of the pressure
-//! zero, which determines the position of the end.
+//! Galerkin's equations with bilinear pressure P and test functions N, ∫ H³ ∇P·∇N + (∂H/∂θ + 2
+//! ∂H/∂τ) N = 0, balance the flow at an inner node. At a node on a front (the start or the end of
+//! the film) they make the slope of the pressure zero, which determines the position of the front.
 
 use nalgebra::{DMatrix, Vector2};
 
@@ -19,7 +20,8 @@ use super::film::Film;
 /// journal along the load and across, and to its velocity.
 pub(super) const SIDES: usize = 5;
 
-/// The equations of a film, linear in small changes of pressure, fronts and journal.
+/// The equations of a film, linear in small changes of the pressure, of the fronts (start and end
+/// of the film) and of the position and velocity of the journal.
 ///
 /// Nodes are numbered column by column; the first and the last column are on the fronts.
 pub(super) struct Assembly {
@@ -36,15 +38,16 @@ pub(super) struct Assembly {
     pub(super) load_fronts: DMatrix<f64>,
 }
 
-/// The two points of Gauss' rule on (0, 1); both weigh a half.
+/// The two points of Gauss' rule on (0, 1); each has the weight ½.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Contributions of an element of four nodes: two of a column of the mesh, then two of the next.
+/// Contributions of an element to the equations. Its four nodes are two of a column of the mesh,
+/// then two of the next column.
 ///
-/// Fronts: start and end of its row, then of the next row.
+/// Its four fronts are the start and the end of the film in its row, then in the next row.
 #[derive(Default)]
 struct Element {
-    /// Lower triangle.
+    /// Lower triangle of the element matrix.
     matrix: [[f64; 4]; 4],
     sides: [[f64; SIDES]; 4],
     by_front: [[f64; 4]; 4],
@@ -93,7 +96,7 @@ impl Assembly {
         let node = column * rows + row;
         let nodes = [node, node + 1, node + rows, node + rows + 1];
         let sides = self.load_fronts.ncols() + SIDES;
-        // The last row has no pressure.
+        // The last row, at the open end of the bearing, has no pressure.
         let above = row + 1 < rows;
         let inside = || (0..4).filter(move |a| above || a % 2 == 0);
         for a in inside() {
@@ -152,7 +155,8 @@ impl Element {
         element
     }
 
-    /// Adds a point of Gauss at (u, v) of the element, a fraction t of the way along the film.
+    /// Adds the contribution of a Gauss point at (u, v) of the element, at the fraction t of the
+    /// way from the start to the end of the film.
     #[inline]
     fn add_point(
         &mut self,

@@ -112,8 +112,8 @@ impl<'a> Search<'a> {
         Ok(film)
     }
 
-    /// Moves the fronts of a film to convergence with the journal fixed; returns the step from
-    /// there.
+    /// Moves the fronts of a film to convergence with the journal fixed; returns the Newton step at
+    /// the converged film.
     fn relaxed(&self, film: &mut Film, tolerance: f64) -> Result<Step, BearingError> {
         let mut change = f64::NAN;
         for _ in 0..limits::NEWTON_STEPS {
@@ -222,7 +222,8 @@ mod tests {
                     for (side, [near, next]) in [[1, 2], [last - 1, last - 2]].iter().enumerate() {
                         if film.free[side][row] {
                             free += 1;
-                            // A parabola from the front has a quarter, a line a half.
+                            // Next to a front, a parabolic pressure has the ratio ¼ at the two
+                            // nodes, a linear one ½.
                             let ratio = film.pressure[(row, *near)] / film.pressure[(row, *next)];
                             assert!(ratio < 0.35, "{bearing:?}: {ratio}");
                         }

@@ -18,7 +18,7 @@ pub(super) struct Film {
     pub(super) pad: Pad,
     /// Axial coordinate of the rows, in radii from the middle; the last is the open end.
     pub(super) axial: Vec<f64>,
-    /// Columns as fractions of the way from start to end.
+    /// Positions of the columns, as fractions of the way from start to end.
     pub(super) columns: Vec<f64>,
     /// Start and end of the film in each row but the last, in rad.
     pub(super) fronts: [Vec<f64>; 2],

@@ -84,8 +84,8 @@ impl Pad {
         if within { 1.0 - x.hypot(y) } else { thickness(first).min(thickness(last)) }
     }
 
-    /// Returns the angles between which the film converges, in rad; `None` for less than a
-    /// thousandth.
+    /// Returns the angles between which the film converges, in rad; `None` if they are less than a
+    /// thousandth apart.
     ///
     /// A pad of at most half the circumference, or a full bore, has one such arc.
     pub(super) fn converging(&self, position: Vector2<f64>) -> Option<[f64; 2]> {

@@ -7,7 +7,7 @@ use super::film::Film;
 use crate::error::BearingError;
 use crate::limits;
 
-/// A film to first order: its load, and how pressure and fronts follow the journal.
+/// Linearisation of a film: its load, and the changes of pressure and fronts with the journal.
 pub(super) struct Step {
     /// Load of the film once it satisfies its equations, to first order.
     pub(super) load: Vector2<f64>,

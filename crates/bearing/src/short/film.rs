@@ -8,9 +8,10 @@ use crate::error::BearingError;
 
 /// The film of a short bearing as a nonlinear force on the journal.
 ///
-/// The film has pressure where it is positive at this instant: half the circumference, whose
-/// position depends on the velocity. Along each circumferential line the film pushes with μ L³ (Ω/2
-/// ∂h/∂θ + ∂h/∂t) / h³ per radian of its radius.
+/// The film has pressure where the formula gives a positive one at this instant: on half the
+/// circumference, whose position depends on the velocity. The pressure, integrated over the length
+/// of the bearing, is −μ L³ (Ω/2 ∂h/∂θ + ∂h/∂t) / h³, in N per m of circumference, with the film
+/// thickness h at the angle θ.
 ///
 /// x and y are any two perpendicular directions such that the journal rotates from x to y.
 ///
@@ -39,7 +40,7 @@ pub struct ShortFilm {
 /// The force of a film on the journal and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilmForce {
-    /// Along x and y, in N.
+    /// Force along x and y, in N.
     pub force: [f64; 2],
     /// Stiffness −∂F/∂x (N/m) and damping −∂F/∂ẋ (N·s/m) at this position and velocity.
     pub tangent: OilFilm,
@@ -86,8 +87,8 @@ impl ShortFilm {
     }
 }
 
-/// Returns the force over μ R L³ / c² and its derivatives, for a position in clearances and a
-/// velocity in clearances per unit of time.
+/// Force divided by μ R L³ / c², and its derivatives, for a position in clearances and a velocity
+/// in clearances per unit of time.
 pub(super) struct HalfFilm {
     pub(super) force: [f64; 2],
     pub(super) stiffness: [[f64; 2]; 2],
@@ -95,10 +96,10 @@ pub(super) struct HalfFilm {
 }
 
 impl HalfFilm {
-    /// ∫ G n / h³ dθ over the half where G < 0, with h = 1 − ε cos θ from the line of centres,
-    /// n = (cos θ, sin θ) and G = Ω/2 ∂h/∂θ + ∂h/∂t = p sin θ − q cos θ.
+    /// Computes ∫ G n / h³ dθ over the half where G < 0, with h = 1 − ε cos θ from the line of
+    /// centres, n = (cos θ, sin θ) and G = Ω/2 ∂h/∂θ + ∂h/∂t = p sin θ − q cos θ.
     ///
-    /// G vanishes at both ends, which therefore do not contribute to the derivatives.
+    /// G vanishes at both ends of this half, which therefore do not contribute to the derivatives.
     pub(super) fn new(position: [f64; 2], velocity: [f64; 2], omega: f64) -> Self {
         let eccentricity = position[0].hypot(position[1]);
         let [cos, sin] =
@@ -116,7 +117,7 @@ impl HalfFilm {
         let stiffness = [0, 1].map(|i| [0, 1].map(|k: usize| -(turn[i][k] + 3.0 * bend[i][k])));
         let damping = [[cc, cs], [cs, ss]];
 
-        // Rotates back from the line of centres.
+        // The matrices are rotated back from the line of centres to x and y.
         let turned = |m: [[f64; 2]; 2]| {
             let rotation = [[cos, -sin], [sin, cos]];
             [0, 1].map(|i: usize| {

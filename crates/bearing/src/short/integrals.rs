@@ -9,9 +9,9 @@ use std::f64::consts::TAU;
 /// polynomials (Booker 1965).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Integrals {
-    /// a = 0, 1, 2 with n = 3.
+    /// Integrals for a = 0, 1, 2 with n = 3.
     pub(super) second: [f64; 3],
-    /// a = 0, 1, 2, 3 with n = 4.
+    /// Integrals for a = 0, 1, 2, 3 with n = 4.
     pub(super) third: [f64; 4],
 }
 
@@ -21,7 +21,7 @@ impl Integrals {
         let e = eccentricity;
         let q = (1.0 - e) * (1.0 + e);
         let root = q.sqrt();
-        // γ of the end, and of the start half a turn before it; γ passes ±π where θ does.
+        // Angle γ of the end, and of the start half a turn before it; γ passes ±π where θ does.
         let (sin, cos) = end.sin_cos();
         let last = (root * sin).atan2(cos - e);
         let first = (-root * sin).atan2(-cos - e);

@@ -97,14 +97,14 @@ impl ShortBearing {
     }
 }
 
-/// Load over μ Ω R L³ / c².
+/// Returns the load divided by μ Ω R L³ / c².
 fn load(eccentricity: f64) -> f64 {
     let square = eccentricity * eccentricity;
     let gap = (1.0 - eccentricity) * (1.0 + eccentricity);
     eccentricity / (4.0 * gap * gap) * (PI * PI * gap + 16.0 * square).sqrt()
 }
 
-/// Angle from the load to the eccentricity, in rad.
+/// Returns the angle from the load to the eccentricity, in rad.
 fn attitude(eccentricity: f64) -> f64 {
     let gap = (1.0 - eccentricity) * (1.0 + eccentricity);
     (PI * gap.sqrt()).atan2(4.0 * eccentricity)

@@ -1,4 +1,4 @@
-//! Bearings that cannot be: each is refused with its numbers.
+//! Impossible bearings: each is refused with its numbers.
 
 use mechid_bearing::{
     BearingError, Bore, Conditions, FiniteBearing, Mesh, ShortBearing, ShortFilm, Threshold,
@@ -74,7 +74,7 @@ fn a_journal_outside_the_bore_has_no_film() {
     }
 }
 
-/// Loads so heavy that no mesh resolves the film end in an error, soon.
+/// Loads that are too heavy for any mesh soon end in an error.
 #[test]
 fn hopeless_loads_end_in_an_error() {
     for sommerfeld in [1e-12, 1e-300] {

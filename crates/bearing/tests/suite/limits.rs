@@ -67,8 +67,8 @@ fn everything_converges_with_the_square_of_the_step() {
     }
 }
 
-/// For L/D → 0 the flow is axial: Ocvirk's bearing, eight coefficients and all. What is left falls
-/// at least in proportion to L/D.
+/// For L/D → 0 the flow is axial, as in Ocvirk's bearing. The difference from its position and its
+/// eight coefficients decreases at least in proportion to L/D.
 #[test]
 fn short_bearings_tend_to_ocvirk() {
     for eccentricity in [0.2, 0.6] {
@@ -84,9 +84,9 @@ fn short_bearings_tend_to_ocvirk() {
     }
 }
 
-/// For L/D → ∞ pressure stands all around, as in Sommerfeld's solution: the journal moves at right
-/// angles to the load, with W = 2π ε / ((2 + ε²) √(1 − ε²)) per unit of length, and the ends cost
-/// in proportion to D/L.
+/// For L/D → ∞ the whole circumference has pressure, as in Sommerfeld's solution: the journal moves
+/// at right angles to the load, with W = 2π ε / ((2 + ε²) √(1 − ε²)) per unit of length, and the
+/// ends reduce the load in proportion to D/L.
 #[test]
 fn long_bearings_tend_to_sommerfeld() {
     let e: f64 = 0.4;
@@ -106,8 +106,8 @@ fn long_bearings_tend_to_sommerfeld() {
     assert!(distance(&limit, &expected) < 0.004, "{limit:?} {expected:?}");
 }
 
-/// From light loads to heavy ones, short bearings to long, an equilibrium is found, and it turns
-/// into the load as the load grows.
+/// An equilibrium is found from light loads to heavy ones and from short bearings to long ones;
+/// with a growing load the journal turns towards its direction.
 #[test]
 fn equilibria_are_found_over_the_range_of_practice() {
     let elliptical = |preload: f64| Bore::elliptical(preload, 0.35).unwrap();
@@ -118,7 +118,7 @@ fn equilibria_are_found_over_the_range_of_practice() {
             let bearing = bearing.with_mesh(Mesh { along: 32, across: 8 }).unwrap();
             let mut before = f64::INFINITY;
             for k in 0..8 {
-                // S (L/D)² tells short bearings apart, S long ones.
+                // The parameter S (L/D)² governs short bearings, S long ones.
                 let sommerfeld = 30.0 * 0.3_f64.powi(k) / f64::min(ratio * ratio, 1.0);
                 let found = bearing.equilibrium(sommerfeld).unwrap();
                 assert!(found.attitude() < before && found.attitude() > 0.0, "{bearing:?}");

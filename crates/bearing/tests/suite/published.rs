@@ -2,7 +2,7 @@
 
 use mechid_bearing::{Bore, Conditions, Equilibrium, FiniteBearing};
 
-/// A row of the table: our equilibrium and what is printed.
+/// A row of the table: the computed equilibrium and the printed values.
 struct Row {
     name: String,
     ours: Equilibrium,
@@ -42,8 +42,8 @@ fn deviation(ours: &[f64], printed: &[f64]) -> f64 {
     differences.fold(0.0, f64::max) / largest
 }
 
-/// The issue asks for 2 %. The rows of the elliptical bearing agree within the printed digits;
-/// those of the bearing with two grooves within 1 %, see the book for the reason.
+/// Required are 2 %. The rows of the elliptical bearing agree within the printed digits, those of
+/// the bearing with two grooves within 1 %; the book gives the reason.
 #[test]
 fn coefficients_agree_with_lund_and_thomsen() {
     for row in rows() {
@@ -65,7 +65,7 @@ fn places_of_the_journal_agree_with_lund_and_thomsen() {
         let eccentricity = row.ours.eccentricity();
         assert!((eccentricity - row.eccentricity).abs() < 0.0015, "{}: {eccentricity}", row.name);
         let attitude = row.ours.attitude().to_degrees();
-        // 83.29° stands in the table where the neighbours ask for 85.29°: a digit misprinted.
+        // The table has 83.29°, but its neighbours require 85.29°: a misprinted digit.
         let printed = if row.attitude == 83.29 { 85.29 } else { row.attitude };
         assert!((attitude - printed).abs() < 0.15, "{}: {attitude}", row.name);
     }

@@ -49,7 +49,7 @@ fn sommerfeld_number_and_eccentricity_lead_to_one_another() {
     for e in [1e-9, 1e-3, 0.2, 0.8, 0.999, 1.0 - 1e-9] {
         let there = bearing.at_eccentricity(e).unwrap();
         let again = bearing.equilibrium(there.sommerfeld_number()).unwrap();
-        // S falls as (1 − ε)²: what is left of 1 − ε is known as well as S is.
+        // S decreases as (1 − ε)², so that 1 − ε has the relative accuracy of S.
         let error = (again.eccentricity() - e).abs();
         assert!(error < 1e-12 * e && error < 1e-6 * (1.0 - e), "{e}: {again:?}");
     }
@@ -99,7 +99,8 @@ fn the_force_is_the_integral_of_the_pressure_at_any_state() {
         let size = expected[0].hypot(expected[1]);
         for axis in 0..2 {
             let error = (ours[axis] - expected[axis]).abs();
-            // The rule sees the kink where the pressure begins: second order in its step.
+            // The quadrature has a kink where the pressure begins, so that its error is of second
+            // order in its step.
             assert!(error < 1e-8 * size, "{position:?} {ours:?} {expected:?}");
         }
     }
@@ -136,7 +137,7 @@ fn tangents_are_the_derivatives_of_the_force() {
     }
 }
 
-/// Nothing tells the directions of the film apart but the rotation.
+/// Only the rotation distinguishes the directions of the film.
 #[test]
 fn the_film_turns_with_the_axes() {
     let film = ShortFilm::new(CONDITIONS).unwrap();
@@ -155,8 +156,8 @@ fn the_film_turns_with_the_axes() {
     }
 }
 
-/// A journal that circles at half the speed of rotation takes the oil along: no pressure, whatever
-/// its eccentricity. So oil whirl has half the frequency of rotation.
+/// A journal that circles at half the speed of rotation takes the oil along, without pressure at
+/// any eccentricity. For this reason oil whirl has half the frequency of rotation.
 #[test]
 fn whirl_at_half_the_speed_meets_no_force() {
     let film = ShortFilm::new(CONDITIONS).unwrap();

@@ -98,7 +98,8 @@ fn standard_errors_are_those_of_the_scatter() {
     for ([sum, squares], expected) in sums.into_iter().zip(expected) {
         let mean = sum / f64::from(draws);
         let scatter = (squares / f64::from(draws) - mean * mean).sqrt();
-        // Four standard errors of a scatter of so many draws, and the second order.
+        // The limit is four standard errors of the scatter of this many draws, plus the second
+        // order.
         assert!((scatter / expected - 1.0).abs() < 0.025, "{scatter} {expected}");
     }
 }

@@ -52,7 +52,7 @@ fn trouble_is_seen_before_the_fit() {
     assert_eq!(verdict(held, &poor_motion, &poor, Subject::Excitation), Verdict::Bad);
     assert_eq!(verdict(held, &poor_motion, &poor, Subject::Conditioning), Verdict::Bad);
 
-    // From rest: not the period it is said to be.
+    // A motion from rest is not periodic with the claimed period.
     let transient = exact_zoh(&system, &rich, &InitialState::rest(2)).unwrap();
     assert_eq!(verdict(held, &transient, &rich, Subject::Periodicity), Verdict::Bad);
 
@@ -77,7 +77,7 @@ fn residuals_are_told_from_noise() {
 
     let white = noise::white(sampling, 1, 1.0, 1).unwrap();
     let u = white.channel(0);
-    // A residual that still holds the input, two samples late, and its own past.
+    // A residual that contains the input two samples late, and its own previous value.
     let mut e = vec![0.0; 2000];
     for k in 2..2000 {
         e[k] = 0.5 * e[k - 1] + 0.3 * u[k - 2];
@@ -86,14 +86,14 @@ fn residuals_are_told_from_noise() {
     let cross = cross_correlation(&e, u, 5).unwrap();
     assert!(cross.p_value < 1e-6);
     let largest = cross.coefficients.iter().cloned().fold(0.0, f64::max);
-    // Lags −5 … 5: the delay of two stands at place 7. Its coefficient is √(1 − 0.25).
+    // At lags −5 … 5 the delay of two samples is entry 7. Its coefficient is √(1 − 0.25).
     assert_eq!(cross.coefficients[7], largest);
     assert!((largest - 0.866).abs() < 0.05);
     assert!(whiteness(&e, 0).is_err() && whiteness(&e[..10], 9).is_err());
 }
 
-/// Coefficients of a slow input go together: taken as 51 independent ones, their squares would
-/// exceed the limit of 1 % in one record of ten.
+/// Coefficients of a slow input are correlated with one another: if they counted as 51 independent
+/// ones, their squares would exceed the limit of 1 % in one record of ten.
 #[test]
 fn a_slow_input_is_no_more_often_found_in_noise_than_a_fast_one() {
     let sampling = Sampling::new(1.0 / 128.0, 512).unwrap();
@@ -113,8 +113,8 @@ fn a_slow_input_is_no_more_often_found_in_noise_than_a_fast_one() {
     }
 }
 
-/// Differences of white noise are correlated at lag 1, and their coefficients beyond scatter √1.5
-/// as much as those of white noise.
+/// Differences of white noise are correlated at lag 1; beyond it, their coefficients scatter √1.5
+/// times as much as those of white noise.
 #[test]
 fn noise_of_a_known_span_has_nothing_beyond_it() {
     let sampling = Sampling::new(0.1, 2001).unwrap();
@@ -183,11 +183,11 @@ fn a_fit_is_validated_on_another_record() {
         let predicted = predict(&found, &other, hold, Extent::WholePeriod, &rest);
         predicted.map(|p| fit_percent(&noisy, p.displacement()).unwrap())
     };
-    // All that is missing is the noise of 10 %.
+    // Only the noise of 10 % is not predicted.
     for fit in percent(Discretisation::ZeroOrderHold).unwrap() {
         assert!((fit - 90.0).abs() < 1.5, "{fit}");
     }
-    // Euler's machine is damped by the wrong sign at this step, or predicts badly.
+    // At this step, Euler's rule gives a system with negative damping, or a bad prediction.
     assert!(percent(Discretisation::Euler).map_or(true, |fits| fits.iter().all(|f| *f < 80.0)));
 }
 
@@ -207,7 +207,7 @@ fn residuals_of_a_right_model_are_rounding() {
     assert!(right.kinematic_error() < 1e-9);
     let wrong = fit(Discretisation::ZeroOrderHold);
     let residual = wrong.one_step_errors(x, v, &force, Extent::Open).unwrap();
-    // The force of the next sample is missing: it shows at the lag −1.
+    // The force of the next sample is missing, which appears at lag −1.
     let column: Vec<f64> = residual.column(1).iter().copied().collect();
     let cross = cross_correlation(&column, &force.channel(0)[..199], 3).unwrap();
     assert!(cross.p_value < 1e-6 && cross.coefficients[2].abs() > 0.5, "{cross:?}");
@@ -242,7 +242,7 @@ fn a_sweep_is_the_same_on_any_number_of_threads_and_finds_the_best() {
     assert_eq!(best.error, Some(smallest));
     // Without a reference the standard errors decide.
     assert!(sweep(&settings, None, run, |_| {}).best().is_some());
-    // Failures are points, too: at the end of the range the mode is beyond half the rate.
+    // Failures are points, too: at the end of the range the mode is above half the sampling rate.
     let failing = sweep(&[1.0, 2.0], None, |_| Err::<Estimate, _>(EstimateError::NoDof), |_| {});
     assert_eq!(failing.best(), None);
     assert_eq!(failing.points()[1].outcome, Err(EstimateError::NoDof));
@@ -273,13 +273,15 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
                 for wrong in [1023, 1025, 1022, 1536, 1365, 700, 1800] {
                     let found = look(wrong).unwrap_or_else(|| panic!("{name} {share} {wrong}"));
                     assert_eq!(found.verdict(), Verdict::Bad);
-                    // What repeats every fifth of it does so after 205 samples to the nearest.
+                    // A force that repeats five times per period repeats, to the nearest sample,
+                    // after 205 samples.
                     assert!(found.value() > 200.0, "{name} {wrong}: {found}");
                 }
             }
         }
     }
-    // One claimed period that holds one and a half; a fifth of the period is no whole number.
+    // One claimed period that contains one and a half true ones; a fifth of the period is not a
+    // whole number of samples.
     let force = wide().unwrap().sample(sampling).unwrap().repeated(2).unwrap();
     let found = claimed_period(&force.window(0, 1536).unwrap(), 1536).unwrap();
     let Finding::WrongPeriod(WrongPeriod { claimed: 1536, fault }) = found else {
@@ -290,8 +292,8 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
     };
 }
 
-/// Four samples off, every period close by is as wrong as the claimed one: the right one is named, also with noise on
-/// the force, and none of those in between.
+/// If the claimed period is wrong by four samples, its neighbours are as wrong as itself: the check
+/// names the right period and no period in between, also with noise on the force.
 #[test]
 fn a_period_some_samples_off_is_replaced_by_the_right_one_only() {
     let sampling = Sampling::new(0.01, 256).unwrap();
@@ -309,8 +311,8 @@ fn a_period_some_samples_off_is_replaced_by_the_right_one_only() {
     }
 }
 
-/// Rows missing from a record, and rows of a second run behind it: the samples on the two sides of a
-/// gap return after other lags, too, which says nothing of the record.
+/// Rows missing from a record, and rows of a second run after it: the samples on the two sides of a
+/// gap agree after other lags, too, which is no evidence of another period.
 #[test]
 fn a_gap_in_the_record_is_no_other_period() {
     let sampling = Sampling::new(0.01, 256).unwrap();
@@ -332,13 +334,13 @@ fn a_gap_in_the_record_is_no_other_period() {
             else {
                 panic!("{found:?}");
             };
-            // A sample or two there may be by chance as expected.
+            // A sample or two after the gap may agree with the expected ones by chance.
             assert!((gap..gap + 7).contains(&sample), "{gap} {missing}: {sample}");
         }
     }
 }
 
-/// What never repeats, what hardly varies, and what is still most of the time.
+/// A force that never repeats, one that hardly varies, and one that is zero most of the time.
 #[test]
 fn nothing_is_said_of_a_force_that_does_not_repeat() {
     let sampling = Sampling::new(0.01, 1000).unwrap();

@@ -1,4 +1,4 @@
-//! Whether the checks of the channels name what is wrong with them, and are silent where nothing is.
+//! Checks of the channels name a fault if there is one, and report no fault otherwise.
 
 use mechid_checks::{Bias, Clipping, Spike};
 use mechid_checks::{
@@ -45,7 +45,7 @@ fn noisy_response(response: &Response, share: f64, seed: u64) -> Response {
     Response::new(x, v, a).unwrap()
 }
 
-/// The record so many samples later, whole or not.
+/// Returns the record delayed by a number of samples, whole or not.
 fn later(record: &Record, samples: f64) -> Record {
     let spectrum = Spectrum::from_record(record);
     let dt = record.sampling().dt();
@@ -61,9 +61,10 @@ fn late_response(response: &Response, samples: f64) -> Response {
     Response::new(x, v, a).unwrap()
 }
 
-/// Noise on the motion biases least squares while its residual stays white: with one sample as
-/// instrument of the next that shows. Noise on the force does not bias, and is not taken for it: of
-/// 300 runs at a level of 1 % 3 are, with a standard deviation of 1.7.
+/// Noise on the motion biases least squares although the residual stays white; with one sample as
+/// the instrument of the next, the bias becomes visible. Noise on the force does not bias the
+/// estimate and is not reported: of 300 runs at a level of 1 %, 3 report it on average, with a
+/// standard deviation of 1.7.
 #[test]
 fn noise_on_the_motion_is_told_from_noise_on_the_force() {
     for system in [oscillator(), bearing()] {
@@ -90,8 +91,8 @@ fn noise_on_the_motion_is_told_from_noise_on_the_force() {
     }
 }
 
-/// What the instruments give is right on average where least squares is not, whichever parameter is
-/// told.
+/// The instrumental estimate is right on average although least squares is not, for any parameter
+/// that is reported.
 #[test]
 fn instruments_rid_a_parameter_of_its_bias() {
     let system = oscillator();
@@ -178,7 +179,7 @@ fn a_converter_of_few_bits_is_named() {
     }
 }
 
-/// A blow that the force shows, and the jump after it, are no spikes of the response.
+/// A blow that the force contains, and the jump of the response after it, are not spikes.
 #[test]
 fn a_spike_is_named_but_not_a_blow() {
     let system = oscillator();
@@ -235,7 +236,7 @@ fn nothing_is_said_of_channels_that_are_as_they_should_be() {
     }
 }
 
-/// Of motions that have nothing to do with the force, too: half of the lines take power out.
+/// Motions that are unrelated to the force are part of the test: half of their lines extract power.
 #[test]
 fn forces_that_take_power_out_are_told() {
     let kind = ResponseQuantity::Displacement;

@@ -17,7 +17,7 @@ use mechid_spectra::{Lines, Pooling, RepeatedPeriods};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Of misfit, of whiteness from line to line and of linearity, true for good.
+/// Verdicts on misfit, whiteness from line to line, and linearity; true for good.
 fn verdicts(checks: &[Finding]) -> [bool; 3] {
     [Subject::Misfit, Subject::Whiteness, Subject::Linearity].map(|subject| {
         let mut of = checks.iter().filter(|c| c.subject() == subject).peekable();
@@ -26,7 +26,7 @@ fn verdicts(checks: &[Finding]) -> [bool; 3] {
     })
 }
 
-/// Share of `runs` experiments in which each check finds fault.
+/// Share of `runs` experiments in which each check reports a fault.
 fn faulted<const N: usize>(runs: u64, check: impl Fn(u64) -> [bool; N] + Sync + Send) -> [f64; N] {
     let found: Vec<[bool; N]> = (0..runs).into_par_iter().map(check).collect();
     let share = |at: usize| found.iter().filter(|good| !good[at]).count() as f64 / runs as f64;
@@ -39,7 +39,7 @@ const LONG: usize = 1 << 13;
 struct Random {
     segments: Segments,
     estimator: FrfEstimator,
-    /// Relative to the RMS of motion and of force.
+    /// Noise relative to the RMS of motion and of force.
     noise: [f64; 2],
     mass: Option<f64>,
 }
@@ -54,7 +54,8 @@ impl Random {
         };
         let clean = course(&force);
         let motion = match self.estimator {
-            // It takes both as noisy alike: a noise with the spectrum of the motion.
+            // This estimator assumes equal relative noise on both: noise with the spectrum of the
+            // motion.
             FrfEstimator::Hv => {
                 let other = noise::white(sampling, 1, 100.0, 2 * seed + 1).unwrap();
                 let data = clean.data() + linear(&other).data() * self.noise[0];
@@ -83,9 +84,9 @@ fn linear(force: &Record) -> Record {
     exact_harmonic_periodic(&oscillator(), force).unwrap().displacement().clone()
 }
 
-/// The level is 1 %, of 100 runs 1 with a standard deviation of 1. Products of a hundred lines are
-/// not quite normally distributed, so that their sum exceeds its limit in 2 to 3 % (of 400 runs, by
-/// the same experiments).
+/// At a level of 1 %, a test warns in 1 of 100 runs with a standard deviation of 1. Products of a
+/// hundred lines are not quite normally distributed: their sum exceeds its limit in 2 to 3 % of 400
+/// runs of the same experiments.
 #[test]
 fn checks_of_responses_seldom_find_fault_with_a_right_machine() {
     let windowed = |hop, window| Segments::Windowed { len: 512, hop, window };
@@ -146,7 +147,7 @@ fn hardening(force: &Record) -> Record {
     Record::from_channel(force.sampling(), x).unwrap()
 }
 
-/// On what is driven hangs a second mass, of a tenth, at 20 rad/s, which is not measured.
+/// A second mass, a tenth of the first, hangs on it at 20 rad/s and is not measured.
 fn with_a_second_mass(force: &Record) -> Record {
     let of = |a: f64, b: f64, c: f64| DMatrix::from_row_slice(2, 2, &[a, b, b, c]);
     let (m, c, k) = (of(10.0, 0.0, 1.0), of(180.0, -2.0, 2.0), of(5400.0, -400.0, 400.0));
@@ -157,7 +158,7 @@ fn with_a_second_mass(force: &Record) -> Record {
     Record::from_channel(force.sampling(), motion.displacement().channel(0).to_vec()).unwrap()
 }
 
-/// The level is 1 %: of 200 runs 2, with a standard deviation of 1.4.
+/// At a level of 1 %, 2 of 200 runs warn, with a standard deviation of 1.4.
 #[test]
 fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
     let period = Sampling::new(0.02, 256).unwrap();
@@ -193,8 +194,9 @@ fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
     }
 }
 
-/// Eight masses in a row of which two are driven, all of them measured; the response to the true forces, with a cubic
-/// spring of this share of the first mass's stiffness at its RMS displacement, to first order.
+/// Eight masses in a row, all measured and two of them driven: the response to the true forces,
+/// with a cubic spring that has this share of the first mass's stiffness at its RMS displacement,
+/// to first order.
 fn eight_sensors(cubic: f64, seed: u64) -> Finding {
     let system = chain(8, Support::Held, 0.02, 5);
     let sampling = Sampling::new(0.01, 1 << 12).unwrap();
@@ -246,8 +248,9 @@ fn eight_sensors(cubic: f64, seed: u64) -> Finding {
     linearity(&estimate.unwrap(), &force, &motion, kind, [0.5, 25.0]).unwrap()
 }
 
-/// Judge: the generator. Noise on a force is in all responses alike: eight sensors are no eight witnesses. The level is
-/// 1 %: of 60 runs more than 3 exceed it with a probability of 0.003.
+/// Judge: the generator. Noise on a force appears in all responses: eight sensors are not eight
+/// independent observations. At a level of 1 %, more than 3 of 60 runs warn with a probability of
+/// 0.003.
 #[test]
 fn noise_on_the_forces_of_eight_sensors_is_no_nonlinearity() {
     let warned = |cubic: f64, runs: u64| {

@@ -36,7 +36,7 @@ fn of(checks: &[Finding], subject: Subject) -> &Finding {
     checks.iter().find(|c| c.subject() == subject).unwrap()
 }
 
-/// The machine's fastest mode turns at 1.8 rad/s.
+/// The fastest mode of the machine is at 1.8 rad/s.
 #[test]
 fn trouble_with_spectra_is_seen_before_the_fit() {
     let system = bearing();
@@ -57,7 +57,7 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
     let good = look(0.2, 1..=60, 512, 0.01);
     assert_eq!(good.iter().map(|c| c.verdict()).max(), Some(Verdict::Good), "{good:?}");
     assert_eq!(of(&good, Subject::Excitation).value(), 60.0);
-    // The noise of 1 % does not repeat, and shows on the largest of three deviations.
+    // The noise of 1 % does not repeat, and determines the largest of three deviations.
     assert!((0.007..0.011).contains(&of(&good, Subject::Periodicity).value()));
 
     // Two equations, four unknowns; then four for four.
@@ -70,7 +70,7 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
     assert_eq!(of(&look(0.2, 1..=60, 512, 0.2), Subject::Periodicity).verdict(), Verdict::Doubtful);
 }
 
-/// The machine's fastest mode turns at 1.8 rad/s.
+/// The fastest mode of the machine is at 1.8 rad/s.
 #[test]
 fn a_mode_beyond_the_lines_or_the_sampling_is_seen_after_the_fit() {
     let system = bearing();
@@ -89,7 +89,7 @@ fn a_mode_beyond_the_lines_or_the_sampling_is_seen_after_the_fit() {
     assert_eq!((good.subject(), good.verdict()), (Subject::Step, Verdict::Good));
     let samples = std::f64::consts::TAU / (fastest * 0.2);
     assert!((good.value() / samples - 1.0).abs() < 1e-6, "{good} {samples}");
-    // Line 20 of 102.4 s stands at 1.23 rad/s.
+    // Line 20 of 102.4 s is at 1.23 rad/s.
     assert_eq!(look(0.2, 1..=20).verdict(), Verdict::Doubtful);
     assert_eq!(look(2.0, 1..=250).verdict(), Verdict::Bad);
 }
@@ -106,7 +106,7 @@ fn trouble_with_samples_is_seen_before_the_equation_of_motion_is_fitted() {
     let good = look(1..=60, 0.2);
     assert_eq!(good.len(), 4);
     assert_eq!(good.iter().map(|c| c.verdict()).max(), Some(Verdict::Good), "{good:?}");
-    // Two lines persist to the order of four, each equation has six unknowns.
+    // Two lines are persistently exciting of order four; each equation has six unknowns.
     let poor = look(5..=6, 0.2);
     assert_eq!(of(&poor, Subject::Excitation).verdict(), Verdict::Bad);
     assert_eq!(of(&poor, Subject::Conditioning).verdict(), Verdict::Bad);
@@ -143,11 +143,12 @@ fn residuals_are_judged_channel_by_channel() {
     let force = noise::white(sampling, 2, 1.0, 4).unwrap();
     let fitted = noise::white(sampling, 2, 100.0, 5).unwrap();
     let checks = after_fit(&white, &fitted, &force, 20, 0).unwrap();
-    // Each residual alone and with each force.
+    // Each residual is tested alone and with each force.
     assert_eq!(checks.len(), 6);
     assert!(checks.iter().all(|c| c.verdict() == Verdict::Good), "{checks:?}");
 
-    // The second force is left in the first residual, one sample late; the second is coloured.
+    // The first residual contains the second force one sample late; the second residual is
+    // coloured.
     let data = DMatrix::from_fn(2000, 2, |k, channel| match (k, channel) {
         (0, _) => 0.0,
         (_, 0) => white.data()[(k, 0)] + 0.5 * force.data()[(k - 1, 1)],
@@ -166,7 +167,7 @@ fn residuals_are_judged_channel_by_channel() {
         "{checks:?}"
     );
 
-    // As rounding the same residual says nothing, and a force that never changes is left out.
+    // As rounding, the same residual has no meaning, and a force that never changes is left out.
     let large = Record::new(sampling, fitted.data() * 1e10).unwrap();
     let still = Record::new(sampling, DMatrix::from_element(2000, 1, 3.0)).unwrap();
     let checks = after_fit(&residual, &large, &still, 20, 0).unwrap();
@@ -217,7 +218,7 @@ fn a_start_is_found_from_any_kind_of_motion() {
         let found = fitted_start(&system, &force, hold, &measured).unwrap();
         assert!((found.displacement() - truth.displacement()).amax() < 1e-9);
         assert!((found.velocity() - truth.velocity()).amax() < 1e-9);
-        // Stretches of it that share a sample tell the same.
+        // Segments that share a sample give the same result.
         let mut fit = StartFit::new(&system, hold).unwrap();
         for (start, len) in [(0, 7), (6, 2), (7, 393)] {
             let part = |record: &Record| record.window(start, len).unwrap();
@@ -233,7 +234,8 @@ fn a_start_is_found_from_any_kind_of_motion() {
         let fit = fit_percent(motion.velocity(), predicted.velocity()).unwrap();
         assert!(fit.iter().all(|fit| *fit > 100.0 - 1e-6));
     }
-    // Noise on every sample is averaged: the first alone would be off by 10 % of the motion's RMS.
+    // Noise on every sample is averaged: the first sample alone would be wrong by 10 % of the RMS
+    // of the motion.
     let noisy = noise::add_white(motion.displacement(), NoiseLevel::FractionOfRms(0.1), 8).unwrap();
     let found =
         fitted_start(&system, &force, hold, &[(ResponseQuantity::Displacement, &noisy)]).unwrap();
@@ -246,7 +248,7 @@ fn a_start_is_found_from_any_kind_of_motion() {
         Err(EstimateError::Numerics(NumericsError::TooFewRows { rows: 0, .. }))
     ));
 
-    // A free mass: where it stands does not show in its acceleration.
+    // A free mass: its position does not appear in its acceleration.
     let one = |value: f64| DMatrix::from_element(1, 1, value);
     let free = SecondOrderSystem::new(one(2.0), one(0.0), one(0.0)).unwrap();
     let push = Record::from_channel(force.sampling(), force.channel(0).to_vec()).unwrap();

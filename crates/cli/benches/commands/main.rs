@@ -1,8 +1,8 @@
 //! Whole commands on large input: their time and their peak memory, as the system sees them.
 //!
-//! Commands that are compared take turns. The last lines are the figures beside their goals; the time of
-//! reading is held against Arrow's CSV reader where `MECHID_BENCH_PYTHON` names a Python interpreter that
-//! has `pyarrow`.
+//! Commands that are compared run alternately. The last lines show each result beside its goal. If
+//! `MECHID_BENCH_PYTHON` names a Python interpreter that has `pyarrow`, the reading time is also
+//! compared with that of Arrow's CSV reader.
 
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
@@ -21,7 +21,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 /// Time between two looks at the memory of a command.
 const TICK: Duration = Duration::from_millis(2);
 
-/// Returns whether every command is only to run once, on little, as `cargo test` lets it.
+/// Returns whether every command runs only once, on small input, as under `cargo test`.
 fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }
@@ -57,16 +57,16 @@ fn run(folder: &Path, arguments: &[&str]) -> Result<Cost> {
     Ok(Cost { seconds, megabytes })
 }
 
-/// Largest memory of a running command, in MB, where the system tells.
+/// Largest memory of a running command, in MB; `None` if the system does not report it.
 fn peak_memory(child: &Child) -> Option<f64> {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? * 1024e-6)
 }
 
-/// Arrow's reader of text, waiting for the names of files.
+/// Process with Arrow's CSV reader, which reads the names of files from its standard input.
 struct Arrow {
-    // Ended when its input is closed.
+    // The process ends when its standard input is closed.
     _python: Child,
     files: ChildStdin,
     seconds: BufReader<ChildStdout>,
@@ -94,7 +94,7 @@ impl Arrow {
     }
 }
 
-/// One line of the end.
+/// One result of the summary at the end, with its goal.
 struct Figure {
     what: String,
     value: String,
@@ -129,7 +129,7 @@ fn write_record(path: &Path, periods: usize) -> Result<()> {
     Ok(())
 }
 
-/// Reads a text of 2·10⁶ × 4.
+/// Measures the reading of a text file of 2·10⁶ rows and 4 columns.
 fn reading(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
     let periods = if is_tried_only() { 4 } else { 488 };
     let record = folder.join("record.csv");
@@ -177,7 +177,7 @@ fn reading(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
     }
     let [.., without, with] = costs;
     let written = fs::metadata(folder.join("force.csv"))?.len() as f64 * 1e-6;
-    // What writing adds, for each MB, over what reading takes, for each MB.
+    // Additional time per MB written, divided by the time per MB read.
     let ratio = (with.seconds - without.seconds) / written / (without.seconds / megabytes);
     figures.push(figure(
         "force --output: writing over reading",
@@ -187,7 +187,7 @@ fn reading(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
     Ok(())
 }
 
-/// A file of coordinates of a symmetric matrix from its lower triangle.
+/// Writes a symmetric matrix as a Matrix Market file of coordinates, from its lower triangle.
 fn write_matrix(path: &Path, n: usize, entries: &[(usize, usize, f64)]) -> Result<()> {
     let mut text = String::from("%%MatrixMarket matrix coordinate real symmetric\n");
     writeln!(text, "{n} {n} {}", entries.len())?;
@@ -232,7 +232,8 @@ fn repeatedly(folder: &Path, arguments: &[&str], times: usize) -> Result<Cost> {
     Ok(best)
 }
 
-/// The description of a held chain of `n` masses, all of them driven.
+/// Returns the description of a chain of `n` masses between two walls, all of them driven by a
+/// force.
 fn driven_chain(n: usize, samples: usize, lines: usize, periods: usize) -> String {
     let matrix = |diagonal: f64, off: f64| {
         let entry = |i: usize, j: usize| match i.abs_diff(j) {
@@ -267,7 +268,7 @@ fn driven_chain(n: usize, samples: usize, lines: usize, periods: usize) -> Strin
 fn identification(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
     let channels =
         |kind: &str, n: usize| (1..=n).map(|i| format!("{kind}_{i}")).collect::<Vec<_>>().join(",");
-    // With as many masses as forces are independent, and lines enough for all of them.
+    // Each force drives all lines with its own random phases, so that the forces are independent.
     let cases = [
         (50, 2048, 1, "least-squares", "2 s and 200 MB at most"),
         (10, 2048, 4, "maximum-likelihood", "2 s at most"),

@@ -38,10 +38,10 @@ pub struct ResponseArgs {
     /// Displacement columns, in m, one per degree of freedom; 0 where it was not measured
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     displacement: Vec<String>,
-    /// Velocity columns, in m/s, likewise
+    /// Velocity columns, in m/s, one per degree of freedom; 0 where it was not measured
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     velocity: Vec<String>,
-    /// Acceleration columns, in m/s², likewise
+    /// Acceleration columns, in m/s², one per degree of freedom; 0 where it was not measured
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     acceleration: Vec<String>,
 }

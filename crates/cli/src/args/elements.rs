@@ -17,28 +17,28 @@ pub struct ElementArgs {
     /// Find the unknown coefficients of the machine in this description: degrees of freedom,
     /// elements (masses, springs and dampers, bearings, known matrices), sensors anywhere, and
     /// inputs (forces, motion of the support, unbalance). Columns have the names of sensors and
-    /// inputs. A record with --period is taken as whole periods, one with --hits as the hits of a
-    /// hammer, otherwise as an open record
+    /// inputs. With --period the record is read as whole periods, with --hits as the hits of a
+    /// hammer, otherwise as an open record (any part of a response)
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
           "acceleration", "domain", "lines", "without_lines", "method", "force_noise", "extent",
           "between_samples", "ac_coupling", "mass", "structure", "struck", "nonlinear", "candidates",
           "derivatives", "refine", "from_frf", "segment", "validate", "fitted_lines", "more_starts", "quantity", "averages", "points"])]
     machine: Option<PathBuf>,
-    /// The files are tables of synchronous responses, a row for each speed of a run: speed_rpm (or
-    /// speed_hz), and of each sensor and unbalance NAME_amplitude and NAME_phase_deg, or NAME_real
-    /// and NAME_imaginary; in SI units, unbalance in kg·m
+    /// The files are tables of synchronous responses, with one row per speed of a run. Columns:
+    /// speed_rpm (or speed_hz), and for each sensor and unbalance NAME_amplitude and
+    /// NAME_phase_deg, or NAME_real and NAME_imaginary; in SI units, unbalance in kg·m
     #[arg(long, requires = "machine", conflicts_with_all = ["frf_table", "period", "start",
           "sample_rate", "time", "detrend", "noise", "hits"])]
     speed_table: bool,
-    /// Table of frequency responses of a part, measured free of all other parts; its receptance
-    /// replaces a model of the part; may be repeated
+    /// Table of frequency responses of one part, measured while it was not connected to the other
+    /// parts; its receptance replaces a model of the part; may be repeated
     #[arg(long, value_name = "TABLE", requires = "machine")]
     part: Vec<PathBuf>,
-    /// Number of searches at most: one from the first values of the description, the others from
-    /// random ones [default: 12]
+    /// Maximum number of searches: the first begins at the initial values of the description, the
+    /// others at random values [default: 12]
     #[arg(long, value_name = "COUNT", requires = "machine", value_parser = at_least_one)]
     starts: Option<usize>,
-    /// Seed of the random first values [default: 0]
+    /// Seed of the random initial values [default: 0]
     #[arg(long, value_name = "SEED", requires = "machine")]
     seed: Option<u64>,
     /// Level of the intervals, in per cent [default: 95]

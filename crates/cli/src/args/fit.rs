@@ -43,20 +43,20 @@ pub struct FitArgs {
     domain: Domain,
     #[command(flatten)]
     pub(super) lines: LineArgs,
-    /// Estimator of the parameters from the spectra: least-squares on the equation of motion (noise
-    /// on the response biases it), instrumental (one half of the periods against the other; not
-    /// biased), or maximum-likelihood on the response (not biased, of least scatter) [default:
-    /// maximum-likelihood if at least two periods show the noise, if noise biases least squares, or
-    /// with --from-frf; otherwise least-squares]
+    /// Estimator of the parameters from the spectra: least-squares on the equation of motion
+    /// (biased by noise on the response), instrumental (instrumental variables from the other half
+    /// of the periods; unbiased), or maximum-likelihood on the response (unbiased, with the least
+    /// scatter) [default: maximum-likelihood if at least two periods show the noise, if noise
+    /// biases least squares, or with --from-frf; otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_parser = word::<Method>())]
     method: Option<Method>,
     /// Noise spectrum that weights the lines in maximum likelihood: white, smooth, neighbours:N
     /// (means over N lines to either side), per-line, or auto, which chooses
     #[arg(long, value_name = "NOISE")]
     pub(super) noise: Option<Pooling>,
-    /// Standard deviation of the noise on the force samples, in N: one for all forces, or one per
-    /// degree of freedom; for open records, so the record is fitted as one [default: estimated
-    /// above the excited band, or between hits]
+    /// Standard deviation of the noise on the force samples, in N: one value for all forces, or one
+    /// per degree of freedom. It applies to open records, and makes the fit treat the record as an
+    /// open one [default: estimated above the excited band, or between hits]
     #[arg(long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true)]
     force_noise: Vec<f64>,
     /// Extent of the window: open (any part of a response; its transient is estimated with the
@@ -64,14 +64,15 @@ pub struct FitArgs {
     /// transient is found; in the time domain open, except for spectral derivatives]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
-    /// Force between the samples: held (as a converter drives a shaker) or linear, exact if this is
-    /// true, for open records, hits and the time domain; euler (the dissertation's rule) for the
-    /// time domain, with a bias in proportion to the step [default: band-limited; in the time
-    /// domain the equation of motion at the samples if there is an acceleration, otherwise linear]
+    /// Assumed force between the samples. For open records, hits and the time domain: held (as by
+    /// the converter that drives a shaker) or linear; the fit is exact if the assumption is true.
+    /// For the time domain only: euler (the dissertation's rule), with a bias in proportion to the
+    /// step [default: band-limited; in the time domain the equation of motion at the samples if
+    /// there is an acceleration, otherwise linear]
     #[arg(long, value_name = "ASSUMPTION", value_parser = word::<Discretisation>())]
     between_samples: Option<Discretisation>,
-    /// Channels behind a first-order high-pass, such as an AC-coupled input, each with its corner
-    /// frequency in Hz; for open records and hits
+    /// Channels behind a first-order high-pass filter, such as an AC-coupled input, each with its
+    /// corner frequency in Hz; for open records and hits
     #[arg(long, value_name = "COLUMN=HZ,…", value_delimiter = ',')]
     ac_coupling: Vec<AcCoupling>,
     /// Masses, in kg, one per degree of freedom (or all n×n entries row by row), each a number or
@@ -94,8 +95,9 @@ pub struct FitArgs {
     nonlinear: NonlinearArgs,
     #[command(flatten)]
     time: TimeArgs,
-    /// Fit frequency responses averaged over segments, weighted by their coherence; the estimator
-    /// depends on where the noise is: h1 on the response, h2 on the force, hv on both
+    /// Fit frequency responses averaged over segments, weighted by their coherence; choose the
+    /// estimator by the channels that have the noise: h1 for noise on the response, h2 on the
+    /// force, hv on both
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<frf::Estimator>(),
           help_heading = "Frequency responses")]
     from_frf: Option<frf::Estimator>,
@@ -146,21 +148,23 @@ struct NonlinearArgs {
     /// to any record
     #[arg(long, value_name = "TERMS")]
     nonlinear: Option<Terms>,
-    /// Further terms to try, written in the same way: the most useful is added, one after the
-    /// other, as long as --criterion accepts it
+    /// Candidate terms, written as for --nonlinear: the most useful ones are added one by one, as
+    /// long as --criterion accepts them
     #[arg(long, value_name = "TERMS")]
     candidates: Option<Terms>,
-    /// Criterion for the addition of a candidate: information (extended Bayesian, and a coefficient
-    /// that differs from zero) or held-out (misfit of each record, predicted by the fit to the
-    /// others: three records or windows at least) [default: information]
+    /// Criterion for the addition of a candidate: information (extended Bayesian criterion, and a
+    /// coefficient that differs from zero) or held-out (error of the prediction of each record by
+    /// the fit to the others; needs at least three records or windows) [default: information]
     #[arg(long, value_name = "CRITERION", value_parser = word::<Criterion>())]
     criterion: Option<Criterion>,
-    /// Constants to estimate as well: laws (constants inside the laws, from the given values on),
-    /// delay (of the force), phase (common to all channels, as of equal filters)
+    /// Further constants to estimate: laws (constants inside the laws; the given values are the
+    /// initial ones), delay (of the force), phase (a phase error common to all channels, as from
+    /// equal filters)
     #[arg(long, value_name = "WHAT,…", value_parser = word::<Constant>(), value_delimiter = ',')]
     search: Vec<Constant>,
-    /// Weights of the lines, from the quantity in which the equation error is equal on all of them:
-    /// white-force, response, or smooth-spectrum (the residual's own); automatic: the likeliest
+    /// Weights of the lines, by the spectrum that the error of the equation of motion is assumed to
+    /// have: white-force (equal forces on all lines), response (equal responses on all lines),
+    /// smooth-spectrum (estimated from the residual), or automatic (the most likely of the three)
     /// [default: automatic]
     #[arg(long, value_name = "WEIGHTING", value_parser = word::<Weighting>())]
     weighting: Option<Weighting>,

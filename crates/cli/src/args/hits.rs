@@ -11,13 +11,14 @@ use crate::error::CliError;
 #[command(next_help_heading = "Hammer tests")]
 pub struct HitRuleArgs {
     /// The records are hammer tests: the hits are found in the force, and bad ones (double hits,
-    /// overloads, weak hits, too little room) are excluded. --hits=trigger=0.5,double=5,… changes
-    /// the rule: trigger (force that begins a hit, in per cent of the largest of the record; 0.5),
-    /// double (least second peak of a double hit, in per cent of the first; 5), weak (least peak,
-    /// in per cent of the median of all peaks of a tenth of the largest or more; 25), bounce (time
-    /// after the trigger within which a force belongs to the same hit, in s; 0.1), before (samples
-    /// before the pulse; twice those of the pulse), samples (length of a hit, including the samples
-    /// before it; up to the next hit)
+    /// overloads, weak hits, hits with too few samples around them) are excluded.
+    /// --hits=trigger=0.5,double=5,… changes the rule. Each setting is given here with its default:
+    /// trigger (force that begins a hit, in per cent of the largest of the record; 0.5), double
+    /// (smallest second peak of a double hit, in per cent of the first; 5), weak (smallest peak of
+    /// a good hit, in per cent of the median of all peaks that reach a tenth of the largest; 25),
+    /// bounce (time after the trigger within which a force belongs to the same hit, in s; 0.1),
+    /// before (number of samples before the pulse; twice those of the pulse), samples (length of a
+    /// hit, including the samples before it; up to the next hit)
     #[arg(long, value_name = "RULE", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     hits: Option<HitRule>,
 }
@@ -28,8 +29,8 @@ pub struct HitRuleArgs {
 pub struct HitArgs {
     #[command(flatten)]
     rule: HitRuleArgs,
-    /// Degree of freedom that is struck in each record, counted from 1, where one --force column
-    /// serves them all
+    /// Degree of freedom that is struck in each record, counted from 1, if the same --force column
+    /// serves all records
     #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
     struck: Vec<usize>,
 }

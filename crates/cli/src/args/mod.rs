@@ -35,8 +35,8 @@ pub struct ReportArgs {
 /// File to draw the result into.
 #[derive(Debug, Default, Args)]
 pub struct PlotArgs {
-    /// Draw the result into this file; its ending, .svg, .png or .html, says how; a page
-    /// zooms and has a cursor
+    /// Draw the result into this file; the ending .svg, .png or .html selects the format; an .html
+    /// page has zoom and a cursor
     #[arg(long, value_name = "FILE.svg|.png|.html", value_parser = plot_file, help_heading = "Output")]
     pub plot: Option<PathBuf>,
 }
@@ -193,30 +193,31 @@ pub struct RecordArgs {
     /// The record: text with one row per sample, MATLAB .mat, HDF5, universal file (dataset 58), or
     /// Parquet; also in gzip; - is standard input
     ///
-    /// The format is detected. Text: delimiter (comma, semicolon, tab, blanks) and header are found
-    /// too, the header also in a comment (#, %, !) or of LabVIEW (.lvm). MATLAB: a vector is a
-    /// column, of a matrix those called name[1], name[2] …, of a struct name.field. HDF5: a data
-    /// set is a column called by its path, such as run/force. Universal file: a function of time is
-    /// a column called after its node and direction, such as 12+Z, and brings its time axis.
-    /// Parquet: instants are read as seconds from the first one on; units and sample_rate_hz may be
-    /// among the keys of the file.
+    /// The format is detected. Text: the delimiter (comma, semicolon, tab, blanks) and the header
+    /// are detected too; the header may be a comment (#, %, !) or that of LabVIEW (.lvm). MATLAB: a
+    /// vector is one column, a matrix has the columns name[1], name[2] …, a field of a struct is
+    /// called name.field. HDF5: a data set is one column, called by its path, such as run/force.
+    /// Universal file: a function of time is one column, called after its node and direction, such
+    /// as 12+Z, and brings its time axis. Parquet: times are read as seconds from the first one;
+    /// the keys of the file may state units and sample_rate_hz.
     #[arg(value_name = "RECORD")]
     pub record: PathBuf,
     /// Number of header lines to skip above the table
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub skip_lines: u64,
-    /// Column whose value names the record of each row, where a Parquet file holds many records
+    /// Column that names the record of each row, if a Parquet file holds many records
     #[arg(long, value_name = "COLUMN")]
     pub record_column: Option<String>,
-    /// Record to read of such a file, by its value in that column [default: the only one]
+    /// Record to read from a file of many records, by its name in --record-column [default: the
+    /// only one]
     #[arg(long, value_name = "ID", requires = "record_column")]
     pub record_id: Option<String>,
     /// Factor that raises all limits on a file: 4 MiB a row of text, 4 KiB a name, 65536 columns, 1
     /// GiB of a compressed file, 2^28 numbers held, and memory (--memory-gb)
     #[arg(long, value_name = "FACTOR", value_parser = at_least_one)]
     pub raise_limits: Option<usize>,
-    /// Memory that the numbers of a file and the work on them may take, in GB [default: 0.27 GB,
-    /// and 512 bytes for each byte of the file; 8.6 GB at most]
+    /// Maximum memory for the numbers of a file and the work on them, in GB [default: 0.27 GB plus
+    /// 512 bytes per byte of the file, at most 8.6 GB]
     #[arg(long, value_name = "GB", value_parser = positive)]
     pub memory_gb: Option<f64>,
     /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
@@ -290,7 +291,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// Parses a count of at least one.
 pub fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
-        Ok(0) => Err("counted from 1".into()),
+        Ok(0) => Err("a number of at least 1 is needed, got 0 (counted from 1)".into()),
         Ok(n) => Ok(n),
         Err(e) => Err(format!("a whole number is needed: {e}")),
     }

@@ -18,17 +18,18 @@ use crate::outcome::{Files, Outcome};
 /// Identify the stiffness, damping and mass coefficients of a journal bearing from rig tests
 ///
 /// The housing floats on the film of a rotating shaft in rigid supports; shakers in x and y excite
-/// it in one test each, or on alternate lines of one. --force names the forces of the shakers,
-/// --acceleration those of the housing, --displacement the motion of the housing relative to the
-/// shaft, x before y. The window must hold whole periods; lines at multiples of --rotation-hz are
-/// excluded. Baseline tests (no film, shaft at rest) are subtracted with their uncertainty.
+/// it in one test each, or on alternate lines of one test. --force names the forces of the shakers,
+/// --acceleration the accelerations of the housing, --displacement the motion of the housing
+/// relative to the shaft, x before y. The window must hold whole periods; lines at multiples of
+/// --rotation-hz are excluded. Baseline tests (no film, shaft at rest) are subtracted with their
+/// uncertainty.
 ///
 /// With --frf-table the files are frequency responses instead, two for each test: first the
 /// displacement, then the acceleration per shaker force.
 ///
-/// A campaign at several speeds and loads is described by a JSON file with `points`, each with
-/// `tests`, `baseline`, `rotation_hz` and `load`, beside `channels`, `window` (or `frf_table`) and
-/// `settings` as --json prints them: --campaign.
+/// With --campaign the file is a JSON description of tests at several speeds and loads. It has a
+/// list `points`, each with `tests`, `baseline`, `rotation_hz` and `load`, and, common to all
+/// points, `channels`, `window` (or `frf_table`) and `settings` as --json prints them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid bearing x.csv y.csv --force fx,fy --acceleration ax,ay --displacement dx,dy \\
@@ -57,8 +58,8 @@ pub struct BearingArgs {
     /// Mass of the housing with all that moves with it, in kg
     #[arg(long, value_name = "KG", required_unless_present = "campaign")]
     stator_mass: Option<f64>,
-    /// Speed of rotation, in Hz; its line and multiples are excluded [default: the shaft is at
-    /// rest]
+    /// Speed of rotation, in Hz; the lines at this frequency and its multiples are excluded
+    /// [default: the shaft is at rest]
     #[arg(long, value_name = "HZ")]
     rotation_hz: Option<f64>,
     /// Static load, in N, for dimensionless coefficients
@@ -92,9 +93,9 @@ pub struct BearingArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Tables of frequency responses")]
 struct TableArgs {
-    /// The files are tables of frequency responses, of displacement and of acceleration by turns:
-    /// text with columns h_1_1_real, h_1_1_imaginary … as `mechid frf --output` writes it, or
-    /// universal files (datasets 58 of types 4 and 6)
+    /// The files are tables of frequency responses, alternately of displacement and of
+    /// acceleration: text with columns h_1_1_real, h_1_1_imaginary … as `mechid frf --output`
+    /// writes it, or universal files (datasets 58 of types 4 and 6)
     #[arg(long, conflicts_with_all = ["force", "displacement", "acceleration", "velocity",
           "sample_rate", "time", "period", "detrend", "lines", "without_lines"])]
     frf_table: bool,

@@ -1,4 +1,4 @@
-//! `mechid completions`: what a shell needs to complete the program's options.
+//! `mechid completions`: scripts for the completion of subcommands and options in a shell.
 
 use clap::{Args, CommandFactory as _};
 use clap_complete::Shell;

@@ -21,9 +21,10 @@ use crate::worker::worker_program;
 ///
 /// Every record becomes one row: parameters, standard errors, covariance, modes, findings,
 /// warnings, notes, or the error of a record that cannot be identified. The records are divided
-/// into parts of --part-records records, by rising path; a part is one file of the folder, complete
-/// or absent. Repeated, the command computes the missing parts: those that were not finished, and
-/// those in which a record, the analysis or the version of the program has changed.
+/// into parts of --part-records records, in the order of their paths; a part is one file of the
+/// folder, complete or absent. Repeated, the command computes the missing parts: those that were
+/// not finished, and those in which a record, the analysis or the version of the program has
+/// changed.
 ///
 /// Each worker is a separate process. A record that uses too much memory or time, or that ends its
 /// process, becomes a row with its error, and the others continue. Named pipes, sockets and devices
@@ -41,13 +42,13 @@ pub struct FleetArgs {
     /// The analysis: channels, reading, window and identify, as JSON
     #[arg(long, value_name = "ANALYSIS.json")]
     analysis: PathBuf,
-    /// The folder of results; it is made if it is not there
+    /// The folder of results; it is created if it does not exist
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     output: PathBuf,
     /// Records worked on at a time [default: as many as there are processors]
     #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     workers: Option<usize>,
-    /// Records in a part
+    /// Number of records in a part, which is one file of the folder
     #[arg(long, value_name = "COUNT", default_value_t = RECORDS_PER_PART,
           value_parser = at_least_one)]
     part_records: usize,
@@ -62,7 +63,8 @@ pub struct FleetArgs {
 }
 
 impl FleetArgs {
-    /// Returns the files that the arguments name; the fleet names its results.
+    /// Returns the files that the arguments name, without the results, whose names the fleet
+    /// chooses.
     pub fn files(&self) -> Files<'_> {
         Files::default().reads([&self.analysis]).reads(&self.records)
     }

@@ -25,10 +25,10 @@ use crate::outcome::{Files, Outcome};
 /// the standard error of the force. A machine with nonlinear terms needs displacement, velocity and
 /// acceleration of every degree of freedom.
 ///
-/// The system may also be the result of `mechid modes --json`: forces and responses are then those
-/// of the modal test, by name or in order, --forced counts its forces, and the force is found line
-/// by line in the band of the test, for whole periods or a record that begins and ends at rest
-/// (--at-rest).
+/// The system may also be the result of `mechid modes --json`. Forces and responses are then those
+/// of the modal test, by name or in order, and --forced gives the numbers of its forces. The force
+/// is found line by line in the band of the test; the record must be whole periods, or begin and
+/// end at rest (--at-rest).
 ///
 /// A long text is read in chunks. The methods continuous and discretised do not keep an open record
 /// in memory; every other method, --spectrum and --plot keep the columns used. For whole periods
@@ -53,22 +53,22 @@ pub struct ForceArgs {
     /// Degrees of freedom on which a force acts, counted from 1 [default: all]
     #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
     forced: Vec<usize>,
-    /// Method: auto (the one that suits the record); continuous (equation of motion at the samples:
-    /// displacement, velocity and acceleration of everything); discretised (from sample to sample,
-    /// the force linear between them: displacement and velocity); frequency-domain (dynamic
-    /// stiffness: whole periods); shrinkage (posterior mean), tikhonov or truncated-svd (whole
-    /// periods, or a short record); kalman (filter and smoother: an open record of any length)
+    /// Method: auto (the one that suits the record); continuous (equation of motion at the samples;
+    /// needs displacement, velocity and acceleration of every degree of freedom); discretised
+    /// (state transition from sample to sample, with a force that is linear between them; needs
+    /// displacement and velocity); frequency-domain (dynamic stiffness; needs whole periods);
+    /// shrinkage (posterior mean), tikhonov or truncated-svd (whole periods, or a short record);
+    /// kalman (filter and smoother; an open record of any length)
     #[arg(long, value_name = "METHOD", value_parser = word::<Method>(), default_value = "auto")]
     method: Method,
     /// Spectral lines with force: all, odd, even, or numbers and ranges first:step:last
     #[arg(long, value_name = "LINES")]
     lines: Option<LineSpec>,
-    /// Estimate the force only between two frequencies, in Hz; its standard error is that of this
-    /// band, too [default: all; without a displacement the frequencies at which the responses show
-    /// a force]
+    /// Estimate the force and its standard error only between two frequencies, in Hz [default: all;
+    /// without a displacement the frequencies at which the responses show a force]
     #[arg(long, value_name = "LOW:HIGH", conflicts_with = "lines")]
     band_hz: Option<Band>,
-    /// An open record begins at rest
+    /// Assume that an open record begins at rest
     #[arg(long)]
     at_rest: bool,
     /// Standard deviation of the noise in each measured column, in its unit, before periods are
@@ -86,8 +86,8 @@ pub struct ForceArgs {
     /// File for the force: time, force and standard error, in s and N
     #[arg(long, short, value_name = "FORCE.csv", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// File for its spectrum, on the lines of --lines or on all: frequency in Hz, amplitude in N,
-    /// phase in degrees
+    /// File for the spectrum of the force, on the lines of --lines or on all: frequency in Hz,
+    /// amplitude in N, phase in degrees
     #[arg(long, value_name = "SPECTRUM.csv", help_heading = "Output")]
     spectrum: Option<PathBuf>,
     #[command(flatten)]

@@ -37,8 +37,8 @@ pub struct FrfArgs {
     more: Vec<PathBuf>,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Frequency response estimator; it depends on where the noise is: h1 on the response, h2 on
-    /// the force, hv on both
+    /// Frequency response estimator, chosen by the channels that have the noise: h1 for noise on
+    /// the response, h2 on the force, hv on both
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "h1")]
     estimator: Estimator,
     #[command(flatten)]

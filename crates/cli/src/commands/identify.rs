@@ -10,12 +10,13 @@ use crate::outcome::{Files, Outcome};
 
 /// Find mass, damping and stiffness from a measured force and response
 ///
-/// In the frequency domain (the default) the window must contain whole periods of a periodic
-/// excitation, and one kind of motion is enough; the periods are averaged. For a random excitation,
-/// or any record that is not a period, the transient is estimated with the machine; for a hammer
-/// test that of each good hit (--hits). In the time domain any record is possible: displacement,
-/// velocity and acceleration for the equation of motion itself, or displacement and velocity with
-/// an assumption on the force between the samples; --derivatives computes what was not measured.
+/// In the frequency domain (the default) one kind of response is enough. For a periodic excitation
+/// the window must contain whole periods, which are averaged. For a random excitation, or any
+/// record that is not whole periods, the transient is estimated together with the machine; for a
+/// hammer test, the transient of each good hit (--hits). In the time domain any record is possible.
+/// The equation of motion itself needs displacement, velocity and acceleration; displacement and
+/// velocity are enough with an assumption on the force between the samples. --derivatives computes
+/// what was not measured.
 ///
 /// With --frf-table the files are frequency responses measured elsewhere.
 ///
@@ -23,10 +24,10 @@ use crate::outcome::{Files, Outcome};
 /// from sensors anywhere: springs and dampers of a chain, the bearings of a rotor, a frame on a
 /// shake table.
 ///
-/// A long text is read in chunks and not kept in memory: the fit uses all of it, checks and plots
-/// in the time domain at most the first 262144 samples. Kept in memory are windows for spectral
-/// --derivatives and for --refine by a spline or band-limited, one long period, and a record that
-/// --validate predicts as a steady state.
+/// A long text is read in chunks and not kept in memory: the fit uses all of it; checks and plots
+/// in the time domain use at most the first 262144 samples. The following are kept in memory:
+/// windows for spectral --derivatives, windows for --refine with spline or band-limited
+/// interpolation, one long period, and a record that --validate predicts as a steady state.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement

@@ -16,9 +16,8 @@ use crate::outcome::{Files, Outcome};
 /// weighted by a Hann window. In a text of more than 262144 rows, the levels cover all samples of
 /// the window, lines and period its first 262144 samples.
 ///
-/// The picture shows the first eight columns over time, all of the window, and their spectra, of
-/// the mean period if there is one. The column of time has a spectrum only if --columns asks for
-/// it.
+/// The picture shows the first eight columns: over time, in the whole window, and as spectra, of
+/// the mean period if there is one. The column of time has a spectrum only if --columns names it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid info record.csv

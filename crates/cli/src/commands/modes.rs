@@ -29,11 +29,11 @@ use crate::{options, repeat};
 /// Find the modes: of a test with forces, of a table of frequency responses, of a free decay, of an
 /// ambient record, of a machine
 ///
-/// With --force, any number of forces and responses: shakers, a hammer (--hits excludes bad hits),
-/// a hammer that roves from point to point (a record for each, --force-at). Frequencies, damping
-/// ratios and shapes are estimated by maximum likelihood on the spectral lines of the whole
-/// records, without windows; the number of modes is chosen, too. Without --force the record is a
-/// free decay, or with --ambient the response to unmeasured forces.
+/// With --force the record has any number of measured forces and responses: of shakers, of a hammer
+/// (--hits excludes bad hits), or of a hammer that roves from point to point (one record per point,
+/// --force-at). Frequencies, damping ratios and shapes are estimated by maximum likelihood on the
+/// spectral lines of the whole records, without windows; the number of modes is chosen, too.
+/// Without --force the record is a free decay, or with --ambient the response to unmeasured forces.
 ///
 /// Without any column the file is a table of frequency responses: a universal file (datasets 58),
 /// or a table with the columns that `mechid frf --output` writes. A file in JSON is the description
@@ -43,7 +43,8 @@ use crate::{options, repeat};
 /// a universal file): pairs by frequency and shape, with differences over their standard errors.
 ///
 /// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes to
-/// compute all: --modes takes the lowest frequencies, --near-hz the frequencies around a given one.
+/// compute all of them: --modes computes the given number of lowest modes, or, with --near-hz, of
+/// the modes nearest to a frequency.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid modes beam.csv --force hammer --acceleration a1 --band-hz 5:1200
@@ -70,25 +71,26 @@ pub struct ModesArgs {
     /// struck point of each record
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     force_at: Vec<String>,
-    /// Place of each response column; where a force acts at the place of a response, modal masses
-    /// follow
+    /// Point of each response column, such as 3 or 12+Z; modal masses are given if a force acts at
+    /// the point of a response
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     response_at: Vec<String>,
     /// Frequencies to use, in Hz [default: the band that the forces excite]
     #[arg(long, value_name = "LOW:HIGH")]
     band_hz: Option<Band>,
-    /// Number of modes [default: as many as the record shows; of a machine all]
+    /// Number of modes [default: as many as the record shows; for a machine, all]
     #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     modes: Option<usize>,
     /// Maximum number of modes
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
     max_modes: Option<usize>,
-    /// Frequencies, in Hz, near which a mode is estimated even if it is weak; of a machine with
-    /// --modes, the frequency that the modes are nearest to
+    /// Frequencies, in Hz, near which a mode is estimated even if it is weak; for a machine with
+    /// --modes, one frequency, whose nearest modes are computed
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
-    /// Exclude this part at the end of each record from a second fit, and predict it
+    /// Fit once more without this percentage at the end of each record, and predict the excluded
+    /// part
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     validate_percent: Option<f64>,
     /// Predict this record, with the same columns, from its forces
@@ -134,14 +136,14 @@ struct UnmeasuredArgs {
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           requires = "ambient", allow_negative_numbers = true)]
     without_hz: Vec<f64>,
-    /// Exclude the harmonics that are found
+    /// Exclude the lines of the harmonics that are found in the record
     #[arg(long, requires = "ambient")]
     without_harmonics: bool,
     /// Beginning of a free decay, in seconds from the first sample of the window [default: found]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     from: Option<f64>,
-    /// End of what is used of a free decay, in seconds from the first sample of the window
-    /// [default: its end]
+    /// End of the part of a free decay that is used, in seconds from the first sample of the window
+    /// [default: the end of the window]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     to: Option<f64>,
     /// Fit a free decay without a constant in each channel
@@ -280,7 +282,8 @@ impl ModesArgs {
         names: &[String],
     ) -> Result<Outcome, CliError> {
         let saved = SavedModes::from_result(summary)?;
-        // A geometry has the columns, or the places where they were measured.
+        // The geometry names its points after the columns, or after the points where they were
+        // measured.
         let shapes = self.shapes.mode_shapes(modes, names).or_else(|error| {
             self.shapes.mode_shapes(modes, &saved.shapes().1).map_err(|_| error)
         })?;
@@ -332,7 +335,7 @@ impl ModesArgs {
         refused.retain(|(name, _)| *name != "near_hz");
         self.refuse("a machine", &refused)?;
         if self.modes.is_none() && !self.near_hz.is_empty() {
-            let why = "of a machine it needs `modes`, the number to find".into();
+            let why = "for a machine it needs `modes`, the number of modes to find".into();
             return Err(AnalysisError::Setting { setting: "near_hz", why }.into());
         }
         if let Some(count) = self.modes {

@@ -1,4 +1,4 @@
-//! `mechid multisine`: an excitation to drive a test with, and how good it is.
+//! `mechid multisine`: design of an excitation for a test, with its quality.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ use crate::outcome::{Files, Outcome};
 /// Make a multisine excitation, write its record and judge it
 ///
 /// A multisine is a sum of cosines on chosen lines of a period. The phases decide how its power is
-/// spread over time: with phases of low crest factor the shaker gives most power for its largest
+/// spread over time: with a low crest factor the shaker gives the most power for a given peak
 /// force.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
@@ -80,7 +80,7 @@ pub struct MultisineArgs {
     /// Separation of the inputs
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Several inputs")]
     uncorrelated: Uncorrelated,
-    /// Periods in the record written
+    /// Number of periods in the written record
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = at_least_one,
           help_heading = "Output")]
     periods: usize,
@@ -118,7 +118,7 @@ enum Uncorrelated {
     Interleaved,
     /// All inputs share all lines, orthogonal by a DFT matrix: as many experiments as inputs
     Dft,
-    /// The same with a Hadamard matrix, signs only: 2, 4, 8 … inputs
+    /// All inputs share all lines, orthogonal by a Hadamard matrix (signs only): 2, 4, 8 … inputs
     Hadamard,
 }
 

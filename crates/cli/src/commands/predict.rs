@@ -16,10 +16,10 @@ use crate::outcome::{Files, Outcome};
 /// The model may also be the result of `mechid modes --json`: the forces and responses are then
 /// those of the modal test, by name or in order, and the prediction holds in its band.
 ///
-/// With --period the steady state under the mean of the periods, otherwise the whole window from
-/// its first sample on, at rest before it or from the state that --settle fits. Between the samples
-/// the force is band-limited. Response columns are compared with the prediction. The window is held
-/// in memory.
+/// With --period the prediction is the steady state under the mean of the periods. Otherwise it
+/// covers the whole window from its first sample on, from rest or from the initial state that
+/// --settle fits. Between the samples the force is band-limited. Response columns are compared with
+/// the prediction. The window is held in memory.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify rig.csv --force f --displacement x --period 1024 --nonlinear 'k3: x1^3' --json \\
@@ -36,12 +36,12 @@ pub struct PredictArgs {
     input: RecordArgs,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Fit the initial state to this many first samples of the response, which then do not count in
-    /// the errors [default: at rest]
+    /// Fit the initial state to this number of samples at the beginning of the response; the errors
+    /// do not count these samples [default: at rest]
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     settle: Option<usize>,
-    /// File for the predicted response: time in s, then every measured kind of response, or
-    /// displacements, in SI units
+    /// File for the predicted response: time in s, then every measured kind of response
+    /// (displacements if none was measured), in SI units
     #[arg(long, short, value_name = "RESPONSE.csv", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]

@@ -25,9 +25,10 @@ use crate::{options, repeat};
 /// Takes the options of `mechid identify`. The file is self-contained: it can be sent, printed and
 /// archived; its figures zoom and have a cursor. It ends with the command that writes it again.
 ///
-/// A long text is read in chunks and kept in memory as by `mechid identify`: levels, time histories
-/// and mean periods cover all samples; the residual in time and, for an open record, its spectrum
-/// and the reconstructed force cover the first 262144 samples, and the page says so.
+/// A long text is read in chunks, and `mechid report` keeps as little of it in memory as `mechid
+/// identify`: levels, time histories and mean periods cover all samples; the residual in time and,
+/// for an open record, its spectrum and the reconstructed force cover the first 262144 samples, and
+/// the page says so.
 ///
 /// With --machine the page is that of a machine of named elements. A file in JSON, without columns,
 /// is a saved result of `mechid modes` or `mechid identify`, or the description of a machine: the

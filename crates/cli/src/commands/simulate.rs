@@ -39,18 +39,21 @@ use crate::outcome::{Files, Outcome};
 ///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta,
 ///               generalised-alpha, hht-alpha, wbz-alpha, bathe, rho-infinity-bathe,
 ///               matrix-exponential, runge-kutta-4)
-///               and its parameters (beta, gamma; start: taylor, rest; start: average-acceleration,
-///               central-difference, {"given": {"at_dt": …, "at_2dt": …}} in m; theta, load:
-///               projected, interpolated; rho_infinity, acceleration: equation-of-motion, carried;
-///               rho_infinity, load: linear, exact; load: held, linear; load: held, linear, exact)
+///               and its parameters: newmark: beta, gamma; central-difference: start (taylor,
+///               rest); houbolt: start (average-acceleration, central-difference,
+///               {"given": {"at_dt": …, "at_2dt": …}} in m); wilson-theta: theta, load (projected,
+///               interpolated); generalised-alpha, hht-alpha and wbz-alpha: rho_infinity,
+///               acceleration (equation-of-motion, carried); bathe: load (linear, exact);
+///               rho-infinity-bathe: rho_infinity, load (linear, exact); matrix-exponential: load
+///               (held, linear); runge-kutta-4: load (held, linear, exact, band-limited, spline)
 ///
 ///   response    periodic (the steady state), from-rest, or {"from": {"displacement": …,
 ///               "velocity": …}} in m and m/s
 ///
-///   periods     how many
+///   periods     number of periods in the record
 ///
-///   outputs     degrees of freedom whose response is recorded, counted from 1; without, all, and
-///               of more than 64 in sparse matrices those that a force acts on
+///   outputs     degrees of freedom whose response is recorded, counted from 1; if not given, all,
+///               but with more than 64 in sparse matrices those that a force acts on
 ///
 ///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
 ///               fraction_of_rms; and a seed
@@ -76,7 +79,8 @@ pub struct SimulateArgs {
     /// a Parquet file, its name ending in .parquet
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: PathBuf,
-    /// Number of runs with different noise: the seed counts up from the one described
+    /// Number of runs with different noise: the seed increases by 1 from run to run, from the one
+    /// described
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "plot",
           help_heading = "Many runs")]
     runs: Option<usize>,

@@ -1,4 +1,4 @@
-//! `mechid sweep`: how an estimator does over a range of sampling steps.
+//! `mechid sweep`: errors of an estimator over a range of sampling steps.
 
 use std::path::PathBuf;
 
@@ -18,10 +18,10 @@ use crate::outcome::{Files, Outcome};
 
 /// Identify a machine at many sampling steps, and find the step that suits the estimator best
 ///
-/// From the description of an experiment (SYSTEM.json, as "mechid simulate" takes it) each setting
-/// is simulated: NPI or a rate replaces the sampling rate and the number of samples in a period
-/// stays. With NPI a period holds that many cycles of the natural frequency, so that the step is 2π
-/// NPI / (samples · ωn). The machine described is the truth that errors are measured against.
+/// With the description of an experiment (SYSTEM.json, as for "mechid simulate") each setting is
+/// simulated: NPI or a rate replaces the sampling rate, and the number of samples in a period stays
+/// the same. NPI is the number of cycles of the natural frequency ωn in a period, so that the step
+/// is 2π NPI / (samples · ωn). Errors are differences from the machine in the description.
 ///
 /// Every n-th sample of a measured record is used, without a filter; columns and window are chosen
 /// as in "mechid identify". Without --reference the standard errors are compared, which do not
@@ -60,7 +60,7 @@ pub struct SweepArgs {
         conflicts_with = "unknown_mass"
     )]
     mass: Option<KnownMass>,
-    /// The machine that errors of a record's estimates are measured against
+    /// Reference machine: the errors of a record's estimates are differences from it
     #[arg(long, value_name = "SYSTEM.json")]
     reference: Option<PathBuf>,
     /// Print only the best setting and its intervals (--json always lists all)
@@ -80,10 +80,10 @@ struct SettingArgs {
     /// 1:0.5:16
     #[arg(long, value_name = "NPI,…")]
     npi: Option<Settings>,
-    /// Sampling rates, in Hz; of a record, the own rate divided by whole numbers
+    /// Sampling rates, in Hz; for a record, its own rate divided by whole numbers
     #[arg(long, value_name = "HZ,…")]
     rate_hz: Option<Settings>,
-    /// Take every n-th sample; of an experiment, divide its sampling rate by these
+    /// Take every n-th sample; for an experiment, divide its sampling rate by n
     #[arg(long, value_name = "N,…")]
     decimate: Option<Settings>,
 }

@@ -31,14 +31,14 @@ fn subcommands() -> Vec<clap::Command> {
     all
 }
 
-/// The examples of a help text; lines that end with a backslash go on.
+/// Returns the examples of a help text, each on one line; a backslash at the end continues a line.
 fn examples(help: &str) -> Vec<String> {
     let (_, block) = help.split_once("Examples:\n").unwrap_or_default();
     let joined = block.replace("\\\n", " ");
     joined.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
 }
 
-/// The words of a command, as a shell splits it: what stands between quotes stays together.
+/// Returns the words of a command, as a shell splits it: text between quotes is one word.
 fn words(call: &str) -> Vec<&str> {
     let parts = call.split('\'').enumerate();
     parts
@@ -57,7 +57,7 @@ fn every_subcommand_has_examples_that_are_understood() {
         let examples = examples(&help);
         assert!(!examples.is_empty(), "{name} --help has no Examples:");
         for example in &examples {
-            // What the shell would take for itself.
+            // The shell reads a redirection itself.
             let call = example.split_once(" > ").map_or(example.as_str(), |(call, _)| call);
             let parsed = Cli::try_parse_from(words(call));
             assert!(parsed.is_ok(), "{example}\n{}", parsed.unwrap_err());
@@ -90,7 +90,7 @@ fn every_option_is_explained_and_names_its_unit() {
             let unit = UNITS.iter().find(|(value, _)| name.starts_with(value));
             match unit {
                 Some((_, unit)) => assert!(help.contains(unit), "{place}: {help}"),
-                // A level in the unit of its own column, or no unit at all.
+                // A level is in the unit of its own column, or has no unit.
                 None => assert!(
                     PURE.contains(&name.as_str()) || help.contains("unit"),
                     "{place} takes a number called {name}: which unit?"

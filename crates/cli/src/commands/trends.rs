@@ -15,9 +15,10 @@ use crate::outcome::{Files, Outcome};
 /// Show the results of `mechid fleet` side by side: parameters and modes over the records,
 /// outliers, failures
 ///
-/// Steps and drifts are found by the ranks of the values, with the record where they begin and a
-/// p-value. An outlier is farther from the level of its records than 3.5 standard deviations, those
-/// of the series (a robust estimate) and of the value together.
+/// Rank tests find steps and drifts, each with the record where it begins and a p-value. An outlier
+/// is farther than 3.5 standard deviations from the level of the records around it; the standard
+/// deviation combines the scatter of the series (a robust estimate) and the standard error of the
+/// value.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid trends results --output trends.html

@@ -1,5 +1,6 @@
-//! Lines for the reader's shell that are not commands of `mechid`: each is held to the workspace,
-//! and what it starts is run. A line that nothing here knows must not be in a page.
+//! Lines for the reader's shell that are not commands of `mechid`. Each is checked against the
+//! workspace, and the program that it starts is run. A page must not have a line that this file
+//! does not know.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,11 +10,11 @@ use serde_json::Value;
 
 use super::runs::Run;
 
-/// Words with which a command in running text begins.
+/// First words of commands in running text.
 pub const BEGINNINGS: [&str; 8] =
     ["cargo ", "git ", "mdbook ", "rustup ", "pip ", "python ", ".ci/", "MECHID_"];
 
-/// What holds the lines: the workspace as cargo sees it.
+/// The workspace as cargo describes it, against which the lines are checked.
 pub struct Workspace {
     root: PathBuf,
     metadata: Value,
@@ -25,10 +26,10 @@ impl Workspace {
         Self { root: root.to_owned(), metadata: serde_json::from_str(&told).unwrap() }
     }
 
-    /// What runs one line.
+    /// Returns the way in which one line is run.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If the line does not fit the workspace; the error gives the reason.
     pub fn meaning(&self, line: &str) -> Result<Run, String> {
         let typed = line.split(" # ").next().unwrap_or_default().trim();
         let mut words = shlex::split(typed).ok_or("no shell reads it")?;
@@ -44,14 +45,15 @@ impl Workspace {
                 Ok(Run::Book(folder.into()))
             }
             ["mdbook", "build", folder] => Err(format!("no book.toml in {folder}")),
-            // A measurement, for a machine that does nothing else; the check of every change reads its types.
+            // A measurement needs an idle computer, so it is not run; the Python checks read its
+            // types.
             ["python", script]
                 if script.starts_with("crates/python/examples/")
                     && self.root.join(script).is_file() =>
             {
                 Ok(Run::Always)
             }
-            // The check of every change has Python and what the line installs in a clean environment.
+            // `.ci/python` runs this line in a clean environment.
             ["pip" | "python", ..] => has_line(&self.root, ".ci/python", typed),
             [".ci/run"] => Ok(Run::Always),
             [check] if check.starts_with(".ci/") => has_line(&self.root, ".ci/run", check),
@@ -88,13 +90,13 @@ impl Workspace {
             ("new", None) | ("add", None) => self.begins_a_crate(own),
             ("install", _) => self.installs(value(own, &["--path"]).unwrap_or_default()),
             ("tree", _) if own.is_empty() => Ok(Run::Always),
-            // Whatever needs the whole workspace, the check of every change runs.
+            // `.ci/run` has the commands for the whole workspace.
             _ if own.contains(&"--workspace") => self.is_run_always(typed),
             _ => Err("nothing runs this command of cargo".into()),
         }
     }
 
-    /// What `.cargo/config.toml` puts in the place of this word.
+    /// Returns the command that `.cargo/config.toml` defines for this word.
     fn alias(&self, task: &str) -> Option<String> {
         let config = std::fs::read_to_string(self.root.join(".cargo/config.toml")).unwrap();
         let line = config.lines().find_map(|line| line.strip_prefix(task)?.strip_prefix(" = "))?;
@@ -105,8 +107,8 @@ impl Workspace {
         self.metadata["packages"].as_array().unwrap().iter().find(|p| p["name"] == name)
     }
 
-    /// The folder's package brings the program of this book, which `.ci/python` compiles without the tests and
-    /// their features.
+    /// Checks that the package in this folder has the program `mechid`. `.ci/python` compiles it
+    /// without the tests and their features.
     fn installs(&self, folder: &str) -> Result<Run, String> {
         let manifest = self.root.join(folder).join("Cargo.toml");
         let packages = self.metadata["packages"].as_array().unwrap();
@@ -118,7 +120,8 @@ impl Workspace {
         }
     }
 
-    /// A crate of the reader's, beside a clone of the workspace, comes to depend on a crate of it.
+    /// Makes a crate of the reader beside a clone of the workspace, and adds a crate of the
+    /// workspace as a dependency.
     fn begins_a_crate(&self, words: &[&str]) -> Result<Run, String> {
         let [name, options @ ..] = words else { return Err("no name".into()) };
         let beside = tempfile::tempdir().unwrap();
@@ -137,7 +140,7 @@ impl Workspace {
     }
 }
 
-/// The script of a check has this line, `--locked` or not.
+/// Checks that the script has this line, with or without `--locked`.
 fn has_line(root: &Path, script: &str, line: &str) -> Result<Run, String> {
     let checks = std::fs::read_to_string(root.join(script)).unwrap();
     let unlocked = |line: &str| line.trim_end_matches(" --locked").to_owned();
@@ -154,7 +157,7 @@ fn cargo(root: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Whether cargo's own help has every option.
+/// Checks that cargo's own help has every option.
 fn known_options(task: &str, words: &[&str]) -> Result<(), String> {
     let help = Command::new(env!("CARGO")).args([task, "-h"]).output().unwrap();
     if !help.status.success() {
@@ -169,7 +172,7 @@ fn known_options(task: &str, words: &[&str]) -> Result<(), String> {
     }
 }
 
-/// The word after one of these options.
+/// Returns the word after one of these options.
 fn value<'a>(words: &[&'a str], options: &[&str]) -> Option<&'a str> {
     let at = words.iter().position(|word| options.contains(word))?;
     words.get(at + 1).copied()
@@ -184,7 +187,7 @@ fn target(package: &Value, kind: &str, name: &str) -> Option<Value> {
     targets(package, kind).into_iter().find(|target| target["name"] == name).cloned()
 }
 
-/// `cargo test` runs each measurement of these benches once.
+/// Checks that `cargo test` runs each measurement of these benches once.
 fn is_benched(package: Option<&Value>) -> Result<Run, String> {
     let benches = package.map(|package| targets(package, "bench")).unwrap_or_default();
     match benches.iter().find(|bench| bench["test"] != true) {
@@ -194,7 +197,8 @@ fn is_benched(package: Option<&Value>) -> Result<Run, String> {
     }
 }
 
-/// Whether the sources of a test have the tests that a line picks, and the setting it makes.
+/// Checks that the sources of a test have the tests that a line selects and the variables that it
+/// sets.
 fn test_knows(test: &Value, words: &[&str], settings: &[String]) -> Result<(), String> {
     let main = Path::new(test["src_path"].as_str().unwrap());
     let files = below(main.parent().unwrap());
@@ -214,7 +218,7 @@ fn test_knows(test: &Value, words: &[&str], settings: &[String]) -> Result<(), S
     }
 }
 
-/// The Rust files in a folder and the folders in it.
+/// Returns the Rust files in a folder and in the folders below it.
 fn below(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let (folders, mut files): (Vec<PathBuf>, Vec<PathBuf>) = entries.partition(|e| e.is_dir());

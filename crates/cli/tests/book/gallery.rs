@@ -1,4 +1,4 @@
-//! Pages of the gallery, whose measured records lie beside the project and not in it.
+//! Pages of the gallery; their measured records are stored next to the project, not in it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,8 @@ use super::session::Session;
 /// Largest figure of a page of the gallery, in bytes.
 const LARGEST_FIGURE: u64 = 100_000;
 
-/// The folder of a page's record: it has the page's name. `None` for pages without a record.
+/// Returns the folder of a page's record, which has the page's name; `None` for pages without a
+/// record.
 fn record_of(page: &Path) -> Option<PathBuf> {
     let folder = page.parent()?;
     let name = page.file_stem()?;
@@ -18,8 +19,8 @@ fn record_of(page: &Path) -> Option<PathBuf> {
         .then(|| root().join("../shared/data").join(name))
 }
 
-/// Copies a page's record into the reader's folder; `false`, and a word on it, where it is not
-/// beside the project.
+/// Copies a page's record into the reader's folder. Returns false and prints a note if the record
+/// is not stored next to the project.
 #[allow(clippy::print_stderr, reason = "a skipped page says so")]
 pub fn has_its_record(page: &Path, session: &Session) -> bool {
     let Some(folder) = record_of(page) else { return true };

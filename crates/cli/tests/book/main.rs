@@ -1,9 +1,10 @@
-//! What the README and the book show is what the program prints, draws and compiles, and every
-//! link leads somewhere.
+//! README and book show exactly what the program prints and draws; their code compiles, and every
+//! link has a target.
 //!
-//! A page's `console` blocks are followed in order; a chapter and the pages nested below it in the
-//! book's summary share one folder. `MECHID_BLESS=1 cargo test -p mechid-cli --test book` writes
-//! the answers and pictures anew. Pages of the gallery are followed where their records are.
+//! The commands in a page's `console` blocks are run in order; a chapter and the pages below it in
+//! the book's summary share one folder. `MECHID_BLESS=1 cargo test -p mechid-cli --test book`
+//! writes the answers and pictures anew. Pages of the gallery are tested only if their records are
+//! present.
 
 mod commands;
 mod gallery;
@@ -35,7 +36,7 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// A page with what it includes.
+/// Returns a page with the files that it includes.
 fn whole(path: &Path) -> String {
     let text = read(path);
     let includes = Page::parse(&text).includes;
@@ -44,7 +45,7 @@ fn whole(path: &Path) -> String {
         .fold(text.clone(), |text, file| text + &read(&path.parent().unwrap().join(file)))
 }
 
-/// The book's pages, those that share a folder together: a chapter with what is nested in it.
+/// Returns the pages of the book in groups that share a folder: a chapter with the pages below it.
 fn chapters() -> Vec<Vec<PathBuf>> {
     let source = root().join("docs/book/src");
     let mut chapters: Vec<Vec<PathBuf>> = Vec::new();
@@ -57,7 +58,7 @@ fn chapters() -> Vec<Vec<PathBuf>> {
     chapters
 }
 
-/// The README and every page below docs.
+/// Returns the README and every page below `docs`.
 fn documents() -> Vec<PathBuf> {
     let mut documents = vec![root().join("README.md")];
     let mut folders = vec![root().join("docs")];
@@ -74,16 +75,16 @@ fn documents() -> Vec<PathBuf> {
     documents
 }
 
-/// What is wrong with the pages.
+/// Faults found in the pages.
 #[derive(Default)]
 struct Findings {
-    /// Answers and pictures that are others today; blessing writes them anew.
+    /// Answers and pictures that differ from those of the program; blessing replaces them.
     stale: Vec<String>,
-    /// What only an author can mend.
+    /// Faults that only an author can correct.
     wrong: Vec<String>,
 }
 
-/// Follows a page; gives its text with the answers of today.
+/// Runs the commands of a page; returns its text with the answers of the program.
 fn follow(page: &Path, session: &mut Session, findings: &mut Findings) -> String {
     let text = read(page);
     let (mut today, mut copied) = (String::new(), 0);
@@ -119,7 +120,7 @@ fn follow(page: &Path, session: &mut Session, findings: &mut Findings) -> String
     today + &text[copied..]
 }
 
-/// Holds a page's pictures to those that its commands drew.
+/// Compares a page's pictures with those that its commands drew.
 fn look(page: &Path, session: &Session, findings: &mut Findings) {
     for image in Page::parse(&read(page)).images {
         let committed = page.parent().unwrap().join(&image);
@@ -128,9 +129,9 @@ fn look(page: &Path, session: &Session, findings: &mut Findings) {
             Some(drawn) if committed.exists() && pictures::alike(&drawn, &read(&committed)) => {}
             Some(drawn) if bless() => fs::write(&committed, drawn).unwrap(),
             Some(_) => findings.stale.push(format!("{} is drawn otherwise", committed.display())),
-            // Drawn and compared by `cargo xtask` and by the test `film_in_motion` of the workspace.
+            // `cargo xtask` and the test `film_in_motion` draw and compare these pictures.
             None if ["thesis/", "film_in_motion/"].iter().any(|drawn| image.contains(drawn)) => {}
-            // Times, which no run repeats.
+            // This picture shows measured times, which differ in every run.
             None if image == "cost.svg" => {}
             None => findings.wrong.push(format!("{}: nothing draws {image}", page.display())),
         }
@@ -204,7 +205,7 @@ fn every_page_can_be_found() {
     }
 }
 
-/// Where a block is a file, the text must say which: what follows the fence is not shown.
+/// If a block shows a file, the text must name it, because the line of the fence is not shown.
 #[test]
 fn readers_are_told_what_to_call_a_file() {
     for page in chapters().concat() {
@@ -217,8 +218,8 @@ fn readers_are_told_what_to_call_a_file() {
     }
 }
 
-/// Numbers of three digits and more in the text of introduction and tutorial are those that the
-/// chapter's blocks show or give, rounded to the digits written.
+/// Numbers of three or more digits in the text of introduction and tutorial must be in a block of
+/// the same chapter, rounded to the digits written.
 #[test]
 fn the_tutorial_says_what_its_blocks_show() {
     let mut looked_at = 0;
@@ -252,7 +253,7 @@ fn the_tutorial_says_what_its_blocks_show() {
     assert!(looked_at > 30, "{looked_at} numbers");
 }
 
-/// Rows of tables, whose cells two blanks or more keep apart, fit on a screen of 100 columns.
+/// Rows of tables fit on a screen of 100 columns; two or more blanks separate their cells.
 #[test]
 fn tables_fit_on_a_screen() {
     let mut rows = 0;
@@ -272,8 +273,8 @@ fn tables_fit_on_a_screen() {
     assert!(rows > 100, "{rows} rows");
 }
 
-/// Every line for a shell, in blocks and in running text, with the page that has it. Folders are
-/// made and entered where the pages are followed.
+/// Returns every line for a shell, in blocks and in running text, and its page. Lines that make or
+/// enter a folder are not among them.
 fn shell_lines(wrong: &mut Vec<String>) -> Vec<(PathBuf, String)> {
     let mut all = Vec::new();
     for document in documents() {
@@ -287,7 +288,7 @@ fn shell_lines(wrong: &mut Vec<String>) -> Vec<(PathBuf, String)> {
             match block.language() {
                 "sh" => lines.extend(content.lines().map(String::from)),
                 "console" | "rust" | "json" | "text" => {}
-                // crates/python/tests/test_pages.py runs them, and compares what they print.
+                // `crates/python/tests/test_pages.py` runs these blocks and compares their output.
                 "python" => {}
                 other => wrong.push(format!("{place}: nothing tests a block of \"{other}\"")),
             }
@@ -321,7 +322,7 @@ fn every_command_is_run() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Subcommands and options that the pages speak of are in the program's help.
+/// Subcommands and options named in the pages exist in the help of the program.
 #[test]
 fn options_in_running_text_exist() {
     let help = |arguments: &[&str]| {
@@ -355,7 +356,8 @@ fn options_in_running_text_exist() {
     assert!(wrong.is_empty() && looked_at > 40, "{looked_at} looked at\n{}", wrong.join("\n"));
 }
 
-/// `cargo test --doc` compiles and runs the Rust of the pages that the facade names.
+/// `cargo test --doc` compiles and runs the Rust blocks of all pages that the crate `mechid`
+/// includes.
 #[test]
 fn the_rust_of_every_page_is_compiled() {
     let facade = read(&root().join("crates/mechid/src/lib.rs"));
@@ -377,7 +379,7 @@ fn the_reference_has_every_subcommand() {
     let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let page = read(&root().join("docs/book/src/reference/commands.md"));
     let mut commands = 0;
-    // Names stand two blanks in, their descriptions further.
+    // Names are indented by two blanks, continued descriptions by more.
     for line in list.lines().filter(|line| !line.starts_with("   ")) {
         let name = line.split_whitespace().next().unwrap();
         assert!(name == "help" || page.contains(&format!("$ mechid {name} --help\n")), "{name}");
@@ -386,7 +388,7 @@ fn the_reference_has_every_subcommand() {
     assert!(commands > 8, "{list}");
 }
 
-/// The sentence is the generated audit's.
+/// The book has the sentence with the counts from the generated audit.
 #[test]
 fn the_book_counts_as_the_audit_does() {
     let audit = read(&root().join("docs/thesis/audit.md"));
@@ -396,7 +398,7 @@ fn the_book_counts_as_the_audit_does() {
     assert!(page.contains(sentence), "{sentence}");
 }
 
-/// The committed record is what its description gives, to rounding.
+/// The committed record agrees with the simulation of its description, to rounding.
 #[test]
 fn the_example_record_is_that_of_its_description() {
     let examples = root().join("examples");
@@ -413,7 +415,7 @@ fn the_example_record_is_that_of_its_description() {
         let column = table.column(name).unwrap();
         let size = record.column(0).amax();
         for (read, made) in column.iter().zip(record.channel(0)) {
-            // Other machines' sine and cosine may differ in the last digit.
+            // Sine and cosine may differ in the last digit on other processors.
             assert!((read - made).abs() < 1e-12 * size, "{name}: {read} {made}");
         }
     }

@@ -1,4 +1,4 @@
-//! What the tests need to know of a Markdown page: its code blocks, links and anchors.
+//! Parser for the parts of a Markdown page that the tests need: code blocks, links and anchors.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -8,36 +8,36 @@ use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 /// A fenced code block.
 #[derive(Debug)]
 pub struct Block {
-    /// What follows the opening fence.
+    /// Text after the opening fence.
     pub info: String,
-    /// Where in the page the text between the fences is.
+    /// Range of the text between the fences in the page.
     pub range: Range<usize>,
 }
 
 impl Block {
-    /// The name after `file=` in the info string: the block is the content of that file.
+    /// Returns the name after `file=` in the info string: the block shows the content of this file.
     pub fn file(&self) -> Option<&str> {
         self.info.split(',').find_map(|part| part.strip_prefix("file="))
     }
 
-    /// The word before the first comma.
+    /// Returns the word before the first comma of the info string.
     pub fn language(&self) -> &str {
         self.info.split(',').next().unwrap_or_default()
     }
 }
 
-/// What a page refers to, and what may be referred to in it.
+/// Links, anchors and texts of a page.
 #[derive(Debug, Default)]
 pub struct Page {
     pub blocks: Vec<Block>,
-    /// Code in running text.
+    /// Pieces of code in running text.
     pub codes: Vec<String>,
     /// Running text and tables without the code in them, with blanks between the pieces.
     pub prose: String,
-    /// Targets of links with the depth of the list they stand in.
+    /// Targets of links, with the depth of the list that contains them.
     pub links: Vec<(usize, String)>,
     pub images: Vec<String>,
-    /// Files that mdBook puts in the place of `{{#include …}}`.
+    /// Files that mdBook inserts for `{{#include …}}`.
     pub includes: Vec<String>,
     pub anchors: HashSet<String>,
 }
@@ -93,7 +93,7 @@ impl Page {
     }
 }
 
-/// The anchor of a heading: lower case, words joined by hyphens.
+/// Returns the anchor of a heading: lower case, words joined by hyphens.
 fn anchor(title: &str) -> String {
     let kept = title.to_lowercase();
     let kept = kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));

@@ -1,21 +1,21 @@
-//! Numbers in text.
+//! Numbers in texts, compared to the digits written.
 
-/// A number as the text has it.
+/// A number as written in a text.
 pub struct Written {
     pub text: String,
     value: f64,
-    /// Half of its last digit.
+    /// Half a unit of the last digit.
     half: f64,
 }
 
 impl Written {
-    /// Whether another number has these digits when it is rounded to them.
+    /// Returns true if the exact number, rounded to the same digits, is this number.
     pub fn is_of(&self, exact: f64) -> bool {
         (exact - self.value).abs() <= self.half * (1.0 + 1e-6)
     }
 }
 
-/// The numbers of three digits and more in a text, signs apart; years are no numbers.
+/// Returns the numbers of three or more digits in a text, without signs; except years.
 pub fn written(text: &str) -> Vec<Written> {
     let plain = |c: char| c.is_ascii_digit() || matches!(c, '.' | ',');
     let words = text.split(|c: char| !plain(c)).map(|word| word.replace(',', ""));
@@ -37,7 +37,8 @@ pub fn written(text: &str) -> Vec<Written> {
         .collect()
 }
 
-/// Every number in a block without its sign; of one in powers of ten the digits before them, too.
+/// Returns every number in a block without its sign; of a number with a power of ten also the
+/// digits before it.
 pub fn all(block: &str) -> Vec<f64> {
     let part = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-');
     let mut found = Vec::new();

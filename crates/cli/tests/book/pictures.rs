@@ -1,8 +1,8 @@
-//! Comparing drawings: rounding may move a point by a hundredth of a pixel from one processor to
-//! another.
+//! Comparison of drawings: rounding may shift a point by a hundredth of a pixel on another
+//! processor.
 
-/// Whether two SVG drawings have the same elements and texts, and points closer than a tenth of a
-/// pixel.
+/// Returns true if two SVG drawings have the same elements and texts, and their points differ by
+/// less than a tenth of a pixel.
 pub fn alike(drawn: &str, committed: &str) -> bool {
     let (ours, theirs) = (parts(drawn), parts(committed));
     ours.len() == theirs.len()
@@ -12,7 +12,7 @@ pub fn alike(drawn: &str, committed: &str) -> bool {
         })
 }
 
-/// The text cut into numbers and what stands between them.
+/// Splits the text into numbers and the text between them.
 fn parts(svg: &str) -> Vec<&str> {
     let mut parts = Vec::new();
     let mut rest = svg;

@@ -1,6 +1,6 @@
-//! What lines for the reader's shell start, run.
+//! Runs the programs that lines for the reader's shell start.
 //!
-//! Built without the reader's `--release` where that would compile everything once more.
+//! They are built without the reader's `--release` if that would compile everything again.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use std::time::Duration;
 use mdbook_driver::MDBook;
 use serde_json::Value;
 
-/// How a line is run.
+/// The way in which a line is run.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Run {
-    /// By the check of every change, of which these tests are a part.
+    /// The check of every change runs the line; these tests are a part of it.
     Always,
-    /// A program or an example of the workspace with what the line says to it.
+    /// A program or an example of the workspace with the arguments of the line.
     Program { kind: &'static str, name: String, arguments: Vec<String> },
-    /// mdBook, on this folder.
+    /// The line builds the book in this folder with mdBook.
     Book(String),
 }
 
@@ -30,21 +30,22 @@ impl Run {
         Run::Program { kind, name: target["name"].as_str().unwrap().into(), arguments }
     }
 
-    /// Runs it, as from the root of the repository, and sees that something came of it.
+    /// Runs the line from the root of the repository, and checks that it prints something.
     ///
     /// # Errors
-    /// What went wrong.
+    /// If the run fails; the error gives the reason.
     pub fn go(&self, root: &Path, programs: &Programs) -> Result<(), String> {
         let made = tempfile::tempdir().unwrap();
         match self {
             Run::Always => Ok(()),
-            // The beginning of commands that the pages have in full elsewhere.
+            // A program without arguments is only the beginning of a command.
             Run::Program { kind: "bin", arguments, .. } if arguments.is_empty() => Ok(()),
             Run::Program { kind, name, arguments } => {
                 let mut program = Command::new(programs.path(kind, name)?);
                 program.current_dir(root).args(arguments);
                 if name == "xtask" && !arguments.iter().any(|word| word == "--check") {
-                    // Others read the files in the repository meanwhile.
+                    // Other tests read the files in the repository, so the output goes to a
+                    // temporary folder.
                     program.arg("--out").arg(made.path());
                 }
                 said(program).map(drop)
@@ -55,7 +56,8 @@ impl Run {
 }
 
 impl Programs {
-    /// Builds what these runs start, as `cargo test --workspace` has already done.
+    /// Builds the programs of these runs, which `cargo test --workspace` has already done in most
+    /// cases.
     pub fn of(root: &Path, runs: &BTreeSet<Run>) -> Self {
         let mut build = Command::new(env!("CARGO"));
         build.current_dir(root).args(["build", "--workspace", "--locked", "--offline"]);
@@ -81,7 +83,7 @@ impl Programs {
     }
 }
 
-/// Goes through all of them, several at a time; what went wrong, in their order.
+/// Runs all of them, several at a time; returns the failures in their order.
 pub fn go_all(runs: &BTreeSet<Run>, root: &Path, programs: &Programs) -> Vec<String> {
     let (waiting, failed) = (Mutex::new(runs.iter()), Mutex::new(BTreeMap::new()));
     let work = || {
@@ -105,7 +107,7 @@ pub fn go_all(runs: &BTreeSet<Run>, root: &Path, programs: &Programs) -> Vec<Str
 /// A command of the pages that takes longer than this is stopped and named.
 const LONGEST: Duration = Duration::from_secs(600);
 
-/// What a command prints, which must be something, and its exit code 0.
+/// Returns the output of a command, which must not be empty; the exit code must be 0.
 fn said(command: Command) -> Result<String, String> {
     let mut command = assert_cmd::Command::from_std(command);
     let Output { status, stdout, stderr } =
@@ -116,7 +118,7 @@ fn said(command: Command) -> Result<String, String> {
     String::from_utf8(stdout).map_err(|error| error.to_string())
 }
 
-/// Makes the pages that a reader opens in a browser.
+/// Builds the pages that a reader opens in a browser.
 fn build_book(folder: &Path, to: &Path) -> Result<(), String> {
     let mut book = MDBook::load(folder).map_err(|error| format!("{error:#}"))?;
     book.config.build.build_dir = to.to_owned();

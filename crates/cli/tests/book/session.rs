@@ -1,4 +1,4 @@
-//! A reader at a terminal: follows a page's commands in a folder of its own.
+//! A reader at a terminal, who runs the commands of a page in a separate folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-/// How the program is started where it is installed, and from a fresh clone.
+/// The ways to start the program: an installed one, and one in a fresh clone.
 const PROGRAM: [&str; 2] = ["mechid", "cargo run --package mechid-cli --"];
 
-/// Tools of every shell that cut columns out of a text.
+/// Tools of every shell with which the pages cut rows and columns out of a text.
 const TEXT_TOOLS: [&str; 2] = ["tail ", "paste "];
 
-/// A folder with the repository's examples, and what the commands so far have left there.
+/// A folder with the repository's examples and the files that earlier commands wrote.
 pub struct Session {
-    /// Removed with the session.
+    /// The folder is removed with the session.
     _home: TempDir,
-    /// Where the reader is.
+    /// Current folder of the reader.
     folder: PathBuf,
-    /// Exit code of the last command; one that is not 0 must be asked for by `echo $?`.
+    /// Exit code of the last command; the page must show one that is not 0 by `echo $?`.
     code: i32,
 }
 
@@ -55,22 +55,22 @@ impl Session {
         fs::write(self.folder.join(name), text).unwrap();
     }
 
-    /// Copies a file that the reader has fetched.
+    /// Copies a file that the reader has downloaded.
     pub fn copy(&self, file: &Path) {
         fs::copy(file, self.folder.join(file.file_name().unwrap())).unwrap();
     }
 
-    /// A file that the reader would find, if it is there.
+    /// Returns the text of a file in the current folder, if it exists.
     pub fn read(&self, name: &str) -> Option<String> {
         fs::read_to_string(self.folder.join(name)).ok()
     }
 
-    /// Whether a line makes or enters a folder.
+    /// Returns true if a line makes or enters a folder.
     pub fn walks(line: &str) -> bool {
         line.starts_with("mkdir ") || line.starts_with("cd ")
     }
 
-    /// Makes or enters a folder, if that is what the line does.
+    /// Makes or enters a folder if the line says so.
     pub fn walk(&mut self, line: &str) -> Result<(), String> {
         let done = match line.split_whitespace().collect::<Vec<_>>()[..] {
             ["mkdir", name] => fs::create_dir(self.folder.join(name)),
@@ -80,7 +80,7 @@ impl Session {
         done.map_err(|error| format!("{line}: {error}"))
     }
 
-    /// What the terminal shows after a command.
+    /// Runs a command and returns what the terminal shows.
     pub fn run(&mut self, command: &str) -> Result<String, String> {
         if command == "echo $?" {
             return Ok(format!("{}\n", std::mem::take(&mut self.code)));
@@ -126,30 +126,30 @@ impl Session {
         let output = Command::cargo_bin("mechid")
             .unwrap()
             .current_dir(&self.folder)
-            // The width of the developer's terminal is not the reader's.
+            // The result must not depend on the width of the developer's terminal.
             .env_remove("COLUMNS")
             .args(shlex::split(arguments).ok_or_else(|| format!("no shell reads `{command}`"))?)
             .output()
             .unwrap();
         self.code = output.status.code().ok_or("killed by a signal")?;
-        // A run over many records reports even if some of them failed.
+        // A run over many records prints a report even if some of them failed.
         let reports = self.code == 0 || output.stderr.is_empty();
         let text = if reports { output.stdout } else { output.stderr };
         String::from_utf8(text).map_err(|error| error.to_string())
     }
 }
 
-/// A command and the terminal's answer to it.
+/// A command and the answer of the terminal.
 #[derive(Debug, PartialEq)]
 pub struct Step {
-    /// As the page has it: with prompt, over several lines.
+    /// The command as on the page: with prompt, possibly over several lines.
     pub typed: String,
     pub shown: String,
 }
 
 impl Step {
-    /// The steps of a `console` block: a line that begins with `$` is typed, a backslash at its end
-    /// continues it, everything else is answer.
+    /// Returns the steps of a `console` block. A line that begins with `$` is typed, a backslash at
+    /// its end continues it, and all other lines are answers.
     pub fn all(block: &str) -> Vec<Self> {
         let mut steps: Vec<Self> = Vec::new();
         let mut typing = false;
@@ -164,14 +164,14 @@ impl Step {
         steps
     }
 
-    /// On one line, without the prompt.
+    /// Returns the command on one line, without the prompt.
     pub fn command(&self) -> String {
         let line = self.typed.trim_start_matches("$ ").replace("\\\n", " ");
         line.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 }
 
-/// Whether the answer is the one shown, in which a line `...` stands for any lines and `[..]` for
+/// Returns true if the answer is the one shown. There a line `...` represents any lines, and `[..]`
 /// any part of one line.
 pub fn fits(shown: &str, answer: &str) -> bool {
     let lines: Vec<&str> = answer.lines().collect();

@@ -16,7 +16,7 @@ use super::{mechid, refused};
 
 const PERIOD: usize = 256;
 
-/// The rig with a short bearing, and its coefficients kxx … cyy.
+/// Returns the rig with a short bearing, and its coefficients kxx … cyy.
 fn rig(rotation_hz: f64, load: f64) -> (BearingRig, [f64; 8]) {
     let conditions = Conditions {
         diameter: 0.1,
@@ -35,7 +35,8 @@ fn rig(rotation_hz: f64, load: f64) -> (BearingRig, [f64; 8]) {
     (rig, [kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy])
 }
 
-/// Writes the records of a test in x and one in y, of so many periods, as `name-x.csv` and `name-y.csv`.
+/// Writes the records of a test in x and one in y, with this number of periods, as `name-x.csv` and
+/// `name-y.csv`.
 fn write(folder: &Path, rig: &BearingRig, periods: usize, name: &str) {
     let sampling = Sampling::from_rate_hz(1024.0, PERIOD).unwrap();
     let lines: Vec<usize> = (6..=50).step_by(2).collect();
@@ -62,8 +63,8 @@ fn json_of(text: &str) -> Value {
 
 const CHANNELS: &str = "--force fx,fy --acceleration ax,ay --displacement dx,dy --period 256";
 
-/// The table that `ross.BearingElement` takes: `frequency` is the column `speed`, and the columns kxx … myy
-/// are its keyword arguments.
+/// The table can be passed to `ross.BearingElement`: the column `speed` is its argument
+/// `frequency`, and the columns kxx … myy are its keyword arguments.
 #[test]
 fn a_campaign_is_one_table_over_speed_and_load() {
     let home = tempfile::tempdir().unwrap();
@@ -98,7 +99,7 @@ fn a_campaign_is_one_table_over_speed_and_load() {
     assert_eq!(rows[0][2..14], names);
     let errors = names.map(|name| format!("{name}_standard_error"));
     assert_eq!(rows[0][14..], errors);
-    // By rising speed, then load.
+    // The rows are sorted by speed, then by load.
     let order = [(35.0, 800.0), (35.0, 1500.0), (70.0, 1500.0)];
     assert_eq!(rows.len(), 1 + order.len());
     for (row, (rotation_hz, load)) in rows[1..].iter().zip(order) {
@@ -157,7 +158,7 @@ fn tables_of_frequency_responses_are_a_bearing_test() {
     let below = json_of(&mechid(folder, &format!("{tables} {how} --band-hz 20:100")));
     assert!(below["lines"].as_u64().unwrap() < found["lines"].as_u64().unwrap());
 
-    // As a campaign: the same numbers.
+    // A campaign of these tables gives the same numbers.
     let files = ["displacement-x", "acceleration-x", "displacement-y", "acceleration-y"];
     let campaign = json!({
         "frf_table": true,

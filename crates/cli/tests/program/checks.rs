@@ -1,4 +1,4 @@
-//! What `mechid identify` looks at before and after a fit, whatever the estimator.
+//! Checks of `mechid identify` before and after a fit, for all estimators.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ fn noisy(record: &Record, share: f64, seed: u64) -> Record {
     noise::add_white(record, NoiseLevel::FractionOfRms(share), seed).unwrap()
 }
 
-/// Columns time, f, x and v; noise of a share of the RMS on both motions.
+/// Writes the columns time, f, x and v; both motions have noise, given as a share of their RMS.
 fn write(folder: &Path, name: &str, force: &Record, motion: &Response, share: f64) {
     let motions = [(motion.displacement(), 1), (motion.velocity(), 2)];
     let [x, v] = motions.map(|(record, seed)| match share {
@@ -30,7 +30,7 @@ fn write(folder: &Path, name: &str, force: &Record, motion: &Response, share: f6
     std::fs::write(folder.join(name), text).unwrap();
 }
 
-/// Four periods of 256 samples.
+/// Writes a record of four periods of 256 samples.
 fn periodic(folder: &Path, name: &str, seed: u64, share: f64) {
     let force = Multisine::flat(4..=60, 2.0, Phases::Random { seed }).unwrap();
     let force = force.sample(Sampling::new(0.01, 256).unwrap()).unwrap().repeated(4).unwrap();
@@ -38,7 +38,7 @@ fn periodic(folder: &Path, name: &str, seed: u64, share: f64) {
     write(folder, name, &force, &motion, share);
 }
 
-/// All checks of a subject.
+/// Returns all checks of a subject.
 fn checks(folder: &Path, arguments: &str, subject: &str) -> Vec<Value> {
     let report: Value =
         serde_json::from_str(&mechid(folder, &format!("{arguments} --json"))).unwrap();
@@ -108,7 +108,7 @@ fn every_way_to_fit_is_looked_at_afterwards_record_by_record() {
     }
 }
 
-/// The force is linear between the samples: without noise only rounding is left.
+/// The force is linear between the samples, so without noise the residual is only rounding.
 #[test]
 fn a_refined_fit_is_judged_from_measured_sample_to_measured_sample() {
     let place = tempfile::tempdir().unwrap();
@@ -158,7 +158,7 @@ fn a_fit_of_responses_to_a_random_force_is_judged_line_by_line() {
 fn an_unstable_machine_is_not_led_through_a_long_record() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path();
-    // A negative spring, as a magnetic bearing without its control: e-fold in 0.100 s.
+    // A negative spring, as of a magnetic bearing without control, grows by a factor e in 0.100 s.
     let one = |value: f64| nalgebra::DMatrix::from_element(1, 1, value);
     let system = SecondOrderSystem::new(one(1.0), one(0.0), one(-100.0)).unwrap();
     let rest = InitialState::rest(1);
@@ -174,7 +174,7 @@ fn an_unstable_machine_is_not_led_through_a_long_record() {
     assert!(told.contains("grows e-fold every 0.100 s"), "{told}");
 }
 
-/// What a wrong channel is told as, whichever way it is fitted.
+/// A faulty channel is named with the same fault by every estimator.
 #[test]
 fn what_is_wrong_with_a_channel_is_named() {
     let place = tempfile::tempdir().unwrap();
@@ -216,7 +216,7 @@ fn what_is_wrong_with_a_channel_is_named() {
     let swapped = "--force x --displacement f";
     let said = verdicts(folder, &format!("identify right.csv {swapped} --period 256"), "power");
     assert_eq!(said, ["bad"]);
-    // The reason is told if nothing can be fitted, too.
+    // The message names the fault even if the fit fails.
     let said = refused(folder, &format!("identify right.csv {swapped} --velocity v --domain time"));
     assert!(said.contains("f changes "), "{said}");
 }
@@ -235,7 +235,7 @@ fn a_dead_channel_is_named_whether_it_can_be_fitted_or_not() {
     assert!(zero.contains("; x is 0 in all 400 samples"), "{zero}");
     let time = said("offset.csv --force f --displacement v --velocity x --domain time");
     assert!(time.contains("; x is 0.25 in all 400 samples"), "{time}");
-    // The spectrum of a constant is rounding, from which something follows.
+    // The spectrum of a constant is only rounding, but the fit has a result.
     let way = "identify offset.csv --force f --displacement x";
     assert_eq!(verdicts(place.path(), way, "range"), ["bad"]);
 }
@@ -263,7 +263,7 @@ fn noise_that_biases_least_squares_in_time_is_told() {
         let said = verdicts(place.path(), &command, "bias");
         assert_eq!(said.len(), usize::from(share > 0.0), "{said:?}");
     }
-    // Where the derivatives are the cause the way around them is told.
+    // If the derivatives cause the bias, the report proposes another method.
     let command = "identify noisy.csv --force f --acceleration a --domain time \
                    --derivatives spectral";
     let said = mechid(place.path(), command);

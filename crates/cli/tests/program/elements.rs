@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::{mechid, refused};
 
-/// Three masses in a row; all are recorded, and noisy.
+/// Makes a folder with a simulated noisy record of three masses in a row; all of them are measured.
 fn simulated() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let experiment = json!({
@@ -35,7 +35,7 @@ fn simulated() -> tempfile::TempDir {
     folder
 }
 
-/// The same as its engineer draws it: two sensors, springs and dampers unknown.
+/// Description of the same machine by elements: two sensors, unknown springs and dampers.
 fn three() -> Value {
     let link = |name: &str, ends: Value| {
         let mut link =
@@ -70,14 +70,14 @@ fn identified(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&mechid(folder, &format!("identify {arguments} --json"))).unwrap()
 }
 
-/// Value and standard error of an unknown.
+/// Returns value and standard error of an unknown.
 fn unknown(report: &Value, name: &str) -> [f64; 2] {
     let rows = report["parameters"].as_array().unwrap();
     let row = rows.iter().find(|row| row["name"] == name).unwrap();
     ["value", "standard_error"].map(|field| row[field].as_f64().unwrap())
 }
 
-/// Judge: the springs and dampers behind the matrices of the simulation.
+/// Reference: the springs and dampers behind the matrices of the simulation.
 const TRUTH: [(&str, f64); 6] =
     [("s1.k", 3e4), ("s1.c", 6.0), ("s2.k", 2e4), ("s2.c", 4.0), ("s3.k", 2.5e4), ("s3.c", 3.0)];
 
@@ -101,7 +101,7 @@ fn two_sensors_find_springs_and_dampers_and_other_commands_read_the_result() {
     is_true(&open);
     assert_eq!(open["tests"][0]["kind"], "open");
     write(at, "found.json", &periodic);
-    // The saved settings hold the whole description.
+    // The saved settings contain the complete description.
     assert_eq!(periodic["analysis"]["machine"]["elements"].as_array().unwrap().len(), 6);
     let modes: Value = serde_json::from_str(&mechid(at, "modes found.json --json")).unwrap();
     let error = modes["modes"][0]["natural_frequency_hz"]["standard_error"].as_f64().unwrap();
@@ -118,7 +118,7 @@ fn two_sensors_find_springs_and_dampers_and_other_commands_read_the_result() {
     assert!(predicted.contains("displacement_2"), "{predicted}");
 }
 
-/// Frequency responses of `mechid frf` in place of the record.
+/// Frequency responses of `mechid frf` give the same result as the record.
 #[test]
 fn a_table_of_frequency_responses_gives_the_same() {
     let folder = simulated();
@@ -136,8 +136,8 @@ fn a_table_of_frequency_responses_gives_the_same() {
     is_true(&report);
 }
 
-/// A rigid rotor on a bearing with trial weights over the speed; its response is known in closed
-/// form.
+/// A rigid rotor on a bearing, with trial weights at several speeds; the response is known in
+/// closed form.
 #[test]
 fn unbalance_over_the_speed_gives_a_bearing() {
     let folder = tempfile::tempdir().unwrap();
@@ -155,7 +155,7 @@ fn unbalance_over_the_speed_gives_a_bearing() {
             let motion = |at: usize, force: Complex<f64>| {
                 force / Complex::new(stiffness[at] - mass * omega * omega, omega * damping[at])
             };
-            // An error of two standard errors or less, without a pattern.
+            // The errors are at most two standard errors and vary without a pattern.
             let error = |at: usize| {
                 let phase = f64::from(step * 7 + 3) * (1.3 + at as f64) + run as f64;
                 Complex::from_polar(1e-7, phase)
@@ -209,7 +209,7 @@ fn unbalance_over_the_speed_gives_a_bearing() {
     assert!(message.contains("give a table over the speed (--speed-table)"), "{message}");
 }
 
-/// One line each, with the name of what does not make sense.
+/// Every faulty description gives a message of one line with the name of the faulty part.
 #[test]
 fn bad_descriptions_are_told_by_name() {
     let folder = simulated();
@@ -243,7 +243,8 @@ fn bad_descriptions_are_told_by_name() {
         ]);
     });
     assert!(told.contains("lost.mtx"), "{told}");
-    // Nothing that the data could determine is a failure, one combination of several is not.
+    // If the data do not determine an unknown at all, the command fails; if they determine only a
+    // sum of several, it does not.
     let told = message(&|m| {
         for at in 3..6 {
             (m["elements"][at]["k"], m["elements"][at]["c"]) = (json!(3e4), json!(4));
@@ -264,7 +265,8 @@ fn bad_descriptions_are_told_by_name() {
     assert!(message.contains("cannot be used with"), "{message}");
 }
 
-/// Samples of the acceleration along the table, of a logger whose table begins at `PacketCounter`.
+/// Reads the acceleration along the table from the file of a logger, whose table begins at
+/// `PacketCounter`.
 fn logged(file: &Path) -> Option<Vec<f64>> {
     let text = fs::read_to_string(file).ok()?;
     let rows = text.lines().skip_while(|line| !line.starts_with("PacketCounter")).skip(2);
@@ -274,8 +276,8 @@ fn logged(file: &Path) -> Option<Vec<f64>> {
     Some(values.iter().map(|value| value - mean).collect())
 }
 
-/// A model of one storey under an earthquake, on two wireless loggers at 120 Hz. Judge: the highest
-/// peak of the spectrum of the storey is at 21.98 Hz.
+/// A model of one storey under an earthquake, measured by two wireless loggers at 120 Hz.
+/// Reference: the highest peak in the spectrum of the storey is at 21.98 Hz.
 #[test]
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn two_loggers_on_a_shake_table() {
@@ -313,15 +315,15 @@ fn two_loggers_on_a_shake_table() {
         assert!((hz - 21.98).abs() < 0.1, "{hz}");
         let [delay, error] = unknown(&report, "top.delay");
         assert!((delay - 0.015).abs() < 3e-4 && error < 1e-4, "{delay} ± {error}");
-        // One storey is not all that moves: the residual says so.
+        // Other parts move, too, and the residual shows it.
         let checks = report["checks"].as_array().unwrap();
         let is_told = |check: &Value| check["subject"] == "whiteness" && check["verdict"] != "good";
         assert!(checks.iter().any(is_told), "{checks:?}");
     }
 }
 
-/// Good hits of a hammer, as open records; bad ones are left out and named, on the page too. Judge:
-/// the matrices behind the modes of the generator.
+/// Good hits of a hammer are open records. Bad hits are excluded and named, also on the page.
+/// Reference: the matrices behind the modes of the generator.
 #[test]
 fn hits_of_a_hammer_and_the_page() {
     let rig = HammerTest {
@@ -379,7 +381,7 @@ fn hits_of_a_hammer_and_the_page() {
     assert!(message.contains("--frf-table of a report belongs to --machine"), "{message}");
 }
 
-/// A saved analysis of the same kind makes a row of every record.
+/// A saved analysis with elements gives a row for every record of a fleet.
 #[test]
 fn fleets_identify_machines_of_elements() {
     let folder = simulated();

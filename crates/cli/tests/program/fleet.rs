@@ -1,4 +1,4 @@
-//! Many records: the exit code, the folder, and what a second run does.
+//! Analyses of many records: the exit code, the folder, and a second run.
 
 use std::fs;
 use std::path::Path;
@@ -37,14 +37,14 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     assert_eq!(failed.status.code(), Some(1), "{}", String::from_utf8_lossy(&failed.stderr));
     let report: Value = serde_json::from_slice(&failed.stdout).unwrap();
     assert_eq!(report["failures"][0]["code"], "io.empty");
-    // The part of a and b is that of before; the one of c has changed.
+    // The part of a and b is unchanged; only that of c is computed again.
     assert_eq!((&report["computed_parts"], &report["other_parts"]), (&1.into(), &1.into()));
 
     let trends =
         program(home.path(), "trends out/results --output page.html --plot trends.svg --json");
     assert_eq!(trends.status.code(), Some(0), "{}", String::from_utf8_lossy(&trends.stderr));
     let trends: Value = serde_json::from_slice(&trends.stdout).unwrap();
-    // Both versions of the second part are in the folder; of its record the newer one counts.
+    // The folder has both versions of the second part; for its record the newer one counts.
     assert_eq!((&trends["records"], &trends["failed"]), (&4.into(), &1.into()));
     assert_eq!(trends["superseded"], 1);
     assert_eq!(trends["series"][0]["points"].as_array().unwrap().len(), 3);
@@ -58,7 +58,7 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     let refused = program(home.path(), "trends day");
     assert_eq!(refused.status.code(), Some(2));
 
-    // What is wrong with the analysis concerns no record.
+    // An error in the settings is an error of the run, not of a record.
     fs::write(home.path().join("analysis.json"), "{}").unwrap();
     let refused = program(home.path(), "fleet day --analysis analysis.json --output none");
     assert_eq!(refused.status.code(), Some(2));
@@ -101,7 +101,7 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
         assert!((value - mass).abs() < 4.0 * error, "{point}");
     }
 
-    // The spread over the seeds is the standard error of each: of 100 runs, to 7 % (one σ).
+    // The standard deviation over 100 seeds, known to 7 %, agrees with the standard errors.
     json("simulate rig.json --runs 100 --output seeds.parquet --json");
     json("fleet seeds.parquet --analysis analysis.json --output seeds --json");
     let trends = json("trends seeds --json");
@@ -125,8 +125,8 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
     assert!(!home.path().join("a.parquet").exists());
 }
 
-/// A record that takes too much memory, one that takes too much time, a named pipe and a socket, beside one that is well:
-/// each record has its row, and the run ends.
+/// Faulty records next to a good one: one needs too much memory, one too much time, one is a named
+/// pipe and one a socket. Each record has its row, and the run ends.
 #[cfg(target_os = "linux")]
 #[test]
 fn records_that_end_their_process_become_rows() {
@@ -148,7 +148,8 @@ fn records_that_end_their_process_become_rows() {
         member.finish().unwrap()
     };
     let header = packed("time,force,displacement\n");
-    // A minute of rows to read; and columns of which some rows take more memory than there is.
+    // One file takes a minute to read; another has columns with rows that need more memory than
+    // allowed.
     let rows = packed(&"0,1,2\n".repeat(1 << 20));
     fs::write(day.join("slow.csv.gz"), [header, rows.repeat(400)].concat()).unwrap();
     let wide = format!("{}\n", ["1"; 20_000].join(","));
@@ -176,7 +177,7 @@ fn records_that_end_their_process_become_rows() {
     let left_out = report["left_out"].to_string();
     assert!(left_out.contains("pipe.csv (a named pipe)"), "{left_out}");
     assert!(left_out.contains("socket.csv (a socket)"), "{left_out}");
-    // The rows stand: nothing is tried again.
+    // A second run keeps the rows and does not try the records again.
     let again: Value = serde_json::from_slice(&program(home.path(), run).stdout).unwrap();
     assert_eq!((&again["computed_records"], &again["failed"]), (&0.into(), &2.into()));
 }
@@ -199,7 +200,7 @@ fn results_among_the_records_are_refused() {
     assert_eq!(fs::read_dir(&day).unwrap().count(), 1);
 }
 
-/// Names that differ in bytes that are no UTF-8 are different records.
+/// Records are different if their names differ only in bytes that are not UTF-8.
 #[cfg(target_os = "linux")]
 #[test]
 fn names_without_a_text_stay_apart() {

@@ -1,4 +1,5 @@
-//! The force behind a long text is the one behind the record in memory.
+//! The force computed from a long text file equals the force computed from the same record in
+//! memory.
 
 use std::fs;
 use std::ops::Range;
@@ -16,33 +17,35 @@ use super::{mechid, refused};
 
 const PERIOD: usize = 1000;
 
-/// More than are held of a text, not whole stretches, and some more than whole periods.
+/// The number of samples is larger than the part of a text kept in memory, and is no multiple of a
+/// section or of a period.
 const SAMPLES: usize = 270_123;
 
-/// Samples of which the strongest line is found at once.
+/// Number of samples per piece in the search for the strongest line.
 const PIECE: usize = 1 << 18;
 
 const RATE_HZ: f64 = 1024.0;
 
-/// m, c and k, and their standard errors.
+/// Parameters m, c and k of the machine, in SI units.
 const MACHINE: [f64; 3] = [25.0, 190.0, 142e3];
 const ERRORS: [f64; 3] = [0.1, 2.0, 300.0];
 
 const ALL: &str = "--displacement x --velocity v --acceleration a";
 
-/// The standard error that counts the machine alone.
+/// Column of the standard error that includes only the machine.
 const OF_MACHINE: &str = "standard_error_of_machine";
 
-/// Where the second part of the force begins.
+/// Sample at which the second part of the force begins.
 const BURST: usize = 250_000;
 
-/// 3 N at 20 Hz all the time; near the end 100 N at 32 Hz.
+/// The force: 3 N at 20 Hz throughout, and 100 N at 32 Hz near the end.
 fn force(k: usize) -> f64 {
     let turn = |hz: f64| (std::f64::consts::TAU * hz * k as f64 / RATE_HZ).cos();
     3.0 * turn(20.0) + if k < BURST { 0.0 } else { 100.0 * turn(32.0) }
 }
 
-/// x, v and a that this force belongs to at every sample, as text and as a MATLAB file; the machine.
+/// Writes the exact motion for this force as a text and as a MATLAB file, and the machine; returns
+/// x, v and a.
 fn motion(folder: &Path) -> [Vec<f64>; 3] {
     let wave = |amplitude: f64, samples: f64| -> Vec<f64> {
         let turn = |k: usize| (std::f64::consts::TAU * k as f64 / samples).sin();
@@ -68,8 +71,8 @@ fn motion(folder: &Path) -> [Vec<f64>; 3] {
     [x, v, a]
 }
 
-/// Runs `force` on both files, which must say and write the same; the report and what it wrote, the
-/// standard error under this name.
+/// Runs `force` on both files, which must give the same report and output. Returns the report and
+/// the output; `error` is the name of the standard error.
 fn both(folder: &Path, arguments: &str, error: &str) -> (Value, Record) {
     let run = |file: &str| -> (Value, Record) {
         let call = format!("force {file} --system machine.json {arguments} --output f.csv --json");
@@ -85,7 +88,7 @@ fn both(folder: &Path, arguments: &str, error: &str) -> (Value, Record) {
     text
 }
 
-/// That a column is this at every sample, to so much.
+/// Checks that a column agrees with `truth` at every sample, to the tolerance.
 fn close(found: &Record, column: usize, truth: &dyn Fn(usize) -> f64, tolerance: f64) {
     for (k, value) in found.channel(column).iter().enumerate() {
         let error = (value - truth(k)).abs();
@@ -117,8 +120,8 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     told("rms", rms((0..SAMPLES).map(force)));
     told("standard_error", rms((0..SAMPLES).map(error)));
     told("peak", (0..SAMPLES).map(|k| force(k).abs()).fold(0.0, f64::max));
-    // Two pieces, from the first sample and to the last one, hold different parts of the burst;
-    // both forces lie on lines.
+    // The two pieces, one from the first sample and one up to the last, contain different parts of
+    // the burst. The frequencies of both forces are lines of a piece.
     told("strongest_hz", 32.0);
     let part = |piece: Range<usize>| 100.0 * (piece.end - BURST) as f64 / PIECE as f64;
     let parts = [part(0..PIECE), part(SAMPLES - PIECE..SAMPLES)];
@@ -128,7 +131,7 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     let remark = format!("strongest line: by the mean power of 2 pieces of {PIECE} samples each");
     assert_eq!(report["remarks"][0], remark);
 
-    // What is transformed at once is held, and the same.
+    // If a spectrum is written, the record is kept in memory, with the same result.
     let all = format!("{ALL} --spectrum lines.csv");
     let (held, rows) = both(folder.path(), &all, OF_MACHINE);
     for column in 0..2 {
@@ -140,7 +143,7 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     assert_eq!(report["remarks"], held["remarks"]);
 }
 
-/// The error that noise and machine lead to together, each sample by itself.
+/// Reference: the standard error from noise and machine together, for each sample separately.
 #[test]
 fn sample_by_sample_the_noise_stated_is_counted() {
     let folder = tempfile::tempdir().unwrap();
@@ -156,7 +159,7 @@ fn sample_by_sample_the_noise_stated_is_counted() {
     assert_eq!(report["noise_uncertainty"], true);
     let (report, _) = both(folder.path(), ALL, OF_MACHINE);
     assert_eq!(report["noise_uncertainty"], false);
-    // 270 periods are averaged, of noise and motion alike.
+    // The mean of 270 periods is taken of noise and motion.
     let periods = SAMPLES / PERIOD;
     let (_, written) =
         both(folder.path(), &format!("{stated} --period {PERIOD}"), "standard_error");
@@ -168,7 +171,7 @@ fn sample_by_sample_the_noise_stated_is_counted() {
         machine.hypot(of_noise / (periods as f64).sqrt())
     };
     close(&written, 1, &error, 1e-11);
-    // One level for three columns, or an impossible one, was once passed over.
+    // A single level for three columns, or a negative level, must be refused.
     for (levels, words) in [
         ("1e-6", "--noise gives 1 level, the response has 3 columns"),
         ("1e-6,-1,1", "must be positive"),
@@ -237,7 +240,7 @@ fn periods_and_windows_of_a_long_text_are_those_of_all_of_it() {
         let size = truth.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
         close(&found, column, &|k| truth[k], 1e-11 * size);
     }
-    // An open record of which all is needed at once.
+    // This method needs an open record as a whole.
     let (report, _) =
         both(folder.path(), "--displacement x --start 270001 --method tikhonov", "standard_error");
     assert_eq!(report["samples"], 123);
@@ -268,8 +271,8 @@ fn nothing_is_left_of_a_file_begun_when_the_end_of_the_record_is_bad() {
     }
 }
 
-/// Line 3 of a period of 64 samples is line 12 of four of them: whoever forgets --period is told
-/// that the motion is elsewhere.
+/// Line 3 of a period of 64 samples is line 12 of four periods. If a user forgets --period, a
+/// message says that the motion is at other lines.
 #[test]
 fn lines_of_another_period_are_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Hammer tests whose hammer roves: names and pictures.
+//! Hammer tests with a roving hammer: names and pictures.
 
 use std::fs;
 use std::path::Path;
@@ -38,7 +38,8 @@ fn channels_keep_their_names_and_the_picture_has_the_coherence() {
     assert!(picture.contains(">x at a2 / force at a1<"));
 }
 
-/// Judge: reciprocity at the second mode. The hits end before the response has died out, which errs by some per cent.
+/// Reference: reciprocity at the second mode. The hits end before the response has decayed, which
+/// causes an error of some per cent.
 #[test]
 fn frequency_responses_are_averaged_over_the_hits_at_every_place() {
     let place = folder();

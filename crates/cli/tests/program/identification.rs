@@ -1,4 +1,4 @@
-//! What `mechid identify` and `mechid frf` take and tell, on records made by closed forms.
+//! Arguments and reports of `mechid identify` and `mechid frf`, on records in closed form.
 
 use std::fs;
 use std::path::Path;
@@ -28,7 +28,8 @@ fn json(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&told).unwrap()
 }
 
-/// Exit code 2, one message with all of `parts`, and no new file.
+/// Runs the program, which must fail with exit code 2 and one message with all of `parts`, and
+/// write no file.
 fn refused(folder: &Path, arguments: &str, parts: &[&str]) {
     let before = fs::read_dir(folder).unwrap().count();
     let output = Command::cargo_bin("mechid")
@@ -46,7 +47,7 @@ fn refused(folder: &Path, arguments: &str, parts: &[&str]) {
     assert_eq!(fs::read_dir(folder).unwrap().count(), before, "{arguments}");
 }
 
-/// Columns time, f (or f1, f2), x, v and a.
+/// Writes the columns time, f (or f1, f2), x, v and a.
 fn write(folder: &Path, name: &str, force: &Record, motion: &Response) {
     let quantities = [
         ("f", force),
@@ -77,7 +78,8 @@ fn oscillator() -> SecondOrderSystem {
     Sdof::new(2.0, 6.0, 800.0).unwrap().system()
 }
 
-/// Twenty lines of a period of 256 samples, 31 samples a cycle of the oscillator.
+/// A multisine of twenty lines with a period of 256 samples, which gives 31 samples per cycle of
+/// the oscillator.
 fn multisine(seed: u64) -> Record {
     let sampling = Sampling::new(0.01, 256).unwrap();
     let force = Multisine::flat(1..=20, 3.0, Phases::Random { seed }).unwrap();
@@ -89,7 +91,7 @@ fn parameter(report: &Value, name: &str, field: &str) -> f64 {
     rows.iter().find(|row| row["name"] == name).unwrap()[field].as_f64().unwrap()
 }
 
-/// Largest relative error of m, c and k.
+/// Returns the largest relative error of m, c and k.
 fn error(report: &Value) -> f64 {
     let truth = [("m", 2.0), ("c", 6.0), ("k", 800.0)];
     let of = |(name, truth): &(&str, f64)| (parameter(report, name, "value") / truth - 1.0).abs();
@@ -124,10 +126,10 @@ fn checks_tell_a_good_record_from_a_bad_one() {
     ] {
         assert_eq!(verdict(&held, when, subject), "good", "{subject}");
     }
-    // From rest it is no period: its last sample is not followed by its first.
+    // A response from rest is not periodic: its end does not meet its beginning.
     let period = json(folder, &format!("{common} --between-samples held --extent period"));
     assert_ne!(verdict(&period, "before", "periodicity"), "good");
-    // Noise on the motion enters two steps that follow one another.
+    // Noise on the motion affects two successive steps, so the residual is coloured.
     let motion = exact_zoh(&oscillator(), &force, &rest).unwrap();
     write(folder, "noisy.csv", &force, &noisy(&motion, 0.01, 9));
     let coloured =
@@ -141,7 +143,7 @@ fn checks_tell_a_good_record_from_a_bad_one() {
     let (_, text, _) = run(folder, &format!("{common} --between-samples euler"));
     assert!(text.contains(&format!("\n  step: {}", step["text"].as_str().unwrap())));
 
-    // One line carries two equations; the three unknowns of the next record need two lines.
+    // One line gives two equations, so three unknowns need two lines.
     let one = Multisine::flat([3], 5.0, Phases::Zero).unwrap().sample(sampling).unwrap();
     let two = Multisine::flat([3, 9], 5.0, Phases::Zero).unwrap().sample(sampling).unwrap();
     for (name, force) in [("one.csv", one), ("two.csv", two)] {
@@ -154,10 +156,10 @@ fn checks_tell_a_good_record_from_a_bad_one() {
     assert_eq!(verdict(&tight, "before", "excitation"), "doubtful");
     let good = json(folder, &format!("identify two.csv {columns}"));
     assert_eq!(verdict(&good, "before", "excitation"), "good");
-    // Four numbers less three parameters leave nothing to test.
+    // Four numbers and three parameters give one degree of freedom, too few for a test.
     let tested = |check: &Value| !check["finding"]["p_value"].is_null();
     assert!(!good["checks"].as_array().unwrap().iter().any(tested), "{good}");
-    // A wrong period: the record repeats every 400 samples.
+    // The stated period is wrong: the record repeats every 400 samples.
     let wrong = json(folder, &format!("identify two.csv {columns} --period 190"));
     assert_eq!(verdict(&wrong, "before", "periodicity"), "bad");
 }
@@ -180,17 +182,17 @@ fn another_record_is_predicted() {
     let exact = json(folder, &format!("{common} --validate b.csv"));
     assert_eq!(fits(&exact).len(), 2);
     assert!(fits(&exact).iter().all(|fit| *fit > 99.9999), "{exact}");
-    // All that is missing is the noise.
+    // The prediction lacks only the noise.
     let noise = json(folder, &format!("{common} --validate c.csv:101"));
     assert_eq!(noise["validation"]["first_sample"], 101);
     assert!(fits(&noise).iter().all(|fit| (fit - 90.0).abs() < 1.5), "{noise}");
-    // A window of the record itself, as a person reads it.
+    // The text report names a validation window of the same record.
     let own = format!("{common} --period 300 --periods 1 --validate :301:200");
     let (done, text, message) = run(folder, &own);
     assert!(done, "{message}");
     assert!(text.contains("predicted of a.csv, samples 301 to 500 "), "{text}");
 
-    // In the steady state, whole periods.
+    // The next records are whole periods of a steady state.
     for (name, seed) in [("p.csv", 1), ("q.csv", 2)] {
         let force = multisine(seed).repeated(3).unwrap();
         let motion = exact_harmonic_periodic(&oscillator(), &force).unwrap();
@@ -222,7 +224,8 @@ fn one_kind_of_motion_is_enough_with_derivatives() {
         let found = json(folder, &format!("{common} --derivatives spectral"));
         assert!(error(&found) < 1e-9, "{motion}: {found}");
         assert_eq!(verdict(&found, "before", "periodicity"), "good");
-        // Thirteen samples a cycle at the highest line, a polynomial through eleven.
+        // The highest line has thirteen samples per cycle, and the polynomial is fitted to eleven
+        // samples.
         let found = json(folder, &format!("{common} --derivatives savitzky-golay:11:8"));
         assert!(error(&found) < 0.02, "{motion}: {found}");
         refused(folder, &common, &["--derivatives says how", "savitzky-golay:WINDOW:ORDER"]);
@@ -253,7 +256,7 @@ fn intermediate_points_make_the_step_smaller_and_nothing_more_certain() {
         assert!(error(&finer) < error(&once) / better, "{way}: {} {}", error(&finer), error(&once));
         let freedom = finer["covariance"]["degrees_of_freedom"].as_u64().unwrap();
         let measured = once["covariance"]["degrees_of_freedom"].as_u64().unwrap();
-        // An open record has one interval less.
+        // An open record has one interval less than a period.
         assert!(measured - freedom <= 1, "{way}: {freedom} {measured}");
     }
     refused(folder, &format!("{common} --refine 8"), &["FACTOR:linear"]);
@@ -291,7 +294,7 @@ fn a_whole_period_closes() {
     );
 }
 
-/// Periods without noise, and a period that is not said.
+/// The report names periods without noise, and a record whose period was not stated.
 #[test]
 fn periods_taken_as_one_are_told() {
     let place = tempfile::tempdir().unwrap();
@@ -330,7 +333,7 @@ fn masses_may_be_known_in_part() {
     refused(folder, &format!("{common} unknown,-1"), &["got -1 kg"]);
 }
 
-/// Each record drives one line: alone it leaves the three unknowns open.
+/// Each record has a force on one line, so a single record does not determine the three unknowns.
 #[test]
 fn several_records_are_one_fit() {
     let place = tempfile::tempdir().unwrap();
@@ -376,7 +379,7 @@ fn frequency_responses_are_estimated_and_fitted() {
         for (at, hz) in column("frequency_hz").iter().enumerate() {
             let exact = system.receptance(hz * std::f64::consts::TAU).unwrap()[(0, 0)];
             let gap = (re[at] - exact.re).hypot(im[at] - exact.im);
-            // Hv takes the root of rounding.
+            // The estimator Hv takes a square root, and so the root of the rounding error.
             let tolerance = if estimator == "hv" { 1e-6 } else { 1e-10 };
             assert!(gap < tolerance * exact.norm(), "{estimator} {hz}: {gap}");
             assert!((column("coherence_1")[at] - 1.0).abs() < 1e-9);
@@ -411,7 +414,7 @@ fn frequency_responses_are_estimated_and_fitted() {
     );
     refused(folder, "frf p.csv --displacement x", &["--force"]);
 
-    // Random excitation under windows: leakage leaves some per cent.
+    // Under random excitation with windows, leakage causes an error of some per cent.
     let sampling = Sampling::new(0.01, 1 << 14).unwrap();
     let force = noise::white(sampling, 1, 5.0, 7).unwrap();
     let motion = exact_harmonic_periodic(&system, &force).unwrap();

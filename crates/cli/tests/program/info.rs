@@ -1,4 +1,4 @@
-//! `mechid info`. Judge: closed forms of the signals in the files.
+//! The subcommand `mechid info`. Reference: closed forms of the signals in the files.
 
 use std::f64::consts::{SQRT_2, TAU};
 use std::fmt::Write as _;
@@ -8,7 +8,8 @@ use serde_json::Value;
 
 use super::mechid;
 
-/// Six periods of 2 sin(2π·k/50) + 0.5 sin(2π·3k/50) + 1 at 100 Hz, and a decaying 7 Hz.
+/// Makes a folder with a record at 100 Hz: six periods of 2 sin(2π·k/50) + 0.5 sin(2π·3k/50) + 1,
+/// and a decaying oscillation of 7 Hz.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut text = String::from("t,force,ring\n");
@@ -47,7 +48,7 @@ fn levels_lines_and_period_are_those_of_the_signal() {
     assert_eq!(force["period"]["samples"], 50);
     close(&force["period"]["seconds"], 0.5, 1e-12);
     close(&force["period"]["mismatch"], 0.0, 1e-12);
-    // All lines there are, exact since the window holds whole periods.
+    // The report has all lines of the signal; they are exact, because the window has whole periods.
     let peaks = force["spectrum_peaks"].as_array().unwrap();
     assert_eq!(peaks.len(), 2);
     for (peak, (hz, amplitude)) in peaks.iter().zip([(2.0, 2.0), (6.0, 0.5)]) {
@@ -108,7 +109,7 @@ fn what_cannot_be_shown_is_told() {
     ] {
         assert!(text.contains(part), "\"{part}\" is missing in\n{text}");
     }
-    // Time that is not even is told, unless it was asked for.
+    // An uneven time column is reported, unless it is inspected as a channel.
     fs::write(folder.path().join("b.csv"), "time,x\n0,1\n1,2\n3,1\n").unwrap();
     let text = mechid(folder.path(), "info b.csv");
     assert!(text.contains("left out: time axis: b.csv: the time steps are not uniform"), "{text}");
@@ -134,7 +135,7 @@ fn a_table_below_other_lines_and_in_utf16_is_the_same_table() {
     assert_eq!(wide, told);
 }
 
-/// A ramp has many lines, none of which is a vibration; its mean and its ends stay.
+/// A ramp has many lines, but no vibration; its mean and its ends are reported.
 #[test]
 fn the_time_column_has_no_spectrum_unless_asked_for() {
     let folder = folder();
@@ -148,14 +149,14 @@ fn the_time_column_has_no_spectrum_unless_asked_for() {
     assert_eq!((rows(&text, "1 t"), rows(&text, "2 force")), (1, 2), "{text}");
     let asked = mechid(folder.path(), "info timed.csv --columns t,force");
     assert_eq!((rows(&asked, "1 t"), rows(&asked, "2 force")), (2, 2), "{asked}");
-    // Who calls it otherwise gets it like any other column.
+    // A time column with another name is treated like any other column.
     let text = mechid(folder.path(), "info a.csv");
     assert_eq!(rows(&text, "1 clock"), 2, "{text}");
     assert_eq!(rows(&mechid(folder.path(), "info a.csv --time clock"), "1 clock"), 1);
 }
 
-/// The mean of whole periods of a sine is zero, of which summing leaves a rounding; an offset of as
-/// little as 1e-12 of the sine is none.
+/// The mean over whole periods of a sine is zero up to rounding, and is reported as zero. An offset
+/// of 1e-12 of the sine is reported as it is.
 #[test]
 fn a_mean_of_zero_is_told_as_zero() {
     let folder = tempfile::tempdir().unwrap();
@@ -170,8 +171,8 @@ fn a_mean_of_zero_is_told_as_zero() {
     close(&report["channels"][1]["mean"], 1e-9, 1e-11);
 }
 
-/// One period alone does not repeat; where --period says that it is one, its lines are exact, and
-/// neighbours do not mix as they do under a window.
+/// A single period does not show that it repeats. If --period states it, its lines are exact and do
+/// not spread to their neighbours as under a window.
 #[test]
 fn a_period_that_is_given_has_exact_lines() {
     let folder = tempfile::tempdir().unwrap();
@@ -209,7 +210,8 @@ fn a_channel_that_is_cut_off_is_told() {
     assert!(text.contains("\ncolumn 3 cut is cut off at -0.80000: "), "{text}");
 }
 
-/// A number that was cut short is a number, too.
+/// If the last line of a file has no line break, its last number may be cut short, so a remark
+/// names the line.
 #[test]
 fn a_last_line_that_nothing_ends_is_told() {
     let folder = tempfile::tempdir().unwrap();

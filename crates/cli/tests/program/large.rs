@@ -1,4 +1,4 @@
-//! Machines in Matrix Market files, and the degrees of freedom that are recorded.
+//! Machines in Matrix Market files, and the choice of recorded degrees of freedom.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -23,7 +23,7 @@ fn band(folder: &Path, name: &str, n: usize, diagonal: f64, beside: f64) {
     fs::write(folder.join(name), text).unwrap();
 }
 
-/// A chain of masses on springs, in files of its own folder.
+/// Writes a chain of masses on springs, as files in a separate folder.
 fn chain(folder: &Path, n: usize, rest: &str) {
     fs::create_dir_all(folder.join("chain")).unwrap();
     band(&folder.join("chain"), "m.mtx", n, 1.0, 0.0);
@@ -42,7 +42,7 @@ fn column(folder: &Path, file: &str, name: &str) -> Vec<f64> {
     Table::read(folder.join(file)).unwrap().column(name).unwrap().to_vec()
 }
 
-/// Judge: the last of some periods from rest, after which nothing is left of the start.
+/// Reference: the last of several periods from rest, after which the transient has decayed.
 #[test]
 fn the_periodic_response_of_a_large_machine_is_what_a_long_run_comes_to() {
     let home = tempfile::tempdir().unwrap();
@@ -51,7 +51,7 @@ fn the_periodic_response_of_a_large_machine_is_what_a_long_run_comes_to() {
     for (n, nonlinear) in [(400, ""), (100, ""), (100, hard)] {
         let rest = format!(r#", "outputs": [2, 1]{nonlinear}"#);
         chain(home.path(), n, &rest);
-        // On springs and dampers to the ground, by which the motion dies out.
+        // The masses are on springs and dampers to the ground, so the transient decays.
         band(&home.path().join("chain"), "c.mtx", n, 20.0, -1.0);
         band(&home.path().join("chain"), "k.mtx", n, 2600.0, -900.0);
         let file = home.path().join("chain/chain.json");
@@ -77,8 +77,8 @@ fn the_periodic_response_of_a_large_machine_is_what_a_long_run_comes_to() {
     assert!(largest[2] < 0.8 * largest[1], "the terms hardly act: {largest:?}");
 }
 
-/// Judge: the waves from one end have not reached the other when the run ends, so that a chain whose
-/// matrices are lists of rows, short enough to be stepped through densely, moves alike.
+/// Reference: a short chain with dense matrices. The waves from one end have not reached the other
+/// end when the run ends, so both chains move alike.
 #[test]
 fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
     let home = tempfile::tempdir().unwrap();
@@ -94,7 +94,8 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
                       acceleration_2,acceleration_1\n";
         assert!(text.starts_with(header), "{}", text.lines().next().unwrap());
 
-        // 64 degrees of freedom are dense; a wave of 30 masses per second goes 60 of them in 2 s.
+        // The machine of 64 degrees of freedom has dense matrices. A wave passes 30 masses per
+        // second, so 60 in 2 s.
         chain(home.path(), 64, &rest);
         mechid(home.path(), "simulate chain/chain.json --output small.csv --plot small.svg");
         for name in ["force_2", "displacement_1", "displacement_2", "velocity_1", "acceleration_2"]
@@ -107,7 +108,7 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
                 assert!((a - b).abs() < 1e-9 * size, "{name}, sample {k}: {a} and {b}");
             }
         }
-        // Of a dense machine every force is recorded.
+        // The record of a dense machine has the forces on all degrees of freedom.
         assert_eq!(column(home.path(), "small.csv", "force_64"), vec![0.0; 200]);
         column(home.path(), "large.csv", "displacement_1")
     });
@@ -118,7 +119,7 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
     assert!(apart > 0.05 * largest(&mut linear.into_iter()), "the spring matters: {apart}");
 }
 
-/// Judge: ω = 2 √(k/m) sin(r π / 2(n + 1)); the damping is that part of K.
+/// Reference: mode r has ω = 2 √(k/m) sin(r π / 2(n + 1)); the damping is proportional to K.
 #[test]
 fn some_modes_of_a_large_machine_are_found() {
     let home = tempfile::tempdir().unwrap();
@@ -134,7 +135,7 @@ fn some_modes_of_a_large_machine_are_found() {
         let mode = &told["modes"][0];
         let frequency = mode["natural_frequency_hz"].as_f64().unwrap() * TAU;
         assert!((frequency / exact(number) - 1.0).abs() < 1e-9, "{command}: {frequency}");
-        // C = K / 9,000: ζ = ω / 18,000.
+        // With C = K / 9,000 the damping ratio is ζ = ω / 18,000.
         let damping = mode["damping_ratio"].as_f64().unwrap();
         assert!((damping * 18_000.0 / exact(number) - 1.0).abs() < 1e-6, "{command}: {damping}");
         assert_eq!(mode["shape"].as_array().unwrap().len(), n);
@@ -195,8 +196,8 @@ fn what_a_large_machine_does_not_have_is_refused() {
     assert!(!home.path().join("x.csv").exists());
 }
 
-/// Judge: the limit of central differences, 2 over the highest frequency 60 sin(n π / 2(n + 1)) rad/s, less what
-/// damping makes of it; and the spectrum of the force in the equations of motion.
+/// Reference: the stability limit of central differences, 2 over the highest frequency 60 sin(n π /
+/// 2(n + 1)) rad/s, slightly reduced by damping; and the equations of motion.
 #[test]
 fn a_large_machine_has_a_steady_state_and_largest_steps() {
     let home = tempfile::tempdir().unwrap();
@@ -231,7 +232,7 @@ fn a_large_machine_has_a_steady_state_and_largest_steps() {
     }
 }
 
-/// Judge: the record that the machine gave, whose steady state has no time step.
+/// Reference: the simulated record; its steady state is exact and has no error of a time step.
 #[test]
 fn a_machine_of_a_hundred_masses_finds_its_force_and_predicts_its_response() {
     let home = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Files that promise more than they hold: a message within the limits of time and memory, in a process that
-//! the system itself holds to them.
+//! Files that claim to hold more than they do are refused with a message. The operating system
+//! limits memory and time of the process.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -11,10 +11,11 @@ use std::time::{Duration, Instant};
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 
-/// Memory that the program gets, in kB: that which a file of 1 MB may take, with the program and its stacks.
+/// Memory that the program gets, in kB: the memory allowed for a file of 1 MB, plus the program and
+/// its stacks.
 const MEMORY_KB: usize = 1_000_000;
 
-/// Time within which the program has to end. The tests run beside others, without optimisation.
+/// Time within which the program must end. Other tests run at the same time, without optimisation.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Runs the program under the limits.
@@ -33,7 +34,7 @@ fn limited(folder: &Path, arguments: &str) -> Output {
     output
 }
 
-/// Runs the program, which must refuse the file by the limit on memory and name the option.
+/// Runs the program, which must refuse the file because of the limit on memory and name the option.
 fn refused(folder: &Path, arguments: &str) {
     let output = limited(folder, arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -41,7 +42,7 @@ fn refused(folder: &Path, arguments: &str) {
     assert!(message.contains("--memory-gb"), "{arguments}: {message}");
 }
 
-/// A MATLAB file of one vector `v` of `len` zero bytes.
+/// Returns a MATLAB file with one vector `v` of `len` zero bytes.
 fn matlab(len: u32) -> Vec<u8> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::best());
     let words = [14, 56 + len.next_multiple_of(8), 6, 8, 9, 0, 5, 8, len, 1, 1, 1];
@@ -67,13 +68,13 @@ fn matlab(len: u32) -> Vec<u8> {
 #[test]
 fn a_small_file_of_many_numbers_is_refused_before_they_are_held() {
     let home = tempfile::tempdir().unwrap();
-    // 250 million bytes, 2 GB as numbers.
+    // The file has 250 million bytes, which are 2 GB as numbers.
     let file = matlab(250_000_000);
     assert!(file.len() < 300_000, "{}", file.len());
     fs::write(home.path().join("a.mat"), file).unwrap();
     refused(home.path(), "info a.mat");
     refused(home.path(), "identify a.mat --force v --displacement v --sample-rate 1");
-    // What is read may still be too much to work on.
+    // A record that can be read may still be too large to analyse.
     fs::write(home.path().join("b.mat"), matlab(6_000_000)).unwrap();
     refused(home.path(), "info b.mat");
     let machine = r#"{"system": {"mass": 25, "damping": 188.5, "stiffness": 142122}}"#;
@@ -83,7 +84,8 @@ fn a_small_file_of_many_numbers_is_refused_before_they_are_held() {
     assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
 }
 
-/// A record of so many forces and displacements, each of which is noise.
+/// Returns a record with this number of forces and displacements, all of them noise, and the names
+/// of its columns.
 fn wide_record(channels: usize, samples: usize) -> (String, String) {
     let names =
         |kind: &str| (1..=channels).map(|at| format!("{kind}{at}")).collect::<Vec<_>>().join(",");
@@ -159,7 +161,7 @@ fn a_text_that_repeats_itself_in_gzip_is_refused() {
     assert!(message.contains("the compressed data are longer than"), "{message}");
 }
 
-/// As many as one argument of a command line takes: a description of 120 kB.
+/// The description has 120 kB, the most that one argument of a command line takes.
 #[test]
 fn many_nonlinear_terms_are_refused_before_any_work() {
     let home = tempfile::tempdir().unwrap();

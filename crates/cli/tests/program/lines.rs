@@ -1,4 +1,4 @@
-//! Which lines `mechid identify` uses where nobody chose them.
+//! Spectral lines that `mechid identify` uses if the user chooses none.
 
 use std::fs;
 
@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::mechid;
 
-/// Judge: the lines that the force was made of. Noise on force and motion, as load cells and probes
-/// have it.
+/// Reference: the lines of the force. Force and motion have noise, as from load cells and
+/// displacement probes.
 #[test]
 fn noise_on_the_force_does_not_look_like_force() {
     let folder = tempfile::tempdir().unwrap();

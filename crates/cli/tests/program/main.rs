@@ -1,4 +1,4 @@
-//! What every subcommand has in common: the records it takes, and how it talks.
+//! Behaviour common to all subcommands: the records that they read, and their messages.
 
 mod bearing;
 mod checks;
@@ -30,7 +30,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 
-/// Runs `mechid` in a folder; what it printed, on success.
+/// Runs `mechid` in a folder, where it must succeed; returns its output.
 pub fn mechid(folder: &Path, arguments: &str) -> String {
     let output = run(folder, arguments);
     let message = String::from_utf8_lossy(&output.stderr);
@@ -38,7 +38,7 @@ pub fn mechid(folder: &Path, arguments: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs `mechid` in a folder where it must fail with exit code 2; its message.
+/// Runs `mechid` in a folder, where it must fail with exit code 2; returns its message.
 pub fn refused(folder: &Path, arguments: &str) -> String {
     let output = run(folder, arguments);
     let message = String::from_utf8(output.stderr).unwrap();

@@ -1,4 +1,4 @@
-//! `mechid modes` on known machines and on what `mechid identify` found.
+//! The subcommand `mechid modes` on known machines and on results of `mechid identify`.
 
 use std::path::Path;
 
@@ -39,7 +39,7 @@ fn a_known_machine_has_its_published_modes() {
     assert!(text.contains("1 damped frequency") && text.contains("2 direction 2"), "{text}");
 }
 
-/// One degree of freedom, every number by hand: k has the only variance.
+/// One degree of freedom, calculated by hand; only k has a variance.
 #[test]
 fn standard_errors_follow_from_the_covariance() {
     let place = tempfile::tempdir().unwrap();
@@ -48,10 +48,10 @@ fn standard_errors_follow_from_the_covariance() {
     std::fs::write(place.path().join("found.json"), text).unwrap();
     let report = json(place.path(), &["modes", "found.json", "--json"]);
     let mode = &report["modes"][0];
-    // ωn = 20 rad/s and dωn/ωn = dk/2k: ±8 N/m in 800 make ±0.5 %.
+    // At ωn = 20 rad/s the relation dωn/ωn = dk/2k turns ±8 N/m of 800 N/m into ±0.5 %.
     let error = mode["natural_frequency_hz"]["standard_error"].as_f64().unwrap();
     assert!((error - 0.005 * 20.0 / std::f64::consts::TAU).abs() < 1e-12);
-    // ζ = c/(2√(km)) falls by the same share.
+    // The damping ratio ζ = c/(2√(km)) has the same relative error.
     let error = mode["damping_ratio"]["standard_error"].as_f64().unwrap();
     assert!((error - 0.005 * 0.4 / (2.0 * 1600f64.sqrt())).abs() < 1e-14);
     let text = String::from_utf8(mechid(place.path(), &["modes", "found.json"]).stdout).unwrap();
@@ -62,7 +62,8 @@ fn standard_errors_follow_from_the_covariance() {
 fn what_identify_found_is_read_back_with_its_uncertainty() {
     let place = tempfile::tempdir().unwrap();
     let mut table = String::from("time,force,displacement\n");
-    // 10 ẍ + 180 ẋ + 5000 x = F under five cosines of 50 N, read to a micrometre.
+    // The record is the response of 10 ẍ + 180 ẋ + 5000 x = F to five cosines of 50 N, rounded to a
+    // micrometre.
     for sample in 0..64 {
         let (t, mut force, mut x) = (sample as f64 * 0.02, 0.0, 0.0);
         for n in [1.0, 3.0, 5.0, 7.0, 9.0] {
@@ -85,7 +86,7 @@ fn what_identify_found_is_read_back_with_its_uncertainty() {
     for quantity in ["natural_frequency_hz", "damping_ratio"] {
         for part in ["value", "standard_error"] {
             let [a, b] = [&found, &modal].map(|r| r["modes"][0][quantity][part].as_f64().unwrap());
-            // Seventeen digits through the file, then the same sums.
+            // The file has seventeen digits, and the sums are the same.
             assert!((a / b - 1.0).abs() < 1e-9, "{quantity} {part}: {a} {b}");
         }
     }

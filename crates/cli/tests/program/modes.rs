@@ -1,4 +1,5 @@
-//! `mechid modes` on records with forces: more modes than sensors, more points than sensors.
+//! The subcommand `mechid modes` on records with forces, with more modes or more points than
+//! sensors.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -22,8 +23,8 @@ fn modes(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// Judge: the machine behind the examples, whose response is known in closed form: 12 Hz and 1 %, 31 Hz
-/// and 1.5 %.
+/// Reference: the machine behind the examples, whose response is known in closed form: modes at 12
+/// Hz with 1 % and at 31 Hz with 1.5 % damping.
 fn are_those_of_the_machine(report: &Value) {
     let found = report["modes"].as_array().unwrap();
     assert_eq!(found.len(), 2, "{report}");
@@ -45,8 +46,8 @@ fn one_accelerometer_shows_both_modes() {
     are_those_of_the_machine(&report);
 }
 
-/// Judge: reciprocity. The row of one accelerometer over the struck points is the column of two
-/// accelerometers under one of them.
+/// Reference: reciprocity. One accelerometer and several struck points give the same shape as
+/// several accelerometers and one struck point.
 #[test]
 fn a_hammer_that_roves_gives_the_shapes() {
     let folder = examples();
@@ -92,8 +93,8 @@ fn what_means_nothing_is_refused() {
     }
 }
 
-/// Writes 4 s at 256 Hz of a machine of 20 Hz and 2 % under two random forces, the second with a gain, by
-/// an exact recursion, with what a fault makes of each channel.
+/// Writes 4 s at 256 Hz of a machine of 20 Hz and 2 % damping under two random forces, by an exact
+/// recursion. `gain` scales the second force, and `fault` changes the channels.
 fn two_shakers(folder: &Path, name: &str, gain: f64, fault: impl Fn([f64; 4]) -> [f64; 4]) {
     let (omega, zeta, dt) = (TAU * 20.0, 0.02, 1.0 / 256.0);
     let pole = Complex::new(-zeta * omega, omega * (1.0f64 - zeta * zeta).sqrt());
@@ -132,7 +133,7 @@ fn faults_of_a_test_are_told_in_a_line_each() {
         let message = refused(path, &format!("modes {file} {SHAKERS}"));
         assert!(message.contains(told) && message.trim_end().lines().count() == 1, "{message}");
     }
-    // A shaker that is off, but whose channel has noise.
+    // The second shaker is off, but its channel has noise.
     two_shakers(path, "noise.csv", 0.0, |[f1, f2, a1, a2]| [f1, 1e-3 * f2, a1, a2]);
     let text = mechid(path, &format!("modes noise.csv {SHAKERS}"));
     let warnings = text.lines().filter(|line| line.contains("f2 drives no mode")).count();
@@ -144,7 +145,8 @@ fn faults_of_a_test_are_told_in_a_line_each() {
     assert!(silence.contains("no mode in") && silence.trim_end().lines().count() == 1, "{silence}");
 }
 
-/// Judge: the machine behind the examples; the responses are averages of hits under an exponential window.
+/// Reference: the machine behind the examples; the responses are averages of hits under an
+/// exponential window.
 #[test]
 fn a_table_gives_the_modes_of_the_record() {
     let folder = examples();
@@ -180,7 +182,7 @@ fn a_table_gives_the_modes_of_the_record() {
     );
 }
 
-/// Judge: the same machine in two records, and the same machine as its description.
+/// Reference: two records of the same machine, and its description.
 #[test]
 fn two_results_are_compared() {
     let folder = examples();
@@ -209,8 +211,8 @@ fn two_results_are_compared() {
     assert_eq!(again["modes"].as_array().unwrap().len(), 2, "{again}");
 }
 
-/// The example is a part of a longer test and begins in motion: the prediction from rest says what it leaves out. The
-/// force on the record explains both responses.
+/// The example is a part of a longer test and begins in motion, so the prediction from rest states
+/// that it lacks this motion. The force in the record explains both responses.
 #[test]
 fn a_result_predicts_responses_and_finds_the_force() {
     let folder = examples();

@@ -1,5 +1,5 @@
-//! Pictures of records, runs and machines. Judge: where closed forms put curves and marks between
-//! the ticks of the axes.
+//! Pictures of records, runs and machines. Reference: the positions of curves and marks between the
+//! ticks of the axes, from closed forms.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -9,14 +9,15 @@ use roxmltree::{Document, Node};
 
 use super::{mechid, refused};
 
-/// Half the height of a tick's digits above its baseline, in px.
+/// Vertical distance between the baseline of a tick's digits and their middle, in px.
 const MIDDLE: f64 = 0.36 * 11.5;
 
 const MACHINE: &str = r#"{"system": {"mass": 25, "natural_frequency_hz": 12, "damping_ratio": 0.05},
     "sampling": {"samples": 64, "rate_hz": 64}, "excitation": [{"dof": 1, "lines": "1:20", "amplitude": 2}],
     "periods": 2, "noise": {"force": {"snr_db": 20}, "seed": 7}}"#;
 
-/// The machine of a chain of equal masses between two walls, as JSON.
+/// Returns the description of a chain of equal masses as JSON, with a wall at both ends if
+/// `between_walls`.
 fn chain(masses: usize, between_walls: bool) -> String {
     let matrix = |diagonal: f64, beside: f64| {
         let entry = |i: usize, j: usize| match i.abs_diff(j) {
@@ -40,7 +41,7 @@ fn chain(masses: usize, between_walls: bool) -> String {
     )
 }
 
-/// A picture that a command draws.
+/// Runs a command and returns the picture that it draws.
 fn drawn(folder: &Path, arguments: &str) -> String {
     let file = folder.join("drawn.svg");
     mechid(folder, &format!("{arguments} --quiet --plot drawn.svg"));
@@ -68,7 +69,7 @@ fn has(svg: &str, words: &[&str]) {
     }
 }
 
-/// Numbers of the path that a group draws first, by twos.
+/// Returns the coordinates of the first path in a group, in pairs.
 fn path(group: Node<'_, '_>) -> Vec<(f64, f64)> {
     let path = group.descendants().find_map(|n| n.attribute("d")).unwrap();
     let numbers = path.split([' ', 'M', 'L']).filter(|part| !part.is_empty());
@@ -76,7 +77,7 @@ fn path(group: Node<'_, '_>) -> Vec<(f64, f64)> {
     numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect()
 }
 
-/// Where a tick of the lowest abscissa stands, or one of the ordinate of a panel.
+/// Returns the position of a tick on the lowest abscissa, or on the ordinate of a panel.
 fn tick(node: Node<'_, '_>, label: &str, anchor: &str) -> f64 {
     let of = |n: &Node<'_, '_>| {
         n.has_tag_name("text")
@@ -115,7 +116,7 @@ fn a_resonance_is_marked_and_stands_where_it_belongs() {
     let labels = labels.filter_map(|n| n.parent()).filter(|n| n.text() == Some("10"));
     let decades: Vec<f64> = labels.map(|n| n.attribute("y").unwrap().parse().unwrap()).collect();
     near(static_y - highest.1, (decades[0] - decades[1]) * (peak / first).log10());
-    // Force and motion are a quarter of a turn apart at the natural frequency.
+    // At the natural frequency the phase between force and motion is 90°.
     let turned = tick(panels[1], "−90", "end");
     let nearest =
         curve(1).into_iter().min_by(|a, b| (a.1 - turned).abs().total_cmp(&(b.1 - turned).abs()));
@@ -130,7 +131,7 @@ fn every_pair_of_two_and_the_driving_points_of_many_are_drawn() {
     write("eight.json", chain(8, true));
     write("free.json", chain(2, false));
     let svg = drawn(folder.path(), "modes two.json");
-    // sqrt(k/m) and sqrt(3 k/m) of two equal masses on three equal springs.
+    // Two equal masses on three equal springs have the frequencies √(k/m) and √(3 k/m).
     let marks = "natural frequencies, 5.0329, 8.7173 Hz";
     has(&svg, &["x1 / F1", "x1 / F2 = x2 / F1", "x2 / F2", marks]);
     let svg = drawn(folder.path(), "modes eight.json");
@@ -143,7 +144,7 @@ fn every_pair_of_two_and_the_driving_points_of_many_are_drawn() {
         assert_eq!(of_class(panel, "curve").len(), 6);
         assert_eq!(of_class(panel, "reference").len(), 8);
     }
-    // Without damping and walls: the phase turns over between 0 and −180°.
+    // Without damping and without walls the phase jumps between 0 and −180°.
     let svg = drawn(folder.path(), "modes free.json");
     has(&svg, &["natural frequency, 7.1176 Hz", "0", "−180"]);
     let texts = texts(&Document::parse(&svg).unwrap());
@@ -178,7 +179,7 @@ fn a_run_is_drawn_as_it_is_written() {
     );
 }
 
-/// 2 sin(2π·k/50) + 0.5 sin(2π·3k/50) + 1 at 100 Hz, and ten columns more.
+/// Writes a record of 2 sin(2π·k/50) + 0.5 sin(2π·3k/50) + 1 at 100 Hz, with ten other columns.
 fn record(folder: &Path) {
     let mut text = String::from("t,Force [kN],x_mm,c3,c4,c5,c6,c7,c8,c9,c10\n");
     for k in 0..300 {
@@ -213,7 +214,7 @@ fn a_record_is_drawn_over_time_and_by_frequency() {
     };
     let peak = (0..50).map(|k| closed(f64::from(k))).fold(0.0, f64::max);
     near(largest, zero + (one - zero) * peak);
-    // Stems at 2 and 6 Hz, of 2 and 0.5.
+    // The lines at 2 and 6 Hz have the amplitudes 2 and 0.5.
     let (none, fifty) = (tick(panels[5], "0", "middle"), tick(panels[5], "50", "middle"));
     let (tenth, whole) = (tick(panels[1], "0.1", "end"), tick(panels[1], "1", "end"));
     let stems = of_class(panels[1], "curve")[0];
@@ -253,7 +254,7 @@ fn columns_beyond_eight_and_the_time_are_left_out_and_told() {
         &drawn(folder.path(), "info timed.csv --columns 3 --period 150"),
         &["period of 150 samples"],
     );
-    // Where there is no time axis; and the column of time, asked for.
+    // This record has no time axis; its time column is shown as a channel.
     let svg = drawn(folder.path(), "info other.csv --columns clock,2 --start 101");
     has(&svg, &["1 clock", "Sample", "Frequency (cycles/sample)", "120", "300"]);
 }

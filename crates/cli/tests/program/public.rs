@@ -1,5 +1,5 @@
-//! Headers, axes and formats as public questions and bug reports have them. Judge: the record of the example, whose mass
-//! is that of its file in SI units.
+//! Headers, axes and formats from public questions and bug reports; the codes F1, F2 … number the
+//! cases. Reference: the example record, whose mass in SI units is known.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ const G: f64 = 9.80665;
 const LBF: f64 = 4.448_221_615_260_5;
 const INCH: f64 = 0.0254;
 
-/// Time, force, displacement and acceleration of the example.
+/// Returns time, force, displacement and acceleration of the example.
 fn columns() -> [Vec<f64>; 4] {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
     let text = fs::read_to_string(path).unwrap();
@@ -24,7 +24,7 @@ fn columns() -> [Vec<f64>; 4] {
     [0, 1, 2, 4].map(|at| rows.iter().map(|row| row[at]).collect())
 }
 
-/// Writes lines and then columns, each divided by its factor to SI units.
+/// Writes lines and below them columns, each divided by its factor to SI units.
 fn table(file: &Path, above: &[&str], columns: &[(&[f64], f64)], separator: &str) {
     let mut text: String = above.iter().map(|line| format!("{line}\n")).collect();
     for row in 0..columns[0].0.len() {
@@ -39,7 +39,7 @@ fn json(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&mechid(folder, &format!("{arguments} --json"))).unwrap()
 }
 
-/// Mass, and whether a check asks about a unit.
+/// Returns the mass, and true if a check asks about a unit.
 fn mass(report: &Value) -> (f64, bool) {
     let asks = report["checks"].as_array().unwrap().iter().any(|check| check["subject"] == "unit");
     (
@@ -51,10 +51,11 @@ fn mass(report: &Value) -> (f64, bool) {
     )
 }
 
-/// Lines above the numbers, the unit of the force, the response and its unit, the unit of time, and the delimiter.
+/// The lines above the numbers, the unit of the force, the response and its unit, the unit of time,
+/// and the delimiter.
 type Case<'a> = (&'a [&'a str], f64, &'a [f64], f64, f64, &'a str);
 
-/// F1, F2, F7, F31, F34, F39: units and instants that a person reads.
+/// Cases F1, F2, F7, F31, F34, F39: units in a header, and times as clock readings.
 #[test]
 fn units_that_stand_in_a_header_are_used() {
     let home = tempfile::tempdir().unwrap();
@@ -101,7 +102,7 @@ fn response_option(is_displacement: bool) -> &'static str {
     if is_displacement { "--displacement" } else { "--acceleration" }
 }
 
-/// F1, F7, F32: what is not sure is asked about, with the factor.
+/// Cases F1, F7, F32: a check asks about uncertain units and gives the factor.
 #[test]
 fn units_that_are_not_sure_are_asked_about() {
     let home = tempfile::tempdir().unwrap();
@@ -120,11 +121,11 @@ fn units_that_are_not_sure_are_asked_about() {
         assert!(asks, "{header}: {found}");
         let text = report["checks"].to_string();
         assert!(text.contains(part), "{header}: {text}");
-        // An inspection asks, too.
+        // The subcommand `info` asks, too.
         let text = mechid(home, "info a.csv");
         assert!(text.contains(part), "{header}: {text}");
     }
-    // A stated sensitivity and a factor answer.
+    // A stated sensitivity or a factor settles the question.
     let above = ["time,Force [mV; 11.2 mV/N],x"];
     table(&home.join("a.csv"), &above, &[(&t, 1.0), (&f, 1.0 / 11.2), (&x, 1.0)], ",");
     let line = "identify a.csv --force 2 --displacement 3 --period 256";
@@ -142,7 +143,7 @@ fn units_that_are_not_sure_are_asked_about() {
     assert!((stated / expected - 1.0).abs() < 1e-6 && (scaled / expected - 1.0).abs() < 1e-6);
 }
 
-/// F5, F38: axes and units of tables of frequency responses, and directions.
+/// Cases F5, F38: axes, units and directions in tables of frequency responses.
 #[test]
 fn axes_and_units_of_response_tables_are_used() {
     let home = tempfile::tempdir().unwrap();
@@ -150,7 +151,7 @@ fn axes_and_units_of_response_tables_are_used() {
     let (m, c, k) = (5.0, 33.9, 63_956.0);
     let hz: Vec<f64> = (1..=160).map(|line| 0.25 * f64::from(line)).collect();
     let omega: Vec<f64> = hz.iter().map(|hz| std::f64::consts::TAU * hz).collect();
-    // −ω² / (k + i ω c − ω² m)
+    // The accelerance is −ω² / (k + i ω c − ω² m).
     let parts: Vec<[f64; 2]> = omega
         .iter()
         .map(|w| {
@@ -174,7 +175,7 @@ fn axes_and_units_of_response_tables_are_used() {
         let (found, _) = mass(&json(home, "identify h.csv --frf-table --quantity acceleration"));
         assert!((found / m - 1.0).abs() < 1e-3, "{above:?}: {found}");
     }
-    // Orders are no frequency without the speed.
+    // Orders cannot be converted to frequencies without the speed.
     table(
         &home.join("h.csv"),
         &["order,real,imaginary"],
@@ -185,7 +186,8 @@ fn axes_and_units_of_response_tables_are_used() {
     assert!(message.contains("speed of rotation"), "{message}");
 }
 
-/// F37: a pulse that begins with the record has no answer, and says so.
+/// Case F37: a pulse that begins with the record does not determine the machine, and a message says
+/// so.
 #[test]
 fn a_pulse_at_the_beginning_is_not_a_precise_answer() {
     let home = tempfile::tempdir().unwrap();

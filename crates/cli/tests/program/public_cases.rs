@@ -1,5 +1,5 @@
-//! Layouts, forces and delays as public questions and bug reports have them. Judge: closed forms, and the record of the
-//! example.
+//! Layouts, forces and delays from public questions and bug reports; the codes F4, F24 … number the
+//! cases. References: closed forms, and the record of the example.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -19,13 +19,13 @@ fn json(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&mechid(folder, &format!("{arguments} --json"))).unwrap()
 }
 
-/// Value and standard error of a parameter, by its place in the list.
+/// Returns value and standard error of a parameter by its index.
 fn parameter(report: &Value, at: usize) -> [f64; 2] {
     ["value", "standard_error"].map(|part| report["parameters"][at][part].as_f64().unwrap())
 }
 
-/// A dataset 58 of even spacing: type, first abscissa, spacing, type and label of the ordinate, response and reference as
-/// node and direction, real numbers or pairs.
+/// A dataset 58 with even spacing. The fields are its type, first abscissa, spacing, type and label
+/// of the ordinate, node and direction of response and reference, and real numbers or pairs.
 struct Function<'a> {
     kind: u32,
     first: f64,
@@ -76,7 +76,7 @@ fn write(file: &Path, functions: &[Function<'_>]) {
     fs::write(file, functions.iter().map(Function::text).collect::<String>()).unwrap();
 }
 
-/// F4: labels of a universal file without dataset 164.
+/// Case F4: labels of functions in a universal file without dataset 164 are read as units.
 #[test]
 fn labels_of_functions_of_time_are_units() {
     let home = tempfile::tempdir().unwrap();
@@ -106,12 +106,13 @@ fn labels_of_functions_of_time_are_units() {
     }
 }
 
-/// Masses, dampers and springs of a machine with two points.
+/// Masses of a machine with two points; its dampers and springs follow.
 const M: [f64; 2] = [4.0, 3.0];
 const C: Matrix2<f64> = Matrix2::new(25.0, -8.0, -8.0, 18.0);
 const K: Matrix2<f64> = Matrix2::new(9e4, -5e4, -5e4, 7e4);
 
-/// Accelerance of that machine at 0.25 … 50 Hz, by the inverse of the dynamic stiffness; `signs` of the two directions.
+/// Accelerance of this machine at 0.25 … 50 Hz, from the inverse of the dynamic stiffness; `signs`
+/// are those of the two directions.
 fn accelerance(response: usize, reference: usize, signs: [f64; 2]) -> Function<'static> {
     let values = (1..=200).flat_map(|line| {
         let omega = TAU * 0.25 * f64::from(line);
@@ -135,7 +136,7 @@ fn accelerance(response: usize, reference: usize, signs: [f64; 2]) -> Function<'
     }
 }
 
-/// F24, F38: a row of responses, and directions that are negative.
+/// Cases F24, F38: a row of responses, and negative directions.
 #[test]
 fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     let home = tempfile::tempdir().unwrap();
@@ -155,7 +156,7 @@ fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     let report = json(home, "identify row.unv --frf-table --structure symmetric");
     exact(&report);
     assert!(report["remarks"].to_string().contains("by reciprocity"), "{report}");
-    // Both points of the force and of the response in −Z, or one of them.
+    // Force and response are both in −Z, or only one of them.
     for signs in [[-1.0, -1.0], [1.0, -1.0]] {
         let all = [(0, 0), (0, 1), (1, 0), (1, 1)];
         write(&home.join("neg.unv"), &all.map(|(i, j)| accelerance(i, j, signs)));
@@ -163,8 +164,8 @@ fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     }
 }
 
-/// 3 kg, 8 Hz, 5 %: time, a force by its instants, and the displacement that follows from rest, exact for a force that
-/// is linear between its samples.
+/// Oscillator of 3 kg, 8 Hz and 5 % damping from rest: returns time, force and displacement; exact
+/// for a force that is linear between samples.
 fn driven(count: usize, rate: f64, force: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let sampling = Sampling::from_rate_hz(rate, count).unwrap();
     let force: Vec<f64> = sampling.times().map(force).collect();
@@ -185,7 +186,7 @@ fn write_table(file: &Path, header: &str, columns: &[&[f64]]) {
     fs::write(file, text).unwrap();
 }
 
-/// F28: few lines are driven, which more seconds do not mend.
+/// Case F28: the force excites few lines, and a longer record does not change that.
 #[test]
 fn a_force_that_drives_few_lines_is_named() {
     let home = tempfile::tempdir().unwrap();
@@ -203,7 +204,7 @@ fn a_force_that_drives_few_lines_is_named() {
     assert!((mass / 3.0 - 1.0).abs() < 0.01, "{mass}");
 }
 
-/// F29: the motion of the ground among the forces.
+/// Case F29: the motion of the ground is given among the forces.
 #[test]
 fn the_motion_of_a_support_is_no_force() {
     let home = tempfile::tempdir().unwrap();
@@ -216,7 +217,7 @@ fn the_motion_of_a_support_is_no_force() {
     assert!(message.contains("named elements (--machine)"), "{message}");
 }
 
-/// F31: spellings of a time column.
+/// Case F31: spellings of a time column.
 #[test]
 fn spellings_of_time_are_read_or_named() {
     let home = tempfile::tempdir().unwrap();
@@ -238,7 +239,7 @@ fn spellings_of_time_are_read_or_named() {
     assert!(told.contains("4 Hz, a step of 0.25 s"), "{told}");
 }
 
-/// F39: the hint of the lines to skip also where the first rows have fields.
+/// Case F39: the message names the lines to skip even if the first rows have several fields.
 #[test]
 fn the_table_below_many_lines_is_found() {
     let home = tempfile::tempdir().unwrap();
@@ -251,7 +252,7 @@ fn the_table_below_many_lines_is_found() {
     assert!(mechid(home.path(), "info a.csv --skip-lines 300").contains("3 columns, 50 samples"));
 }
 
-/// A delay far beyond the search of responses that follow their force, in the time domain.
+/// In the time domain a delay is named even if it is far beyond the usual search range.
 #[test]
 fn a_delay_of_fifty_samples_is_named_in_the_time_domain() {
     let home = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A record says the same in every format.
+//! A record gives the same result in every format.
 
 use std::fs;
 use std::io::Write as _;
@@ -12,8 +12,8 @@ use super::{mechid, refused};
 
 const COLUMNS: [&str; 2] = ["force", "displacement"];
 
-/// The example's record as text, as a MATLAB file plain and compressed, as a universal file, and in
-/// gzip; the folder and the names of the files.
+/// Writes the example record as text, as a MATLAB file with and without compression, as a universal
+/// file, and as gzip; returns the folder and the names of the files.
 fn records() -> (tempfile::TempDir, [&'static str; 6]) {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
     let record = Table::read(&source).unwrap();
@@ -41,7 +41,7 @@ fn records() -> (tempfile::TempDir, [&'static str; 6]) {
     (folder, ["rec.csv", "rec.csv.gz", "plain.mat", "packed.mat", "rec.unv", "rec.unv.gz"])
 }
 
-/// Columns of doubles as a MATLAB file of level 5.
+/// Returns columns of doubles as a MATLAB file of level 5.
 pub fn matlab(columns: &[(String, &[f64])], packed: bool) -> Vec<u8> {
     let mut file = b"MATLAB 5.0 MAT-file, by hand".to_vec();
     file.resize(124, b' ');
@@ -79,7 +79,7 @@ pub fn matlab(columns: &[(String, &[f64])], packed: bool) -> Vec<u8> {
     file
 }
 
-/// A response in time at a node in direction +Z, as a binary dataset 58.
+/// Returns a response over time at a node in direction +Z, as a binary dataset 58.
 fn function(node: u32, dt: f64, values: &[f64]) -> Vec<u8> {
     let len = values.len();
     let mut text = format!("    -1\n    58b     1     2          11{:12}     0     0\n", 8 * len);
@@ -96,7 +96,7 @@ fn function(node: u32, dt: f64, values: &[f64]) -> Vec<u8> {
     bytes
 }
 
-/// 0.0078125 as Fortran's E13.5 prints it.
+/// Formats a number as Fortran's E13.5 does.
 fn exponent(value: f64) -> String {
     let text = format!("{value:.5E}");
     let (mantissa, power) = text.split_once('E').unwrap();
@@ -116,7 +116,7 @@ fn identify_finds_the_same_machine_in_every_format() {
         let told = mechid(folder.path(), &format!("identify {file} {arguments}"));
         let told = told.replace(&format!("residual 1 with {force}:"), "residual 1 with f:");
         let mut told: serde_json::Value = serde_json::from_str(&told.replace(file, "rec")).unwrap();
-        // The names of the columns are those of the file.
+        // The report has the column names of the file.
         assert_eq!(told["channels"]["force"][0], force);
         told.as_object_mut().unwrap().remove("channels");
         told
@@ -203,7 +203,7 @@ fn limits_on_memory_can_be_raised() {
     assert!(told.contains("3 samples"), "{told}");
 }
 
-/// A logger reserves a file and is stopped before it is full.
+/// A logger that is stopped early leaves the rest of its file empty; a remark names the empty part.
 #[test]
 fn what_was_left_out_of_a_file_is_told() {
     let (folder, _) = records();
@@ -212,6 +212,6 @@ fn what_was_left_out_of_a_file_is_told() {
     fs::write(folder.path().join("reserved.csv"), bytes).unwrap();
     for command in ["info reserved.csv", "identify reserved.csv --force force --displacement 3"] {
         let told = mechid(folder.path(), command);
-        assert!(told.contains("4096 zero bytes behind the last line"), "{command}: {told}");
+        assert!(told.contains("4096 zero bytes after the last line"), "{command}: {told}");
     }
 }

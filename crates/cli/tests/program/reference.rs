@@ -1,5 +1,4 @@
-//! The reference page names every field that a report has, and its description of an experiment is
-//! one.
+//! The reference page names every field of a report, and its example of a description is valid.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -14,7 +13,7 @@ fn page() -> String {
     fs::read_to_string(path).unwrap()
 }
 
-/// The part of the page below a heading of second level.
+/// Returns the part of the page below a heading of second level.
 fn section<'a>(page: &'a str, heading: &str) -> &'a str {
     let (_, rest) = page.split_once(&format!("\n## {heading}\n")).unwrap_or_else(|| {
         panic!("no section {heading}");
@@ -22,7 +21,8 @@ fn section<'a>(page: &'a str, heading: &str) -> &'a str {
     rest.split("\n## ").next().unwrap()
 }
 
-/// Paths of all values that are no object or list: `modes[].damping_ratio.value`.
+/// Collects the paths of all values that are neither object nor list, such as
+/// `modes[].damping_ratio.value`.
 fn leaves(value: &Value, path: &str, into: &mut BTreeSet<String>) {
     match value {
         Value::Object(fields) => {
@@ -36,7 +36,8 @@ fn leaves(value: &Value, path: &str, into: &mut BTreeSet<String>) {
     }
 }
 
-/// Whether the section names a path, or the uncertain number whose field it is, or what is null.
+/// Returns true if the section names the path, or the uncertain number to which it belongs, or
+/// fields below a value that is null.
 fn is_named(section: &str, path: &str) -> bool {
     let row = |path: &str| {
         section.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{path}`")))
@@ -48,16 +49,17 @@ fn is_named(section: &str, path: &str) -> bool {
         .iter()
         .filter_map(|field| path.strip_suffix(field))
         .any(|parent| row(parent).is_some_and(|row| row.contains("uncertain")));
-    // Fields of a described machine are on the page of file formats.
+    // The page of file formats describes the fields of a machine.
     let of_description = path.starts_with("analysis.machine.");
     if of_description && section.contains("formats.md#machines-of-named-elements") {
         return true;
     }
-    // A whole object or list may be null, where its fields are named.
+    // An object or list may be null if the page names its fields.
     of_uncertain || [".", "["].iter().any(|next| section.contains(&format!("`{path}{next}")))
 }
 
-/// The machine of the example with two springs that only their sum is known of, and a candidate.
+/// The machine of the example with two parallel springs that can be found only as a sum, and with a
+/// candidate for a sensor.
 const DRAWN: &str = r#"{
     "dofs": ["x"],
     "elements": [
@@ -141,7 +143,7 @@ fn every_field_of_every_report_is_in_the_reference() {
         let page = page();
         let mut section = section(&page, &format!("mechid {command}")).to_owned();
         if ["report", "bearing"].contains(&command) {
-            // They say all that identify says, or its checks.
+            // The two reports also contain all fields of `identify`, or its checks.
             section += self::section(&page, "mechid identify");
         }
         let mut paths = BTreeSet::new();
@@ -165,7 +167,7 @@ fn the_description_in_the_reference_is_one() {
     assert_eq!(report["response"]["from"]["displacement"], 0.001);
     let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
     assert_eq!(text.lines().count(), 513);
-    // Every kind and every scheme there is has a row.
+    // Every kind of force and every scheme has a row.
     let description = section(&page, "The description of an experiment");
     for name in [
         "multisine",
@@ -191,7 +193,7 @@ fn the_description_in_the_reference_is_one() {
     }
 }
 
-/// A start that says nothing of the velocity, and one that says nothing of the displacement.
+/// An initial state may lack the velocity or the displacement.
 #[test]
 fn a_start_needs_no_more_than_it_says() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! The Silverbox, a public benchmark that stands beside the project, through the program as a user has it.
+//! The Silverbox, a public benchmark stored next to the project, analysed with the program as a
+//! user would.
 //!
 //! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear system
 //! identification", ECC 2013.
@@ -13,7 +14,7 @@ use super::mechid;
 /// First samples of the steady periods of the six realisations, counted from 1.
 const STARTS: [usize; 6] = [9030, 17722, 26414, 35106, 43798, 52490];
 
-/// A file of the benchmark; `None`, and a word on it, where it is not.
+/// Returns the path of a file of the benchmark; if it is missing, prints a note and returns `None`.
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn file(name: &str) -> Option<PathBuf> {
     let path =
@@ -25,7 +26,7 @@ fn file(name: &str) -> Option<PathBuf> {
     Some(path.canonicalize().unwrap())
 }
 
-/// Arguments to read a file of the benchmark.
+/// Returns the arguments to read a file of the benchmark.
 fn record(path: &Path) -> String {
     let path = path.display();
     format!("{path} --sample-rate 610.3515625 --force V1 --displacement V2 --detrend mean")
@@ -47,7 +48,8 @@ fn the_schroeder_record_is_explained() {
     let Some(path) = file("Schroeder80mV.csv") else { return };
     let folder = tempfile::tempdir().unwrap();
     let window = format!("{} --start 13657 --period 1024 --periods 8 --lines 1:335", record(&path));
-    // Automatic weights follow the residual force, and leave 1.5 % of the response with springs alone.
+    // Automatic weights would follow the residual force; with springs alone they leave 1.5 % of the
+    // response unexplained.
     for (terms, most) in [
         ("--nonlinear k2:x1^2,k3:x1^3 --weighting white-force", 0.0070),
         ("--nonlinear k2:x1^2,k3:x1^3,c2:|v1|v1 --weighting response --search phase", 0.0025),
@@ -56,11 +58,11 @@ fn the_schroeder_record_is_explained() {
         let left = told["fit"]["unexplained_motion"].as_f64().unwrap();
         assert!(left <= most, "{terms} leaves {left}");
         assert_small_amplitude_frequency(&told);
-        // Before any model, from the lines without force.
+        // The kind of distortion is found without a model, from the lines without force.
         let kind = told["nonlinear"]["distortion"]["text"].as_str().unwrap();
         assert!(kind.contains("cubic stiffness"), "{kind}");
     }
-    // Surface, spring, damper and residual; and all of it on a page.
+    // The picture shows surface, spring, damper and residual.
     let drawn = format!("identify {window} --nonlinear k2:x1^2,k3:x1^3 --quiet --plot drawn.svg");
     mechid(folder.path(), &drawn);
     let svg = fs::read_to_string(folder.path().join("drawn.svg")).unwrap();
@@ -69,7 +71,7 @@ fn the_schroeder_record_is_explained() {
     }
 }
 
-/// RMSE in mV of a realisation in its steady state.
+/// Returns the RMSE in mV of a realisation in its steady state.
 fn rmse(folder: &Path, path: &Path, start: usize) -> f64 {
     let window = format!("{} --start {start} --period 8192 --periods 1", record(path));
     let told = mechid(folder, &format!("predict machine.json {window} --json"));
@@ -87,7 +89,7 @@ fn four_windows_of_a_file_predict_the_other_two() {
         record(&path),
         STARTS[0]
     );
-    // What realisations held out choose; named by hand it is the same.
+    // Terms chosen by held-out realisations give the same fit as when they are named by hand.
     let candidates = "--candidates k2:x1^2,k3:x1^3,k5:x1^5,k4:x1^4 --criterion held-out";
     let chosen = identified(folder.path(), &format!("{four} {candidates}"));
     let steps = chosen["nonlinear"]["selection"]["steps"].as_array().unwrap();

@@ -1,4 +1,4 @@
-//! Standard input and output in place of files, through the pipes of a real shell.
+//! Standard input and output in place of files, tested with the pipes of a real shell.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use super::{mechid, refused};
 
 const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
 
-/// Runs a line for a shell, in which `mechid` is the program, in a folder with the examples.
+/// Runs a shell line in a folder with the examples; `mechid` is the program in it.
 fn shell(folder: &Path, line: &str) -> Output {
     for file in ["machine.csv", "machine.json"] {
         fs::copy(Path::new(EXAMPLES).join(file), folder.join(file)).unwrap();
@@ -27,7 +27,7 @@ fn text(bytes: &[u8]) -> &str {
 const FORCE: &str = "mechid force machine.csv --system machine.json --displacement displacement \
                      --period 256";
 
-/// The file and nothing else on the one stream, the report as ever on the other.
+/// If the file goes to standard output, the report goes to standard error.
 #[test]
 fn an_output_to_standard_output_is_alone_there() {
     let folder = tempfile::tempdir().unwrap();
@@ -45,7 +45,7 @@ fn an_output_to_standard_output_is_alone_there() {
         for name in ["-", "/dev/stdout"] {
             let piped = shell(folder.path(), &format!("{line} --output {name} | cat"));
             assert!(piped.status.success(), "{line}");
-            // A page tells the command that made it.
+            // A page shows the command that made it.
             assert_eq!(
                 text(&piped.stdout)
                     .replace(&format!("--output {name}"), &format!("--output {file}")),
@@ -58,7 +58,7 @@ fn an_output_to_standard_output_is_alone_there() {
     }
 }
 
-/// More than a pipe holds, of which the reader takes three lines.
+/// The output is larger than a pipe, and its reader stops after three lines.
 #[test]
 fn a_reader_may_have_seen_enough() {
     let folder = tempfile::tempdir().unwrap();
@@ -73,7 +73,7 @@ fn a_reader_may_have_seen_enough() {
     assert_eq!(closed.status.code(), Some(141), "{}", text(&closed.stderr));
 }
 
-/// Standard output may be a file, of which what stands in it already is kept.
+/// If standard output is redirected to a file, existing content is kept as the shell requires.
 #[test]
 fn a_redirected_output_is_written_where_the_shell_says() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,12 +128,12 @@ fn a_record_may_come_from_standard_input() {
         text(&ragged.stderr),
         "error: standard input, line 3: 1 field where the first line has 2\n"
     );
-    // A file of that name, too.
+    // A file named `-` exists, too.
     fs::write(folder.path().join("-"), "t,x\n0,1\n1,2\n").unwrap();
     assert!(mechid(folder.path(), "info ./-").starts_with("./-: "));
 }
 
-/// A machine goes from one call to the next, with the covariance of its parameters.
+/// A machine is passed from one call to the next, with the covariance of its parameters.
 #[test]
 fn a_description_may_come_from_standard_input() {
     let folder = tempfile::tempdir().unwrap();
@@ -155,7 +155,7 @@ fn a_description_may_come_from_standard_input() {
     assert!(simulated.status.success(), "{}", text(&simulated.stderr));
 }
 
-/// An output is never an input, by whatever path, and the input stays as it was.
+/// An output that is also an input is refused for every path to it, and the input is unchanged.
 #[test]
 fn an_output_that_is_an_input_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -184,7 +184,7 @@ fn an_output_that_is_an_input_is_refused() {
     }
 }
 
-/// What cannot be told is a failure, and never a panic.
+/// If the output cannot be written, the program fails without a panic.
 #[test]
 fn a_full_stream_is_told_by_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
@@ -197,7 +197,7 @@ fn a_full_stream_is_told_by_the_exit_code() {
         ("mechid info nowhere.csv 2> /dev/full".to_owned(), 2),
         ("mechid info --nonsense 2> /dev/full".to_owned(), 2),
         ("mechid info nowhere.csv 2>&-".to_owned(), 2),
-        // The null device stands in the place of a stream that is closed at the start: SECURITY.md.
+        // A stream that is closed at the start is replaced by the null device, see SECURITY.md.
         (format!("{info} >&-"), 0),
         (
             "mechid multisine --samples 8 --rate 8 --amplitude 1 -o a.csv >&- && test -s a.csv"
@@ -207,14 +207,14 @@ fn a_full_stream_is_told_by_the_exit_code() {
         (format!("{info} | true; exit ${{PIPESTATUS[0]}}"), 141),
     ] {
         let run = shell(folder.path(), &line);
-        // A report may be in the pipe before its reader is gone.
+        // The report may be written to the pipe before its reader ends.
         let piped = code == 141 && run.status.code() == Some(0);
         assert!(piped || run.status.code() == Some(code), "{line}: {:?}", run.status);
         assert!(!text(&run.stderr).contains("panicked"), "{line}");
     }
 }
 
-/// Names from a file do not reach a terminal raw.
+/// Control characters in names from a file are escaped before they reach a terminal.
 #[test]
 fn names_that_a_terminal_would_obey_are_written_out() {
     let folder = tempfile::tempdir().unwrap();
@@ -227,7 +227,7 @@ fn names_that_a_terminal_would_obey_are_written_out() {
     }
 }
 
-/// A signal ends the program as it ends any other, and nothing is left of what it was writing.
+/// A signal ends the program as usual, and no unfinished file remains.
 #[test]
 fn a_signal_leaves_no_unfinished_file() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Records too long to be held say what they say when they are held.
+//! Records that are too long to keep in memory give the same results as records in memory.
 
 use std::fs;
 
@@ -18,11 +18,11 @@ use super::{mechid, refused};
 
 const PERIOD: usize = 1000;
 
-/// More than are held of a text; 262 periods are.
+/// Number of periods; 262 of them are the part of a text kept in memory.
 const PERIODS: usize = 270;
 
-/// The record of an oscillator as text, of which only the beginning is held, and as a MATLAB file,
-/// which is read at once. The noise of the last 8 periods is large.
+/// Writes the record of an oscillator as text and as a MATLAB file. Only the beginning of the text
+/// is kept in memory; the MATLAB file is read as a whole. The noise of the last 8 periods is large.
 fn records() -> tempfile::TempDir {
     let sampling = Sampling::new(1e-3, PERIOD).unwrap();
     let force = Multisine::flat(1..=40, 2.0, Phases::Schroeder).unwrap();
@@ -74,7 +74,7 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     let remarks = report["remarks"].as_array().unwrap();
     let part = "checks of single samples used samples 1 to 262000 of rec only";
     assert!(remarks.iter().any(|r| r == part), "{remarks:?}");
-    // What is not held counts all the same: 8 periods of a hundred times the noise, of 270.
+    // The part not in memory counts, too: 8 of 270 periods have a hundred times the noise.
     let beginning = both("identify --period 1000 --periods 262 --method maximum-likelihood");
     let error = |report: &Value| report["parameters"][2]["standard_error"].as_f64().unwrap();
     assert!(error(&report) > 10.0 * error(&beginning), "{report}");
@@ -91,8 +91,8 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     assert_eq!(report["last_sample"], samples);
 }
 
-/// A sweep goes through the record once for all settings, in stretches that are no multiple of the
-/// factors: as if each n-th row had been written into a file of its own.
+/// A sweep reads the record once for all settings, in sections that are no multiple of the factors.
+/// The result is that of separate files with every nth row.
 #[test]
 fn a_sweep_of_a_long_text_takes_every_nth_row() {
     let folder = records();
@@ -143,8 +143,8 @@ fn a_sweep_of_a_long_text_takes_every_nth_row() {
     }
 }
 
-/// What a fit in the time domain makes of all samples at once, where the program goes from stretch to
-/// stretch.
+/// A fit in the time domain that reads the record in sections gives the same result as one of all
+/// samples in memory.
 #[test]
 fn stretches_of_a_long_text_meet_as_in_one_record() {
     let folder = records();
@@ -202,7 +202,7 @@ fn stretches_of_a_long_text_meet_as_in_one_record() {
     }
 }
 
-/// How much of a record is predicted, of one in stretches as of all samples at once.
+/// The prediction of a record in sections gives the same fit as that of all samples in memory.
 #[test]
 fn a_long_text_is_predicted_as_one_record() {
     let folder = records();
@@ -235,11 +235,11 @@ fn a_long_text_is_predicted_as_one_record() {
     }
 }
 
-/// Samples of which a text is not held whole.
+/// Number of samples, more than the part of a text kept in memory.
 const SPIKED: usize = 270_000;
 
-/// A column alternating between 3 and 1, but for one sample of 80 near the end, and a sine of eight
-/// samples; as text, line by line.
+/// Returns a column that alternates between 3 and 1, with one sample of 80 near the end, and a sine
+/// with eight samples per cycle; as lines of text and as columns.
 fn spiked() -> (Vec<String>, Vec<(String, Vec<f64>)>) {
     let mut square: Vec<f64> = (0..SPIKED).map(|k| if k % 2 == 0 { 3.0 } else { 1.0 }).collect();
     square[SPIKED - 2] = 80.0;
@@ -296,14 +296,14 @@ fn levels_of_a_long_text_are_those_of_all_of_it() {
     close("rms", (5.0 + (80.0 * 80.0 - 9.0) / n).sqrt());
     close("peak", 80.0);
     close("minimum", 1.0);
-    // Of the part in which there is no spike.
+    // The period is that of the part without the spike.
     assert_eq!(square["period"]["samples"], 2);
     assert_eq!(
         report["remarks"][0],
         "period, mismatch and strongest lines were computed from samples 1 to 262144 of rec.csv only; \
          the levels count all samples up to 270000"
     );
-    // All of a short window is looked at, wherever it stands.
+    // A short window is analysed as a whole, at any position.
     let report = run("rec.csv", "--columns square --start 269001");
     assert_eq!(report["remarks"].as_array().unwrap().len(), 0);
     assert_eq!(report["channels"][0]["peak"], 80.0);
@@ -340,7 +340,7 @@ fn what_is_wrong_near_the_end_of_a_long_text_is_told_with_its_line() {
     assert!(message.contains(what), "{message}");
 }
 
-/// Over time all of a window is drawn, held or not.
+/// A history over time shows the whole window, in memory or not.
 #[test]
 fn a_long_text_is_drawn_whole() {
     let folder = records();
@@ -359,7 +359,7 @@ fn a_long_text_is_drawn_whole() {
     let (text, held) = (lines("rec.csv"), lines("rec.mat"));
     assert_eq!(text.len(), 2);
     assert!(text == held);
-    // The noise of the last periods, which are not held, stands out.
+    // The noise of the last periods, which are not in memory, is visible.
     let heights: Vec<f64> =
         text[0].split([' ', 'L']).skip(1).step_by(2).map(|y| y.parse().unwrap()).collect();
     let spread = |heights: &[f64]| {

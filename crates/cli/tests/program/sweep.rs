@@ -1,12 +1,12 @@
-//! `mechid sweep`: the best step is found, of experiments and of records, and what cannot be swept is
-//! refused.
+//! The subcommand `mechid sweep` finds the best step of experiments and of records, and refuses
+//! input that cannot be swept.
 
 use std::fs;
 
 use assert_cmd::Command;
 use serde_json::Value;
 
-/// The dissertation's oscillator under a flat multisine; the response is the exact one of the
+/// The dissertation's oscillator under a flat multisine; the response is the exact one to the
 /// band-limited force.
 const EXPERIMENT: &str = r#"{
     "system": { "mass": 10, "damping": 180, "stiffness": 5000 },
@@ -43,7 +43,7 @@ fn euler_is_best_at_the_finest_step_and_spectra_at_any() {
     let found = errors(&report);
     assert_eq!(found.len(), 4);
     assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
-    // ωn = 22.3607 rad/s: a cycle of 256 samples at NPI 1.
+    // At ωn = 22.3607 rad/s a cycle has 256 samples at NPI 1.
     let point = &report["points"][0];
     assert!((point["samples_per_cycle"].as_f64().unwrap() - 256.0).abs() < 1e-9);
     assert_eq!(point["parameters"][1]["name"], "k");
@@ -53,7 +53,8 @@ fn euler_is_best_at_the_finest_step_and_spectra_at_any() {
         let arguments = format!("--npi 1:1:4 --unknown-mass --estimator {estimator}");
         let (done, report, error) = sweep(EXPERIMENT, &arguments);
         assert!(done, "{error}");
-        // Exact data: only rounding, amplified by the condition of the equations, is left.
+        // The data are exact, so the error is only rounding times the condition number of the
+        // equations.
         assert!(errors(&report).iter().all(|e| *e < 1e-8), "{estimator}: {report}");
     }
 }
@@ -70,7 +71,7 @@ fn a_sweep_that_finds_nothing_says_why() {
     );
 }
 
-/// A record of the closed form: the oscillator under fifteen lines of a period of 240 samples.
+/// A record in closed form: the oscillator under fifteen lines with a period of 240 samples.
 fn record(folder: &std::path::Path) {
     use mechid::signal::{Multisine, Phases, Sampling};
     let system = mechid::model::Sdof::new(10.0, 180.0, 5000.0).unwrap().system();
@@ -107,23 +108,23 @@ fn a_record_is_swept_by_taking_fewer_samples() {
     let [low, high] = [0, 1].map(|at| point["parameters"][2]["interval"][at].as_f64().unwrap());
     assert!(low < high);
     assert!(place.path().join("s.svg").exists());
-    // The same samples by their rate, as a person reads of the best of them.
+    // The same settings given as sample rates; the text report names the best one.
     let rates = report(&format!("{known} --rate-hz 100,50"));
     assert_eq!(errors(&rates), errors(&euler)[..2]);
     let best = told(&format!("{known} --rate-hz 50,100 --best"));
     assert!(best.contains("\nBest: rate 100 Hz\n") && best.contains("95 % interval"), "{best}");
     assert!(best.contains("\nerror ") && best.contains(" 5000 "), "{best}");
-    // Spectra do not care as long as the lines are below half the rate; the mass may be known.
+    // Spectra give the exact result if all lines are below half the sample rate.
     let spectra = format!("{columns} --reference a.json --estimator least-squares");
     for mass in ["", "--mass 10"] {
         let found = report(&format!("{spectra} --decimate 1,2,4 {mass}"));
         assert!(errors(&found).iter().all(|e| *e < 1e-8), "{found}");
     }
-    // A period that falls between the samples is said where it happens.
+    // If a period is no multiple of the factor, the point of this setting says so.
     let uneven = report(&format!("{spectra} --decimate 1,7"));
     let reason = uneven["points"][1]["failure"].as_str().unwrap();
     assert_eq!(reason, "a period of 240 samples cannot be divided into steps of every 7th sample");
-    // Without a reference the standard errors are told as such.
+    // Without a reference the report gives standard errors and says that they do not include bias.
     let own = told(&format!("{columns} --decimate 1,2"));
     assert!(own.contains("it does not include bias"), "{own}");
 }
@@ -145,7 +146,7 @@ fn settings_belong_to_what_is_swept() {
         let message = crate::refused(place.path(), &arguments);
         assert!(message.contains(part), "{arguments}: {message}");
     }
-    // A described experiment is simulated at other rates.
+    // The experiment of a description is simulated at other sample rates.
     let told = |arguments: &str| -> Value {
         serde_json::from_str(&crate::mechid(place.path(), arguments)).unwrap()
     };
@@ -178,6 +179,6 @@ fn a_machine_of_many_parameters_fits_a_page() {
     for name in ["m11", "m22", "c12", "c21", "k11", "k21", "k22"] {
         assert_eq!(text.matches(&format!("{name} (")).count(), 1, "{name}\n{text}");
     }
-    // Each block of parameters has a row per setting, and the truth.
+    // Each block of parameters has a row for each setting and one with the true values.
     assert!(blocks[1..].iter().all(|b| b.lines().count() == 5 && b.contains("\ntrue ")), "{text}");
 }

@@ -1,4 +1,5 @@
-//! How the program talks: scripts for shells, no colours into pipes, nothing when told to be quiet.
+//! Messages of the program: completion scripts for shells, no colours in pipes, no output with
+//! --quiet.
 
 use std::f64::consts::PI;
 use std::fs;
@@ -34,7 +35,7 @@ fn completions_know_every_subcommand() {
     assert!(message.contains("bash, elvish, fish, powershell, zsh"), "{message}");
 }
 
-/// Judge: bash itself, which reads the script without running it.
+/// Reference: bash itself, which parses the script without running it.
 #[test]
 fn bash_understands_its_completions() {
     let folder = tempfile::tempdir().unwrap();
@@ -67,7 +68,7 @@ fn quiet_success_says_nothing_and_quiet_failure_says_what_is_wrong() {
     assert!(message.starts_with("error: a.csv has no column \"x\""), "{message}");
 }
 
-/// One is no plural, and numbers in a row end as they are spoken.
+/// Messages use the singular for one, and ordinal numbers have the right ending.
 #[test]
 fn one_thing_is_told_as_one() {
     let folder = tempfile::tempdir().unwrap();
@@ -102,7 +103,8 @@ fn one_thing_is_told_as_one() {
     assert!(told.contains("--mass gives 1 value, the record has 2 degrees of freedom"), "{told}");
 }
 
-/// A random walk where a motion should be: warnings and notes, a line each and no gaps.
+/// The displacement is a random walk: warnings and notes follow one another, one line each, without
+/// gaps.
 #[test]
 fn warnings_stand_together() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What is told of a force that the measured motion contradicts, and of its noise.
+//! Remarks on a force that contradicts the measured motion, and on its noise.
 
 use std::fs;
 use std::path::Path;
@@ -7,13 +7,14 @@ use serde_json::{Value, json};
 
 use super::{mechid, refused};
 
-/// A rotor with as much motion in either direction as noise of 0.5 % is worth.
+/// A rotor whose motion in both directions is so small that the noise is about 0.5 % of it.
 const ROTOR: &str = r#"{"mass": [[25, 0], [0, 25]], "damping": [[14e3, -2.5e3], [-2.5e3, 18e3]],
     "stiffness": [[12e6, 5e6], [-8e6, 18e6]]}"#;
 
 const BOTH: &str = "--displacement displacement_1,displacement_2";
 
-/// The motion under the same multisine on these degrees of freedom, four periods of 512 samples.
+/// Writes the response to independent multisines on these degrees of freedom, four periods of 512
+/// samples.
 fn motion(folder: &Path, forced: &[usize]) {
     let excitation = |dof: &usize| json!({"dof": dof, "lines": "5:60", "amplitude": 13, "phases": "random", "seed": dof});
     let experiment = json!({
@@ -28,7 +29,7 @@ fn motion(folder: &Path, forced: &[usize]) {
     mechid(folder, "simulate rotor.json --output run.csv --quiet");
 }
 
-/// The same rows, one column of which is made of all.
+/// Replaces one column of the record by a function of the row.
 fn with_column(folder: &Path, name: &str, value: impl Fn(&[&str]) -> String) {
     let text = fs::read_to_string(folder.join("run.csv")).unwrap();
     let header = text.lines().next().unwrap();
@@ -58,7 +59,8 @@ fn unexplained(report: &Value) -> Vec<Option<f64>> {
     channels.map(|channel| channel["unexplained"].as_f64()).collect()
 }
 
-/// Every way to seek one force in two channels; the last is an open record that is solved at once.
+/// All ways to find one force from two channels; the last is an open record that is solved as a
+/// whole.
 const WAYS: [&str; 6] = [
     "--period 512 --lines 5:60",
     "--period 512",
@@ -107,7 +109,7 @@ fn a_force_that_explains_the_motion_is_not_doubted() {
             assert!(share.unwrap() < 0.03, "{way}: {share:?}");
         }
     }
-    // As many forces as channels: the fit is exact and says nothing.
+    // With as many forces as channels the fit is exact, so it cannot show a contradiction.
     let found = report(folder.path(), &format!("{BOTH} --period 512 --lines 5:60"));
     assert_eq!(unexplained(&found), [None, None]);
     assert_eq!(found["channels"][0]["channel"], 1);
@@ -139,7 +141,8 @@ fn sensors_that_are_dead_or_exchanged_are_told() {
     }
 }
 
-/// A machine 5 % too stiff across: whether that is worth a word is a matter of how well it is known.
+/// The cross stiffness k21 is 5 % too large. A remark appears only if this exceeds the stated
+/// uncertainty of the machine.
 #[test]
 fn what_the_machine_is_known_to_is_expected() {
     let folder = tempfile::tempdir().unwrap();
@@ -153,13 +156,14 @@ fn what_the_machine_is_known_to_is_expected() {
         });
         fs::write(folder.path().join("rotor.json"), machine.to_string()).unwrap();
         for way in ways() {
-            // Periods show their noise; an open record does not, apart from the fit.
+            // Several periods show the noise; an open record shows it only in the residual.
             let noise = if way.contains("period") { "" } else { "--noise 4e-8,4e-8" };
             let found = report(folder.path(), &format!("{way} {noise}"));
             let told = remarks(&found);
             if doubted && way.contains("kalman") {
-                // A force of any band follows both channels of a wrong machine by what it does between samples: it is
-                // told that the machine may be another, and the standard error holds the force that acted.
+                // A force without a limited band can follow both channels of a wrong machine by its
+                // values between the samples. A remark says that the machine may be wrong, and the
+                // interval contains the true force.
                 assert!(told.contains("hardly determines the force"), "{way}, {found}");
                 assert!(told.contains("another machine"), "{way}, {found}");
                 let force = &found["forces"][0];
@@ -181,23 +185,23 @@ fn what_the_machine_is_known_to_is_expected() {
 fn noise_is_that_of_the_record_before_periods_are_averaged() {
     let folder = tempfile::tempdir().unwrap();
     motion(folder.path(), &[1, 2]);
-    // What the lines without force show of it, stated.
+    // Noise estimated from the lines without force and stated noise give the same error.
     let lines = format!("{BOTH} --period 512 --lines 5:60");
     let error = |arguments: &str| {
         let found = report(folder.path(), arguments);
         found["forces"][0]["standard_error"].as_f64().unwrap()
     };
     let (found, stated) = (error(&lines), error(&format!("{lines} --noise 4e-8,4e-8")));
-    // 195 lines of two channels tell a level to 4 %.
+    // The level is known to 4 % from 195 lines of two channels.
     assert!((found / stated - 1.0).abs() < 0.16, "{found}, stated {stated}");
-    // And what shrinkage finds is told as --noise takes it.
+    // Shrinkage reports the level as --noise takes it, before periods are averaged.
     let found = report(folder.path(), &format!("{BOTH} --period 512"));
     let chosen = found["chosen"].as_array().unwrap().iter();
     let levels = chosen.filter(|c| c["name"].as_str().unwrap().starts_with("noise of channel"));
     for level in levels.map(|level| level["value"].as_f64().unwrap()) {
         assert!((2.5e-8..6.5e-8).contains(&level), "{level}");
     }
-    // In the unit of its column.
+    // The level is given in the unit of its column.
     let text = fs::read_to_string(folder.path().join("run.csv")).unwrap();
     let named = text.replacen("displacement_1,displacement_2", "x [um],displacement_2", 1);
     fs::write(folder.path().join("run.csv"), named).unwrap();

@@ -1,4 +1,4 @@
-//! Columns that say to be in other units than those of the SI.
+//! Columns whose header states units other than SI units.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::{mechid, refused};
 
 const NAMES: [&str; 4] = ["force", "displacement", "velocity", "acceleration"];
 
-/// The example's record in SI units, and with other names and numbers.
+/// Writes the example record in SI units, and a copy with other names and units.
 fn records(names: [&str; 4], per_si: [f64; 4], row_of_units: Option<&str>) -> tempfile::TempDir {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
     let record = Table::read(&source).unwrap();
@@ -37,7 +37,7 @@ fn json(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&mechid(folder, &format!("{arguments} --json"))).unwrap()
 }
 
-/// Every number alike to rounding, every text the same but for what `names` and notes say.
+/// Checks that two reports agree: numbers to rounding, and texts except names and notes.
 fn alike(path: &str, a: &Value, b: &Value) {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
@@ -104,7 +104,7 @@ fn the_machine_is_the_same_in_any_units() {
     }
 }
 
-/// The example's record with other names and numbers in its column of time.
+/// Writes the example record with another name and unit of its time column.
 fn timed(folder: &Path, name: &str, time: &str, per_second: f64) {
     let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
     let text = fs::read_to_string(machine).unwrap();
@@ -116,7 +116,7 @@ fn timed(folder: &Path, name: &str, time: &str, per_second: f64) {
     fs::write(folder.join(name), format!("{header}\n{}", rows.collect::<String>())).unwrap();
 }
 
-/// 128 Hz: 7.8125 ms from sample to sample, 512 of them in 4 s.
+/// At 128 Hz the samples are 7.8125 ms apart, and 512 of them last 4 s.
 #[test]
 fn milliseconds_that_do_not_say_so_are_asked_about() {
     let place = tempfile::tempdir().unwrap();
@@ -156,7 +156,7 @@ fn milliseconds_that_do_not_say_so_are_asked_about() {
     assert!(page().contains("has no unit"));
 }
 
-/// Slow, or rather slow and long; what a name or a row of units says is not doubted.
+/// A slow record with a stated unit of time is accepted, and so is a fast one without a unit.
 #[test]
 fn slow_records_with_a_unit_and_fast_ones_without_are_not_doubted() {
     let folder = tempfile::tempdir().unwrap();
@@ -191,7 +191,8 @@ fn a_column_of_another_quantity_is_refused() {
     assert!(told.contains("is in g, a unit of acceleration; --force takes"), "{told}");
 }
 
-/// What a time column says and is not read is asked about, with the factor that it would make.
+/// A time column with an unknown unit, or with a factor in its name, causes a question, which
+/// states the factor if there is one.
 #[test]
 fn a_time_column_with_a_factor_or_an_unknown_unit_is_asked_about() {
     let place = tempfile::tempdir().unwrap();

@@ -1,13 +1,13 @@
-//! The page in a real browser, where there is one.
+//! The page in a real browser, if one is installed.
 
 use std::{fs, path::Path, process};
 
 use super::{NAMES, USUAL, mechid, page, rig};
 
-/// What a browser shows of the page in a frame of this width, in px, and what it complains of; nothing
-/// if there is no browser.
+/// Returns the text that a browser shows of the page in a frame of this width, in px, and its
+/// complaints; `None` if there is no browser.
 ///
-/// A frame, because the window of a browser has a least width.
+/// The page is in a frame, because the window of a browser has a minimum width.
 fn browse(folder: &Path, width: u32) -> Option<(String, String)> {
     let measure = "<script>addEventListener('load', () => {
         const beyond = [...document.querySelectorAll('body, body *')].filter(e =>
@@ -15,7 +15,7 @@ fn browse(folder: &Path, width: u32) -> Option<(String, String)> {
         parent.postMessage([innerWidth, document.documentElement.scrollWidth,
             ...beyond.map(e => e.tagName)].join(' '), '*');
     })</script>";
-    // The copy may run the script of the test; the policy still forbids to load anything.
+    // The copy may run the script of the test; the policy still forbids loading other files.
     let own = page(folder);
     let hash = own.find("script-src").expect("a policy for the script");
     let end = hash + own[hash..].find('"').expect("the end of the policy");

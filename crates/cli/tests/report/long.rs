@@ -1,4 +1,5 @@
-//! The page of a record too long to be held: true of all of it, and no larger for it.
+//! The page of a record that is too long to keep in memory: it describes the whole record, and is
+//! not larger than others.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -13,16 +14,16 @@ use super::{closed, mechid, page, parse, row, tagged, text};
 
 const PERIOD: usize = 1000;
 
-/// More than the 262 periods that are held.
+/// Number of periods, more than the 262 kept in memory.
 const PERIODS: usize = 270;
 
 const DT: f64 = 1e-3;
 
-/// Lines of the force.
+/// Number of lines of the force.
 const LINES: usize = 40;
 
-/// The samples of force, displacement, velocity and acceleration of an oscillator in steady state,
-/// summed term by term. Unlike the beginning, the last eight periods are noisy, and the force strikes once.
+/// Returns force, displacement, velocity and acceleration of an oscillator in steady state, summed
+/// term by term. Only the last eight periods are noisy and have a peak of the force.
 fn channels() -> [Vec<f64>; 4] {
     let (m, c, k) = (25.0, 190.0, 142e3);
     let mut period = [const { Vec::new() }; 4];
@@ -87,7 +88,7 @@ fn mean_period(values: &[f64]) -> Vec<f64> {
     (0..PERIOD).map(of).collect()
 }
 
-/// Cosine and sine amplitude of a line of a period.
+/// Returns the cosine and sine amplitude of a line of a period.
 fn line(period: &[f64], n: usize) -> (f64, f64) {
     let angle = |at: usize| TAU * (n * at % PERIOD) as f64 / PERIOD as f64;
     let sum = |of: fn(f64) -> f64| {
@@ -99,7 +100,7 @@ fn line(period: &[f64], n: usize) -> (f64, f64) {
 
 fn near(cell: &str, expected: f64, digits: i32) {
     let got: f64 = cell.trim_end_matches(" %").replace('−', "-").parse().unwrap();
-    // Half a unit of the last of so many digits, at worst of the number 1.
+    // The tolerance is half a unit of the last of `digits` digits, for the worst leading digit 1.
     let within = 0.51 * 10f64.powi(1 - digits) * expected.abs();
     assert!((got - expected).abs() <= within, "{got} is not {expected}");
 }
@@ -136,7 +137,7 @@ fn numbers_and_pictures_are_those_of_all_samples() {
         near(&cells[7], 100.0 * apart / varying, 3);
     }
 
-    // The mean period is that of all: line by line, by the sum that defines a line.
+    // The mean period is that of all samples; its lines are computed from their definition.
     let told: Value = serde_json::from_str(&told).unwrap();
     let value = |at: usize| told["parameters"][at]["value"].as_f64().unwrap();
     let [m, c, k] = [0, 1, 2].map(value);
@@ -151,10 +152,10 @@ fn numbers_and_pictures_are_those_of_all_samples() {
         found += 0.5 * stiffness * stiffness * (re * re + im * im);
     }
     let cells = row(&document, "Force found and force measured", "F");
-    // The strike is 2 N in the mean period, and not in what is held.
+    // The peak of the force adds 2 N to the mean period, but is not in the part kept in memory.
     near(&cells[1], measured.sqrt(), 4);
     near(&cells[2], found.sqrt(), 4);
-    // The strike is the last but one of the samples drawn.
+    // The peak of the force is the last but one of the samples drawn.
     let force = figure(&document, "figure-force");
     let curve = force.descendants().find(|node| node.attribute("class") == Some("curve")).unwrap();
     let path = curve.descendants().find_map(|node| node.attribute("d")).unwrap();
@@ -168,7 +169,7 @@ fn numbers_and_pictures_are_those_of_all_samples() {
     assert!(end.0 - top.0 < 0.2, "{top:?} is not at the end, {end:?}");
     assert!(points.iter().filter(|point| point.1 < 0.5 * (top.1 + end.1)).count() < 4);
 
-    let of_held = row(&document, "What is left of the motion, samples 1 to 262000", "x");
+    let of_held = row(&document, "Residual of the response, samples 1 to 262000", "x");
     near(&of_held[2], rms(without_mean(&all[1][..262_000]).into_iter()), 4);
     assert_eq!(row(&document, "The record", "Samples used")[1], "1 to 270000");
 }
@@ -204,11 +205,11 @@ fn an_open_record_says_which_samples_it_shows() {
     }
     assert!(captions.iter().any(|c| c.contains("segments of 32768 samples")), "{captions:?}");
     let excited = row(&document, "Quality of the excitation, samples 1 to 262144", "F");
-    // Without the strike: the peak over the RMS of what is held.
+    // The crest factor of the part in memory does not include the peak of the force.
     let held = &all[0][..262_144];
     let peak = held.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));
     near(&excited[1], peak / rms(held.iter().copied()), 3);
-    // With it.
+    // The levels of the whole window include the peak.
     let cells = row(&document, "Channels over the window", "F");
     near(&cells[6], 500.0 / rms(all[0].iter().copied()), 3);
 }

@@ -1,4 +1,5 @@
-//! The page of `mechid report`: whole, alone, readable, and true.
+//! The page of `mechid report` is complete, loads no other files, is readable, and agrees with the
+//! data.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
 mod browser;
@@ -22,10 +23,10 @@ fn mechid(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// A folder with a record of two periods: a force of equal lines, the steady displacement of two
+/// Writes a record of two periods: a force of equal lines, the steady displacement of two
 /// oscillators side by side, summed term by term, and white noise.
 ///
-/// `second` is the stiffness of the second oscillator; infinity for none.
+/// `second` is the stiffness of the second oscillator; infinity means that there is none.
 fn rig(names: [&str; 3], second: f64, noise: f64) -> tempfile::TempDir {
     let mut text = format!("{}\n", names.map(|name| format!("\"{name}\"")).join(","));
     let mut random = 1_u64;
@@ -40,7 +41,8 @@ fn rig(names: [&str; 3], second: f64, noise: f64) -> tempfile::TempDir {
                 x += 5.0 / re.hypot(im) * (omega * t + phase - im.atan2(re)).cos();
             }
         }
-        // A uniform number from a linear congruence (Knuth's MMIX): white to the eye of any test.
+        // A linear congruential generator (Knuth's MMIX) gives uniform numbers, which are white
+        // noise to all tests here.
         random =
             random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         x += noise * ((random >> 11) as f64 / (1_u64 << 53) as f64 - 0.5);
@@ -72,8 +74,8 @@ fn page(folder: &Path) -> String {
     fs::read_to_string(folder.join("page.html")).unwrap()
 }
 
-/// The page as XML: of the elements that HTML never closes it has `meta` only, and its one script, which is no XML, is that of
-/// the figures, known by its hash to the policy.
+/// Returns the page as XML. The only element without an end tag is `meta`. The only script, which
+/// is not XML, is that of the figures; the policy identifies it by its hash.
 fn closed(page: &str) -> String {
     let policy = mechid::plot::content_policy();
     let quoted = policy.replace('\'', "&#39;");
@@ -102,25 +104,25 @@ fn text(node: Node<'_, '_>) -> String {
     node.descendants().filter(Node::is_text).filter_map(|n| n.text()).collect()
 }
 
-/// The cells of the first row of a table that begins with `first`.
+/// Returns the cells of the first row of a table that begins with `first`.
 fn row(document: &Document<'_>, caption: &str, first: &str) -> Vec<String> {
     let tables = tagged(document, "table");
     let has = |table: &&Node<'_, '_>| text(table.first_element_child().unwrap()) == caption;
     let table = tables.iter().find(has).unwrap_or_else(|| panic!("no table \"{caption}\""));
-    // The head has no values.
+    // The header row has no values.
     let has_values = |row: &Node<'_, '_>| row.children().any(|cell| cell.has_tag_name("td"));
     let rows = table.descendants().filter(|node| node.has_tag_name("tr") && has_values(node));
     let mut cells = rows.map(|row| row.children().map(text).collect::<Vec<_>>());
     cells.find(|cells| cells[0] == first).unwrap_or_else(|| panic!("no row \"{first}\""))
 }
 
-/// Headings and texts of what speaks against the numbers and for them.
+/// Returns headings and texts of the remarks for and against the result.
 fn remarks(document: &Document<'_>) -> Vec<(String, String)> {
     let asides = tagged(document, "aside");
     asides.iter().map(|aside| (text(aside.first_element_child().unwrap()), text(*aside))).collect()
 }
 
-/// The lists of what was looked at.
+/// Returns the text of the lists of checks.
 fn checks(document: &Document<'_>) -> String {
     let lists = tagged(document, "ul").into_iter();
     lists.filter(|list| list.attribute("class") == Some("checks")).map(text).collect()
@@ -181,7 +183,7 @@ fn the_page_is_whole_and_stands_alone() {
     assert!(!html.replace("url(#", "").contains("url("));
 }
 
-/// Judge: the oscillator summed in the record, and its period.
+/// Reference: the oscillator whose response is summed in the record, and its period.
 #[test]
 fn the_page_says_what_is_in_the_record() {
     let folder = rig(NAMES, f64::INFINITY, 0.0);
@@ -195,11 +197,11 @@ fn the_page_says_what_is_in_the_record() {
     assert_eq!(row(&document, "The record", "Duration")[1], "8 s");
     assert_eq!(row(&document, "The record", "Line spacing")[1], "0.25 Hz");
     let channel = row(&document, "Channels over the window", "F");
-    // 77 lines of 5 N: RMS 5 √(77/2).
+    // The force has 77 lines of 5 N, so its RMS is 5 √(77/2).
     assert_eq!((channel[4].as_str(), channel[7].as_str()), ("31.02", "0 %"));
     let excitation = row(&document, "Quality of the excitation", "F");
     assert_eq!(excitation[3..], ["77", "1 to 20", "1.00", "154"]);
-    assert_eq!(row(&document, "What is left of the motion", "x")[3..], ["0", "0 %"]);
+    assert_eq!(row(&document, "Residual of the response", "x")[3..], ["0", "0 %"]);
     assert!(checks(&document).contains("residual 1: rounding"), "{}", checks(&document));
     let force = row(&document, "Force found and force measured", "F");
     assert_eq!((&force[1], &force[2]), (&"31.02".to_owned(), &"31.02".to_owned()));
@@ -207,7 +209,8 @@ fn the_page_says_what_is_in_the_record() {
     assert_eq!(heading, "What speaks for the numbers");
 }
 
-/// Judge: white noise leaves the power of noise, and a mode that the model has not leaves more.
+/// Reference: a correct model leaves a residual with the power of the noise; a mode that the model
+/// lacks leaves more.
 #[test]
 fn a_missing_mode_shows_in_the_residual() {
     let likely = [&USUAL[..], &["--method", "maximum-likelihood"]].concat();
@@ -219,7 +222,7 @@ fn a_missing_mode_shows_in_the_residual() {
         let is_missing = second.is_finite();
         assert_eq!(checks(&document).contains("good misfit"), !is_missing);
         let remarks = remarks(&document);
-        // The power of the residual speaks for the fit or against it.
+        // The power of the residual is a remark for or against the fit.
         for (heading, text) in &remarks {
             let bad = heading.starts_with("Before");
             assert_eq!(text.contains("exceeds the noise"), bad && is_missing, "{text}");
@@ -257,7 +260,7 @@ fn names_of_others_stay_text() {
     assert_eq!(handlers.filter(|a| a.name().starts_with("on")).count(), 0);
     assert_eq!(text(tagged(&document, "h1")[0]), title);
     assert_eq!(text(tagged(&document, "title")[0]), title);
-    // What stands in brackets, these ones too, is no part of a name.
+    // Text in brackets is not part of a name, including angle brackets.
     let shown = "alert(1)";
     assert_eq!(row(&document, "Channels over the window", shown)[1], "force");
     let command = text(tagged(&document, "code")[0]);
@@ -291,7 +294,7 @@ fn programs_get_the_report_of_identify_and_the_place_of_the_page() {
     assert_eq!(printed, identified);
 }
 
-/// The receptance of an open record is averaged over segments; everything else is there, too.
+/// The receptance of an open record is averaged over segments; the page has everything else, too.
 #[test]
 fn an_open_record_has_its_page_too() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -324,11 +327,11 @@ fn an_open_record_has_its_page_too() {
     assert_eq!(figures.len(), 7);
     let force = row(&document, "Force found and force measured", "force");
     let difference: f64 = force[4].strip_suffix(" %").unwrap().parse().unwrap();
-    // Noise of a hundredth on motion of which the inertia is the greater part.
+    // Noise of 1 % on the motion gives an error of about 1 % of the force, which is mostly inertia.
     assert!(difference > 0.5 && difference < 5.0, "{difference}");
 }
 
-/// Judge: the noise that was added, against the motion of the formula.
+/// Reference: the added noise, relative to the motion in closed form.
 #[test]
 fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let folder = rig(NAMES, f64::INFINITY, 1e-3);
@@ -340,7 +343,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let closed = closed(&page(folder.path()));
     let document = parse(&closed);
     let names: Vec<String> = tagged(&document, "h3").into_iter().map(text).collect();
-    // Data, excitation, residual and force of each.
+    // Each record has sections for data, excitation, residual and force.
     assert_eq!(names, ["rig.csv", "again.csv"].repeat(4));
     let figures = tagged(&document, "figure");
     let ids: Vec<&str> = figures.iter().filter_map(|f| f.attribute("id")).collect();
@@ -351,7 +354,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     assert_eq!(ids.iter().filter(|id| **id == "figure-validation").count(), 1);
     let fit = &row(&document, "What is predicted", "x")[1];
     let fit: f64 = fit.strip_suffix(" %").unwrap().parse().unwrap();
-    // A uniform number of this width has the standard deviation of its √12th part.
+    // A uniform number has the standard deviation of its width divided by √12.
     let motion: f64 = row(&document, "Channels over the window", "x")[4].parse().unwrap();
     let noise = 4e-2 / 12f64.sqrt();
     let expected = 100.0 * (1.0 - noise / motion.hypot(noise));
@@ -360,7 +363,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let (_, merits) =
         remarks.iter().find(|(heading, _)| heading.starts_with("What speaks")).unwrap();
     assert!(merits.contains("noisy.csv, samples 1 to 512"), "{merits}");
-    // What was fitted proves nothing, unless other samples of it were.
+    // Validation on fitted samples proves little; on other samples of the same record it counts.
     for (more, proves) in [
         (&["--validate", "rig.csv"][..], false),
         (&["--validate", "rig.csv:257", "--periods", "1"], true),
@@ -371,8 +374,8 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     }
 }
 
-/// Lines are those of a segment, not of the record. Judge: the oscillator whose motion under sines
-/// that no segment holds whole periods of is summed.
+/// The lines are those of a segment, not of the record. Reference: the exact response of an
+/// oscillator to sines with no whole number of periods in a segment.
 #[test]
 fn a_record_in_segments_has_its_page_too() {
     let (m, c, k) = (2.0, 6.0, 800.0);
@@ -403,7 +406,7 @@ fn a_record_in_segments_has_its_page_too() {
     assert_eq!(row(&document, "The record", "Segments")[1], "of 512 samples");
     assert_eq!(row(&document, "The record", "Line spacing")[1], "0.125 Hz");
     let percent = |cell: &str| cell.strip_suffix(" %").unwrap().parse::<f64>().unwrap();
-    let left = row(&document, "What is left of the motion", "x");
+    let left = row(&document, "Residual of the response", "x");
     assert!(percent(&left[4]) < 5.0, "{left:?}");
     let force = row(&document, "Force found and force measured", "F");
     assert!(percent(&force[4]) < 20.0, "{force:?}");

@@ -1,4 +1,4 @@
-//! The receptance of a fit in the time domain, read off the picture.
+//! The receptance after a fit in the time domain, read from the picture.
 
 use super::{NAMES, USUAL, closed, mechid, page, parse, rig, row, tagged};
 
@@ -6,8 +6,8 @@ fn number(text: Option<&str>) -> f64 {
     text.unwrap().parse().unwrap()
 }
 
-/// Judge: a record without noise, whose oscillator the fit gives back. Every line measured must then
-/// lie on the curve of the machine, in both panels.
+/// Reference: a record without noise, so that the fit finds the exact oscillator. Every measured
+/// line must then lie on the curve of the machine, in both panels.
 #[test]
 fn lines_of_whole_periods_lie_on_the_curve_of_the_machine() {
     let folder = rig(NAMES, f64::INFINITY, 0.0);
@@ -36,11 +36,11 @@ fn lines_of_whole_periods_lie_on_the_curve_of_the_machine() {
             let right = curve.partition_point(|(at, _)| *at < x).clamp(1, curve.len() - 1);
             let ((x0, y0), (x1, y1)) = (curve[right - 1], curve[right]);
             let on_curve = y0 + (y1 - y0) * (x - x0) / (x1 - x0);
-            // Pixels; a chord of the peak is below it by less.
+            // The unit is pixels; the polyline of the peak deviates from the curve by less.
             assert!((y - on_curve).abs() < 1.0, "{x}: {y} {on_curve}");
             markers += 1;
         }
     }
-    // 77 lines, magnitude and phase.
+    // There are 77 lines, each with a magnitude and a phase.
     assert_eq!((curves.len(), markers), (4, 154));
 }

@@ -63,7 +63,7 @@ pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateE
 }
 
 /// Returns estimates of [`equation_error`] with every row divided by the standard deviation of its
-/// equation error, from the stated noise and the measured receptance, so that lines of noise have
+/// equation error, from the stated noise and the measured receptance, so that noisy lines have
 /// little weight. The first one uses all lines, the second one only lines with little noise: a
 /// noisy line with hardly any force would give a far too soft system.
 ///

@@ -91,10 +91,10 @@ impl<'a> InitialEstimates<'a> {
         self
     }
 
-    /// Returns all initial estimates, the rounds of one iteration as one family, the most reliable
-    /// first: total and ordinary least squares weighted by the dynamic stiffness of the round
-    /// before; then the nominal system, and ordinary least squares with the weights ω^e and with
-    /// the weights of the noise.
+    /// Returns all initial estimates, the most reliable first; the rounds of one iteration form one
+    /// family. The order is: total and ordinary least squares weighted by the dynamic stiffness of
+    /// the round before, the nominal system, then ordinary least squares with the weights ω^e and
+    /// with the weights of the noise.
     pub(super) fn families(&self) -> Vec<Vec<DVector<f64>>> {
         let powers =
             EXPONENTS.map(|exponent| self.estimate(Kind::Ordinary, &self.powers(exponent)));
@@ -138,7 +138,8 @@ impl<'a> InitialEstimates<'a> {
         })
     }
 
-    /// Returns the inverse standard deviation of D ΔX − ΔF for the dynamic stiffness D of `theta`.
+    /// Returns the inverse standard deviations of D ΔX − ΔF, with the dynamic stiffness D of
+    /// `theta` and the noise ΔX and ΔF of displacement and force.
     fn weights(&self, theta: &DVector<f64>) -> Option<Weights> {
         let matrices = self.unknowns.assemble(theta.as_slice());
         let n = self.data.dof();
@@ -258,7 +259,7 @@ impl<'a> InitialEstimates<'a> {
                 enters[column].push((last, -powers[m as usize] * value));
             }
             enters[n + equation.row].push((last, Complex::from(weights[line])));
-            // Most channels have noise of their own: most covariances are 0.
+            // The noise of most channels is independent: most covariances are 0.
             let covariance = self.noise.covariance(line);
             let entering = || enters.iter().enumerate().filter(|(_, columns)| !columns.is_empty());
             for (j, right) in entering() {
@@ -325,7 +326,8 @@ fn values(estimate: &Estimate) -> DVector<f64> {
     DVector::from_iterator(parameters.len(), parameters.map(|p| p.value))
 }
 
-/// Returns the θ that minimises the ratio of |R [θ; −1]|² to [θ; −1]ᵀ N [θ; −1].
+/// Returns the θ that minimises the ratio of |R [θ; −1]|² to [θ; −1]ᵀ N [θ; −1], with the
+/// triangular factor R of the data and the Gram matrix N of their noise.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 6.3; Pintelon & Schoukens,

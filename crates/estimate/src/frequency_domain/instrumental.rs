@@ -26,7 +26,7 @@ use crate::{Estimate, EstimateError, Unknowns};
 ///
 /// # Errors
 /// [`SpectraError::FrequencyMismatch`](mechid_spectra::SpectraError::FrequencyMismatch) or
-/// [`NumericsError::Size`]if the sizes or frequencies differ,
+/// [`NumericsError::Size`] if the sizes or frequencies differ,
 /// [`EstimateError::Undetermined`] if the data do not determine a parameter, and the errors of
 /// [`equation_error`](super::equation_error).
 ///

@@ -28,7 +28,7 @@ pub(super) struct Line {
     lower: ComplexMatrix,
     /// E[ΔF eᴴ] of the forces with noise, in its first rows.
     cross: ComplexMatrix,
-    /// (L Lᴴ)⁻¹e.
+    /// Error (L Lᴴ)⁻¹e, weighted twice.
     twice: ComplexVector,
 }
 
@@ -113,7 +113,7 @@ impl Line {
 
     /// Whitens like [`Line::whiten`], with L from the covariance of displacements and forces, and
     /// computes the most likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
-    /// Forces that are not `noisy` have no covariance with anything.
+    /// Forces outside `noisy` are exact.
     pub(super) fn whiten_both<'x>(
         &mut self,
         measured: impl Iterator<Item = &'x Complex<f64>>,
@@ -139,7 +139,8 @@ impl Line {
         exists
     }
 
-    /// Writes Q and the lower triangle of L Lᴴ = [I −G] E[z zᴴ] [I −G]ᴴ, z = (ΔX, ΔF).
+    /// Writes Q and the lower triangle of L Lᴴ = [I −G] E[z zᴴ] [I −G]ᴴ, with the noise z = (ΔX,
+    /// ΔF).
     fn write_covariance(
         &mut self,
         covariance: &ComplexMatrix,

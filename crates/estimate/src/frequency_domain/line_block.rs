@@ -8,8 +8,8 @@ use nalgebra::DMatrix;
 
 use crate::limits::GRAM_LINES;
 
-/// Lines whose products are computed at a time, and the columns that are not zero on all of them:
-/// the transient of a record acts on its own lines alone.
+/// Lines whose products are computed together, and the columns that are nonzero on at least one of
+/// them. The transient of a record has nonzero columns on the lines of this record only.
 pub(super) struct LineBlock {
     pub(super) lines: Range<usize>,
     /// Columns of the layout, in rising order.
@@ -32,8 +32,8 @@ impl LineBlock {
         (0..lines).step_by(GRAM_LINES).map(block).collect()
     }
 
-    /// Adds the columns that are coupled to its columns by a triangle, so that its rows change no
-    /// other columns.
+    /// Adds the columns that the triangular factor `r` couples to the columns of the block, so that
+    /// new rows of the block change no other columns.
     pub(super) fn close(&mut self, r: &DMatrix<f64>) {
         let mut used = vec![false; r.ncols()];
         self.columns.iter().for_each(|column| used[*column] = true);
@@ -46,12 +46,13 @@ impl LineBlock {
         self.columns = (0..r.ncols()).filter(|column| used[*column]).collect();
     }
 
-    /// Returns the part of a triangle that belongs to its columns.
+    /// Returns the part of a triangular factor that belongs to the columns of the block.
     pub(super) fn triangle(&self, r: &DMatrix<f64>) -> DMatrix<f64> {
         r.select_rows(&self.columns).select_columns(&self.columns)
     }
 
-    /// Rotates rows of its columns into a triangle; `None` if a value is not finite.
+    /// Rotates rows with the columns of the block into a triangular factor; `None` if a value is
+    /// not finite.
     pub(super) fn push(&self, r: &mut DMatrix<f64>, rows: &DMatrix<f64>) -> Option<()> {
         let mut factor = TriangularFactor::new(self.columns.len());
         let finite = factor.push(&[self.triangle(r).as_view()]) && factor.push(&[rows.as_view()]);

@@ -15,9 +15,9 @@ use crate::limits::{
 /// Range of sums of squares that the noise explains.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plausible {
-    /// Expected value for a correct model; `None` if the level of the noise is not known.
+    /// Expected sum of squares of a correct model; `None` if the level of the noise is not known.
     pub expected: Option<f64>,
-    /// Maximum ratio to the expected value by chance.
+    /// Maximum ratio of a sum of squares to its expected value by chance.
     pub factor: f64,
 }
 
@@ -92,8 +92,8 @@ fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
 }
 
 /// Returns the best of some rounds of linear least squares, each with the weights of the round
-/// before: they cross wide regions in which a search would need many small steps. There are no
-/// rounds if the noise already explains the data; `None` if the sum of squares does not exist.
+/// before. Such rounds cross wide regions in which a search would need many small steps. There are
+/// no rounds if the noise already explains the data; `None` if the sum of squares does not exist.
 ///
 /// # Source
 /// Sanathanan & Koerner (1963), IEEE Transactions on Automatic Control 8, 56–58.

@@ -117,11 +117,12 @@ impl Layout {
     /// Returns the normal equations and makes the regressors orthonormal. `None` if these are
     /// linearly dependent, or if values overflow.
     ///
-    /// With H = WᴴW the entry of unknowns (i, a) and (j, b) is 2 Re Σ φ̄_a φ_b H_ij: the product of
-    /// a matrix of pairs (a, b) and a matrix of pairs (i, j), with 1/dof of the operations for the
-    /// rows of J. The condition number of the Gram matrix is the square of that of J. This is
-    /// harmless for regressors that are orthonormal over the lines weighted by ‖W_l‖; rounding of
-    /// the Gram matrix slows the search but does not change the minimum, where Jᵀr = 0.
+    /// With H = WᴴW, the entry for the unknown in column a of equation i and the unknown in column
+    /// b of equation j is 2 Re Σ φ̄_a φ_b H_ij. This is the product of a matrix of pairs (a, b) and
+    /// a matrix of pairs (i, j), with 1/dof of the operations for the rows of J. The condition
+    /// number of the Gram matrix is the square of that of J. This is harmless for regressors that
+    /// are orthonormal over the lines weighted by ‖W_l‖; rounding of the Gram matrix slows the
+    /// search but does not change the minimum, where Jᵀr = 0.
     ///
     /// # Source
     /// Van Loan (2000), J. Computational and Applied Mathematics 123, 85–100 (least squares with
@@ -314,7 +315,8 @@ impl NormalEquations {
     /// `None` if JᵀJ is singular to rounding.
     pub(super) fn covariance(&self) -> Option<(DMatrix<f64>, f64)> {
         let inverse = Cholesky::new(&self.gram, 0.0)?.inverse_of_lower();
-        // The covariance is R Rᵀ with the rows R = T⁻¹D⁻¹L⁻ᵀ of the unknowns.
+        // The covariance is R Rᵀ with the rows R = T⁻¹D⁻¹L⁻ᵀ of the unknowns: L is the Cholesky
+        // factor of the Gram matrix, D and T lead from the unknowns to the coordinates.
         let roots = self.coordinates.unknowns_of_columns(&inverse.transpose());
         let covariance = &roots * roots.transpose();
         let lengths = self.coordinates.lengths(&self.gram);

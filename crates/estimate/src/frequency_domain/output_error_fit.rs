@@ -141,8 +141,8 @@ impl EndLoads {
     }
 }
 
-/// Returns the plausible range of a sum of `spare` squares, weighted by a variance of `known`
-/// degrees of freedom.
+/// Returns the plausible range of a sum of `spare` squares, which are weighted with a variance of
+/// `known` degrees of freedom.
 pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
     let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
     Plausible { expected, factor: 1.0 + FIT_PLAUSIBLE * spread }

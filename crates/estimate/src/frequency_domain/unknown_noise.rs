@@ -174,8 +174,8 @@ fn with_white_noise(
     Err(EstimateError::NotConverged { searches, steps })
 }
 
-/// Fits with the spectrum of the residual of the fit before as noise; `None` if the residual is
-/// white.
+/// Fits with a noise spectrum that is estimated from the residual of the previous fit; `None` if
+/// this residual is white.
 fn with_coloured_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,

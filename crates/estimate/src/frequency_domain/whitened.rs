@@ -85,7 +85,8 @@ impl Whitened {
         let n = data.dof();
         let matrices = unknowns.assemble(values.as_slice());
         let [mass, damping, stiffness] = matrices.clone();
-        // Films alone have no mass; their weights do without leverages, as all their studies have.
+        // A system without mass, such as an oil film, has no sensitivities; its noise spectrum is
+        // estimated without leverages.
         SecondOrderSystem::new(mass, damping, stiffness).ok()?;
         let mut residual = DVector::zeros(2 * n * data.len());
         let mut sensitivity = DMatrix::zeros(residual.len(), parameters.len());

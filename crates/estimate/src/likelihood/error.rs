@@ -81,7 +81,7 @@ pub enum LikelihoodError {
         most: usize,
     },
     /// No search converged.
-    #[error("no search ended at a minimum: {searches} made, {steps} steps each at most")]
+    #[error("no search ended at a minimum: {searches} searches of at most {steps} steps each")]
     NotConverged {
         /// Number of searches.
         searches: usize,

@@ -21,9 +21,9 @@ pub(super) struct PriorRow {
     pub(super) deviation: f64,
 }
 
-/// Weighted errors e = y − G u − G_own − A τ of every line, where G_own is the response to loads of
-/// the model: the real and imaginary parts of √2·L⁻¹e with L Lᴴ = E[e eᴴ] have unit variance and no
-/// correlation.
+/// Weighted errors e = y − G u − G_own − A τ of every line, with the inputs u and the outputs y;
+/// G_own is the response to loads of the model, and A τ is the transient: the real and imaginary
+/// parts of √2·L⁻¹e with L Lᴴ = E[e eᴴ] have unit variance and no correlation.
 ///
 /// With noisy inputs the covariance S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ depends on the parameters;
 /// the sum of squares is the likelihood after the true inputs and outputs of each line have been

@@ -92,7 +92,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
     /// Estimates the variance of the noise of each output.
     fn levels(&self, weights: &Weights, minimum: &Minimum) -> Result<Vec<f64>, LikelihoodError> {
         let residual = self.residual(weights);
-        let failed = LikelihoodError::NoResponse { at: "a minimum" };
+        let failed = LikelihoodError::NoResponse { at: "a minimum of the search" };
         let LineErrors { errors, receptances } =
             residual.errors(&minimum.parameters).ok_or(failed)?;
         let factor = self.freedom_ratio(minimum, &residual);
@@ -143,7 +143,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         before: &WeightedMinimum,
     ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), LikelihoodError> {
         let residual = self.residual(&before.weights);
-        let failed = || LikelihoodError::NoResponse { at: "a minimum" };
+        let failed = || LikelihoodError::NoResponse { at: "a minimum of the search" };
         let LineErrors { errors, receptances } =
             residual.errors(&before.minimum.parameters).ok_or_else(failed)?;
         let residual_share = self.residual_share(before).ok_or_else(failed)?;

@@ -11,9 +11,10 @@ impl Information {
     /// the residual, and `bases` are the basis functions of the log powers of each record. `None`,
     /// without a change of the covariance, if a parameter is not determined.
     ///
-    /// With log powers B β of unit information, orthonormal sensitivities Q and P_i = Σ b_li
-    /// Q_lᵀQ_l, the covariance of the estimate grows by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the
-    /// inverse of the Fisher information is too small by the same matrix.
+    /// The logarithms of the noise powers are B β with the basis B, where β has unit information.
+    /// With the orthonormal sensitivities Q_l of line l, P_i = Σ b_li Q_lᵀQ_l and h_l = Σ b_li²,
+    /// the covariance of the estimate grows by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the inverse of
+    /// the Fisher information is too small by the same matrix.
     ///
     /// # Source
     /// Kenward & Roger (1997), Biometrics 53, 983–997; degrees of freedom: Satterthwaite (1946),

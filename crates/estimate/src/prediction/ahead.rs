@@ -25,10 +25,10 @@ use crate::{Estimate, EstimateError};
 /// For a correct model the rest is white if random forces disturb the motion; white noise on the
 /// measured motion enters two neighbouring intervals, so its rest is correlated at lag 1 only.
 ///
-/// `between` is the factor and the interpolation of a refined fit: the prediction then takes as
-/// many steps per interval, under the interpolated force. Motions between the samples are not used,
-/// so an interval has one error for any number of points. The discretisation defines the force
-/// between points; for Euler it is held.
+/// `between` is the factor and the interpolation of a refined fit: the prediction then takes this
+/// number of steps per interval, under the interpolated force. Motions between the samples are not
+/// used, so an interval has one error for any number of points. The discretisation defines the
+/// force between points; for Euler it is held.
 ///
 /// # Errors
 /// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not fit the machine or

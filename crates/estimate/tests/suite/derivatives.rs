@@ -10,7 +10,7 @@ use mechid_problems::{dissertation_bearing, exact_harmonic, exact_harmonic_perio
 use mechid_signal::SignalError;
 use mechid_signal::{Multisine, Phases, Record, Sampling};
 
-/// Forces on lines 1 … 20 of a period of 40 s, the two directions on different phases.
+/// Forces on lines 1 … 20 of a period of 40 s, with different phases in the two directions.
 fn force(samples: usize) -> Record {
     let sampling = Sampling::new(40.0 / samples as f64, samples).unwrap();
     let channel = |seed| {
@@ -88,8 +88,8 @@ fn the_published_coefficients_come_out() {
     }
 }
 
-/// The centred window of order p has an error of order Δt^(p+1−d) and better: halving the step
-/// must shrink the error of the identified matrices by at least 2³ for order 4, d = 2.
+/// The error of the centred window of order p is of order Δt^(p+1−d) or better: half the step must
+/// reduce the error of the identified matrices by a factor of at least 2³ for order 4, d = 2.
 #[test]
 fn an_open_record_is_identified_as_well_as_its_step_allows() {
     let unknowns = Unknowns::unknown_mass(2).unwrap();

@@ -127,7 +127,7 @@ fn an_unforced_direction_needs_a_known_mass() {
 
 #[test]
 fn parameters_that_are_not_excited_are_named_and_the_others_stay_right() {
-    // The second direction is held: nothing is known of what its motion would do.
+    // The second direction is held: the data do not determine its parameters.
     let (w, n) = (vec![10.0, 20.0, 30.0, 40.0], 4);
     let force = forces(&[1, 2, 3, 4], 2, 1.0);
     let motion = DMatrix::from_fn(n, 2, |l, c| {

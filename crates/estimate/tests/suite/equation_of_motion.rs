@@ -17,7 +17,8 @@ struct Data {
 }
 
 impl Data {
-    /// Random motions (no dynamics: any motion has a force) and the force of the system, disturbed.
+    /// Random motions (not those of a system: any motion has a force), and the force of the system,
+    /// disturbed.
     fn new(mck: [&DMatrix<f64>; 3], rows: usize, noise: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let n = mck[0].nrows();
@@ -99,7 +100,7 @@ fn covariance_is_that_of_the_normal_equations() {
 fn an_unexcited_parameter_is_named_and_the_others_stay_right() {
     let [m, c, k] = &film();
     let mut data = Data::new([m, c, k], 300, 0.0, 3);
-    // The second direction does not move with any velocity the first has not: ẋ2 = 0.5 ẋ1.
+    // The velocity of the second direction is proportional to that of the first: ẋ2 = 0.5 ẋ1.
     for row in 0..300 {
         data.v[(row, 1)] = 0.5 * data.v[(row, 0)];
     }
@@ -163,7 +164,7 @@ fn intervals_follow_students_t() {
     assert_eq!(found.parameter("k").unwrap().interval(0.9).unwrap()[1], f64::INFINITY);
 }
 
-/// A Vandermonde block of condition 1e10 (scaled), beyond what normal equations resolve.
+/// A Vandermonde block of condition 1e10 (scaled): normal equations cannot resolve it.
 #[test]
 fn ill_conditioned_rows_keep_the_accuracy_normal_equations_lose() {
     let t = |row: usize| 1.0 + 1e-3 * row as f64 / 2000.0;
@@ -181,7 +182,8 @@ fn ill_conditioned_rows_keep_the_accuracy_normal_equations_lose() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// The same rows twice: the values stay, the variance halves (but for the spare rows' count).
+    /// The same rows twice: the values stay, and the variance is halved, apart from the number of
+    /// spare rows.
     #[test]
     fn a_duplicated_record_halves_the_variance(seed in 0u64..1000, rows in 20usize..300) {
         let [m, c, k] = &film();
@@ -200,7 +202,7 @@ proptest! {
         }
     }
 
-    /// Measuring in other units rescales values and standard errors, nothing else.
+    /// Other units change only the scale of values and standard errors.
     #[test]
     fn units_do_not_matter(seed in 0u64..1000, length in -9..9i32, time in -6..6i32) {
         let (length, time) = (10f64.powi(length), 10f64.powi(time));

@@ -1,4 +1,4 @@
-//! Values and sizes beyond anything measured: an error that names the cause, or the right number.
+//! Values and sizes far beyond measured ones: an error that names the cause, or the right number.
 
 use mechid_estimate::derivatives::SavitzkyGolay;
 use mechid_estimate::{EquationOfMotion, EstimateError, Unknowns};
@@ -19,7 +19,7 @@ fn correlations_do_not_depend_on_the_unit() {
     for power in [-1070, -500, -30, 0, 30, 500, 1000] {
         let scaled =
             |x: &[f64]| -> Vec<f64> { x.iter().map(|v| v * f64::from(power).exp2()).collect() };
-        // Below 2⁻¹⁰²² numbers have fewer digits.
+        // Numbers below 2⁻¹⁰²² have fewer digits.
         let tolerance = if power == -1070 { 0.3 } else { 0.0 };
         for (found, expected) in [
             (whiteness(&scaled(&e), 20).unwrap(), &white),
@@ -62,7 +62,7 @@ fn data_too_small_or_too_large_to_be_squared_are_told_as_such() {
         }
     }
     assert_eq!(equations(1e155, 1e155), Err(EstimateError::Numerics(NumericsError::Overflow)));
-    // Whose squares can be summed alone, but not together.
+    // The squares of each can be summed alone, but not together.
     let mut rows = LeastSquares::new(1, 1);
     let large = DMatrix::from_element(1, 1, 1.2e154);
     rows.push_rows(large.as_view(), large.as_view()).unwrap();

@@ -1,5 +1,5 @@
-//! What must not matter: units, the order of the degrees of freedom, the direction of the axes,
-//! a second copy of the data.
+//! Changes that must not matter: units, the order of the degrees of freedom, the direction of the
+//! axes, a second copy of the data.
 
 use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{Estimate, Unknowns};
@@ -12,7 +12,7 @@ use crate::common::{bearing, displacements, forces};
 
 const LINES: usize = 40;
 
-/// A measurement of the bearing with noise on the displacement, and what the noise is.
+/// A measurement of the bearing with noise on the displacement, and the covariance of this noise.
 fn measurement(seed: u64) -> (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f64>>) {
     let lines: Vec<usize> = (1..=LINES).collect();
     let omega: Vec<f64> = lines.iter().map(|n| *n as f64 * 0.1).collect();
@@ -26,7 +26,7 @@ fn measurement(seed: u64) -> (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f
     (omega, force, motion)
 }
 
-/// The measurement as one would have it with forces P F and displacements Q X.
+/// The same measurement with forces P F and displacements Q X.
 fn data(seed: u64, p: &DMatrix<f64>, q: &DMatrix<f64>) -> FrequencyData {
     let (omega, force, motion) = measurement(seed);
     let turned =
@@ -51,7 +51,7 @@ fn estimates(p: &DMatrix<f64>, q: &DMatrix<f64>) -> [Estimate; 3] {
     ]
 }
 
-/// M, C and K become P M Q⁻¹ and so on: the map of the twelve entries.
+/// Map of the twelve entries if M, C and K become P M Q⁻¹ and so on.
 fn map(p: &DMatrix<f64>, q: &DMatrix<f64>) -> DMatrix<f64> {
     let inverse = q.clone().lu().solve(&DMatrix::identity(2, 2)).unwrap();
     DMatrix::from_fn(12, 12, |to, from| {

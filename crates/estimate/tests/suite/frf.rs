@@ -1,4 +1,5 @@
-//! Frequency response functions: against the closed-form receptance, and what noise does to them.
+//! Frequency response functions, compared with the closed-form receptance, and the effect of noise
+//! on them.
 
 use mechid_estimate::frequency_domain::{equation_error, output_error};
 use mechid_estimate::{Unknowns, output_error_of_responses};
@@ -16,8 +17,8 @@ use crate::common::{bearing, displacements, forces, oscillator, relative_error, 
 
 const ALL: [FrfEstimator; 3] = [FrfEstimator::H1, FrfEstimator::H2, FrfEstimator::Hv];
 
-/// `periods` periods of the oscillator's or the bearing's steady state, each period with its own
-/// phases when there are several forces, so that these act independently.
+/// `periods` periods of the steady state of the oscillator or the bearing. With several forces each
+/// period has its own phases, so that the forces act independently.
 fn steady(
     system: &mechid_model::SecondOrderSystem,
     periods: usize,
@@ -62,7 +63,8 @@ fn exact_steady_states_have_the_closed_form_receptance() {
             for (at, &omega) in frf.omega().iter().enumerate() {
                 let expected = system.receptance(omega).unwrap();
                 let error = (frf.response(at) - &expected).norm() / expected.norm();
-                // Cross-spectra square the condition of the forces, and Hv takes the root of rounding.
+                // Cross-spectra square the condition number of the forces, and Hv takes the square
+                // root of rounding.
                 let tolerance = if estimator == FrfEstimator::Hv { 1e-6 } else { 1e-10 };
                 assert!(error < tolerance, "{estimator:?} {omega}: {error:e}");
             }
@@ -135,7 +137,7 @@ fn the_stated_variance_is_that_of_repeated_measurements() {
     assert!((stated / power - 1.0).abs() < 0.1, "{}", stated / power);
 }
 
-/// A noisy force makes 1/H2 scatter as noisy motion makes H1 scatter.
+/// Noise on the force makes 1/H2 scatter like noise on the motion makes H1 scatter.
 #[test]
 fn the_stated_variance_of_h2_is_that_of_repeated_measurements() {
     let system = oscillator();
@@ -157,7 +159,7 @@ fn the_stated_variance_of_h2_is_that_of_repeated_measurements() {
     found.iter().for_each(|h| mean += h / runs as f64);
     found.iter().for_each(|h| power += (h - mean).norm_sqr() / runs as f64);
     // The mean of 2,000 squares scatters by 2.2 %; to first order in a relative error of 0.15 the
-    // ratio is 1. By H1's formula alone it would be 0.55.
+    // ratio is 1. With the formula of H1 it would be 0.55.
     assert!((0.85..1.15).contains(&(stated / power)), "{}", stated / power);
 }
 
@@ -179,7 +181,7 @@ fn responses_without_noise_give_the_machine_weighted_by_their_coherence() {
     }
 }
 
-/// 100 noisy records, a hum on three lines on top: the coherence knows which, least squares does not.
+/// 100 noisy records with a hum on three lines: the coherence shows it, least squares does not.
 #[test]
 fn weights_by_coherence_leave_less_error() {
     let system = oscillator();
@@ -236,8 +238,8 @@ fn windows_and_overlap_are_the_callers() {
         let estimator = FrfEstimator::H1;
         Frf::estimate(&force, motion.displacement(), quantity, segments, 5..60, estimator)
     };
-    // Side by side: as many as there are. A quarter along, Hann's window shares 0.65915 of its power
-    // with itself, half along 1/6, three quarters along 0.00751.
+    // Without overlap, all segments are independent. Hann's window shares 0.65915 of its power with
+    // itself after a quarter of its length, 1/6 after half, 0.00751 after three quarters.
     assert_eq!(frf(256, Window::Rectangular).unwrap().averages(), 16.0);
     let count = 61.0;
     let lost: f64 = [(1.0, 0.659_155), (2.0, 1.0 / 6.0), (3.0, 0.007_512)]
@@ -246,7 +248,8 @@ fn windows_and_overlap_are_the_callers() {
         .sum();
     let averages = frf(64, Window::Hann).unwrap().averages();
     assert!((averages - count / (1.0 + 2.0 * lost)).abs() < 1e-3, "{averages}");
-    // The less leaks, the closer to the receptance at the lines far above the resonance.
+    // The less leakage, the closer is the response to the receptance at the lines far above the
+    // resonance.
     let worst = |window| {
         let frf = frf(64, window).unwrap();
         let error = |at: usize| {
@@ -263,7 +266,8 @@ fn windows_and_overlap_are_the_callers() {
     }
 }
 
-/// A random force has no period: the window's leakage leaves some per cent near resonance.
+/// A random force has no period: leakage of the window causes some per cent of error near the
+/// resonance.
 #[test]
 fn random_excitation_is_averaged_under_a_window() {
     let system = oscillator();
@@ -291,7 +295,7 @@ fn random_excitation_is_averaged_under_a_window() {
     }
 }
 
-/// From responses and coherences as an analyser gives them.
+/// Responses and coherences in the form that an analyser exports.
 #[test]
 fn coherence_weighs_the_lines() {
     let system = bearing();
@@ -433,8 +437,8 @@ fn some_responses_are_those_estimated_on_their_lines_alone() {
     assert_eq!(some.data(&[0, 1]).unwrap().len(), 2 * places.len());
 }
 
-/// Judge: what was put into the channels. With independent forces at both places the second is scaled down, replaced by
-/// noise, and made to follow the first.
+/// Judge: the generator of the channels. With independent forces at both places the second one is
+/// scaled down, replaced by noise, and made proportional to the first.
 #[test]
 fn a_channel_of_noise_is_idle_and_a_weak_force_is_not() {
     let system = bearing();
@@ -447,7 +451,7 @@ fn a_channel_of_noise_is_idle_and_a_weak_force_is_not() {
                 force.column_mut(dof).scale_mut(part);
                 Record::new(motion.sampling(), force).unwrap()
             };
-            // Periods are steady states of their own: line by line, period by period.
+            // Each period is a steady state of its own: computed line by line, period by period.
             let response = |force: &Record| {
                 let mut x = DMatrix::zeros(force.len(), 2);
                 for p in 0..periods {
@@ -492,7 +496,8 @@ fn a_channel_of_noise_is_idle_and_a_weak_force_is_not() {
     }
 }
 
-/// A table of averages, with standard errors or without, is what the averages themselves are.
+/// A table of averages, with standard errors or without, gives the same fit as the averages
+/// themselves.
 #[test]
 fn averages_measured_elsewhere_are_fitted_as_their_record() {
     let sampling = Sampling::new(0.02, 4096).unwrap();

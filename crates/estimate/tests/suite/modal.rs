@@ -1,4 +1,4 @@
-//! Modes of identified matrices: a published case, derivatives, and intervals that hold.
+//! Modes of identified matrices: a published case, derivatives, and the coverage of intervals.
 
 use mechid_checks::Instability;
 use mechid_checks::{Finding, Verdict, instability};
@@ -39,24 +39,24 @@ fn the_system_of_steffen_and_rade_has_its_published_modes() {
         (3.1157, 0.1869, Complex::new(1.1567, 0.3474)),
         (3.9384, 0.4275, Complex::new(-0.6821, 0.2752)),
     ]) {
-        // Half a unit of the last digit printed, and its truncation.
+        // Half a unit of the last printed digit, and truncation instead of rounding.
         assert!((mode.damped_frequency_hz.value - frequency).abs() < 1e-4);
         assert!((mode.damping_ratio.value - damping).abs() < 1e-4);
         let shape = mode.mode.shape();
         let found = shape[1] / shape[0];
-        // The eigenvalue of positive imaginary part may carry the conjugate.
+        // The eigenvalue with positive imaginary part may belong to the conjugate shape.
         let off = (found - ratio).norm().min((found - ratio.conj()).norm());
         assert!(off < 1e-4, "{found}");
         assert!(mode.damping_ratio.standard_error < 1e-9);
     }
 }
 
-/// Which entry of a shape is 1 by its scaling.
+/// Returns the index of the entry of a shape that is 1 by its scaling.
 fn one(shape: &DVector<Complex<f64>>) -> usize {
     shape.iter().position(|z| *z == Complex::from(1.0)).unwrap()
 }
 
-/// The modes of slightly changed matrices, shapes scaled alike.
+/// Returns the modes of slightly changed matrices, with shapes scaled in the same way.
 fn modes_of(
     unknowns: &Unknowns,
     theta: &[f64],
@@ -179,7 +179,7 @@ fn poles_and_damping_ratio_are_those_of_the_closed_form_above_critical_damping_t
         }
         assert_eq!((modes.len(), modes[0].partner, modes[1].partner), (2, Some(1), Some(0)));
         for (mode, sign) in modes.iter().zip([1.0, -1.0]) {
-            // The slow one without cancellation.
+            // The slow pole, computed without cancellation.
             let pole = match sign > 0.0 {
                 true => -2.0 * k / (c + root.sqrt()),
                 false => -(c + root.sqrt()) / (2.0 * m),
@@ -192,8 +192,8 @@ fn poles_and_damping_ratio_are_those_of_the_closed_form_above_critical_damping_t
     }
 }
 
-/// Free–free chains of two and three masses, all entries estimated: the stiffness is singular within its
-/// error, the elastic modes are no rigid bodies.
+/// Free–free chains of two and three masses with all entries estimated: the stiffness is singular
+/// within its error, and the elastic modes are not rigid-body modes.
 #[test]
 fn a_rigid_body_mode_is_called_one_and_its_interval_contains_zero() {
     let chains = [
@@ -258,8 +258,8 @@ fn warnings(damping: f64, noise: f64, runs: u64) -> (usize, usize) {
     (found.len(), warned.count())
 }
 
-/// Judge: growth −c / 2m. False alarms at a level of 1 %: of 150 estimates of a machine that neither
-/// grows nor decays 1.5 ± 1.2.
+/// Judge: growth −c / 2m. False alarms at a level of 1 %: 1.5 ± 1.2 of 150 estimates of a machine
+/// that neither grows nor decays.
 #[test]
 fn growth_is_told_where_noise_does_not_explain_it() {
     let (growing, warned) = warnings(1e-6, 0.05, 150);

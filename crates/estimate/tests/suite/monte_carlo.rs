@@ -1,4 +1,5 @@
-//! Thousands of experiments: do the intervals hold, and could any estimator do better?
+//! Thousands of experiments: coverage of the intervals, and scatter compared with the Cramér–Rao
+//! bound.
 
 use crate::common::documentation::documented;
 use crate::common::monte_carlo::{Estimator, Experiment, Scatter};
@@ -16,7 +17,7 @@ fn unknown_mass(system: SecondOrderSystem, periods: usize, noise: f64) -> Experi
     Experiment::new(system, unknowns, periods, noise)
 }
 
-/// What is asked of maximum likelihood at 1 % noise on the displacement, the force exact.
+/// Requirements on maximum likelihood with 1 % noise on the displacement and an exact force.
 #[test]
 fn maximum_likelihood_is_as_good_as_it_says_and_as_good_as_can_be() {
     for (name, experiment) in [
@@ -28,7 +29,7 @@ fn maximum_likelihood_is_as_good_as_it_says_and_as_good_as_can_be() {
         let bound = experiment.bound();
         for at in 0..bound.len() {
             let what = format!("{name}, {}", experiment.unknowns.free()[at]);
-            // 95 % of 2,000 scatters by 0.5 % about itself: 93–97 % is four of that.
+            // The coverage of 95 % in 2,000 runs scatters by 0.5 %: 93–97 % is four times that.
             let coverage = scatter.coverage[at];
             assert!((0.93..=0.97).contains(&coverage), "{what}: {coverage}");
             let bias = scatter.bias[at].abs() / scatter.deviation[at];
@@ -60,8 +61,8 @@ fn row(experiment: &Experiment, scatter: &Scatter, name: &str) -> String {
     )
 }
 
-/// The comparison in the book (`studies/estimators.md`), computed: all of it to be written there, otherwise the
-/// rows that no other test has.
+/// The comparison in the book (`studies/estimators.md`), computed: all rows if they are to be
+/// written there, otherwise the rows that no other test has.
 fn table() -> Vec<Option<String>> {
     let is_written = std::env::var_os("MECHID_BLESS").is_some();
     let mut rows = Vec::new();

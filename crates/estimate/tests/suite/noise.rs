@@ -1,4 +1,4 @@
-//! Noise spectra from repeated periods, and what maximum likelihood makes of them.
+//! Noise spectra from repeated periods, and their effect on maximum likelihood.
 
 use mechid_estimate::frequency_domain::{
     OutputErrorFit, equation_error, instrumental_variables, output_error,
@@ -77,7 +77,7 @@ fn the_scatter_of_the_periods_is_the_noise_that_was_added() {
         let found = periods.noise(pooling).unwrap();
         assert_eq!(found.degrees_of_freedom(), averages);
         for row in 0..40 {
-            // The known noise is that of one period, the found one of the mean of 400.
+            // The known noise is that of one period, the estimated noise that of the mean of 400.
             let expected = known.covariance(row) / Complex::from(400.0);
             for i in 0..4 {
                 let variance = expected[(i, i)].re;
@@ -113,7 +113,8 @@ fn without_noise_every_estimator_is_exact() {
     }
 }
 
-/// Share of 95 % intervals that hold, and mean error over standard deviation, per parameter.
+/// Share of 95 % intervals that contain the truth, and mean error over standard deviation, per
+/// parameter.
 fn judge(
     system: &SecondOrderSystem,
     runs: u64,
@@ -167,7 +168,8 @@ fn weights_of_few_periods_widen_the_intervals_as_they_should() {
         output_error(&noise.mean_with_noise(Pooling::PerLine).unwrap(), unknowns).unwrap()
     };
     let (coverage, bias, misfit) = judge(&system, 1000, fit);
-    // 96.5 % on average: what is added for uncertain weights is a little too much. Each scatters by 0.6 %.
+    // The mean is 96.5 %: the correction for uncertain weights is a little too large. Each value
+    // scatters by 0.6 %.
     let mean = coverage.iter().sum::<f64>() / coverage.len() as f64;
     assert!((0.94..=0.97).contains(&mean), "{mean}");
     for (coverage, bias) in coverage.iter().zip(&bias) {
@@ -193,7 +195,7 @@ fn one_period_is_weighted_by_its_own_residual() {
 
 #[test]
 fn a_model_that_is_wrong_shows_in_the_misfit() {
-    // Two degrees of freedom of which only one is looked at.
+    // Two degrees of freedom, one of them tested.
     let system = bearing();
     let setup = setup(&system, 8, ResponseQuantity::Displacement);
     let one = |r: &Record| Record::from_channel(r.sampling(), r.channel(0).to_vec()).unwrap();
@@ -205,7 +207,7 @@ fn a_model_that_is_wrong_shows_in_the_misfit() {
     assert!(fit.misfit_ratio > 100.0, "{}", fit.misfit_ratio);
 }
 
-/// Only the stiffness of the first equation is unknown; the second has nothing to be found.
+/// Only the stiffness of the first equation is unknown; the second equation has no unknowns.
 #[test]
 fn a_single_unknown_is_found_by_all() {
     let system = bearing();
@@ -233,7 +235,7 @@ fn a_single_unknown_is_found_by_all() {
 
 #[test]
 fn parameters_that_are_not_excited_are_named() {
-    // The second mass stands still: its columns of C and K cannot be known.
+    // The second mass does not move: the data do not determine its columns of C and K.
     let setup = setup(&oscillator(), 2, ResponseQuantity::Displacement);
     let still = |r: &Record| {
         let zero = vec![0.0; r.len()];
@@ -244,7 +246,7 @@ fn parameters_that_are_not_excited_are_named() {
         RepeatedPeriods::new(&setup.lines, &force, &motion, ResponseQuantity::Displacement)
             .unwrap();
     let unknowns = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, 10.0)).unwrap();
-    // The second equation then says 0 = 0; a mass of its own would have to move.
+    // The second equation then reads 0 = 0; a known mass would have to move.
     let unknowns = unknowns.fix(Matrix::Mass, 1, 0, 1.0).unwrap();
     let (first, second) = periods.halves().unwrap();
     let refused = [
@@ -291,7 +293,7 @@ fn noise_that_cannot_weigh_is_refused() {
     let e = NoiseSpectrum::new(vec![1.0], vec![negative]).unwrap_err();
     assert_eq!(e, SpectraError::NoiseVariance { row: 0, column: 1, value: -1.0 });
 
-    // Instruments belong to the same lines.
+    // Both measurements must have the same lines.
     let short = FrequencyData::from_amplitudes(
         vec![1.0],
         DMatrix::from_element(1, 2, Complex::from(1.0)),

@@ -1,4 +1,4 @@
-//! Noise that is not white, of few periods: what is made of its spectrum, and what that does to estimates.
+//! Noise that is not white, in few periods: its estimated spectrum, and the effect on estimates.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ use mechid_spectra::{FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, R
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
-/// Noise over the response, in the RMS.
+/// Ratio of the RMS of the noise to that of the response.
 const LEVEL: f64 = 0.05;
 const KIND: ResponseQuantity = ResponseQuantity::Displacement;
 
@@ -67,8 +67,8 @@ impl Rig {
         RepeatedPeriods::new(&self.lines, &force, &x, KIND).unwrap()
     }
 
-    /// Standard errors of maximum likelihood that knows a spectrum of noise of unit power, by the angle
-    /// from sample to sample.
+    /// Returns the standard errors of maximum likelihood with a known noise spectrum of unit power,
+    /// given by the angle from sample to sample.
     fn bound(&self, power: impl Fn(f64) -> f64) -> Vec<f64> {
         let (period, all) = (self.lines.sampling(), self.lines.as_slice().iter());
         let samples = (period.len() * self.periods) as f64;
@@ -84,7 +84,8 @@ impl Rig {
         fit.estimate.parameters().map(|p| p.standard_error).collect()
     }
 
-    /// Least and largest share of 95 % intervals that hold, and largest scatter over the bound.
+    /// Smallest and largest share of 95 % intervals that contain the truth, and largest ratio of
+    /// the scatter to the bound.
     fn judge(&self, pooling: Pooling, bound: &[f64], runs: u64) -> [f64; 3] {
         let unknowns = Unknowns::unknown_mass(1).unwrap();
         let fits: Vec<_> = (0..runs)
@@ -115,9 +116,10 @@ impl Rig {
     }
 }
 
-/// The share that holds is 91 to 95 %: the mode is where the noise begins to fall, on few lines. Of 150
-/// intervals of 92 % fewer than 85 % hold with a probability of 0.002, and standard deviations of 150
-/// scatter by 6 %. Noise taken as white leaves intervals of which some 70 to 76 % hold.
+/// The intervals contain the truth in 91 to 95 % of the runs: the mode is where the noise begins to
+/// fall, on few lines. Of 150 intervals of 92 % fewer than 85 % do so with a probability of 0.002,
+/// and standard deviations of 150 runs scatter by 6 %. With noise assumed white, some 70 to 76 % of
+/// the intervals contain the truth.
 #[test]
 fn intervals_hold_under_coloured_noise_of_few_periods() {
     for periods in [1, 2, 4] {
@@ -152,7 +154,8 @@ fn the_noise_model_is_chosen_from_the_scatter() {
         let coloured = models(&rig, &autoregressive);
         let count = share(&coloured, &|m| matches!(m, NoiseModel::Smooth { order: 1.., .. }));
         assert!(count >= 80, "{periods} periods: {count} of 100 smooth");
-        // A sine of five times the noise, of a frequency that drifts away from line 50.
+        // A sine with five times the size of the noise and a frequency that drifts away from line
+        // 50.
         let spacing_hz = rig.lines.sampling().line_spacing_hz();
         let period = rig.lines.sampling().len() as f64;
         let disturbed = |len: usize, seed| {
@@ -171,8 +174,8 @@ fn the_noise_model_is_chosen_from_the_scatter() {
     }
 }
 
-/// Judge: the closed-form response to a force that no channel shows, four times as long as the record. Taken as a
-/// smooth spectrum, such a noise makes the tests of the residual warn.
+/// Judge: the closed-form response to an unmeasured force whose period is four times as long as the
+/// record. If this noise is assumed to have a smooth spectrum, the tests of the residual warn.
 #[test]
 fn an_unmeasured_force_is_found_and_is_no_cause_for_warnings() {
     const RUNS: u64 = 24;

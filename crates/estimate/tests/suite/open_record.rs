@@ -1,5 +1,5 @@
-//! Records that are no periods: cut out of a steady state under a random force of a far longer period, which
-//! is known in closed form at every line.
+//! Records that are not periods: windows of a steady state under a random force with a far longer
+//! period, which is known in closed form at every line.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ use nalgebra::dmatrix;
 use rayon::prelude::*;
 
 const SAMPLES: usize = 2048;
-/// Noise over the response, in the RMS.
+/// Ratio of the RMS of the noise to that of the response.
 const LEVEL: f64 = 0.01;
 
 /// 10 kg with a natural frequency of a twentieth of the sampling rate.
@@ -24,7 +24,7 @@ fn one(damping_ratio: f64, quantity: ResponseQuantity) -> RandomTest {
     test(oscillator.system(), quantity)
 }
 
-/// Two masses, two forces, nothing symmetric but the masses.
+/// Two masses and two forces; only the mass matrix is symmetric.
 fn two() -> RandomTest {
     let mass = dmatrix![10.0, 0.0; 0.0, 8.0];
     let damping = dmatrix![30.0, -8.0; -12.0, 25.0];
@@ -52,8 +52,8 @@ fn fit(rig: &RandomTest, seed: u64) -> Result<OutputErrorFit, EstimateError> {
     output_error(&data(rig, seed).as_open_record(rig.sampling), &unknowns)
 }
 
-/// Share of 95 % intervals that hold, worst and all together, over some runs; and the RMS error of each
-/// parameter over its mean standard error.
+/// Share of 95 % intervals that contain the truth, for the worst parameter and for all together,
+/// over some runs; and the ratio of the RMS error of each parameter to its mean standard error.
 fn judge(rig: &RandomTest, runs: u64) -> ([f64; 2], Vec<f64>) {
     let fits: Vec<_> = (0..runs).into_par_iter().map(|seed| fit(rig, seed).unwrap()).collect();
     let free = Unknowns::unknown_mass(rig.system.dof()).unwrap().free();
@@ -76,8 +76,8 @@ fn judge(rig: &RandomTest, runs: u64) -> ([f64; 2], Vec<f64>) {
     ([worst, all], ratios)
 }
 
-/// Fewer than 85 % of 60 intervals of 95 % hold with a probability of 0.001, and fewer than 80 % of 40; standard
-/// deviations of 40 scatter by 11 %.
+/// Fewer than 85 % of 60 intervals of 95 % contain the truth with a probability of 0.001, and fewer
+/// than 80 % of 40; standard deviations of 40 runs scatter by 11 %.
 #[test]
 fn intervals_hold_whatever_the_damping_and_the_quantity() {
     let of = |damping_ratio, kind, runs, least: f64| {
@@ -102,7 +102,8 @@ fn intervals_hold_with_two_forces_at_a_time() {
     assert!(ratios.iter().all(|r| (0.65..1.4).contains(r)), "{ratios:?}");
 }
 
-/// Of 0.1 % damping the response dies out over 6,400 samples: the ends are most of what it leaves.
+/// With 0.1 % damping the response decays over 6,400 samples: most of the residual is due to the
+/// ends of the record.
 #[test]
 fn a_record_taken_as_a_period_misleads() {
     let rig = one(0.001, ResponseQuantity::Displacement);
@@ -119,7 +120,7 @@ fn a_record_taken_as_a_period_misleads() {
     assert!(period > 20.0 * open, "{period} {open}");
 }
 
-/// What the loads of the ends do not describe is folded back from above half the sampling rate.
+/// The transient loads do not describe the part that is aliased from above half the sampling rate.
 #[test]
 fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
     let rig = two();
@@ -141,7 +142,7 @@ fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
     let ends = fit.ends.unwrap();
     assert_eq!(ends.len(), 24);
     assert!(ends.p_value() < 1e-12 && ends.share > 1e-4, "{ends:?}");
-    // With these loads the rows are those of periods.
+    // Without these loads the rows are those of periods.
     let closed = ends.without_transients(&records).unwrap();
     let again =
         output_error(&closed[0].and(&closed[1]).unwrap(), &Unknowns::unknown_mass(2).unwrap())

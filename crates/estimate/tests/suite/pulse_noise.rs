@@ -1,4 +1,4 @@
-//! Noise on the samples of a hit: does the covariance know that its lines err together?
+//! Noise on the samples of a hit: the covariance must include the common error of its lines.
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::output_error_pooling;
@@ -12,7 +12,7 @@ use crate::common::oscillator;
 
 const SAMPLES: usize = 1024;
 const PULSE: std::ops::Range<usize> = 20..32;
-/// Noise on the force, in N, of a pulse of 200 N.
+/// Noise on the force, in N, for a pulse of 200 N.
 const DEVIATION: f64 = 1.0;
 
 /// Squares of the errors of m, c and k over their standard errors, of the response to one hit in steady state.
@@ -55,7 +55,7 @@ fn errors(seed: u64, as_pulse: bool) -> Vec<f64> {
     each.map(|(p, exact)| ((p.value - exact) / p.standard_error).powi(2)).collect()
 }
 
-/// Of 400 tests the mean square of three errors, which are not independent, is known to some 0.08.
+/// In 400 tests the mean square of three errors, which are not independent, scatters by about 0.08.
 #[test]
 fn the_covariance_knows_that_the_lines_of_a_pulse_err_together() {
     let mean = |as_pulse: bool| {

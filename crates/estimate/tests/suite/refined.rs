@@ -1,5 +1,5 @@
-//! Fits to records with intermediate points: standard errors against the scatter of experiments, and
-//! how often the checks of the residual are right.
+//! Fits to records with intermediate points: standard errors compared with the scatter of
+//! experiments, and error rates of the checks of the residual.
 
 use mechid_checks::{Verdict, after_fit};
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 const SAMPLES: usize = 256;
 
-/// An oscillator in its steady state, pushed off course at random at every sample.
+/// An oscillator in its steady state, disturbed at random at every sample.
 struct Experiment {
     force: Record,
     course: Response,
@@ -30,7 +30,7 @@ impl Experiment {
     fn driven(course: impl Fn(&SecondOrderSystem, &Record) -> Response) -> Self {
         let system = dissertation_sdof().system();
         let sampling = Sampling::new(0.02, SAMPLES).unwrap();
-        // Thirteen samples a cycle at the highest line: the interpolations are right.
+        // Thirteen samples per cycle at the highest line: the interpolations are accurate.
         let force = Multisine::flat(1..=20, 20.0, Phases::Schroeder).unwrap();
         let force = force.sample(sampling).unwrap();
         let course = course(&system, &force);
@@ -70,7 +70,7 @@ impl Experiment {
     }
 }
 
-/// Root mean square of the standard errors stated, over the scatter of the values, per parameter.
+/// Ratio of the RMS of the stated standard errors to the scatter of the values, per parameter.
 fn stated_over_scatter(factor: usize, interpolation: Interpolation) -> Vec<f64> {
     let experiment = Experiment::new();
     let unknowns = Unknowns::unknown_mass(1).unwrap();
@@ -96,9 +96,9 @@ fn stated_over_scatter(factor: usize, interpolation: Interpolation) -> Vec<f64> 
     (0..3).map(ratio).collect()
 }
 
-/// A scatter of 400 runs is known to 3.5 %; what the interpolation misses adds to the residual, so
-/// that the errors stated may be somewhat too large. Counted as measurements, the intermediate
-/// points would make them too small by √8.
+/// A scatter of 400 runs is known to 3.5 %. The error of the interpolation adds to the residual, so
+/// that the stated errors may be somewhat too large. If the intermediate points counted as
+/// measurements, the errors would be too small by √8.
 #[test]
 fn intermediate_points_do_not_make_an_estimate_look_better() {
     let measured = stated_over_scatter(1, Interpolation::NotAKnotSpline);
@@ -111,7 +111,7 @@ fn intermediate_points_do_not_make_an_estimate_look_better() {
     }
 }
 
-/// The points in between say nothing new, however many they are.
+/// Intermediate points have no new information, for any number of them.
 #[test]
 fn standard_errors_settle_as_points_are_added() {
     let experiment = Experiment::new();
@@ -124,7 +124,7 @@ fn standard_errors_settle_as_points_are_added() {
     };
     let once = linear.fit(&x, &v, &experiment.force, &unknowns).unwrap().into_estimate();
     assert_eq!(fit(1, Interpolation::BandLimited).degrees_of_freedom(), once.degrees_of_freedom());
-    // Two records count twice, and no more.
+    // Two records count as two, not more.
     let mut rows = Transitions::new(1, 0.02 / 4.0).unwrap();
     for _ in 0..2 {
         let records = [&x, &v, &experiment.force];
@@ -134,11 +134,11 @@ fn standard_errors_settle_as_points_are_added() {
     let [four, sixteen] =
         [4, 16].map(|factor| fit(factor, Interpolation::BandLimited).parameter("k").unwrap());
     assert_eq!(four.degrees_of_freedom, once.degrees_of_freedom());
-    // Uncorrected they would halve.
+    // Without the correction they would be halved.
     assert!((sixteen.standard_error / four.standard_error - 1.0).abs() < 0.1);
 }
 
-/// The ways to refine, and whether an experiment's force is what they make of it.
+/// Interpolations to refine a record; `of_way` returns an experiment with a force of each form.
 const WAYS: [Interpolation; 3] =
     [Interpolation::Linear, Interpolation::NotAKnotSpline, Interpolation::BandLimited];
 
@@ -149,8 +149,8 @@ fn of_way(way: Interpolation) -> Experiment {
     }
 }
 
-/// How the checks of whiteness and of cross-correlation come out after a fit of eight steps per
-/// interval, M known or not: true for good.
+/// Verdicts of the checks of whiteness and of cross-correlation after a fit of eight steps per
+/// interval, with M known or not; true for good.
 fn checked([x, v, force]: [&Record; 3], mass: Option<f64>, way: Interpolation) -> [bool; 2] {
     let mass = mass.map(|mass| DMatrix::from_element(1, 1, mass));
     let unknowns = match mass {
@@ -167,15 +167,16 @@ fn checked([x, v, force]: [&Record; 3], mass: Option<f64>, way: Interpolation) -
     [0, 1].map(|at| checks[at].verdict() == Verdict::Good)
 }
 
-/// The share of `runs` experiments that checks of whiteness and of cross-correlation find at fault.
+/// Share of `runs` experiments in which the checks of whiteness and of cross-correlation report a
+/// fault.
 fn faulted(runs: u64, check: impl Fn(u64) -> [bool; 2] + Sync + Send) -> [f64; 2] {
     let found: Vec<[bool; 2]> = (0..runs).into_par_iter().map(check).collect();
     [0, 1].map(|at| found.iter().filter(|good| !good[at]).count() as f64 / runs as f64)
 }
 
-/// The level is 1 %; the statistic of 25 lags has somewhat more than that beyond it in a record of
+/// The level is 1 %; the statistic of 25 lags exceeds its limit somewhat more often in a record of
 /// 256 samples (Ljung and Box, 1978, section 4). 5 % of 400 runs would be four standard deviations
-/// off 1 %. Counted sample by sample, the refined residual would be at fault every time.
+/// above 1 %. If every intermediate sample counted, the refined residual would always be reported.
 #[test]
 fn checks_of_refined_fits_seldom_find_fault_with_a_right_machine() {
     for way in WAYS {
@@ -190,8 +191,8 @@ fn checks_of_refined_fits_seldom_find_fault_with_a_right_machine() {
     }
 }
 
-/// Noise on the motion is in two intervals that follow one another: not white, and told so; but
-/// nothing that the force does.
+/// Noise on the motion affects two successive intervals: the residual is reported as not white, but
+/// not as correlated with the force.
 #[test]
 fn noise_on_the_motion_is_told_from_a_wrong_machine() {
     let experiment = Experiment::new();
@@ -212,8 +213,8 @@ fn noise_on_the_motion_is_told_from_a_wrong_machine() {
     assert!(rates[0] > 0.95 && rates[1] < 0.05, "{rates:?}");
 }
 
-/// The third of the periods of m ẍ + c ẋ + k x + `cubic` x³ = F by the classic Runge–Kutta rule,
-/// sixteen steps per sample.
+/// The third period of m ẍ + c ẋ + k x + `cubic` x³ = F by the classic Runge–Kutta method, sixteen
+/// steps per sample.
 fn hardening(force: &Record, cubic: f64) -> Response {
     let fine = refine(force, 32, Interpolation::BandLimited).unwrap();
     let (f, h) = (fine.channel(0), force.sampling().dt() / 16.0);
@@ -243,7 +244,7 @@ fn of_columns(force: &Record, motion: &DMatrix<f64>) -> Response {
     Response::new(x, v, none).unwrap()
 }
 
-/// On what is driven hangs a second mass of a tenth, at 20 rad/s, which is not measured.
+/// A second mass, a tenth of the first, hangs on it at 20 rad/s and is not measured.
 fn with_a_second_mass(force: &Record) -> Response {
     let of = |a: f64, b: f64, c: f64| DMatrix::from_row_slice(2, 2, &[a, b, b, c]);
     let system =
@@ -256,7 +257,7 @@ fn with_a_second_mass(force: &Record) -> Response {
     of_columns(force, &data)
 }
 
-/// Each machine is pushed about at random as in the other experiments.
+/// Each machine is disturbed at random as in the other experiments.
 #[test]
 fn a_wrong_machine_is_found_out_after_a_refined_fit() {
     let way = Interpolation::BandLimited;
@@ -268,7 +269,7 @@ fn a_wrong_machine_is_found_out_after_a_refined_fit() {
     assert!(rates[1] > 0.95, "a mass wrong by 5 %: {rates:?}");
 
     let largest = right.course.displacement().data().amax();
-    // At the largest displacement the spring is a fifth stiffer.
+    // At the largest displacement the spring is stiffer by a fifth.
     let cubic = 0.2 * 5000.0 / largest.powi(2);
     let hard = Experiment::driven(|_, force| hardening(force, cubic));
     let double = Experiment::driven(|_, force| with_a_second_mass(force));

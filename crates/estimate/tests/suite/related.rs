@@ -12,7 +12,7 @@ use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 /// Damping factors α (1/s) and β (s).
 const FACTORS: [f64; 2] = [0.4, 2e-4];
 
-/// Masses in a row, each on a spring of its own, the damping proportional.
+/// Masses in a row, each on its own spring, with proportional damping.
 fn chain(n: usize) -> SecondOrderSystem {
     let vary = |at: usize, share: f64| 1.0 + share * (2.3 * at as f64).sin();
     let mass = DMatrix::from_fn(n, n, |i, j| if i == j { 2.0 * vary(i, 0.4) } else { 0.0 });
@@ -64,7 +64,8 @@ fn exact(system: &SecondOrderSystem, omega: &[f64]) -> [DMatrix<Complex<f64>>; 2
     [force, displacement]
 }
 
-/// The same with white noise of a part of the RMS of each channel, whose level is known.
+/// The exact displacements with white noise, a fraction of the RMS of each channel, whose level is
+/// known.
 fn measured(system: &SecondOrderSystem, omega: &[f64], part: f64, seed: u64) -> FrequencyData {
     let [force, mut displacement] = exact(system, omega);
     let (lines, n) = displacement.shape();
@@ -98,8 +99,8 @@ fn largest_error(found: &Estimate, system: &SecondOrderSystem) -> f64 {
     pairs.iter().map(|(found, truth)| (found - *truth).amax() / truth.amax()).fold(0.0, f64::max)
 }
 
-/// One force on eight masses, none of them known: of the 192 entries the data determine a few only, but all
-/// 38 unknowns of a symmetric chain.
+/// One force on eight masses, all unknown: the data determine only a few of the 192 entries, but
+/// all 38 unknowns of a symmetric chain.
 #[test]
 fn one_force_determines_a_chain_of_unknown_masses() {
     let system = chain(8);
@@ -125,7 +126,8 @@ fn one_force_determines_a_chain_of_unknown_masses() {
     assert!(matches!(refused, EstimateError::OnlyRatios { dof: 2, .. }), "{refused}");
 }
 
-/// Half a sample of delay is found with one force on five masses, and none where there is none.
+/// A delay of half a sample is found with one force on five masses, and no delay is found without
+/// one.
 #[test]
 fn a_delay_of_the_force_on_a_chain_is_found() {
     let system = chain(5);
@@ -158,7 +160,7 @@ fn a_delay_of_the_force_on_a_chain_is_found() {
 fn bound(system: &SecondOrderSystem, data: &FrequencyData, proportional: bool) -> DVector<f64> {
     let n = system.dof();
     let matrices = [system.mass(), system.damping(), system.stiffness()];
-    // Independent unknowns: what moves with each of them.
+    // Change of the matrices with each independent unknown.
     let mut moves: Vec<[DMatrix<f64>; 3]> = Vec::new();
     let zero = || DMatrix::<f64>::zeros(n, n);
     for (at, matrix) in Matrix::ALL.into_iter().enumerate() {
@@ -218,7 +220,8 @@ fn bound(system: &SecondOrderSystem, data: &FrequencyData, proportional: bool) -
     )
 }
 
-/// 200 experiments on a chain of four masses with one force: intervals hold, and no estimator scatters less.
+/// 200 experiments on a chain of four masses with one force: coverage of the intervals, and scatter
+/// at the bound.
 #[test]
 fn related_entries_are_estimated_at_the_bound_with_intervals_that_hold() {
     let system = chain(4);
@@ -252,7 +255,7 @@ fn related_entries_are_estimated_at_the_bound_with_intervals_that_hold() {
         assert!((0.93..=0.97).contains(&coverage), "proportional {proportional}: {coverage}");
         let ratio = (squares / runs as f64).map(f64::sqrt).component_div(&bound);
         let mean = ratio.mean();
-        // A deviation of 200 runs scatters by 5 %, and those of a chain go together.
+        // A standard deviation of 200 runs scatters by 5 %, and those of a chain are correlated.
         assert!((0.9..1.1).contains(&mean), "proportional {proportional}: {ratio}");
         if proportional {
             let coverage = factors as f64 / (2.0 * runs as f64);
@@ -261,7 +264,8 @@ fn related_entries_are_estimated_at_the_bound_with_intervals_that_hold() {
     }
 }
 
-/// Noise on the force read back equation by equation: least squares of related entries has intervals that hold.
+/// Noise on the recorded force in each equation: the intervals of least squares with related
+/// entries contain the truth as often as stated.
 #[test]
 fn least_squares_of_related_entries_has_intervals_that_hold() {
     let system = chain(3);
@@ -275,7 +279,7 @@ fn least_squares_of_related_entries_has_intervals_that_hold() {
     let mut inside = 0;
     for seed in 0..runs {
         let drawn = noise::white(sampling, 3, 1.0, seed).unwrap();
-        // Of different size in each equation, and in common.
+        // The noise has a different size in each equation, and a common part.
         let mix = dmatrix![1.0, 0.0, 0.0; 5.0, 3.0, 0.0; 0.0, 20.0, 30.0];
         let read = &force + drawn.data() * mix.transpose();
         let mut equations = EquationOfMotion::new(3);
@@ -314,7 +318,8 @@ fn relations_that_contradict_are_refused() {
     assert!(matches!(refused, EstimateError::Related { .. }), "{refused}");
 }
 
-/// Two masses that no force and no spring joins to the rest: the directions that stay open are named.
+/// Two masses that no force and no spring connects to the others: the undetermined directions are
+/// named.
 #[test]
 fn what_relations_do_not_determine_is_named() {
     let system = SecondOrderSystem::new(

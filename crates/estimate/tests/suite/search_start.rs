@@ -1,5 +1,5 @@
-//! Whether the search by maximum likelihood finds the best minimum, and where it starts when most lines
-//! are nothing but noise.
+//! Whether the search by maximum likelihood finds the best minimum, and its start if most lines are
+//! only noise.
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{output_error, output_error_near};
@@ -14,8 +14,8 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::common::{oscillator, relative_error};
 
-/// Accelerances of which the upper half is nothing but noise, as above the band of a random
-/// excitation: by the coherence they weigh next to nothing, in the start of the search as in its end.
+/// Accelerances whose upper half is only noise, as above the band of a random excitation: by their
+/// coherence these lines have hardly any weight, at the start of the search and at its end.
 #[test]
 fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
     let system = oscillator();
@@ -49,8 +49,8 @@ fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
     }
 }
 
-/// Displacements of a random force that leaves off at a third of the band: noise alone, divided by
-/// next to no force, beyond it, on every segment length a machine far too soft.
+/// Displacements under a random force that ends at a third of the band: above it there is noise
+/// divided by hardly any force, which would give a far too soft machine for every segment length.
 #[test]
 fn lines_of_next_to_no_force_do_not_lead_the_search_astray() {
     let system = oscillator();
@@ -75,7 +75,7 @@ fn lines_of_next_to_no_force_do_not_lead_the_search_astray() {
             let fit = output_error(&frf.data(&[0]).unwrap(), &Unknowns::unknown_mass(1).unwrap());
             let found = fit.unwrap().estimate;
             let error = relative_error(&found.mass(), system.mass());
-            // What is left is the leakage of short segments.
+            // The remaining error is the leakage of short segments.
             assert!(error < 0.05, "{seed} {len}: m = {}", found.mass()[(0, 0)]);
         }
     }
@@ -93,8 +93,8 @@ fn measured(test: &Test, level: f64, seed: u64) -> FrequencyData {
         .unwrap()
 }
 
-/// Soft, free and one-force chains, of which the search once found some wrong minima and no end for
-/// others; the last has several minima that the noise explains. The example `search_study` has 200.
+/// Soft, free and one-force chains for which an earlier search found wrong minima or no end; the
+/// last one has several minima that the noise explains. The example `search_study` has 200.
 #[test]
 fn the_search_finds_a_minimum_as_low_as_one_from_the_true_machine() {
     for (index, level) in [(11, 7e-4), (22, 5e-3), (24, 1.3e-2), (34, 3.4e-3), (111, 1.24e-2)] {

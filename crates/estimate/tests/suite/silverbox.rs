@@ -14,7 +14,7 @@ use mechid_spectra::{FrequencyData, Lines};
 #[test]
 fn the_measured_oscillator_has_its_known_frequency_and_damping() {
     let Some(record) = schroeder() else { return };
-    // One period after a steady run-in; the sensors' offset is that of the whole record.
+    // One period after a steady beginning; the offset of the sensors is that of the whole record.
     let period = record.without_mean().window(10584, 1024).unwrap();
     let channel =
         |c: usize| Record::from_channel(period.sampling(), period.channel(c).to_vec()).unwrap();
@@ -31,7 +31,7 @@ fn the_measured_oscillator_has_its_known_frequency_and_damping() {
     assert!((natural_hz - 72.38).abs() < 0.05, "{natural_hz} Hz");
     assert!((mode.damping_ratio() - 0.0471).abs() < 0.0005, "ζ = {}", mode.damping_ratio());
 
-    // Maximum likelihood weighs the cubic spring's remainder differently: close, not equal.
+    // Maximum likelihood weights the residual of the cubic spring differently: close, not equal.
     let likely = output_error(&data, &unknowns).unwrap().estimate.system().unwrap();
     let mode = &likely.modes().unwrap()[0];
     let natural_hz = mode.natural_frequency() / std::f64::consts::TAU;

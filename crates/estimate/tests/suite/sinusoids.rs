@@ -1,4 +1,5 @@
-//! Sinusoids in the responses of open records that no force accounts for, of known frequency and size.
+//! Sinusoids in the responses of open records that are not due to a force, with known frequency and
+//! size.
 
 use std::f64::consts::TAU;
 
@@ -69,13 +70,15 @@ fn run_out_between_lines_does_no_harm() {
             gap(&with, &without)
         };
         let gaps: Vec<f64> = (0..4_u64).into_par_iter().map(check).collect();
-        // The lines next to a resonance tell less with a sinusoid there, by as much as this.
+        // The lines next to a resonance contain less information if a sinusoid is there; this is
+        // the difference.
         let gap = (gaps.iter().sum::<f64>() / gaps.len() as f64).sqrt();
         assert!(gap < 0.3, "{quantity}: {gap} standard errors");
     }
 }
 
-/// Judge: the rate by chance is far below one of 20. A resonance of 0.1 % damping is narrower than a line.
+/// Judge: by chance, fewer than one of 20 records has a sinusoid. A resonance of 0.1 % damping is
+/// narrower than a line.
 #[test]
 fn records_without_sinusoids_have_none() {
     let light = Sdof::new(10.0, 2.0 * 0.001 * 10.0 * 157.0, 10.0 * 157.0 * 157.0).unwrap();
@@ -96,7 +99,8 @@ fn records_without_sinusoids_have_none() {
     }
 }
 
-/// A disturbance over ten lines is noise, and what stands at a line of the force may be the machine's own.
+/// A disturbance over ten lines is noise, and a sinusoid at a line of the force may be the response
+/// of the machine.
 #[test]
 fn what_is_no_sinusoid_is_not_taken_for_one() {
     let rig = rig(ResponseQuantity::Displacement);
@@ -104,7 +108,7 @@ fn what_is_no_sinusoid_is_not_taken_for_one() {
         let [force, response] = noisy(&rig, seed);
         let spacing_hz = 1.0 / (SAMPLES as f64 * DT);
         let unit = response.column(0).variance().sqrt();
-        // Every line of a record eight times as long, of random phase.
+        // Every line of a record eight times as long, with random phases.
         let phases = noise::white(Sampling::new(1.0, 80).unwrap(), 1, 10.0, seed).unwrap();
         let disturbance = |t: f64| {
             let lines =

@@ -1,4 +1,4 @@
-//! The time-domain estimators on exact responses to forces that truly are held or linear.
+//! Time-domain estimators on exact responses to forces that are held or linear between samples.
 
 use mechid_estimate::time_domain::{TimeDomain, Transitions, equation_of_motion};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
@@ -60,7 +60,7 @@ fn machines() -> Vec<(&'static str, SecondOrderSystem, f64)> {
     ]
 }
 
-/// Demanded by the definition of exact: 1e-8.
+/// The definition of exact in these tests: 1e-8.
 const EXACT: f64 = 1e-8;
 
 #[test]
@@ -114,14 +114,15 @@ fn a_force_that_is_zero_is_left_out() {
     let known = Unknowns::known_mass(system.mass()).unwrap();
     let found = fit(FirstOrderHold, Extent::WholePeriod, &motion, &force, &known);
     assert!(error(&found, &system) < EXACT);
-    // With the mass unknown the equation of the first direction is known up to a factor only.
+    // If the mass is unknown, the equation of the first direction is determined only up to a
+    // factor.
     let estimator = TimeDomain::new(FirstOrderHold, Extent::WholePeriod);
     let unknown = Unknowns::unknown_mass(2).unwrap();
     let refused = estimator.fit(motion.displacement(), motion.velocity(), &force, &unknown);
     assert!(matches!(refused, Err(EstimateError::OnlyRatios { dof: 1, .. })), "{refused:?}");
 }
 
-/// exp(AΔt) − I by its Taylor series: the judge of Euler's bias.
+/// exp(AΔt) − I by its Taylor series: the reference for the bias of Euler's rule.
 fn increment(system: &SecondOrderSystem, dt: f64) -> DMatrix<f64> {
     let small = system.state_matrix() * (dt / 1024.0);
     let mut term = small.clone();
@@ -165,7 +166,8 @@ fn the_bias_of_euler_is_that_of_one_plus_a_dt_and_shrinks_with_npi() {
     }
 }
 
-/// Intermediate points of a band-limited period are the samples a faster recorder had taken.
+/// Intermediate points of a band-limited period are the samples that a faster recorder would have
+/// taken.
 #[test]
 fn a_refined_record_is_as_good_as_a_faster_one() {
     let system = dissertation_bearing(KyxSign::Minus).system();
@@ -191,7 +193,7 @@ fn a_refined_record_is_as_good_as_a_faster_one() {
         (a.stiffness() - b.stiffness()).amax() / system.stiffness().amax()
     };
     assert!(gap(&refined(8, Interpolation::BandLimited), &wanted) < 1e-9);
-    // The highest line has 4 samples a cycle, where a spline is a few per cent off.
+    // The highest line has 4 samples per cycle, where a spline is wrong by a few per cent.
     assert!(gap(&refined(8, Interpolation::NotAKnotSpline), &wanted) < 0.1);
     let once = refined(1, Interpolation::BandLimited);
     assert!(error(&wanted, &system) < error(&once, &system) / 4.0);
@@ -239,7 +241,7 @@ fn pieces_and_several_records_are_one_fit() {
 
 #[test]
 fn what_is_not_excited_is_named_and_the_rest_stays_right() {
-    // Two oscillators; the first drives nothing, so the second stands still.
+    // Two oscillators; the first one does not drive the second, which stays at rest.
     let system = SecondOrderSystem::new(
         dmatrix![2.0, 0.0; 0.0, 3.0],
         dmatrix![1.0, 0.7; 0.0, 2.0],
@@ -262,7 +264,7 @@ fn what_is_not_excited_is_named_and_the_rest_stays_right() {
 
 #[test]
 fn an_undersampled_machine_is_explained() {
-    // A lightly damped mode sampled twice a period alternates in sign.
+    // A lightly damped mode that is sampled twice per period alternates in sign.
     let oscillator = Sdof::from_modal(1.0, 0.02, 20.0).unwrap();
     let dt = std::f64::consts::PI / oscillator.damped_frequency();
     let force = white(Sampling::new(dt, 200).unwrap(), 1, 2);
@@ -295,8 +297,8 @@ fn records_that_do_not_belong_together_are_refused() {
     assert_eq!(Transitions::new(0, 0.1).unwrap_err(), EstimateError::NoDof);
 }
 
-/// 300 experiments with white disturbances of the state: the intervals hold, also through the
-/// logarithm. Binomial scatter of the coverage is 1.3 %, so 95 % ± 5 % is four of it.
+/// 300 experiments with white disturbances of the state: coverage of the intervals, also through
+/// the logarithm. The binomial scatter of the coverage is 1.3 %, so 95 % ± 5 % is four times that.
 #[test]
 fn intervals_hold_through_the_logarithm() {
     let system = dissertation_bearing(KyxSign::Minus).system();

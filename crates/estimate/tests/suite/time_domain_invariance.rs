@@ -1,4 +1,5 @@
-//! What must not matter to a time-domain estimate: units, numbering, the directions of the axes.
+//! Changes that must not matter to a time-domain estimate: units, numbering, the directions of the
+//! axes.
 
 use mechid_estimate::time_domain::TimeDomain;
 use mechid_estimate::{Estimate, Unknowns};
@@ -13,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 const METHODS: [Discretisation; 3] =
     [Discretisation::Euler, Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold];
 
-/// x, ẋ and F of the bearing, slightly noisy, so that standard errors mean something.
+/// x, ẋ and F of the bearing with a little noise, so that the standard errors are meaningful.
 fn measured(seed: u64) -> [Record; 3] {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let sampling = Sampling::new(0.2, 200).unwrap();
@@ -35,12 +36,12 @@ fn mapped(record: &Record, sampling: Sampling, map: &DMatrix<f64>) -> Record {
     Record::new(sampling, record.data() * map.transpose()).unwrap()
 }
 
-/// The mass fully known, or diagonal and unknown.
+/// Unknowns with a known mass, or with a diagonal unknown mass.
 fn unknowns(mass: &DMatrix<f64>, known: bool) -> Unknowns {
     if known { Unknowns::known_mass(mass).unwrap() } else { Unknowns::unknown_mass(2).unwrap() }
 }
 
-/// Rounding of the regressors' condition (below 1e3) against noise of 1e-3.
+/// Rounding times the condition number of the regressors (below 1e3), compared with noise of 1e-3.
 const SAME: f64 = 1e-8;
 
 proptest! {
@@ -105,7 +106,8 @@ proptest! {
         }
     }
 
-    /// Twice the same period: same values, half the variance but for the count of spare rows.
+    /// The same period twice: the same values, and half the variance apart from the number of spare
+    /// rows.
     #[test]
     fn a_record_twice(seed in 0u64..1000) {
         let data = measured(seed);

@@ -13,7 +13,7 @@ use crate::common::oscillator;
 
 const RUNS: u64 = 400;
 
-/// Twenty samples a cycle of the natural frequency, 22.36 rad/s.
+/// Sampling interval with twenty samples per cycle of the natural frequency, 22.36 rad/s.
 const DT: f64 = 0.014;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Experiment {
         Self { force, motion: motion.unwrap() }
     }
 
-    /// Experiment number `seed`, every motion with noise of its own.
+    /// Experiment number `seed`, with independent noise on every motion.
     fn measure(&self, share: f64, seed: u64) -> Response {
         let add = |record: &Record, channel: u64| {
             noise::add_white(record, NoiseLevel::FractionOfRms(share), 3 * seed + channel).unwrap()
@@ -75,8 +75,8 @@ impl Experiment {
             .into_estimate()
     }
 
-    /// Largest bias and scatter among the parameters, relative, and the smallest and largest share of
-    /// 95 % intervals that hold the truth.
+    /// Largest bias and scatter among the parameters, relative, and the smallest and largest share
+    /// of 95 % intervals that contain the truth.
     fn study(&self, estimator: Estimator, share: f64) -> [f64; 4] {
         let runs = if share > 0.0 { RUNS } else { 1 };
         let truth = [10.0, 180.0, 5000.0];
@@ -138,7 +138,8 @@ fn the_table_of_the_time_domain_is_what_comes_out() {
     documented("<!-- time domain -->\n", "<!-- end of time domain -->\n", &all);
 }
 
-/// What the table says in one sentence: the estimator that assumes what the force does is exact.
+/// The main statement of the table: the estimator with the right assumption about the force is
+/// exact.
 #[test]
 fn the_right_assumption_is_exact() {
     for (between, estimator) in [

@@ -1,4 +1,4 @@
-//! Accelerations alone show a force above a frequency and say which one it is.
+//! Accelerations alone show a force above a frequency, and the result states this frequency.
 
 use mechid_force::{
     Filter, ForceUnknowns, Measurement, Noise, Start, Tuning, kalman, regularised, within_band,
@@ -12,8 +12,8 @@ use crate::study::accelerations::{found, row};
 
 #[test]
 fn the_force_is_found_in_the_band_that_they_show() {
-    // At the lower end of the band noise is as large as the force by its choice: some lines of the
-    // 307 there make 10 %, and more where stiff springs or far masses let the noise through.
+    // At the lower end of the band, noise is as large as the force, by the choice of this end. Some
+    // of the 307 lines make 10 %, and more if stiff springs or far masses let the noise through.
     for (dof, hz, level, most) in
         [(1, 1.0, 0.01, 0.1), (1, 40.0, 0.01, 0.35), (2, 40.0, 0.001, 0.2), (3, 1.0, 0.05, 0.5)]
     {

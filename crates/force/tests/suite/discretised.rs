@@ -51,11 +51,12 @@ fn the_exact_held_form_returns_the_held_force() {
 
 #[test]
 fn the_exact_linear_form_returns_the_linear_force() {
-    // The displacement rows enter with 6M/Δt²: ten times the step, a hundred times the digits.
+    // The displacement rows have the factor 6M/Δt²: ten times the step keeps a hundred times the
+    // digits.
     for (dt, len, tolerance) in [(0.002, 1500, 1e-8), (0.02, 300, ROUNDING), (0.1, 40, ROUNDING)] {
         let (sampling, force) = samples(dt, len);
         let (x, v) = MACHINE.run((0.01, -0.3), &force, dt, true);
-        // The last step leads to a sample that is not there: it is not used.
+        // The last step would lead to a sample that does not exist, so it is not used.
         let found = discretised(
             &machine(),
             &response(sampling, x, v),
@@ -182,7 +183,7 @@ fn bad_input_is_refused_with_its_numbers() {
         discretised(&mixed().system(), &motion, held, Extent::Open),
         Err(ForceError::Dof { system: 2, response: 1 })
     );
-    // Undamped, one step per whole period: a held force moves nothing.
+    // The system is undamped, and a step is one whole period: a held force causes no motion.
     let undamped = SecondOrderSystem::new(dmatrix![1.0], dmatrix![0.0], dmatrix![1.0]).unwrap();
     let sampling = Sampling::new(std::f64::consts::TAU, 3).unwrap();
     let motion = response(sampling, vec![0.0; 3], vec![0.0; 3]);

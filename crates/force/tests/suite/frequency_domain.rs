@@ -95,7 +95,7 @@ fn one_channel_anywhere_gives_one_force_anywhere() {
 
 #[test]
 fn a_force_sought_where_none_acts_is_seen_as_spurious() {
-    // Told the wrong stiffness, the method finds a force on the unforced direction.
+    // With the wrong stiffness, the method finds a force on the unforced direction.
     let (force, [x, ..]) = harmonic(&rotor(), [0.0, 100.0]);
     let wrong = SecondOrderSystem::new(
         rotor().mass().clone(),
@@ -129,7 +129,8 @@ fn lines_the_machine_does_not_transmit_are_named() {
             assert!(matches!(error, ForceError::NotTransmitted { line: 0, .. }), "{error}");
         }
     }
-    // Two machines that do not touch: the motion of one says nothing of the force on the other.
+    // The two machines are not connected: the motion of one does not depend on the force on the
+    // other.
     let apart = SecondOrderSystem::new(
         DMatrix::identity(2, 2),
         DMatrix::identity(2, 2),
@@ -153,7 +154,8 @@ fn lines_the_machine_does_not_transmit_are_named() {
     .unwrap();
     // With everything measured the dynamic stiffness is used as it is, zero at the resonance.
     assert!(frequency_domain(&undamped, &velocity, &[0], &[2], &unknown).is_ok());
-    // With more channels than forces its inverse is needed, and there is none.
+    // With more channels than forces the inverse of the dynamic stiffness is needed, and it does
+    // not exist.
     let both = Record::new(period(), v.data().clone()).unwrap();
     let twice = vec![Channel { dof: 0, quantity: ResponseQuantity::Velocity }; 2];
     let twice = Measurement::new(both, twice).unwrap();

@@ -44,8 +44,8 @@ fn measured(
     (every(&exact), Measurement::from_record(ResponseQuantity::Acceleration, noisy))
 }
 
-/// The spectrum of a pulse falls as that of a force of low order does, which takes all noise for force: 51 % of the
-/// intervals held.
+/// The spectrum of a pulse falls like that of a force of low order, which takes all noise as force:
+/// then only 51 % of the intervals contained the force.
 #[test]
 fn the_error_of_an_impact_is_that_of_its_noise() {
     let runs = 4;

@@ -1,4 +1,5 @@
-//! The augmented Kalman smoother on forces that are what it assumes, and on bad requests.
+//! The augmented Kalman smoother on forces that agree with its assumptions, and on impossible
+//! requests.
 
 use mechid_force::{
     Channel, ForceError, ForceModel, KalmanForce, Measurement, Start, Tuning, kalman,
@@ -61,7 +62,7 @@ fn likelihood_finds_the_walk_the_noise_and_an_honest_error() {
         let measured = displacements(&response, 0.02, 9);
         let found =
             kalman(&system, &measured, &[forced], Start::FromRest, &Tuning::Likelihood).unwrap();
-        // 4000 samples tell a standard deviation to 1 %; walk and noise are partly confounded.
+        // 4000 samples determine a standard deviation to 1 %; walk and noise are partly confounded.
         assert_eq!(found.model.order, 1);
         let walk = walk(&found, 0);
         assert!((walk / 40.0 - 1.0).abs() < 0.1, "walk {walk}");
@@ -69,7 +70,7 @@ fn likelihood_finds_the_walk_the_noise_and_an_honest_error() {
             let size = response.displacement().column(c).norm() / 4000f64.sqrt();
             assert!((level / (0.02 * size) - 1.0).abs() < 0.05, "channel {c}: {level}");
         }
-        // Errors of neighbouring samples are alike: some hundred independent ones are left.
+        // Errors of neighbouring samples are correlated: some hundred independent ones remain.
         let surprise = surprise(&found, &truth, forced);
         assert!((0.75..1.3).contains(&surprise), "{surprise:.3}");
         // The smoothed motion is nearer to the truth than the measurement.
@@ -163,7 +164,7 @@ fn bad_requests_are_refused_with_their_numbers() {
         ask(&system, &one, &[0], &Tuning::NoiseKnown(vec![0.0])),
         ForceError::NotPositive { what: "noise level", value: 0.0 }
     );
-    // Two machines that do not touch; and the same channel twice for two forces.
+    // Two unconnected machines; and the same channel twice for two forces.
     let diagonal = |a: f64, b: f64| DMatrix::from_diagonal(&dvector![a, b]);
     let apart =
         SecondOrderSystem::new(diagonal(1.0, 1.0), diagonal(1.0, 1.0), diagonal(90.0, 70.0))

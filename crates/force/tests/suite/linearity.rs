@@ -1,4 +1,4 @@
-//! Every method without a choice of its own is a linear map of the measurement.
+//! Every method with given parameters is a linear map of the measurement.
 
 use mechid_force::{
     ForceModel, IdentifiedForce, Measurement, Noise, Start, Tuning, continuous, discretised,
@@ -67,8 +67,8 @@ proptest! {
             let [a, b, both] = [&first, &second, &sum].map(|v| method(&system, v).record().data().clone());
             let expected = &a + &b * weight;
             let size = a.amax().max(weight.abs() * b.amax());
-            // Rounding of sums of a few dozen terms; the smoother's start depends on the size of
-            // what was measured, by less than the ten-thousandth it allows itself.
+            // These are rounding errors of sums of a few dozen terms. The start of the smoother
+            // depends on the size of the measurement, by less than the permitted ten-thousandth.
             let tolerance = if name == "Kalman" { 1e-3 } else { 1e-11 };
             prop_assert!((&both - &expected).amax() <= tolerance * size, "{name}");
         }

@@ -1,4 +1,4 @@
-//! The standard error that noise in a complete motion leads to.
+//! The standard error due to noise in a complete motion.
 
 use mechid_force::{
     ForceError, MotionNoise, continuous_with_noise, discretised, discretised_with_noise,
@@ -40,7 +40,7 @@ fn noisy(samples: usize, seed: u64) -> Response {
     response(&data)
 }
 
-/// Root mean square of many forces, all of noise alone.
+/// Returns the root mean square of many forces that come from noise alone.
 fn scatter(runs: u64, samples: usize, find: impl Fn(&Response) -> Record) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(samples, 2);
     for seed in 0..runs {
@@ -49,8 +49,8 @@ fn scatter(runs: u64, samples: usize, find: impl Fn(&Response) -> Record) -> DMa
     sum.map(|s| (s / runs as f64).sqrt())
 }
 
-/// Of 400 draws a standard deviation is known to 1/√800 = 3.5 %; four of those at every sample, and
-/// over all twelve a third of that.
+/// From 400 draws, a standard deviation is known to 1/√800 = 3.5 %; the limits are four times this
+/// at every sample, and a third of that over all twelve.
 fn agree(stated: &Record, seen: &DMatrix<f64>) {
     for (stated, seen) in stated.data().iter().zip(seen) {
         assert!((stated / seen - 1.0).abs() < 0.14, "{stated}, seen {seen}");
@@ -75,8 +75,8 @@ fn stated_errors_are_the_scatter_over_noisy_motions() {
     }
 }
 
-/// The force is linear in the motion: its variance is the sum over all samples of all channels of
-/// what a unit there does, squared.
+/// The force is linear in the motion: its variance is the sum of the squared effects of a unit at
+/// each sample of each channel.
 #[test]
 fn every_discretisation_carries_the_noise_of_every_sample() {
     let forms = Discretisation::ALL;

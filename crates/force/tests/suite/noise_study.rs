@@ -1,4 +1,4 @@
-//! The promises of the book (`studies/force.md`), and that its tables are the ones the study gives.
+//! The statements of the book (`studies/force.md`), and the agreement of its tables with the study.
 
 use crate::study::coverage::{INTERVALS, SHAPES, coverage};
 use crate::study::{
@@ -25,7 +25,7 @@ fn tokens(text: &str) -> Vec<Result<f64, String>> {
         .collect()
 }
 
-/// The tables of the book, from the one that starts with `header` on.
+/// Returns the tables of the book, beginning with the one that starts with `header`.
 fn printed(header: &str) -> String {
     let book = include_str!("../../../../docs/book/src/studies/force.md");
     let start = book.find(header).expect("the book has the study's tables");
@@ -74,7 +74,8 @@ fn the_likelihood_rule_stays_near_the_best_parameter_as_the_book_prints() {
     assert_printed("| Excited |", &rule_table(&rows));
 }
 
-/// Where the book says that 95 % intervals hold, twelve records each hold 89 to 99 % of the samples.
+/// In the cases for which the book states that 95 % intervals hold, twelve records each contain 89
+/// to 99 % of the samples.
 #[test]
 fn intervals_hold_the_force_of_bands_lines_and_walks() {
     for name in
@@ -93,7 +94,7 @@ fn intervals_hold_the_force_of_bands_lines_and_walks() {
     }
 }
 
-/// The parameter does not have to be told what the noise is: half and twice the noise move it.
+/// The rule needs no noise level: half and twice the noise change the parameter.
 #[test]
 fn more_noise_means_more_regularisation() {
     let parameter = |level: f64| {

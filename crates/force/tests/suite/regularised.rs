@@ -38,7 +38,7 @@ fn force(len: usize, dof: usize, forced: &[usize], value: impl Fn(usize, usize) 
     Record::new(sampling(len), data).unwrap()
 }
 
-/// One column per unit sample of each force: what `answer` makes of it, scaled, channel after
+/// Returns one column per unit sample of each force: the scaled result of `answer`, channel after
 /// channel.
 fn columns(
     len: usize,
@@ -121,7 +121,7 @@ fn open_records_solve_their_normal_equations() {
     }
 }
 
-/// Columns for unit displacements and velocities at the first sample, at the end.
+/// Appends columns for unit displacements and velocities at the first sample.
 fn with_starts(system: &SecondOrderSystem, g: DMatrix<f64>, scale: &[f64]) -> DMatrix<f64> {
     let (dof, rows, forces) = (system.dof(), g.nrows(), g.ncols());
     let silence = force(rows / 2, dof, &[], |_, _| 0.0);

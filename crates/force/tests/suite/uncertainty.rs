@@ -1,4 +1,4 @@
-//! The uncertainty of the machine, carried into the force.
+//! Propagation of the uncertainty of the machine to the force.
 
 use mechid_force::{
     Filter, ForceUnknowns, Measurement, Noise, Rule, continuous, discretised, frequency_domain,
@@ -100,8 +100,8 @@ fn the_stated_error_is_the_scatter_over_machines() {
     assert_close(found.standard_error().unwrap(), &seen, 0.04, "discretised");
 }
 
-/// The parameter chosen keeps what it keeps when the machine is moved by a thousandth: cut at a
-/// singular value itself, it would lose that one to the least change.
+/// A truncation keeps the same components if the machine changes by a thousandth: if the threshold
+/// were a singular value itself, the least change would exclude it.
 #[test]
 fn a_truncation_is_not_at_the_mercy_of_the_machine() {
     let measured =
@@ -126,7 +126,8 @@ fn a_truncation_is_not_at_the_mercy_of_the_machine() {
     );
 }
 
-/// One force of two channels: what machines drawn from the covariance leave of an exact record.
+/// One force and two channels: the residual of an exact record for machines drawn from the
+/// covariance.
 #[test]
 fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
     let measured =
@@ -153,7 +154,7 @@ fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
 
         assert!(channel.rest < 1e-9 * seen);
         let ratio = channel.machine.unwrap() / seen;
-        // As above: what 2,000 draws know, and the second order.
+        // The limits are the accuracy of 2,000 draws, and the second order.
         assert!((ratio - 1.0).abs() < 0.04, "{ratio:.3}");
     }
 }

@@ -1,4 +1,4 @@
-//! What a force leaves of the measured motion, against its definition written out.
+//! The part of the measured motion that a force does not explain, against its definition.
 
 use mechid_force::{
     Channel, Filter, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, Unexplained,
@@ -113,7 +113,8 @@ fn a_dead_sensor_is_wholly_unexplained() {
     let noise = Noise::PerChannel(vec![1e-3, 1e3]);
     let found = frequency_domain(&bearing(), &dead, &[0], &LINES, &noise).unwrap();
     let channel = found.unexplained().unwrap()[1];
-    // The other sensor, so much better, tells the force and with it what should be there.
+    // The other sensor is much more accurate and thus determines the force and the expected
+    // response.
     close(channel.rest, size, 1e-9);
     close(channel.share(), 1.0, 1e-12);
 }
@@ -133,7 +134,7 @@ fn noise_leaves_what_its_level_says() {
         let channels = found.unexplained().unwrap();
         sum += channels.iter().map(|c| (c.rest / c.noise.unwrap()).powi(2)).sum::<f64>();
     }
-    // Two channels, one force: one of two complex numbers per line is left. χ² of eight degrees of
+    // Two channels and one force leave one of two complex numbers per line. χ² of eight degrees of
     // freedom over eight has a standard deviation of 1/2, its mean over 400 runs one of 0.025.
     let mean = sum / runs as f64;
     assert!((mean - 1.0).abs() < 0.1, "{mean}");
@@ -155,7 +156,7 @@ fn mixed(response: &Response) -> Measurement {
     Measurement::new(record, channels.collect()).unwrap()
 }
 
-/// That the rest is that of the motion which the force makes from rest, in closed form.
+/// Checks that the residual is that of the motion which the force causes from rest, in closed form.
 fn is_rest_of(
     system: &SecondOrderSystem,
     force: &Record,
@@ -202,7 +203,7 @@ fn on_open_records_the_rest_is_that_of_the_motion_which_the_force_makes() {
     assert!(channels.iter().all(|c| c.noise.is_none()));
 }
 
-/// A machine already in motion, and no force: all of it is explained by how it began.
+/// A machine is already in motion without a force: the initial state explains all of it.
 #[test]
 fn a_motion_at_the_start_is_no_rest() {
     let system = random_stable(3, 4);

@@ -1,4 +1,4 @@
-//! Machines whose free response grows, held to a bounded response by the force that is sought.
+//! Machines whose free response grows; the unknown force keeps the response bounded.
 
 use mechid_force::{
     Filter, ForceError, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, discretised,

@@ -1,8 +1,8 @@
-//! Cost of a step and of its preparation where there are many degrees of freedom or nonlinear
-//! forces.
+//! Cost of a step and of its preparation for many degrees of freedom and for nonlinear forces.
 //!
-//! Prints times; the last lines are the ratios: to a loop written by hand for a chain, of nonlinear
-//! steps to linear ones, and to SciPy where `MECHID_BENCH_PYTHON` names a Python interpreter that has it.
+//! Prints times. The last lines are ratios: to a loop written by hand for a chain, of nonlinear
+//! steps to linear ones, and to SciPy if `MECHID_BENCH_PYTHON` names a Python interpreter that has
+//! it.
 
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
@@ -19,7 +19,7 @@ use nalgebra_sparse::csr::CsrMatrix;
 
 const DT: f64 = 1e-3;
 
-/// Returns whether every measurement is only to run once, as `cargo test` lets it.
+/// Returns whether every measurement runs only once, as in `cargo test`.
 fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }
@@ -31,8 +31,8 @@ fn job<'a, T>(mut run: impl FnMut() -> T + 'a) -> Job<'a> {
     Box::new(move || drop(black_box(run())))
 }
 
-/// Shortest of several turns of each, in seconds: what else the machine does only ever adds, and comes
-/// and goes for all of them.
+/// Returns the shortest of several runs of each job, in seconds. Other load on the computer can
+/// only add time, and because the jobs run in turn, it affects all of them.
 fn seconds<const N: usize>(mut jobs: [Job<'_>; N]) -> [f64; N] {
     let mut fastest = [f64::INFINITY; N];
     let begin = Instant::now();
@@ -49,7 +49,7 @@ fn seconds<const N: usize>(mut jobs: [Job<'_>; N]) -> [f64; N] {
     fastest
 }
 
-/// What is shown at the end: a ratio and its goal.
+/// Ratio that is shown at the end, and its goal.
 struct Ratio {
     what: String,
     ratio: f64,
@@ -65,7 +65,7 @@ fn chain(n: usize) -> SparseSystem {
     damped(band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]))
 }
 
-/// A grid with stiffness across it that is not symmetric, as that of seals, where it is `skew`.
+/// Returns a grid; if `skew`, it has unsymmetric cross-coupled stiffness like that of seals.
 fn grid(side: usize, skew: bool) -> SparseSystem {
     let across = if skew { 90.0 } else { 0.0 };
     let at = |i: usize, j: usize| i * side + j;
@@ -86,7 +86,7 @@ fn force(steps: usize) -> Record {
     Record::from_channel(Sampling::new(DT, steps + 1).expect("valid"), values).expect("finite")
 }
 
-/// Newmark on a chain as one would write it: three products, Thomas' algorithm, two sums.
+/// Runs Newmark's method on a chain, written by hand: three products, Thomas' algorithm, two sums.
 fn by_hand(n: usize, steps: usize) -> Vec<[f64; 2]> {
     let (h, q) = (0.5 * DT, 0.25 * DT * DT);
     let (off, diagonal) = (-900.0, 2000.0);
@@ -131,7 +131,7 @@ fn by_hand(n: usize, steps: usize) -> Vec<[f64; 2]> {
     kept
 }
 
-/// SciPy's seconds for the factorisation and for a step.
+/// Returns the times of SciPy for the factorisation and for a step, in seconds.
 fn scipy(kind: &str, size: usize, steps: usize) -> Option<[f64; 2]> {
     let python = std::env::var("MECHID_BENCH_PYTHON").ok()?;
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/scale/scipy_steps.py");
@@ -154,7 +154,7 @@ fn ours(system: &dyn System, force: &Record, dofs: SelectedDofs<'_>) -> mechid_m
     integrate_selected(&AllowUnstable(&scheme), system, dofs, force, &rest).expect("stable")
 }
 
-/// Seconds of a step alone, of each system: a long record less a short one.
+/// Returns the time of one step of each system, in seconds, from a long record and a short one.
 fn per_step<const N: usize>(
     systems: [&dyn System; N],
     steps: usize,
@@ -192,7 +192,7 @@ fn sparse(ratios: &mut Vec<Ratio>) {
             job(|| ours(&system, &short, dofs)),
             job(|| ours(&system, &long, dofs)),
             job(|| scheme.prepare(&system, DT).expect("stable")),
-            // Of a grid there is no such loop; what is measured then is not shown.
+            // There is no such loop for a grid; the time measured instead is not shown.
             job(|| by_hand(n, if kind == "chain" { steps } else { 1 })),
         ]);
         let (step, hand) = ((end - begin) / steps as f64, hand / steps as f64);
@@ -255,8 +255,8 @@ fn rotor(n: usize) -> SparseSystem {
     SparseSystem::new(m, c, k).expect("regular")
 }
 
-/// Newmark on Duffing's oscillator as one would write it: Newton's method on the acceleration, with the tangent, until
-/// the equation holds to twelve digits.
+/// Runs Newmark's method on Duffing's oscillator, written by hand: Newton's method on the
+/// acceleration, with the tangent, until the equation holds to twelve digits.
 fn duffing_by_hand([m, c, k, cubic]: [f64; 4], force: &[f64]) -> [Vec<f64>; 3] {
     let (h, q) = (0.5 * DT, 0.25 * DT * DT);
     let [mut xs, mut vs, mut accelerations] = [(); 3].map(|()| vec![0.0; force.len()]);

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector4};
 /// A loop from rest under a force; it returns x, ẋ, ẍ, or x and two empty vectors.
 pub type Loop = fn(&SecondOrderSystem, &Record) -> [Vec<f64>; 3];
 
-/// The loops for `dof` degrees of freedom that keep `ALL` of x, ẋ, ẍ, or x alone.
+/// Returns the loops for `dof` degrees of freedom that store `ALL` of x, ẋ, ẍ, or only x.
 pub fn loops<const ALL: bool>(dof: usize) -> Vec<(&'static str, Loop)> {
     match dof {
         1 if ALL => vec![
@@ -60,7 +60,7 @@ fn textbook<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec
     [xs, vs, accs]
 }
 
-/// z(t+Δt) = A z + B₀ F(t) + B₁ F(t+Δt) on z = (x, ẋ), the trapezoidal rule worked out.
+/// Runs z(t+Δt) = A z + B₀ F(t) + B₁ F(t+Δt) on z = (x, ẋ), the trapezoidal rule in closed form.
 fn transition_1<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let (m, c, k) = (system.mass()[0], system.damping()[0], system.stiffness()[0]);
     let (dt, f) = (force.sampling().dt(), force.channel(0));
@@ -85,8 +85,8 @@ fn transition_1<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> 
     [xs, vs, accs]
 }
 
-/// x(t+Δt) from x(t) and x(t−Δt), the velocity eliminated: as short as a step gets, and with the digits
-/// that a difference of neighbours loses.
+/// Computes x(t+Δt) from x(t) and x(t−Δt), with the velocity eliminated. This is the shortest
+/// possible step; it loses digits in the difference of neighbouring displacements.
 fn two_before(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let (m, c, k) = (system.mass()[0], system.damping()[0], system.stiffness()[0]);
     let (dt, f) = (force.sampling().dt(), force.channel(0));
@@ -104,7 +104,8 @@ fn two_before(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     [xs, vec![], vec![]]
 }
 
-/// Newmark's recurrence with matrices of fixed size, the effective one inverted beforehand.
+/// Runs Newmark's recurrence with matrices of fixed size; the effective matrix is inverted
+/// beforehand.
 fn fixed_2<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let fixed = |m: &DMatrix<f64>| Matrix2::from_fn(|i, j| m[(i, j)]);
     let (m, c, k) = (fixed(system.mass()), fixed(system.damping()), fixed(system.stiffness()));
@@ -133,7 +134,7 @@ fn fixed_2<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<
     [xs, vs, accs]
 }
 
-/// The trapezoidal rule as one 4×4 product, (I − ½ΔtS)⁻¹ worked out beforehand.
+/// Runs the trapezoidal rule as one 4×4 product; (I − ½ΔtS)⁻¹ is computed beforehand.
 fn transition_2<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let (dt, len) = (force.sampling().dt(), force.len());
     let s = Matrix4::from_fn(|i, j| system.state_matrix()[(i, j)]);

@@ -1,7 +1,7 @@
 //! Cost of a step: every scheme against hand-written loops, and how it grows with n.
 //!
-//! Prints ns per step; the last lines are the ratios to the fastest loop written by hand. Everything
-//! that is compared takes turns within one run.
+//! Prints ns per step; the last lines are the ratios to the fastest loop written by hand. All
+//! compared loops run in turn within one run of the program.
 
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
@@ -17,10 +17,10 @@ use nalgebra::DMatrix;
 
 const SAMPLES: usize = 1_000_000;
 
-/// Seconds that the runs of what is compared take together.
+/// Total time of the loops that are compared, in seconds.
 const SECONDS: f64 = 4.0;
 
-/// Largest ratio of our step to the fastest by hand.
+/// Largest acceptable ratio of the time of a step to that of the fastest loop written by hand.
 const GOAL: f64 = 1.2;
 
 fn schemes() -> Vec<(&'static str, Box<dyn Scheme>)> {
@@ -60,7 +60,7 @@ fn noise(samples: usize, channels: usize) -> Record {
     Record::new(Sampling::new(1e-3, samples).expect("valid"), data).expect("finite")
 }
 
-/// Returns whether every measurement is only to run once, as `cargo test` lets it.
+/// Returns whether every measurement runs only once, as in `cargo test`.
 fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }
@@ -72,8 +72,8 @@ fn timed<'a, T>(name: impl Into<String>, mut run: impl FnMut() -> T + 'a) -> Tim
     (name.into(), Box::new(move || drop(black_box(run()))))
 }
 
-/// Fastest of several turns of each, in ns per step: what else the machine does only ever adds, and
-/// comes and goes for all of them.
+/// Returns the fastest of several runs of each job, in ns per step. Other load on the computer can
+/// only add time, and because the jobs run in turn, it affects all of them.
 fn ns_per_step(steps: usize, seconds: f64, jobs: &mut [Timed<'_>]) -> Vec<f64> {
     let mut fastest = vec![f64::INFINITY; jobs.len()];
     let begin = Instant::now();
@@ -98,10 +98,11 @@ struct Ratio {
     ratio: f64,
 }
 
-/// Times a size with everything kept or with x alone; the ratios of Newmark and Runge–Kutta.
+/// Times systems of `dof` degrees of freedom that store x, ẋ, ẍ or only x, and appends the ratios
+/// of Newmark and Runge–Kutta.
 fn steps<const ALL: bool>(dof: usize, ratios: &mut Vec<Ratio>) {
     let kept = if ALL { "x, ẋ, ẍ" } else { "x alone" };
-    // Enough of them for the factorisations not to count.
+    // There are enough samples that the factorisations do not matter.
     let samples = if dof <= 2 { SAMPLES } else { (2_000_000 / (dof * dof)).max(4000) };
     let samples = if is_tried_only() { samples / 100 } else { samples };
     let (system, force, middle) = (chain(dof), noise(samples, dof), noise(samples, dof));
@@ -120,7 +121,7 @@ fn steps<const ALL: bool>(dof: usize, ratios: &mut Vec<Ratio>) {
             Some(_) => SampledForce::with_mid_step(force, middle),
         };
         jobs.push(timed(*name, move || {
-            // Preparing, stability check included, is paid once and is not the cost of a step.
+            // The preparation, stability check included, is done once and is not part of a step.
             let scheme = AllowUnstable(scheme.as_ref());
             match ALL {
                 true => Some(integrate(&scheme, system, force, rest).expect("stable")),
@@ -139,7 +140,8 @@ fn steps<const ALL: bool>(dof: usize, ratios: &mut Vec<Ratio>) {
         "\nn = {dof}, {kept}: ns per step, memory allocated within; ratio to the loop by hand"
     );
     for ((name, _), time) in jobs.iter().zip(&times) {
-        // Beyond two degrees of freedom a scheme is held against its own sequence of kernels.
+        // For more than two degrees of freedom, a scheme is compared with its own sequence of
+        // kernels.
         let own = times[usize::from(name.contains("Runge"))];
         let ratio = time / if dof <= 2 { fastest } else { own };
         println!("{name:<42} {time:9.2}   {ratio:5.2}");

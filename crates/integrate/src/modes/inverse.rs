@@ -12,12 +12,12 @@ use crate::limits;
 use crate::modes::ModeSearch;
 use crate::sparse::{GeneralLu, NotFactored, SparseLu, combination};
 
-/// x ↦ Re (A − σB)⁻¹B x for the first-order form A z = λ B z of the equation of motion, z = [φ; λφ
-/// / s].
+/// Operator x ↦ Re (A − σB)⁻¹B x, for the first-order form A z = λ B z of the equation of motion
+/// with z = [φ; λφ / s].
 pub(super) struct Inverse<'a> {
     system: &'a SparseSystem,
     pub(super) shift: Complex<f64>,
-    /// s, a frequency (rad/s) near the modes searched for: both halves of z then have comparable
+    /// Frequency s (rad/s) near the modes searched for: both halves of z then have comparable
     /// sizes.
     pub(super) scale: f64,
     factors: Factors,
@@ -40,7 +40,7 @@ impl<'a> Inverse<'a> {
                     if !matches!(error, IntegrateError::SingularShift { .. }) {
                         return Err(error);
                     }
-                    // A machine that is free to drift.
+                    // K is singular, because the machine is free to drift.
                     let omega = match highest_frequency(system) {
                         0.0 => 1.0,
                         omega => omega,
@@ -89,8 +89,8 @@ impl<'a> Inverse<'a> {
         Ok(Self { system, shift, scale: shift.norm(), factors })
     }
 
-    /// Measures velocities in units of `omega` (rad/s) if the operator is about zero and they were
-    /// measured in far smaller ones; returns whether they were.
+    /// Sets the unit of velocities to `omega` (rad/s), if the shift of the operator is zero and the
+    /// present unit is far smaller; returns whether the unit was changed.
     ///
     /// Modes far above the unit have a numerical range of size 1/unit about zero. Until they
     /// converge, the estimates of their eigenvalues lie anywhere in this range.
@@ -104,7 +104,7 @@ impl<'a> Inverse<'a> {
         is_far
     }
 
-    /// Roughly the lowest natural frequency (rad/s) without damping, by steps of x ← K⁻¹M x.
+    /// Estimates the lowest natural frequency (rad/s) without damping, by steps of x ← K⁻¹M x.
     fn lowest(&mut self) -> f64 {
         let n = self.system.dof();
         let Factors::Real(factors) = &mut self.factors else { return 1.0 };
@@ -124,8 +124,8 @@ impl<'a> Inverse<'a> {
         growth.sqrt().recip()
     }
 
-    /// Applies the operator. With Q y = −(M v + (C + σM) x) and w = x + σ y it returns the real
-    /// parts of y and w; v and w are in units of s.
+    /// Applies the operator: returns the real parts of y and w = x + σ y, where y solves Q y = −(M
+    /// v + (C + σM) x) with Q = K + σC + σ²M; v and w are in units of s.
     pub(super) fn apply(&mut self, z: &DVector<f64>) -> DVector<f64> {
         let n = self.system.dof();
         let (x, v) = z.as_slice().split_at(n);
@@ -155,8 +155,8 @@ impl<'a> Inverse<'a> {
         image
     }
 
-    /// Returns the eigenvalue of the system for `theta` of the operator; of two candidates the one
-    /// nearer to `about`.
+    /// Returns the eigenvalue of the system for the eigenvalue `theta` of the operator; of two
+    /// candidates, it is the one nearer to `about`.
     pub(super) fn eigenvalue(&self, theta: Complex<f64>, about: Complex<f64>) -> Complex<f64> {
         let omega = self.shift.im;
         if omega == 0.0 {
@@ -178,7 +178,7 @@ fn singular(system: &SparseSystem, shift: Complex<f64>, error: NotFactored) -> I
     })
 }
 
-/// y ← y − scale · A x.
+/// Computes y ← y − scale · A x.
 fn subtract(matrix: &CsrMatrix<f64>, x: &[f64], scale: f64, y: &mut [f64]) {
     if scale == 0.0 {
         return;
@@ -189,7 +189,7 @@ fn subtract(matrix: &CsrMatrix<f64>, x: &[f64], scale: f64, y: &mut [f64]) {
     }
 }
 
-/// The real part of K + σC + σ²M, and the sizes of the sums' terms row by row.
+/// Returns the real part of K + σC + σ²M, and the size of its terms for each row.
 fn real_part(system: &SparseSystem, shift: Complex<f64>) -> (CsrMatrix<f64>, Vec<f64>) {
     combination(&[
         (1.0, system.matrix(Matrix::Stiffness)),
@@ -198,7 +198,7 @@ fn real_part(system: &SparseSystem, shift: Complex<f64>) -> (CsrMatrix<f64>, Vec
     ])
 }
 
-/// K + σC + σ²M, and the sizes of the sums' terms row by row.
+/// Returns K + σC + σ²M, and the size of its terms for each row.
 pub(crate) fn dynamic_stiffness(
     system: &SparseSystem,
     shift: Complex<f64>,
@@ -215,14 +215,14 @@ pub(crate) fn dynamic_stiffness(
     (CscMatrix::from(&sum), sizes.iter().zip(&more).map(|(a, b)| a + b).collect())
 }
 
-/// √(‖K‖ / ‖M‖) (rad/s), the size of the highest natural frequency.
+/// Returns √(‖K‖ / ‖M‖) (rad/s), an estimate of the size of the highest natural frequency.
 pub(super) fn highest_frequency(system: &SparseSystem) -> f64 {
     let [mass, stiffness] =
         [Matrix::Mass, Matrix::Stiffness].map(|which| largest_row(system.matrix(which)));
     (stiffness / mass).sqrt()
 }
 
-/// Largest sum of moduli of a row.
+/// Returns the largest sum of moduli of a row.
 pub(super) fn largest_row(matrix: &CsrMatrix<f64>) -> f64 {
     let sums = matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum());
     sums.fold(0.0, f64::max)

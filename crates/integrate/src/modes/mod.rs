@@ -13,7 +13,7 @@ use crate::modes::inverse::{Inverse, highest_frequency};
 use crate::modes::shift::{Reach, merge, next_shift};
 use crate::modes::space::{Space, residual_of};
 
-/// The modes of a sparse system that [`sparse_modes`] looks for.
+/// Modes of a sparse system that [`sparse_modes`] searches for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ModeSearch {
     /// Modes of the lowest natural frequencies |λ|.
@@ -22,7 +22,7 @@ pub enum ModeSearch {
     NearOmega(f64),
 }
 
-/// A mode of a sparse system, and how well it meets the equation.
+/// A mode of a sparse system, and its residual in the equation of motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparseMode {
     /// The mode.
@@ -85,7 +85,7 @@ pub fn sparse_modes(
     if !(omega > 0.0 && omega.is_finite()) {
         return Err(IntegrateError::SearchFrequency { omega });
     }
-    // Near zero the dynamic stiffness of a free structure is singular to rounding.
+    // A shift near zero makes the dynamic stiffness of a free structure singular to rounding.
     let slow = omega <= limits::FREE_SHIFT * highest_frequency(system);
     if slow
         && Inverse::is_free(system)
@@ -181,7 +181,7 @@ fn search_modes(
             target = most.min(target + (target / 4).max(10));
         };
         let Some(next) = next_shift(&modes, &reach, search, usable == count) else { break };
-        // Complex factors need twice the memory: without them the search ends here.
+        // Complex factors need twice the memory; if there is not enough, the search ends here.
         let Ok(moved) = Inverse::near(system, next) else { break };
         inverse = moved;
         known = modes.into_iter().filter(|mode| mode.converged).collect();
@@ -189,7 +189,7 @@ fn search_modes(
     Err(IntegrateError::ModesNotConverged { wanted: count, found: best, vectors: most })
 }
 
-/// The first `count` of all modes of a small system.
+/// Returns the first `count` of all modes of a small system, in the order of the search.
 fn all_modes(
     system: &SparseSystem,
     search: ModeSearch,
@@ -204,7 +204,7 @@ fn all_modes(
     Ok(modes.into_iter().map(|mode| SparseMode::new(mode, system)).collect())
 }
 
-/// A mode, and whether it has converged.
+/// Approximation of a mode, and whether it has converged.
 #[derive(Clone)]
 struct Candidate {
     mode: SparseMode,

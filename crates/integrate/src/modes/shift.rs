@@ -7,7 +7,7 @@ use crate::limits;
 use crate::modes::{Candidate, ModeSearch};
 
 impl ModeSearch {
-    /// Returns the sort key of the search: the distance of an eigenvalue.
+    /// Returns the distance of an eigenvalue from the target of the search; modes are sorted by it.
     pub(super) fn distance(self, value: Complex<f64>) -> f64 {
         match self {
             Self::Lowest => value.norm(),
@@ -32,7 +32,8 @@ impl Reach {
         Self { shift, radius: converged.last().map_or(0.0, |(distance, _)| *distance) }
     }
 
-    /// Returns the first of the modes within the radius; the others were found from another shift.
+    /// Returns the first of the modes within the radius; modes outside it were found from another
+    /// shift.
     fn first(&self, modes: &[Candidate]) -> Option<Complex<f64>> {
         let within = |value: &Complex<f64>| (value - self.shift).norm() <= self.radius;
         modes.iter().map(Candidate::value).find(within)
@@ -48,7 +49,7 @@ impl Reach {
             ModeSearch::Lowest => {
                 search.distance(first) >= search.distance(self.shift) || gap <= 0.5 * self.radius
             }
-            // Unknown modes may be on the other side of the first, at the distance of the last.
+            // Unknown modes may be beyond the first mode, at the distance of the last one.
             ModeSearch::NearOmega(_) => {
                 gap + (last - first).norm()
                     <= self.radius * (1.0 + limits::SAME_EIGENVALUE) + gap * limits::SAME_EIGENVALUE

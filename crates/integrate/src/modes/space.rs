@@ -14,11 +14,11 @@ use crate::modes::{Candidate, SparseMode};
 /// An orthonormal basis of the vectors reached so far, and the operator in it.
 pub(super) struct Space {
     basis: Vec<DVector<f64>>,
-    /// Column j: products of the operator's j-th image with the basis.
+    /// Column j: products of the basis vectors with the image of basis vector j under the operator.
     columns: Vec<Vec<f64>>,
     /// Number of images.
     pub(super) products: usize,
-    /// Number of vectors without structure that were added.
+    /// Number of pseudo-random vectors that were added.
     added: usize,
 }
 
@@ -44,7 +44,7 @@ impl Space {
         }
     }
 
-    /// Takes the parts along the basis out of `vector`; returns them.
+    /// Subtracts the parts along the basis from `vector`, and returns these parts.
     fn orthogonalise(&self, vector: &mut DVector<f64>) -> Vec<f64> {
         let mut parts = vec![0.0; self.basis.len()];
         for _ in 0..2 {
@@ -75,7 +75,7 @@ impl Space {
         }
     }
 
-    /// Approximate modes, each with whether it has converged.
+    /// Returns approximate modes and, for each, whether it has converged.
     pub(super) fn modes(
         &self,
         system: &SparseSystem,
@@ -90,7 +90,7 @@ impl Space {
             return Err(overflow());
         }
         let remainder = DMatrix::from_fn(self.basis.len() - m, m, |i, j| entry(m + i, j));
-        // Column j ends with the vector that its image added.
+        // Column j ends with the entry of the basis vector that its image added.
         let below = self.columns.iter().enumerate().map(|(j, column)| column.len() - 1 - j);
         let below = below.max().unwrap_or(0);
         let mut modes: Vec<Candidate> = Vec::new();
@@ -175,7 +175,7 @@ fn next_eigenvector(
     Some(if is_independent { apart.normalize() } else { coordinates })
 }
 
-/// ‖(λ²M + λC + K) φ‖ relative to the size of its terms.
+/// Returns ‖(λ²M + λC + K) φ‖ relative to the size of its terms.
 pub(super) fn residual_of(
     system: &SparseSystem,
     value: Complex<f64>,

@@ -22,7 +22,7 @@ pub trait NonlinearForce: fmt::Debug + Send + Sync {
     }
 }
 
-/// Derivatives of a nonlinear force by displacement and velocity.
+/// Derivatives of a nonlinear force with respect to displacement and velocity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tangents {
     /// ∂g/∂x, p × p, in N/m.

@@ -19,7 +19,7 @@ pub(crate) struct LocalForces {
 #[derive(Debug, Clone)]
 struct Member {
     force: Arc<dyn NonlinearForce>,
-    /// Index of each of its degrees of freedom among those of all forces.
+    /// For each degree of freedom of the force, its index among those of all forces.
     at: Vec<usize>,
     x: Vec<f64>,
     v: Vec<f64>,
@@ -107,7 +107,7 @@ impl Member {
                 let largest = values.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
                 let step = limits::TANGENT_DIFFERENCE * if largest > 0.0 { largest } else { 1.0 };
                 values[j] = original + step;
-                // Rounding changes the step; the difference quotient needs the rounded one.
+                // Rounding changes the step, and the difference quotient needs the rounded step.
                 let step = values[j] - original;
                 self.force.force(time, &self.x, &self.v, &mut self.moved);
                 let values = if of_velocity { &mut self.v } else { &mut self.x };
@@ -125,8 +125,8 @@ impl Member {
     }
 }
 
-/// a = a_linear − W g(x̂ + β̂ a, v̂ + γ̂ a, t), W being the columns of M̂⁻¹ at the nonlinear
-/// forces.
+/// Equation a = a_linear − W g(x̂ + β̂ a, v̂ + γ̂ a, t) for the accelerations a; W has the columns
+/// of M̂⁻¹ at the nonlinear forces g.
 ///
 /// Only the p accelerations at these forces are unknown; the others follow from them.
 #[derive(Debug)]
@@ -246,7 +246,7 @@ impl LocalNewton {
         Err(IntegrateError::NotSolved { time, residual: missed })
     }
 
-    /// Returns the largest acceleration, the scale of a residual.
+    /// Returns the largest acceleration, to which a residual is compared.
     fn size(&self) -> f64 {
         self.linear.amax().max(self.a.amax())
     }

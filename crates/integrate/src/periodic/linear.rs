@@ -1,4 +1,4 @@
-//! The periodic steady state, solved for instead of waited for.
+//! Periodic steady state, computed directly, without a simulation of the transient.
 
 use mechid_model::Response;
 use mechid_numerics::krylov::gmres;
@@ -47,8 +47,8 @@ pub fn integrate_periodic<'a>(
     periodic(scheme, system, table, motion)
 }
 
-/// Integrates as [`integrate_periodic`] does, with a force on some degrees of freedom and the
-/// response of some: samples × `dofs.forced` (N) in, samples × `dofs.observed` out.
+/// Finds the response as [`integrate_periodic`] does, but for selected degrees of freedom: the
+/// force has samples × `dofs.forced` (N), the response samples × `dofs.observed`.
 ///
 /// ```
 /// use mechid_integrate::{Newmark, SelectedDofs, integrate_periodic_selected};
@@ -137,7 +137,7 @@ fn by_whole_map(
     motion.into_response(table)
 }
 
-/// Finds the periodic response without forming the matrix.
+/// Finds the periodic response in a Krylov space, without forming the matrix Φ.
 fn by_products(
     scheme: &dyn Scheme,
     system: &dyn System,
@@ -153,7 +153,7 @@ fn by_products(
     for _ in 0..limits::PERIODIC_SEARCHES {
         let gap = shooting.gap(&start)?;
         if !Shooting::missed(&gap).is_finite() {
-            // Refused with the sample that overflows.
+            // The integration refuses this response and reports the sample that overflows.
             return shooting.response(&start, motion);
         }
         let solution = gmres::solve(&gap, limits::PERIODIC_GMRES_RESIDUAL, most, |state, end| {
@@ -186,8 +186,8 @@ fn by_products(
     Err(IntegrateError::PeriodNotClosed { period: shooting.period(), missed, products })
 }
 
-/// Integrates as [`integrate_periodic`] does, for a force given as a function of time with the
-/// period of `sampling`; `force(t, f)` writes the n components at t (s) into `f` (N).
+/// Finds the response as [`integrate_periodic`] does, for a force given as a function of time with
+/// the period of `sampling`; `force(t, f)` writes the n components at t (s) into `f` (N).
 ///
 /// # Errors
 /// The errors of [`integrate_periodic`]; [`IntegrateError::NotFinite`] if the function yields a NaN
@@ -236,8 +236,9 @@ mod tests {
         Multisine::flat(1..=9, 1.0, Phases::SchroederBinary).unwrap().sample(sampling).unwrap()
     }
 
-    /// Judge: the map formed whole, of every scheme. With the weaker damping nearly half of the 140
-    /// modes keep a tenth of their motion for a period, so that (I − Φ)⁻¹ multiplies rounding.
+    /// Judge: the map of every scheme, formed as a matrix. With the weaker damping nearly half of
+    /// the 140 modes keep a tenth of their motion for a period, so that (I − Φ)⁻¹ multiplies
+    /// rounding.
     #[test]
     fn a_search_finds_what_the_whole_map_gives() {
         let force = record(160);

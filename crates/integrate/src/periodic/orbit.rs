@@ -112,8 +112,8 @@ pub fn periodic_orbit<'a>(
     closed(scheme, system, table, motion, guess, settling)
 }
 
-/// Finds a periodic response as [`periodic_orbit`] does, with a force on some degrees of freedom
-/// and the response of some: samples × `dofs.forced` (N) in, samples × `dofs.observed` out.
+/// Finds a periodic response as [`periodic_orbit`] does, but for selected degrees of freedom: the
+/// force has samples × `dofs.forced` (N), the response samples × `dofs.observed`.
 ///
 /// # Errors
 /// The errors of [`periodic_orbit`]; [`IntegrateError::DofOutside`] and
@@ -211,7 +211,7 @@ fn whole_derivative(
     Ok(derivative)
 }
 
-/// The step that closes the orbit of the linearised map, in parts of the scales.
+/// Returns the Newton step that closes the orbit of the linearised map, in units of the scales.
 fn newton_step(
     period: f64,
     derivative: &DMatrix<f64>,
@@ -245,7 +245,7 @@ fn nearer(
         let next = state + step.component_mul(&shooting.scales) * part;
         match shooting.gap(&next) {
             Ok(gap) if Shooting::missed(&gap) < missed => return Ok(Some([next, gap])),
-            // Too far away for the equation of a step to have a solution.
+            // The new state is too far away: the equation of a step has no solution there.
             Ok(_) | Err(IntegrateError::NotSolved { .. }) => part *= 0.5,
             Err(other) => return Err(other),
         }
@@ -292,7 +292,7 @@ fn by_products(
     Err(IntegrateError::NoOrbit { period: shooting.period(), missed })
 }
 
-/// The largest multiplier of the orbit through `state` and its residual; `None` if numbers
+/// Returns the largest multiplier of the orbit through `state`, and its residual; `None` if numbers
 /// overflow.
 fn largest_multiplier(
     shooting: &mut Shooting<'_>,
@@ -326,7 +326,7 @@ mod tests {
     use crate::schemes::newmark::Newmark;
     use crate::schemes::runge_kutta::RungeKutta4;
 
-    /// Judge: the derivative formed whole, for the state and the largest multiplier.
+    /// Judge: the derivative formed as a matrix, for the state and the largest multiplier.
     #[test]
     fn products_lead_to_the_orbit_of_the_whole_derivative() {
         let dof = 12;
@@ -362,7 +362,7 @@ mod tests {
             assert!(missed < 1e-9, "{}: {missed:e}", scheme.name());
             let (largest, error) = largest_multiplier(&mut shooting, &found).unwrap().unwrap();
             let gap = (largest.norm() - multipliers[0].norm()).abs();
-            // Of a matrix without symmetry the error is a small multiple of the residual.
+            // For a matrix without symmetry, the error is a small multiple of the residual.
             assert!(gap < 1e-5 && error < 1e-6, "{}: {gap:e} {error:e}", scheme.name());
             assert!(largest.norm() > 0.1, "{largest}");
         }

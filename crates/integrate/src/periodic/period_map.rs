@@ -6,11 +6,12 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use crate::error::IntegrateError;
 use crate::stepping::transition::Transition;
 
-/// I − Φ, factored in balanced coordinates, for the independent part of the state.
+/// I − Φ, factored in balanced coordinates, for the independent part y of the state.
 ///
-/// After a free step most schemes satisfy M ẍ + C ẋ + K x = 0, so that ẍ = G y follows from the
-/// rest of the state, y, and y' = y + (D_yy + D_ya G) y. With forces ẍ = G y + e; e depends only on
-/// the forces of the last step and is the same at both ends of the period.
+/// The change of the state in a step is D times the state, with the blocks D_yy and D_ya for y and
+/// the accelerations ẍ. After a free step most schemes satisfy M ẍ + C ẋ + K x = 0, so that ẍ = G y
+/// follows from y, and the next y is y + (D_yy + D_ya G) y. With forces ẍ = G y + e, where e
+/// depends only on the forces of the last step and is the same at both ends of the period.
 pub(crate) struct PeriodMap {
     /// I − Φ on y, or on the whole state.
     factored: LU<f64, Dyn, Dyn>,
@@ -21,8 +22,8 @@ pub(crate) struct PeriodMap {
 }
 
 impl PeriodMap {
-    /// Makes the map of a scheme in `dof` degrees of freedom, over as many steps as `sampling` has
-    /// samples.
+    /// Creates the map of a scheme in `dof` degrees of freedom, over as many steps as `sampling`
+    /// has samples.
     pub(crate) fn new(
         transition: &Transition,
         dof: usize,
@@ -42,8 +43,8 @@ impl PeriodMap {
         };
         let steps = sampling.len();
         let over_period = -power_less_identity(&change, steps);
-        // Rounding changes the matrix of a step by ε of its change, and a product by ε of its
-        // result.
+        // Rounding changes the matrix of a step by ε times its change D, and a product of matrices
+        // by ε times the product.
         let rounding = f64::EPSILON
             * (steps as f64 * change.norm() + f64::from(steps.ilog2() + 1) * over_period.norm());
         let size = over_period.norm().max(1.0);
@@ -65,7 +66,8 @@ impl PeriodMap {
         self.map(state, |rest| rest.fill(0.0))
     }
 
-    /// Returns the periodic state, if the state at rest under the same forces ends in `state`.
+    /// Returns the periodic state; `state` is the end of a period that begins at rest, under the
+    /// same forces.
     pub(crate) fn repeat(&self, state: &[f64]) -> Vec<f64> {
         self.map(state, |rest| {
             self.factored.solve_mut(rest);
@@ -92,13 +94,13 @@ impl PeriodMap {
         balanced.component_mul(&self.scales).as_slice().to_vec()
     }
 
-    /// Largest balanced entry.
+    /// Returns the largest balanced entry of a state.
     pub(crate) fn norm(&self, state: &[f64]) -> f64 {
         state.iter().zip(&self.scales).fold(0.0, |most, (z, s)| f64::max(most, (z / s).abs()))
     }
 }
 
-/// D in blocks: the accelerations, and the rest of the state.
+/// Blocks of the change D of the state in a step: the accelerations, and the rest of the state.
 struct Blocks {
     rest_rest: DMatrix<f64>,
     rest_acceleration: DMatrix<f64>,

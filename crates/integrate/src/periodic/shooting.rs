@@ -15,7 +15,7 @@ pub(crate) struct Shooting<'a> {
     simulation: Simulation,
     table: ForceTable<'a>,
     dof: usize,
-    /// Sizes of the numbers of a state: the largest displacement for displacements, and so on.
+    /// Scales of the entries of a state: the largest displacement for displacements, and so on.
     pub(crate) scales: DVector<f64>,
 }
 
@@ -46,8 +46,8 @@ impl<'a> Shooting<'a> {
         (limits::SEARCH_BYTES / bytes).clamp(2, limits::SEARCH_VECTORS)
     }
 
-    /// The state after the start from `guess` and `settling` periods; the scales come from the last
-    /// of them.
+    /// Returns the state after the start from `guess` and `settling` periods; the last of them
+    /// gives the scales.
     pub(crate) fn settle(
         &mut self,
         guess: &InitialState,
@@ -85,7 +85,7 @@ impl<'a> Shooting<'a> {
         Ok(DVector::from_column_slice(&self.simulation.state))
     }
 
-    /// The state at the end of the period, from `state` at sample `from`.
+    /// Returns the state at the end of the period, from `state` at sample `from`.
     pub(crate) fn pass(
         &mut self,
         state: &DVector<f64>,
@@ -147,8 +147,8 @@ impl<'a> Shooting<'a> {
         Ok(())
     }
 
-    /// The response that begins in `state`, written into a `motion` of as many samples as a period
-    /// has.
+    /// Returns the response that begins in `state`, written into a `motion` with as many samples as
+    /// a period.
     pub(crate) fn response(
         mut self,
         state: &DVector<f64>,

@@ -9,8 +9,9 @@ use crate::modes::inverse::dynamic_stiffness;
 use crate::sparse::GeneralLu;
 use crate::stepping::selected_dofs::SelectedDofs;
 
-/// The response of some degrees of freedom of a sparse system that repeats with a force on some,
-/// band-limited between its samples: samples × `dofs.forced` (N) in, samples × `dofs.observed` out.
+/// Computes the response of a sparse system that repeats with a force on some degrees of freedom,
+/// at some degrees of freedom. The force is band-limited between its samples and has samples ×
+/// `dofs.forced` (N); the response has samples × `dofs.observed`.
 ///
 /// ```
 /// use mechid_integrate::{SelectedDofs, sparse_steady_state};

@@ -28,10 +28,10 @@ pub enum SubStepForce {
 /// q₁ = (ρ∞ + 1) / (2γ (ρ∞ − 1) + 4)        q₂ = ½ − γ q₁        q₀ = 1 − q₁ − q₂
 /// ```
 ///
-/// with equilibrium at t + γΔt and t + Δt. Second order and unconditionally stable; ρ∞ is the
-/// spectral radius at very large steps. For ρ∞ = 0 the second sub-step is the backward difference
-/// of second order over the three instants. Each step takes two solves. Starts from the consistent
-/// acceleration.
+/// with equilibrium at t + γΔt and t + Δt. The scheme is of second order and unconditionally
+/// stable; ρ∞ is the spectral radius at very large steps. For ρ∞ = 0 the second sub-step is the
+/// backward difference of second order over the three instants. Each step takes two solves. The
+/// scheme starts from the consistent acceleration.
 ///
 /// # Source
 /// Bathe & Baig, Comput. Struct. 83 (2005), 2513–2524 (γ = ½, ρ∞ = 0); Noh & Bathe, Comput. Struct.
@@ -44,17 +44,17 @@ pub struct Bathe {
 }
 
 impl Bathe {
-    /// The scheme of 2005: two sub-steps of ½Δt, ρ∞ = 0. The two matrices to factor differ.
+    /// The scheme of 2005: two sub-steps of ½Δt, ρ∞ = 0. Two different matrices are factored.
     pub const HALVES: Self = Self { rho: 0.0, splitting: 0.5, force: SubStepForce::Linear };
 
-    /// ρ∞-Bathe: ρ∞, a pure number, between 0 and 1, with γ = (2 − √(2 + 2ρ∞))/(1 − ρ∞), for which
-    /// both sub-steps share one matrix.
+    /// Creates the ρ∞-Bathe scheme: ρ∞, a pure number, is between 0 and 1, and γ = (2 − √(2 +
+    /// 2ρ∞))/(1 − ρ∞), for which both sub-steps share one matrix.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].
     pub fn new(rho_infinity: f64) -> Result<Self, IntegrateError> {
         let rho = check_parameter("Bathe", "ρ∞", rho_infinity, 0.0, 1.0)?;
-        // The same quotient without the 0/0 at ρ∞ = 1.
+        // This is γ in a form without the quotient 0/0 at ρ∞ = 1.
         let splitting = 2.0 / (2.0 + (2.0 + 2.0 * rho).sqrt());
         Ok(Self { rho, splitting, force: SubStepForce::Linear })
     }
@@ -65,12 +65,12 @@ impl Bathe {
         Self { force, ..self }
     }
 
-    /// γ, the first sub-step in parts of the step, a pure number.
+    /// Fraction γ of the step that the first sub-step takes, a pure number.
     pub fn splitting(&self) -> f64 {
         self.splitting
     }
 
-    /// q₀, q₁, q₂.
+    /// Returns the weights q₀, q₁, q₂.
     fn weights(&self) -> [f64; 3] {
         let (rho, gamma) = (self.rho, self.splitting);
         let q1 = (rho + 1.0) / (2.0 * gamma * (rho - 1.0) + 4.0);
@@ -144,11 +144,11 @@ struct BatheStepper {
     mass: EffectiveMatrix,
     dt: f64,
     scheme: Bathe,
-    /// ½γΔt.
+    /// Half of the first sub-step, ½γΔt.
     half: f64,
-    /// q₀Δt, q₁Δt, q₂Δt.
+    /// Products q₀Δt, q₁Δt, q₂Δt.
     weights: [f64; 3],
-    /// ẋ and ẍ at t + γΔt.
+    /// Velocity ẋ and acceleration ẍ at t + γΔt.
     inner: Vec<f64>,
     x_hat: Vec<f64>,
     v_hat: Vec<f64>,

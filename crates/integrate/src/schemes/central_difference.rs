@@ -11,14 +11,16 @@ use crate::stepping::effective_matrix::Equations;
 use crate::stepping::stepper::{Instant, Loads, Stepper, check_step};
 use crate::system::System;
 
-/// Displacement before t = 0 of central difference.
+/// Displacement before t = 0 with which central difference starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CentralDifferenceStart {
-    /// x(−Δt) = x(0) − Δt ẋ(0) + ½Δt² ẍ(0), with the consistent acceleration: second order.
+    /// Step back by Taylor's series, x(−Δt) = x(0) − Δt ẋ(0) + ½Δt² ẍ(0), with the consistent
+    /// acceleration: second order.
     #[default]
     Taylor,
-    /// x(−Δt) = x(0): the system is at rest until the force begins at t = 0. First order unless
-    /// F(0) balances x(0). The velocity at t = 0 then follows from the formula.
+    /// No motion before t = 0, x(−Δt) = x(0): the system is at rest until the force begins at t =
+    /// 0. The error is of first order unless F(0) balances x(0). The velocity at t = 0 then follows
+    /// from the formula.
     Rest,
 }
 
@@ -28,8 +30,9 @@ pub enum CentralDifferenceStart {
 /// ẋ = [x(t+Δt) − x(t−Δt)] / 2Δt        ẍ = [x(t+Δt) − 2x + x(t−Δt)] / Δt²
 /// ```
 ///
-/// Second order; stable up to ωΔt = 2, damped or not. Velocity and acceleration belong to the same
-/// instant as the displacement, although they are known one step later; no quantity is shifted.
+/// The scheme is of second order, and stable up to ωΔt = 2, damped or not. Velocity and
+/// acceleration belong to the same instant as the displacement, although they are known one step
+/// later; no quantity is shifted.
 ///
 /// The state has the velocities at half steps, which avoids the cancellation in differences of
 /// displacements at small steps; otherwise the numbers are the same.
@@ -77,8 +80,8 @@ impl Scheme for CentralDifference {
 
 /// Central difference prepared: state `[x, ẋ, ẍ]`.
 ///
-/// With h = ẋ + ½Δt ẍ, the velocity half a step later, x(t+Δt) = x + Δt h, and equilibrium at
-/// t + Δt with ẋ(t+Δt) = h + ½Δt ẍ(t+Δt) gives the new acceleration: Newmark's step for β = 0.
+/// The velocity half a step later is h = ẋ + ½Δt ẍ, and x(t+Δt) = x + Δt h. Equilibrium at t + Δt
+/// with ẋ(t+Δt) = h + ½Δt ẍ(t+Δt) gives the new acceleration: this is Newmark's step for β = 0.
 #[derive(Debug)]
 struct CentralDifferenceStepper {
     inner: NewmarkStepper,

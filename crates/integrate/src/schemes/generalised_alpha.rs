@@ -30,7 +30,8 @@ enum Member {
     WoodBossakZienkiewicz,
 }
 
-/// The generalised-α method: Newmark's formulas with a = the carried acceleration,
+/// The generalised-α method: Newmark's formulas for an acceleration a that is carried from step to
+/// step,
 ///
 /// ```text
 /// x(t+Δt) = x + Δt ẋ + Δt² [(½ − β) a + β a(t+Δt)]
@@ -44,10 +45,10 @@ enum Member {
 /// γ = ½ − α_m + α_f                      β = ¼ (1 − α_m + α_f)²
 /// ```
 ///
-/// Second order and unconditionally stable. ρ∞, the spectral radius at very large steps, is the
-/// fraction of its amplitude that a motion too fast for the step keeps in each step: 1 damps no
-/// motion, 0 removes it in one step. Of all schemes with this property it damps slow motions least.
-/// Loads at t and t + Δt. Starts from the consistent acceleration.
+/// The method is of second order and unconditionally stable. ρ∞, the spectral radius at very large
+/// steps, is the fraction of its amplitude that a motion too fast for the step keeps in each step:
+/// 1 damps no motion, 0 removes it in one step. Of all schemes with this property it damps slow
+/// motions least. It uses the loads at t and t + Δt, and starts from the consistent acceleration.
 ///
 /// # Source
 /// Chung & Hulbert, J. Appl. Mech. 60 (1993), 371–375, eqs. (1)–(6), (17) and (25); HHT-α: Hilber,
@@ -63,7 +64,8 @@ pub struct GeneralisedAlpha {
 }
 
 impl GeneralisedAlpha {
-    /// The member with the least damping of slow motions: ρ∞, a pure number, between 0 and 1.
+    /// Creates the member with the least damping of slow motions; ρ∞ is a pure number between 0 and
+    /// 1.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].
@@ -73,8 +75,8 @@ impl GeneralisedAlpha {
         Ok(Self::from_parameters(Member::Generalised, rho, alpha_m, alpha_f))
     }
 
-    /// Returns HHT-α, which takes the inertia at t + Δt: ρ∞, a pure number, between ½ and 1; its α
-    /// is (ρ∞ − 1)/(ρ∞ + 1), between −⅓ and 0.
+    /// Returns HHT-α, which has the inertia force at t + Δt; ρ∞ is a pure number between ½ and 1,
+    /// and its α is (ρ∞ − 1)/(ρ∞ + 1), between −⅓ and 0.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].
@@ -83,8 +85,8 @@ impl GeneralisedAlpha {
         Ok(Self::from_parameters(Member::HilberHughesTaylor, rho, 0.0, (1.0 - rho) / (1.0 + rho)))
     }
 
-    /// Returns WBZ-α, which takes all forces except inertia at t + Δt: ρ∞, a pure number, between 0
-    /// and 1; its α is (ρ∞ − 1)/(ρ∞ + 1).
+    /// Returns WBZ-α, which has all forces except inertia at t + Δt; ρ∞ is a pure number between 0
+    /// and 1, and its α is (ρ∞ − 1)/(ρ∞ + 1).
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].
@@ -102,7 +104,7 @@ impl GeneralisedAlpha {
         Self { member, rho, alpha_m, alpha_f, acceleration: AlphaAcceleration::default() }
     }
 
-    /// Returns the scheme with another acceleration returned.
+    /// Returns the scheme with another choice of the acceleration that it returns.
     #[must_use]
     pub fn with_acceleration(self, acceleration: AlphaAcceleration) -> Self {
         Self { acceleration, ..self }

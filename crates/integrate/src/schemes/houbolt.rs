@@ -22,9 +22,9 @@ pub enum HouboltStart {
     /// Displacements given by the caller, in m. The velocities there are differences of second
     /// order over x(0), x(Δt), x(2Δt), the accelerations from the equation of motion.
     Given {
-        /// x(Δt), one entry per degree of freedom.
+        /// Displacement x(Δt), one entry per degree of freedom.
         at_dt: Vec<f64>,
-        /// x(2Δt), one entry per degree of freedom.
+        /// Displacement x(2Δt), one entry per degree of freedom.
         at_2dt: Vec<f64>,
     },
 }
@@ -36,8 +36,9 @@ pub enum HouboltStart {
 /// ẋ(t+Δt) = [11 x(t+Δt) − 18 x(t) + 9 x(t−Δt) − 2 x(t−2Δt)] / 6Δt
 /// ```
 ///
-/// Second order, unconditionally stable, with strong numerical damping. Loads at t + Δt. The state
-/// has backward differences of the displacement, which avoid cancellation at small steps.
+/// The scheme is of second order and unconditionally stable, with strong numerical damping. It uses
+/// the load at t + Δt. The state has backward differences of the displacement, which avoid
+/// cancellation at small steps.
 ///
 /// # Source
 /// Dissertation eqs. (3.3.2.1)–(3.3.2.4) and table 3.2; Bathe (1982), section 9.2.2.
@@ -103,7 +104,7 @@ impl Scheme for Houbolt {
 
 /// Houbolt's scheme prepared: state `[x, ẋ, ẍ, s]` with s = ∇³x/Δt².
 ///
-/// With u = ∇x/Δt and w = ∇²x/Δt² the formulas above are ẍ = w + s and ẋ = u + ½Δt w + ⅓Δt s, so
+/// With u = ∇x/Δt and w = ∇²x/Δt², Houbolt's formulas are ẍ = w + s and ẋ = u + ½Δt w + ⅓Δt s, so
 /// that x, ẋ, ẍ, s are equivalent to four displacements. In one step
 ///
 /// ```text
@@ -122,7 +123,7 @@ struct HouboltStepper {
 }
 
 impl HouboltStepper {
-    /// w = ∇²x/Δt² and u = ∇x/Δt in degree of freedom `i`.
+    /// Returns w = ∇²x/Δt² and u = ∇x/Δt in degree of freedom `i`.
     fn differences(&self, state: &[f64], i: usize) -> (f64, f64) {
         let n = self.x_hat.len();
         let (v, a, s) = (state[n + i], state[2 * n + i], state[3 * n + i]);
@@ -198,7 +199,8 @@ impl Stepper for HouboltStepper {
         if let HouboltStart::Given { .. } = self.start {
             self.finish_given(&begin[0], early, rest)?;
         }
-        // u and w from the steps themselves, not from differences of the displacements.
+        // The values u and w come from the steps themselves, not from differences of the
+        // displacements.
         let (x, _, a) = motion(&rest[1], n);
         for i in 0..n {
             let u = changes[1][i] / self.dt;
@@ -214,7 +216,7 @@ impl Stepper for HouboltStepper {
 }
 
 impl HouboltStepper {
-    /// The change from sample `k` to `k + 1` of the starting procedure.
+    /// Returns the change from sample `k` to `k + 1` of the starting procedure.
     fn lead_step(
         &mut self,
         k: usize,
@@ -240,7 +242,7 @@ impl HouboltStepper {
         self.starter.change(now, &loads, change)
     }
 
-    /// Velocities and accelerations at Δt and 2Δt when the displacements were given.
+    /// Computes velocities and accelerations at Δt and 2Δt from the given displacements.
     fn finish_given(
         &mut self,
         begin: &[f64],

@@ -20,10 +20,12 @@ use crate::system::{Matrices, System};
 /// z(t+Δt) = e^{SΔt} z(t) + Γ₀ F(t) + Γ₁ F(t+Δt),    z = (x, ẋ),  ż = S z + (0, M⁻¹F)
 /// ```
 ///
-/// The only error is in the force between its samples: none for a force that is held or linear
-/// there, otherwise first or second order. Stable at any step if the system is. At a jump of a held
-/// force the acceleration is the limit from the right. A step costs products of dense matrices with
-/// two rows per degree of freedom, so that their number is limited to 250.
+/// Here x are the displacements, F the forces, and S the matrix of the first-order form. The only
+/// error is in the force between its samples: none for a force that is held or linear there,
+/// otherwise first or second order. The scheme is stable at any step if the system is. At a jump of
+/// a held force the acceleration is the limit from the right. A step costs products of dense
+/// matrices with two rows per degree of freedom, so that at most 250 degrees of freedom are
+/// allowed.
 ///
 /// # Source
 /// Van Loan, IEEE Trans. Autom. Control 23 (1978), 395–404.
@@ -96,19 +98,21 @@ impl Scheme for MatrixExponential {
     }
 }
 
-/// e^{SΔt} − I (2n×2n), Γ₀ and Γ₁ (2n×n).
+/// Returns e^{SΔt} − I (2n×2n), Γ₀ and Γ₁ (2n×n).
 fn exponentials(
     system: &SecondOrderSystem,
     dt: f64,
     linear: bool,
 ) -> Result<[DMatrix<f64>; 3], IntegrateError> {
     let n = system.dof();
-    // Step units: the second half of the state is Δt ẋ, the last quarter the change of the force.
+    // In step units, the second half of the state is Δt ẋ, and the last quarter is the change of
+    // the force.
     let mut generator = DMatrix::zeros(4 * n, 4 * n);
     generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&StateTransition::rate(system, dt));
     generator.view_mut((n, 2 * n), (n, n)).copy_from(&StateTransition::force_input(system, dt));
     generator.view_mut((2 * n, 3 * n), (n, n)).fill_with_identity();
-    // Balanced units have a norm of about ωΔt, not its square: fewer squarings.
+    // Balanced units give a norm of about ωΔt instead of its square, so that fewer squarings are
+    // needed.
     let norm = generator.norm();
     let scales =
         Transition::balance(&mut generator).ok_or(NumericsError::ExponentialOverflow { norm })?;
@@ -125,15 +129,15 @@ fn exponentials(
 /// The matrix exponential prepared: state `[x, ẋ, ẍ]`.
 #[derive(Debug)]
 struct ExponentialStepper {
-    /// e^{SΔt} − I.
+    /// Matrix e^{SΔt} − I.
     change: DMatrix<f64>,
-    /// Γ₀ and Γ₁.
+    /// Matrices Γ₀ and Γ₁.
     now: DMatrix<f64>,
     next: DMatrix<f64>,
     mass: EffectiveMatrix,
     dt: f64,
     linear: bool,
-    /// x and ẋ at t + Δt.
+    /// Displacement x and velocity ẋ at t + Δt.
     new: Vec<f64>,
 }
 

@@ -20,12 +20,12 @@ pub(crate) fn start_consistently(
     mass.solve(0.0, v, x, a)
 }
 
-/// The three parts of a motion in `n` degrees of freedom.
+/// Returns the three parts x, ẋ, ẍ of a motion in `n` degrees of freedom.
 pub(crate) fn motion(state: &[f64], n: usize) -> (&[f64], &[f64], &[f64]) {
     (&state[..n], &state[n..2 * n], &state[2 * n..3 * n])
 }
 
-/// The three parts of a motion in `n` degrees of freedom, to be written.
+/// Returns the three parts x, ẋ, ẍ of a motion in `n` degrees of freedom, for writing.
 pub(crate) fn motion_mut(state: &mut [f64], n: usize) -> (&mut [f64], &mut [f64], &mut [f64]) {
     let (x, rest) = state.split_at_mut(n);
     let (v, rest) = rest.split_at_mut(n);

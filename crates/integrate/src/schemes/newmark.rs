@@ -17,9 +17,9 @@ use crate::system::System;
 /// ẋ(t+Δt) = ẋ + Δt [(1 − γ) ẍ + γ ẍ(t+Δt)]
 /// ```
 ///
-/// Second order for γ = ½; unconditionally stable for 2β ≥ γ ≥ ½. Loads at t + Δt. Starts from the
-/// consistent acceleration M ẍ(0) = F(0) − C ẋ(0) − K x(0). The acceleration is the unknown of a
-/// step, so that β = 0 needs no special case.
+/// The scheme is of second order for γ = ½, and unconditionally stable for 2β ≥ γ ≥ ½. It uses the
+/// load at t + Δt, and starts from the consistent acceleration M ẍ(0) = F(0) − C ẋ(0) − K x(0). The
+/// acceleration is the unknown of a step, so that β = 0 needs no special case.
 ///
 /// # Source
 /// Dissertation eqs. (3.3.4.1)–(3.3.4.3) with α = β and δ = γ; Hughes (1987), section 9.1.
@@ -39,7 +39,7 @@ impl Newmark {
     /// β = 0, γ = ½. Stable up to ωΔt = 2.
     pub const CENTRAL_DIFFERENCE: Self = Self { beta: 0.0, gamma: 0.5 };
 
-    /// Any member with β and γ, pure numbers, between 0 and 1.
+    /// Creates any member of the family from β and γ, pure numbers between 0 and 1.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].
@@ -196,7 +196,7 @@ impl Stepper for NewmarkStepper {
         Ok(())
     }
 
-    /// The changes and their sums with the state in one pass over the memory.
+    /// Computes the changes and their sums with the state in one pass over the memory.
     fn step(
         &mut self,
         state: &mut [f64],

@@ -24,8 +24,9 @@ pub enum MidStepForce {
 
 /// The classical four-stage Runge–Kutta scheme on ẍ = M⁻¹ (F − C ẋ − K x).
 ///
-/// Fourth order if the force is known in the middle of the steps. Stable up to ωΔt = 2√2 without
-/// damping. Samples do not contain the force at mid-step: the caller chooses how to get it.
+/// The scheme is of fourth order if the force is known in the middle of the steps. Without damping
+/// it is stable up to ωΔt = 2√2. Samples do not contain the force at mid-step: the caller chooses
+/// how to get it.
 ///
 /// # Source
 /// Dissertation eqs. (3.3.5.1)–(3.3.6.7) (the last stage of 3.3.6.7 is misprinted).
@@ -44,8 +45,8 @@ impl RungeKutta4 {
     pub const SUPPLIED: Self = Self { mid_step: MidStepForce::Supplied };
 }
 
-/// Radius of the largest half disc |z| ≤ r, Re z ≤ 0, in the region |1 + z + z²/2 + z³/6 + z⁴/24| ≤
-/// 1 of stability.
+/// Radius r of the largest half disc |z| ≤ r, Re z ≤ 0, in the region of stability |1 + z + z²/2 +
+/// z³/6 + z⁴/24| ≤ 1.
 const HALF_DISC: f64 = 2.6;
 
 impl Scheme for RungeKutta4 {
@@ -89,7 +90,7 @@ impl Scheme for RungeKutta4 {
     }
 }
 
-/// Runge–Kutta prepared: state `[x, ẋ, ẍ]`, the acceleration being the slope of the first stage.
+/// Runge–Kutta prepared: state `[x, ẋ, ẍ]`; the acceleration is the slope of the first stage.
 #[derive(Debug)]
 struct RungeKuttaStepper {
     mass: EffectiveMatrix,
@@ -102,8 +103,8 @@ struct RungeKuttaStepper {
 }
 
 impl RungeKuttaStepper {
-    /// The slopes at `time` and (x + h·v_stage, v + h·a_stage), the present stage's being in
-    /// `self.v`, `self.a`.
+    /// Computes the slopes of the next stage at `time`, displacement x + h·v_stage and velocity v +
+    /// h·a_stage; the slopes v_stage and a_stage of the present stage are in `self.v` and `self.a`.
     fn stage(
         &mut self,
         (x, v): (&[f64], &[f64]),

@@ -8,7 +8,7 @@ use crate::stability::step_limit::Examined;
 use crate::stepping::stepper::Stepper;
 use crate::system::System;
 
-/// A choice on which programs that share a formula still differ; printed with every result.
+/// A choice in which programs with the same formula may differ; it is printed with every result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Convention {
     /// Name of the choice.
@@ -122,7 +122,7 @@ impl Scheme for AllowUnstable<'_> {
     }
 }
 
-/// `value`, if it is finite and between `least` and `most`.
+/// Returns `value` if it is finite and between `least` and `most`.
 pub(crate) fn check_parameter(
     scheme: &'static str,
     parameter: &'static str,

@@ -13,7 +13,7 @@ use crate::system::System;
 /// Force at t + θΔt for Wilson's scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WilsonLoad {
-    /// F(t) + θ [F(t+Δt) − F(t)]: the line through the two ends of the step, carried on.
+    /// F(t) + θ [F(t+Δt) − F(t)]: extrapolation of the line through the two ends of the step.
     #[default]
     Projected,
     /// F(t+Δt) + (θ − 1) [F(t+2Δt) − F(t+Δt)]: between the two samples around t + θΔt (θ ≤ 2;
@@ -23,8 +23,8 @@ pub enum WilsonLoad {
 
 /// Wilson's scheme: acceleration linear from t to t + θΔt, equilibrium at t + θΔt.
 ///
-/// Second order; unconditionally stable for θ ≥ 1.366. Starts from the consistent acceleration.
-/// Equilibrium does not hold at the samples: M ẍ + C ẋ + K x ≠ F there.
+/// The scheme is of second order, and unconditionally stable for θ ≥ 1.366. It starts from the
+/// consistent acceleration. Equilibrium does not hold at the samples: M ẍ + C ẋ + K x ≠ F there.
 ///
 /// # Source
 /// Dissertation eqs. (3.3.3.1)–(3.3.3.9) (its table 3.3 B is misprinted); Bathe (1982),
@@ -36,7 +36,8 @@ pub struct WilsonTheta {
 }
 
 impl WilsonTheta {
-    /// θ ≥ 1, a pure number (1 is linear acceleration, 1.4 the usual value), the load projected.
+    /// Creates the scheme with θ ≥ 1, a pure number (1 is linear acceleration, 1.4 the usual
+    /// value), and the projected load.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`] if θ < 1 or not finite.
@@ -79,7 +80,7 @@ impl Scheme for WilsonTheta {
     }
 
     fn stable_steps(&self) -> StableSteps {
-        // A root passes −1 at θ = (1 + √3)/2 as Ω → ∞.
+        // A root of the characteristic polynomial passes −1 at θ = (1 + √3)/2 for ωΔt → ∞.
         if self.theta >= 1.366_025_403_8 { StableSteps::All } else { StableSteps::Unknown }
     }
 

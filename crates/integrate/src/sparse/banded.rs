@@ -6,7 +6,7 @@ use crate::limits;
 use crate::sparse::ordering::Ordering;
 use crate::sparse::tridiagonal::Tridiagonal;
 
-/// P A = L U with L of unit diagonal, stored along the columns of the band.
+/// Factors P A = L U with a unit diagonal of L, stored along the columns of the band.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.
@@ -21,9 +21,9 @@ pub(crate) struct BandedLu {
     exchanges: Vec<u32>,
     /// The columns of U above the diagonal, `upper` entries each, top row first.
     above: Vec<f64>,
-    /// 1 / the diagonal of U.
+    /// Reciprocals of the diagonal of U.
     reciprocals: Vec<f64>,
-    /// The factors to solve with of a matrix that has one diagonal on either side.
+    /// Factors that are used for the solution if the matrix is tridiagonal.
     tridiagonal: Option<Box<Tridiagonal>>,
 }
 
@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn a_pivot_of_rounding_is_refused() {
-        // Rows that are equal but for rounding of their terms.
+        // The two rows are equal except for the rounding of their terms.
         let matrix = triplets(2, [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 1.0), (1, 1, 2.0)]).unwrap();
         let ordering = Ordering::narrowing(matrix.pattern());
         assert!(BandedLu::new(&matrix, &ordering, &[3.0, 3.0]).is_err_and(|p| p < 1e-15));

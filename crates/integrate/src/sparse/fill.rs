@@ -6,7 +6,7 @@ use crate::sparse::ordering::Graph;
 
 /// Returns the number of entries of L and U of a matrix with this pattern, eliminated in the order
 /// `old[new]` without exchanges of rows: two Cholesky factors of the pattern of A + Aᵀ. Exchanges
-/// add to it.
+/// of rows would add entries.
 ///
 /// Row i of the factor has the nodes on the paths from its entries up the elimination tree.
 ///
@@ -54,7 +54,7 @@ mod tests {
         let banded = band(50, &[(-4, 1.0), (0, 4.0), (4, 1.0)]);
         assert_eq!(entries(banded.pattern(), &natural), 50 + 2 * 46);
         let banded = band(50, &[(-3, 1.0), (-1, 1.0), (0, 4.0), (1, 1.0), (3, 1.0)]);
-        // All but one: nothing stands above entry (2, 0) to fill it.
+        // All entries of the band except one: no entry above (2, 0) fills it.
         assert_eq!(entries(banded.pattern(), &natural), 50 + 2 * (49 + 48 + 47 - 1));
         // A star: eliminated first, its centre binds all others to one another; last, it does not.
         let star = (1..50).flat_map(|i| [(0, i, 1.0), (i, 0, 1.0), (i, i, 2.0)]);

@@ -11,12 +11,12 @@ use nalgebra_sparse::csc::CscMatrix;
 use crate::limits;
 use crate::sparse::{NotFactored, fill};
 
-/// Factors of a matrix with columns in an order of little fill-in (COLAMD) and rows scaled by the
-/// sizes of their terms and exchanged for stability.
+/// Factors of a matrix with columns in an order of little fill-in (COLAMD). Rows are scaled by the
+/// sizes of their terms, and exchanged for stability.
 pub(crate) struct GeneralLu<T> {
     symbolic: SymbolicLu<usize>,
     numeric: NumericLu<usize, T>,
-    /// 1 / the size of the terms of each row.
+    /// Reciprocal of the size of the terms of each row.
     scales: Vec<f64>,
     scratch: MemBuffer,
 }
@@ -87,8 +87,8 @@ where
     }
 }
 
-/// Smallest shrinking of a vector by a scaled matrix, whose largest entry is 1 at most, that some
-/// inverse iteration with `solve` finds.
+/// Estimates the reciprocal condition of a scaled matrix, whose largest entry is at most 1: the
+/// smallest ratio of the norms of A x and x that a few inverse iterations with `solve` find.
 pub(super) fn reciprocal_condition<T>(n: usize, mut solve: impl FnMut(&mut [T])) -> f64
 where
     T: ComplexField<RealField = f64>,
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn singular_wide_matrices_are_refused() {
-        // Laplacian of the links: the same everywhere costs nothing.
+        // The matrix is the Laplacian of the links: equal displacements cause no force.
         let n = 700;
         let links = wide(n, 0.0, 0.0);
         let degree = |i: usize| -links.row(i).values().iter().sum::<f64>();

@@ -27,7 +27,7 @@ use unsymmetric::{UnsymmetricFactors, UnsymmetricPlan};
 /// Reason why a matrix was not factored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum NotFactored {
-    /// The smallest pivot relative to the terms of its row (or the reciprocal condition) is
+    /// The smallest pivot, relative to the terms of its row, or the reciprocal condition is only
     /// rounding.
     Singular(f64),
     /// The factors need at least this many bytes, more than the limit.
@@ -35,8 +35,8 @@ pub(crate) enum NotFactored {
 }
 
 impl NotFactored {
-    /// Returns the error of a system with `dof` degrees of freedom; `singular` gives that of a
-    /// singular matrix.
+    /// Returns the error for a system with `dof` degrees of freedom; `singular` creates the error
+    /// for a singular matrix.
     pub(crate) fn or_singular(
         self,
         dof: usize,
@@ -82,7 +82,7 @@ impl SparseLu {
         let diagonals = ordering.diagonals(matrix.pattern());
         if diagonals > limits::NARROW_BAND_DIAGONALS
             && let Some(plan) = CholeskyPlan::new(matrix, sizes)
-            // An entry that is looked up takes about as long as two of a band.
+            // An entry that is found by an index takes about as long as two entries of a band.
             && (diagonals > limits::BAND_DIAGONALS || 2 * plan.work() < diagonals * matrix.nrows())
             && let Some(factors) = plan.factor(limit)?
         {
@@ -132,7 +132,7 @@ impl std::fmt::Debug for SparseLu {
     }
 }
 
-/// Σ scaleᵢ Aᵢ of square matrices of one size, and the sizes of the sums' terms, row by row.
+/// Returns Σ scaleᵢ Aᵢ of square matrices of one size, and the size of the terms of each row.
 pub(crate) fn combination(terms: &[(f64, &CsrMatrix<f64>)]) -> (CsrMatrix<f64>, Vec<f64>) {
     let n = terms[0].1.nrows();
     let (mut offsets, mut columns, mut values) = (Vec::with_capacity(n + 1), vec![], vec![]);

@@ -31,7 +31,7 @@ impl Ordering {
         self.old.is_none()
     }
 
-    /// The new place of every old one.
+    /// Returns the new index of every old index.
     pub(crate) fn places(&self, n: usize) -> Vec<usize> {
         let mut places: Vec<usize> = (0..n).collect();
         if let Some(old) = &self.old {
@@ -58,7 +58,7 @@ impl Ordering {
         }
     }
 
-    /// Number of diagonals that hold entries, at most.
+    /// Returns the maximum number of diagonals with entries.
     pub(crate) fn diagonals(&self, pattern: &SparsityPattern) -> usize {
         2 * self.width(pattern) + 1
     }
@@ -123,7 +123,7 @@ impl Graph {
         order
     }
 
-    /// A node about as far from the others of its component as any.
+    /// Returns a node that is about as far from the other nodes of its component as any.
     fn peripheral(&self, mut node: u32) -> u32 {
         let mut depth = 0;
         // Each round but the last increases the depth; a few rounds are enough.
@@ -162,7 +162,7 @@ impl Graph {
     }
 }
 
-/// The levels of a breadth-first search: how many, and where the last begins.
+/// Levels of a breadth-first search: their number, and where the last one begins.
 struct Levels {
     depth: usize,
     last: usize,

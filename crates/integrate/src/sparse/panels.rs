@@ -33,11 +33,12 @@ struct Panel {
     below: u32,
 }
 
-/// The columns of a factor, each from the diagonal down.
+/// Columns of a factor, each from the diagonal down.
 pub(super) enum Columns<'a> {
-    /// One by one.
+    /// Each column separately.
     Single { symbolic: &'a SymbolicSimplicialCholesky<usize>, values: &'a [f64] },
-    /// Neighbours with the same rows together, and the number of this group for each column.
+    /// Groups of neighbouring columns with the same rows, and the index of the group of each
+    /// column.
     Joint { factor: SupernodalLltRef<'a, usize, f64>, of_column: Vec<usize> },
 }
 
@@ -83,7 +84,7 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// Rising numbers of rows.
+/// Indices of rows, in rising order.
 #[derive(Debug, Clone)]
 struct Rows<'a> {
     joint: std::ops::Range<usize>,
@@ -185,7 +186,7 @@ impl Panel {
     }
 }
 
-/// Width of the panel from column `first` on for which a column costs least.
+/// Returns the width of the panel from column `first` on that has the lowest cost per column.
 fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
     // The rows of a column, except its diagonal, are among the rows of the column that its second
     // row names. If this is the next column, the last column of a panel has the rows of all.
@@ -206,7 +207,7 @@ const PER_ROW: usize = 3;
 /// Cost of each panel, in entries.
 const PER_PANEL: usize = 12;
 
-/// One panel of L x = b.
+/// Solves one panel of L x = b.
 fn down<const W: usize>(first: usize, rows: &[u32], values: &[f64], b: &mut [f64]) {
     let (triangle, below) = values.as_chunks::<W>().0.split_at(W);
     let mut x = [0.0; W];
@@ -227,7 +228,7 @@ fn down<const W: usize>(first: usize, rows: &[u32], values: &[f64], b: &mut [f64
     }
 }
 
-/// One panel of Lᵀ x = b.
+/// Solves one panel of Lᵀ x = b.
 fn up<const W: usize>(first: usize, rows: &[u32], values: &[f64], b: &mut [f64]) {
     let (triangle, below) = values.as_chunks::<W>().0.split_at(W);
     let mut x = [0.0; W];

@@ -7,7 +7,8 @@ use nalgebra_sparse::csr::CsrMatrix;
 /// A matrix in the form with the fastest product: by diagonals, or by rows.
 #[derive(Debug)]
 pub(crate) enum Product {
-    /// Values along diagonals: the column less the row, the first row, and the values.
+    /// Values along diagonals: for each one the column minus the row, the first row, and the
+    /// values.
     Diagonals(Vec<Diagonal>),
     /// Values row by row.
     Rows { starts: Vec<u32>, columns: Vec<u32>, values: Vec<f64> },
@@ -61,7 +62,7 @@ impl Product {
         }
     }
 
-    /// y ← y − Σ A x, a block of rows at a time.
+    /// Computes y ← y − Σ A x, one block of rows at a time.
     pub(crate) fn subtract(terms: &[(&Self, &[f64])], y: &mut [f64]) {
         for (block, y) in y.chunks_mut(BLOCK).enumerate() {
             for (product, x) in terms {

@@ -145,7 +145,7 @@ mod tests {
         matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
     }
 
-    /// The columns of flat grids are factored one by one, those of cubes together.
+    /// The columns of flat grids are factored one by one, the columns of cubes in groups.
     #[test]
     fn grids_are_solved() {
         for (side, layers, joint) in [(24, 1, false), (20, 20, true)] {
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn what_is_not_definite_is_factored_otherwise() {
-        // Shifted into the middle of its eigenvalues.
+        // The shift lies in the middle of the eigenvalues.
         let matrix = grid(24, 1, 2.1);
         let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
         assert!(!matches!(factors, SparseLu::Symmetric(_)));

@@ -13,11 +13,12 @@ use crate::sparse::ordering::Ordering;
 /// Computing 5, 45–54.
 #[derive(Debug)]
 pub(super) struct Tridiagonal {
-    /// Parts of the row before, towards an end, that are subtracted from each row.
+    /// Multiple of the previous row, on the side of the nearer end, that is subtracted from each
+    /// row.
     multipliers: Vec<f64>,
-    /// Entry towards the middle over the pivot, row by row.
+    /// Entry towards the middle, divided by the pivot, row by row.
     inward: Vec<f64>,
-    /// 1 / the pivots.
+    /// Reciprocals of the pivots.
     reciprocals: Vec<f64>,
 }
 
@@ -54,7 +55,7 @@ impl Tridiagonal {
             multipliers[i] = above[i] / pivots[i + 1];
             pivots[i] -= multipliers[i] * below[i + 1];
         }
-        // The upper half is eliminated from the first row of the lower, last of all.
+        // The last step eliminates the upper half from the first row of the lower half.
         is_pivot(pivots[half - 1], below[half]).then_some(())?;
         let last = pivots[half];
         pivots[half] -= below[half] / pivots[half - 1] * above[half - 1];

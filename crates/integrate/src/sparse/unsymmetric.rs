@@ -22,7 +22,7 @@ use crate::sparse::{NotFactored, combination};
 ///
 /// # Source
 /// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 5
-/// (the columns that change the next one in lists); Golub & Van Loan, *Matrix Computations*, 4th
+/// (lists of the columns that change the next one); Golub & Van Loan, *Matrix Computations*, 4th
 /// ed. (2013), section 4.3.4, on LU without exchanges where the symmetric part is definite.
 #[derive(Debug)]
 pub(crate) struct UnsymmetricFactors {
@@ -131,8 +131,8 @@ impl UnsymmetricPlan {
         let n = starts.len() - 1;
         let [mut lower, mut upper] = [(); 2].map(|()| vec![0.0; rows.len()]);
         let [mut column, mut row] = [(); 2].map(|()| vec![0.0; n]);
-        // The columns that change column k next, as a list, and where the rows from k on begin in
-        // each.
+        // Lists of the columns that change column k next, and, for each of them, the position at
+        // which its rows from k on begin.
         let [mut first, mut next, mut at] = [vec![NONE; n], vec![NONE; n], vec![0; n]];
         for k in 0..n {
             let entries = starts[k]..starts[k + 1];
@@ -218,8 +218,8 @@ impl UnsymmetricFactors {
         }
     }
 
-    /// Returns the largest error of one solution put back into the matrix, relative to the size of
-    /// its row and the largest entry.
+    /// Returns the largest residual of one solution, relative to the size of its row and the
+    /// largest entry of the solution.
     fn backward_error(&mut self, matrix: &CsrMatrix<f64>, sizes: &[f64]) -> f64 {
         let b: Vec<f64> = pseudo_random(1)
             .zip(sizes)

@@ -15,7 +15,7 @@ use crate::stepping::transition::Transition;
 /// All values except the spectral radius are `None` if the numerical motion does not oscillate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Δt/T, a pure number, T = 2π/ω being the undamped period.
+    /// Ratio Δt/T, a pure number, with the undamped period T = 2π/ω.
     pub step_over_period: f64,
     /// Largest modulus of the eigenvalues of the amplification matrix, a pure number.
     pub spectral_radius: f64,
@@ -76,7 +76,8 @@ pub fn accuracy(
     Ok(accuracy)
 }
 
-/// ln λ of the oscillating pair of eigenvalues λ = 1 + μ, Im λ > 0, μ being eigenvalues of D.
+/// Returns ln λ of the oscillating pair of eigenvalues λ = 1 + μ, Im λ > 0, where μ are eigenvalues
+/// of D.
 fn principal_logarithm(transition: &Transition) -> Option<Complex<f64>> {
     let eigenvalues = growth::eigenvalues(transition)?;
     let pair = eigenvalues

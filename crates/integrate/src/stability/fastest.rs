@@ -13,11 +13,11 @@ use crate::stability::passive;
 use crate::stepping::effective_matrix::Equations;
 use crate::system::System;
 
-/// The fastest motions of a system, found when they are asked for.
+/// The fastest motions of a system, computed when they are first needed.
 pub(super) struct Fastest<'a> {
     pub(super) system: &'a dyn System,
     rate: OnceCell<f64>,
-    /// The stiffest and the most damped motion of a passive system; `None` of others.
+    /// The stiffest and the most damped motion of a passive system; `None` for other systems.
     passive: OnceCell<Option<[SecondOrderSystem; 2]>>,
 }
 
@@ -35,7 +35,8 @@ impl<'a> Fastest<'a> {
         Ok(*self.rate.get_or_init(|| rate))
     }
 
-    /// Returns a single degree of freedom for each of these motions, at least as fast.
+    /// Returns two systems of a single degree of freedom, at least as fast as the stiffest and the
+    /// most damped motion.
     pub(super) fn motions(&self) -> Result<Option<&[SecondOrderSystem; 2]>, IntegrateError> {
         if let Some(motions) = self.passive.get() {
             return Ok(motions.as_ref());
@@ -54,11 +55,11 @@ impl<'a> Fastest<'a> {
     }
 }
 
-/// Returns the system that moves only along `shape`, with mass x*Mx, damping x*Cx and stiffness
-/// x*Kx; its two degrees of freedom are the real and imaginary parts.
+/// Returns the system that moves only along the vector x = `shape`, with mass x*Mx, damping x*Cx
+/// and stiffness x*Kx; its two degrees of freedom are the real and imaginary parts.
 ///
-/// If `shape` belongs to an eigenvector of the amplification, its eigenvalue is also one of this
-/// system.
+/// If `shape` belongs to an eigenvector of the amplification matrix, its eigenvalue is also one of
+/// this system.
 pub(super) fn reduced(
     equations: &Equations,
     shape: &DVector<Complex<f64>>,
@@ -93,7 +94,7 @@ pub(super) fn reduced_to(
 pub(super) fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
     let n = equations.dof();
     let mut mass = equations.mass_only("Arnoldi", 0.0)?;
-    // The iteration also finds the unit of time that makes the two halves of the state comparable.
+    // The iteration also finds the unit of time that makes displacements and velocities comparable.
     let mut unit = 1.0;
     for _ in 0..4 {
         let largest = dominant(start_vector(2 * n), limits::ARNOLDI_STEPS, |state, rate| {

@@ -130,7 +130,7 @@ mod tests {
         SparseSystem::new(band(n, &[(0, 1.0)]), c, k).unwrap()
     }
 
-    /// The largest real part of the eigenvalues, of all of them: the judge.
+    /// Judge: the largest real part of all eigenvalues.
     fn rightmost(system: &SparseSystem) -> f64 {
         let [m, c, k] =
             mechid_model::Matrix::ALL.map(|w| nalgebra::DMatrix::from(system.matrix(w)));
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// A step leaves a fifteenth of each motion, a period less than the smallest number.
+    /// A motion decreases to a fifteenth in a step, and in a period below the smallest number.
     #[test]
     fn a_motion_of_which_nothing_is_left_does_not_grow() {
         let n = 100;

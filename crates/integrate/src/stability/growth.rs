@@ -32,8 +32,9 @@ pub(crate) fn eigenvalues(transition: &Transition) -> Option<Vec<Complex<f64>>> 
     Some(RealSchur::new(change).ok()?.eigenvalues())
 }
 
-/// The amplification matrix by its products, in coordinates x, ẋ/ω, ẍ/ω² (and the scheme's memory
-/// of accelerations). For the fastest motion, which decides, they are of the same size.
+/// The amplification matrix, given by its products, in coordinates x, ẋ/ω, ẍ/ω² (and the scheme's
+/// memory of accelerations). For the fastest motion, which decides, these coordinates are of the
+/// same size.
 pub(super) struct Amplification<'a> {
     stepper: &'a mut dyn Stepper,
     /// 1/ω, in s.
@@ -88,7 +89,7 @@ pub(super) fn small_growth(
     Ok((rate > allowed).then(|| rate.exp()))
 }
 
-/// The largest growth rate among the eigenvalues of a system, in 1/s.
+/// Returns the largest growth rate among the eigenvalues of a system, in 1/s.
 pub(super) fn own_growth(eigenvalues: &[Complex<f64>]) -> f64 {
     eigenvalues.iter().map(|l| l.re).fold(0.0, f64::max)
 }

@@ -64,10 +64,10 @@ pub fn spectral_radius(
 /// time scale 1/|λ| of the system up to a million times that, in factors of √2, then bisected to
 /// rounding. An unstable system is allowed twice its own growth.
 ///
-/// For more than 20 degrees of freedom it is the limit for a single degree of freedom that moves
-/// along the fastest mode, from a hundred products with the matrices. If the system can only
-/// lose energy, factorisations then enclose its frequency to a part in 10⁴; for other systems it is
-/// known to about one part in a thousand.
+/// For more than 20 degrees of freedom, the limit is that of a single degree of freedom that moves
+/// along the fastest mode; it takes a hundred products with the matrices. If the system can only
+/// lose energy, factorisations then enclose its highest frequency to one part in 10⁴; for other
+/// systems it is known to about one part in a thousand.
 ///
 /// # Errors
 /// The errors of [`Scheme::prepare_unchecked`], and [`IntegrateError::Unstable`] if not even the

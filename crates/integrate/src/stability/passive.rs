@@ -115,7 +115,7 @@ impl Symmetric {
         })
     }
 
-    /// Σ |entries| of each row.
+    /// Returns the sum of the moduli of the entries of each row.
     fn row_sums(&self) -> Vec<f64> {
         match self {
             Self::Dense(matrix) => {
@@ -132,13 +132,13 @@ impl Symmetric {
     }
 }
 
-/// A vector, of norm 1 in the product by M, close to the eigenvector of the largest eigenvalue of
-/// M⁻¹A.
+/// Vector of norm 1 in the inner product with M, close to the eigenvector of the largest eigenvalue
+/// of M⁻¹A.
 pub(super) struct Top {
     pub(super) vector: DVector<f64>,
     /// Rayleigh quotient of the vector, in 1/s² or 1/s: at most the largest eigenvalue.
     pub(super) value: f64,
-    /// Distance from it within which there is an eigenvalue.
+    /// Distance from this value within which there is an eigenvalue.
     residual: f64,
 }
 
@@ -170,8 +170,8 @@ impl Top {
     }
 }
 
-/// Returns what Lanczos' iteration finds of the largest eigenvalue of M⁻¹A, A being C or K of a
-/// passive system.
+/// Returns the result of Lanczos' iteration for the largest eigenvalue of M⁻¹A, where A is C or K
+/// of a passive system.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.1; Parlett, *The Symmetric
@@ -180,7 +180,8 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
     let n = equations.dof();
     let mut mass = equations.mass_only("Lanczos", 0.0)?;
     let zeros = vec![0.0; n];
-    // Orthonormal in the product by M: qᵢ and M qᵢ.
+    // The vectors qᵢ are orthonormal in the inner product with M; the products M qᵢ are stored,
+    // too.
     let (mut basis, mut weighted): (Vec<DVector<f64>>, Vec<DVector<f64>>) = (vec![], vec![]);
     let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (vec![], vec![]);
     let mut next = start_vector(n);
@@ -199,7 +200,7 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
         image /= norm;
         basis.push(next.clone());
         weighted.push(image);
-        // M⁻¹ A q, then orthogonal to all before: twice is enough.
+        // The next vector is M⁻¹ A q, made orthogonal to all earlier ones; two passes are enough.
         let mut product = zeros.clone();
         match which {
             Matrix::Damping => mass.solve(0.0, next.as_slice(), &zeros, &mut product)?,

@@ -78,8 +78,8 @@ impl Examined<'_> {
         }
     }
 
-    /// The spectral radius for the stiffest or the most damped motion of a passive system, if it
-    /// grows.
+    /// Returns the spectral radius for the stiffest or the most damped motion of a passive system,
+    /// if this motion grows.
     fn growth_of_fastest(
         &self,
         system: &dyn System,
@@ -98,8 +98,8 @@ impl Examined<'_> {
         Ok(radius)
     }
 
-    /// Returns a value below the largest eigenvalue of M⁻¹A: the limit of the scheme, if the
-    /// eigenvalue is not proved to be below it. A is one of the matrices of a passive system.
+    /// Returns the limit of the scheme, slightly increased, if the largest eigenvalue of M⁻¹A is
+    /// not proved to be below the limit. A is one of the matrices of a passive system.
     fn exceeded(&self, system: &dyn System, which: Matrix, dt: f64) -> Option<f64> {
         let limit = match (self.stable_steps, which) {
             (
@@ -167,11 +167,12 @@ impl Examined<'_> {
         Ok(least)
     }
 
-    /// The limit from the whole amplification matrix.
+    /// Returns the limit from the whole amplification matrix.
     fn small_limit(&self, system: &SecondOrderSystem) -> Result<Option<f64>, IntegrateError> {
         let eigenvalues = system.eigenvalues()?;
         let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
-        // A free body has a double eigenvalue 0, found as about √ε of the others.
+        // A free body has a double eigenvalue 0, which rounding changes to about √ε times the
+        // others.
         let free = eigenvalues.iter().any(|l| l.norm() < 1e-6 * fastest);
         let tolerated = if free { limits::TOLERATED_GROWTH } else { limits::CRITICAL_GROWTH };
         let own_growth = own_growth(&eigenvalues);
@@ -187,7 +188,7 @@ impl Examined<'_> {
         self.search(&radius, fastest, factor, 4.0 * f64::EPSILON)
     }
 
-    /// Returns the step, to `precision`, above which `radius` is not tolerated.
+    /// Returns the step, to `precision`, above which the spectral radius is not tolerated.
     fn search(
         &self,
         radius: &dyn Fn(f64) -> Result<Option<f64>, IntegrateError>,

@@ -34,27 +34,27 @@ pub(crate) struct Collocations {
     dt: f64,
 }
 
-/// One collocation.
+/// One collocation: an instant of a step at which the nonlinear force is evaluated.
 #[derive(Debug)]
 struct Collocation {
     /// Instant, from the beginning of the step, in s.
     after: f64,
-    /// Displacement and velocity there, for each number of the state and each load.
+    /// Displacement and velocity at this instant, for each number of the state and each load.
     motion_map: [Vec<f64>; 2],
-    /// Displacement and velocity at every collocation due to a force of 1 N here.
+    /// Displacement and velocity at every collocation due to a force of 1 N at this one.
     moves: [[f64; MOST]; 2],
-    /// E: the change of the state due to this force.
+    /// Change E of the state due to this force.
     change: Vec<f64>,
     /// Force, in N, equivalent to an acceleration of 1 m/s²; infinite if the scheme is explicit.
     per_acceleration: f64,
 }
 
-/// Forces at a collocation in the steps before, and how a correction went there.
+/// Forces at a collocation in the previous steps, and the effect of a correction there.
 #[derive(Debug, Clone, Copy)]
 struct Before {
     /// The forces, latest first, in N.
     forces: [f64; 3],
-    /// Ratio of a correction to the residual of the force.
+    /// Ratio of the last correction of the force to the residual.
     correction: f64,
 }
 
@@ -127,7 +127,7 @@ impl Collocations {
         }
     }
 
-    /// Steps of `Q` collocations.
+    /// Takes steps of `Q` collocations.
     fn collocated<const Q: usize>(
         &self,
         state: &mut [f64],
@@ -150,7 +150,7 @@ impl Collocations {
         }
     }
 
-    /// Steps of a state of `S` numbers under `W` loads, with `Q` collocations.
+    /// Takes steps of a state of `S` numbers under `W` loads, with `Q` collocations.
     fn steps<const S: usize, const W: usize, const Q: usize>(
         &self,
         state: &mut [f64],
@@ -197,7 +197,7 @@ impl Collocations {
         done
     }
 
-    /// The sum of the forces, in N.
+    /// Returns the sum of the forces, in N.
     fn force(&self, time: f64, x: f64, v: f64) -> f64 {
         let mut sum = 0.0;
         for force in &self.forces {
@@ -217,7 +217,7 @@ impl Before {
     /// The secant method: Ostrowski, *Solution of Equations and Systems of Equations* (1960),
     /// chapter 3.
     fn solved(&mut self, force: impl Fn(f64) -> f64, enough: f64) -> Option<f64> {
-        // A parabola through the last three.
+        // The initial estimate continues the parabola through the last three forces.
         let [last, second, third] = self.forces;
         let mut g = 3.0 * (last - second) + third;
         let mut missed = force(g) - g;
@@ -242,13 +242,13 @@ impl Before {
 /// A collocation with sizes known at compile time, and the results of its last steps.
 struct FixedCollocation<const S: usize, const Q: usize> {
     after: f64,
-    /// Displacement and velocity here due to a force of 1 N.
+    /// Displacement and velocity at this collocation due to a force of 1 N.
     own: [f64; 2],
     /// Displacement and velocity at every collocation due to this force.
     moves: [[f64; Q]; 2],
     change: [f64; S],
     is_explicit: bool,
-    /// Tolerance of the equation as a force, from that of an acceleration.
+    /// Tolerance of the equation as a force, from the tolerance of an acceleration.
     tolerance: f64,
     before: Before,
 }
@@ -331,7 +331,8 @@ impl Probe {
         self.state().unit = Some(unit);
     }
 
-    /// Takes the instants and motions asked for since the last call, collocation by collocation.
+    /// Returns the instants and motions of the evaluations since the last call, collocation by
+    /// collocation.
     fn asked(&self) -> Vec<Asked> {
         std::mem::take(&mut self.state().asked)
     }

@@ -105,7 +105,7 @@ impl Equations {
         self.effective(scheme, dt, 0.0, 0.0)
     }
 
-    /// One of M, C, K times `x`.
+    /// Returns one of M, C, K times `x`.
     pub(crate) fn times(&self, which: Matrix, x: &DVector<f64>) -> DVector<f64> {
         match (&self.linear, which) {
             (Linear::Dense(system), _) => system.matrix(which) * x,
@@ -117,7 +117,7 @@ impl Equations {
 }
 
 impl Linear {
-    /// `load` ← `load` − C v̂ − K x̂.
+    /// Computes `load` ← `load` − C v̂ − K x̂.
     fn subtract_forces(&self, v_hat: &[f64], x_hat: &[f64], load: &mut [f64]) {
         match self {
             Self::Dense(system) => {
@@ -134,11 +134,11 @@ impl Linear {
     }
 }
 
-/// M̂ = M + γ̂ C + β̂ K, factored once, with C and K for the right-hand side.
+/// Matrix M̂ = M + γ̂ C + β̂ K, factored once, with C and K for the right-hand side.
 ///
 /// Every implicit scheme writes displacement and velocity at its collocation instant as x̂ + β̂ a
-/// and v̂ + γ̂ a, known part plus unknown acceleration, and requires equilibrium there, including
-/// the nonlinear forces of the system.
+/// and v̂ + γ̂ a: a known part plus the unknown acceleration. It requires equilibrium there,
+/// including the nonlinear forces of the system.
 #[derive(Debug)]
 pub(crate) struct EffectiveMatrix {
     linear: Linear,
@@ -155,7 +155,7 @@ enum Factored {
 impl Factored {
     fn solve(&mut self, b: &mut [f64]) {
         match self {
-            // Cannot fail: the pivots were checked when M̂ was factored.
+            // The solution exists, because the pivots were checked when M̂ was factored.
             Self::Dense(factored) => {
                 let n = b.len();
                 factored.solve_mut(&mut DVectorViewMut::from_slice(b, n));
@@ -185,7 +185,8 @@ impl EffectiveMatrix {
     }
 }
 
-/// The factors of M + `gamma_hat` C + `beta_hat` K, or its smallest pivot if that is but rounding.
+/// Returns the factors of M + `gamma_hat` C + `beta_hat` K, or its smallest pivot if that is only
+/// rounding.
 fn factor_dense(
     system: &SecondOrderSystem,
     gamma_hat: f64,

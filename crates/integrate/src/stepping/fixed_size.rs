@@ -16,8 +16,8 @@ pub(crate) struct FixedSize {
 }
 
 impl FixedSize {
-    /// The transition of `stepper` for a step of `dt` seconds, if its system is small enough and
-    /// the step is.
+    /// Returns the transition of `stepper` for a step of `dt` seconds, if its system is small
+    /// enough and the step is short.
     pub(crate) fn from_stepper(stepper: &mut dyn Stepper, dt: f64) -> Option<Self> {
         let n = stepper.dof();
         if n > limits::FIXED_SIZE_DOF {
@@ -72,8 +72,8 @@ impl FixedSize {
         })
     }
 
-    /// Steps of a state of `S` numbers under `W` loads, the first `O` numbers of the state being
-    /// stored.
+    /// Takes steps of a state of `S` numbers under `W` loads; the first `O` numbers of the state
+    /// are stored.
     fn steps<const S: usize, const W: usize, const O: usize>(
         &self,
         state: &mut [f64],
@@ -110,7 +110,8 @@ pub(crate) fn resolves(transition: &Transition, dt: f64, n: usize, factor: f64) 
     (0..n).all(|i| change(i) <= 1.0)
 }
 
-/// z(t+2Δt) = z + (2D + D²) z + (B + DB) F(t) + B F(t+Δt); its loads are the first of both.
+/// Returns z(t+2Δt) = z + (2D + D²) z + (B + DB) F(t) + B F(t+Δt); its loads are those of both
+/// steps.
 fn doubled(one: &Transition) -> Transition {
     let d = &one.change;
     let later = |b: &DMatrix<f64>| b + d * b;
@@ -120,7 +121,7 @@ fn doubled(one: &Transition) -> Transition {
     }
 }
 
-/// D and B of a transition, by columns.
+/// Returns D and B of a transition, by columns.
 fn by_columns<const S: usize, const W: usize>(
     transition: &Transition,
 ) -> ([[f64; S]; S], [[f64; S]; W]) {
@@ -132,7 +133,7 @@ fn by_columns<const S: usize, const W: usize>(
     )
 }
 
-/// Steps z += D z + B w.
+/// Takes steps z += D z + B w, one at a time.
 fn singles<const S: usize, const W: usize, const O: usize>(
     transition: &Transition,
     z: &mut [f64; S],
@@ -162,7 +163,7 @@ fn singles<const S: usize, const W: usize, const O: usize>(
     }
 }
 
-/// An even number of steps, two at a time; whether the states between are finite.
+/// Takes an even number of steps, two at a time; returns whether the states between are finite.
 fn pairs<const S: usize, const W: usize, const O: usize>(
     one: &Transition,
     two: &Transition,

@@ -35,7 +35,7 @@ impl FunctionSamples {
     }
 }
 
-/// The force at t = (k + `shift`) Δt.
+/// Returns the force at t = (k + `shift`) Δt for every k.
 fn sample(
     dof: usize,
     sampling: Sampling,

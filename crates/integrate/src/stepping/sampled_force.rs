@@ -44,7 +44,7 @@ pub(crate) struct ForceTable<'a> {
 }
 
 impl<'a> ForceTable<'a> {
-    /// A force that repeats after its last sample.
+    /// Creates a force that repeats after its last sample.
     pub(crate) fn periodic(
         scheme: &dyn Scheme,
         dof: usize,
@@ -56,9 +56,9 @@ impl<'a> ForceTable<'a> {
         Ok(Self { samples: force.samples, mid_step: force.mid_step, after, forced: None, dof })
     }
 
-    /// Creates a force that ends with its last sample. The row after it continues the line through
-    /// the last two, so that a load interpolated across the end equals one projected from before
-    /// it.
+    /// Creates a force that ends with its last sample. The row after it extrapolates the line
+    /// through the last two samples, so that a load interpolated across the end equals one
+    /// projected from the last step.
     pub(crate) fn ending(
         scheme: &dyn Scheme,
         dof: usize,
@@ -134,7 +134,7 @@ impl<'a> ForceTable<'a> {
         record.and_then(|r| r.channel(c).get(from..)).unwrap_or(&[])
     }
 
-    /// The forces at samples 0 ..= `last`.
+    /// Returns the forces at samples 0 ..= `last`.
     pub(crate) fn early(&self, last: usize) -> Vec<Vec<f64>> {
         let end = self.samples.len() - 1;
         let full = |k: usize| {

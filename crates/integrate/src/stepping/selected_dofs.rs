@@ -7,9 +7,10 @@ use crate::error::IntegrateError;
 /// With these an integration needs no memory that grows with degrees of freedom times samples.
 #[derive(Debug, Clone, Copy)]
 pub struct SelectedDofs<'a> {
-    /// One for each channel of the force, without repetition; no force acts on the others.
+    /// Degree of freedom of each channel of the force, without repetition; no force acts on the
+    /// others.
     pub forced: &'a [usize],
-    /// One for each channel of the response.
+    /// Degree of freedom of each channel of the response.
     pub observed: &'a [usize],
 }
 

@@ -31,7 +31,7 @@ impl<'a> Motion<'a> {
         Self::with_parts(3, samples, dof)
     }
 
-    /// Displacement alone.
+    /// Creates a motion that stores only the displacement.
     pub(crate) fn displacement(samples: usize, dof: usize) -> Self {
         Self::with_parts(1, samples, dof)
     }
@@ -94,13 +94,13 @@ impl<'a> Motion<'a> {
         Ok(records.try_into().expect("as many as were asked for"))
     }
 
-    /// The response on the time axis of `table`.
+    /// Returns the response on the time axis of `table`.
     pub(crate) fn into_response(self, table: &ForceTable<'_>) -> Result<Response, IntegrateError> {
         let [x, v, a] = self.into_records(table)?;
         Ok(Response::new(x, v, a)?)
     }
 
-    /// The displacement on the time axis of `table`.
+    /// Returns the displacement on the time axis of `table`.
     pub(crate) fn into_displacement(
         self,
         table: &ForceTable<'_>,
@@ -110,7 +110,7 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// A stepper on its way through a force, with all the memory the way needs.
+/// A stepper with its state and all memory that a simulation needs.
 pub(crate) struct Simulation {
     stepper: Box<dyn Stepper>,
     dt: f64,
@@ -121,11 +121,11 @@ pub(crate) struct Simulation {
     owed: Vec<f64>,
     /// The forces of the present step, by [`Instant`](crate::Instant).
     rows: [Vec<f64>; 4],
-    /// No force.
+    /// Zeros, for a step without force.
     none: Vec<f64>,
 }
 
-/// The step of a small system as products of fixed size.
+/// Step of a small system, as matrix products of fixed size.
 enum Small {
     Linear(FixedSize),
     Nonlinear(Collocations),
@@ -209,7 +209,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// One step through the stepper itself, from sample `k`.
+    /// Takes one step through the stepper itself, from sample `k`.
     pub(crate) fn step(&mut self, table: &ForceTable<'_>, k: usize) -> Result<(), IntegrateError> {
         for &instant in self.stepper.instants() {
             table.load(instant, k, &mut self.rows[instant as usize]);
@@ -219,14 +219,14 @@ impl Simulation {
         self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
     }
 
-    /// One step without force through the stepper itself.
+    /// Takes one step without force through the stepper itself.
     pub(crate) fn free_step(&mut self) -> Result<(), IntegrateError> {
         let loads = Loads::none(&self.none);
         self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
     }
 
-    /// Takes as many steps as it can at fixed size; returns the step to go on with, and whether the
-    /// motion is finite so far.
+    /// Takes as many steps as possible at fixed size; returns the next step, and whether the motion
+    /// is finite so far.
     fn advance_small(
         &mut self,
         table: &ForceTable<'_>,

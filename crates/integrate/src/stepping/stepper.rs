@@ -7,14 +7,14 @@ use crate::error::IntegrateError;
 /// Instant within a step from t to t + Δt at which a scheme reads the force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Instant {
-    /// t
+    /// Beginning of the step, t.
     Now,
-    /// t + Δt/2, or another instant within the step:
-    /// [`Scheme::inner_instant`](crate::Scheme::inner_instant)
+    /// Middle of the step, t + Δt/2, or another instant within the step:
+    /// [`Scheme::inner_instant`](crate::Scheme::inner_instant).
     Middle,
-    /// t + Δt
+    /// End of the step, t + Δt.
     Next,
-    /// t + 2Δt
+    /// End of the next step, t + 2Δt.
     Beyond,
 }
 
@@ -23,7 +23,7 @@ pub enum Instant {
 /// A scheme reads only the loads of [`Stepper::instants`]; the others may have any value.
 #[derive(Debug, Clone, Copy)]
 pub struct Loads<'a> {
-    /// t, in s, for nonlinear forces that depend on time.
+    /// Instant t, in s, for nonlinear forces that depend on time.
     pub time: f64,
     /// F(t), in N, one entry per degree of freedom.
     pub now: &'a [f64],
@@ -36,7 +36,7 @@ pub struct Loads<'a> {
 }
 
 impl<'a> Loads<'a> {
-    /// No force, with `zeros` for it, at t = 0.
+    /// Returns loads without force at t = 0; `zeros` has zeros for all of them.
     pub(crate) fn none(zeros: &'a [f64]) -> Self {
         Self { time: 0.0, now: zeros, middle: zeros, next: zeros, beyond: zeros }
     }
@@ -110,9 +110,9 @@ pub trait Stepper: Send {
         0
     }
 
-    /// Starts the motion from `initial`, the forces at samples 0 ..= [`first`](Self::first) being
-    /// `early` (N): writes the motion `[x, ẋ, ẍ]` (m, m/s, m/s², one entry per degree of freedom)
-    /// at each of these samples into `motions` and the state at the last of them into `state`.
+    /// Starts the motion from `initial`. The forces at samples 0 ..= [`first`](Self::first) are
+    /// `early` (N). Writes the motion `[x, ẋ, ẍ]` (m, m/s, m/s², one entry per degree of freedom)
+    /// at each of these samples into `motions`, and the state at the last of them into `state`.
     ///
     /// # Errors
     /// [`IntegrateError::NotAtRest`] if the starting procedure does not allow an initial velocity;
@@ -136,7 +136,7 @@ pub(crate) fn add(z: &mut f64, owed: &mut f64, dz: f64) {
     *z = sum;
 }
 
-/// `dt`, if it is positive and finite.
+/// Returns `dt` if it is positive and finite.
 pub(crate) fn check_step(dt: f64) -> Result<f64, IntegrateError> {
     if dt > 0.0 && dt.is_finite() {
         return Ok(dt);
@@ -144,7 +144,7 @@ pub(crate) fn check_step(dt: f64) -> Result<f64, IntegrateError> {
     Err(IntegrateError::TimeStep { dt })
 }
 
-/// An error at the first entry of `values` that is not finite.
+/// Returns an error at the first entry of `values` that is not finite.
 pub(crate) fn check_finite(
     what: &'static str,
     values: &[f64],

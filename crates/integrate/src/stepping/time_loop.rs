@@ -12,7 +12,7 @@ use crate::stepping::simulation::{Motion, Simulation};
 use crate::stepping::stepper::check_finite;
 use crate::system::System;
 
-/// The motion of `system` from `initial` under a sampled force (samples × n, in N).
+/// Computes the motion of `system` from `initial` under a sampled force (samples × n, in N).
 ///
 /// Displacement, velocity and acceleration belong to the instants of the samples of the force; the
 /// first is t = 0.
@@ -61,8 +61,8 @@ pub fn integrate_displacement<'a>(
     simulate(scheme, system, &table, initial, motion)?.into_displacement(&table)
 }
 
-/// The motion of some degrees of freedom of `system` from `initial` under a sampled force (in N)
-/// on some: samples × `dofs.forced` in, samples × `dofs.observed` out.
+/// Computes the motion of some degrees of freedom of `system` from `initial` under a sampled force
+/// (in N) on some: the force has samples × `dofs.forced`, the response samples × `dofs.observed`.
 ///
 /// ```
 /// use mechid_integrate::{Newmark, SelectedDofs, integrate_selected};
@@ -98,10 +98,10 @@ pub fn integrate_selected<'a>(
     simulate(scheme, system, &table, initial, motion)?.into_response(&table)
 }
 
-/// The motion of `system` from `initial` under a force given as a function of time:
+/// Computes the motion of `system` from `initial` under a force given as a function of time:
 /// `force(t, f)` writes the n components at t (s) into `f` (N).
 ///
-/// Every scheme gets the function's values at the instants where it looks at the force.
+/// Every scheme uses the values of the function at the instants at which it needs the force.
 ///
 /// # Errors
 /// The errors of [`integrate`]; [`IntegrateError::NotFinite`] if the function yields a NaN or

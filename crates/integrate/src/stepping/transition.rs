@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::stepping::stepper::{Instant, Loads, Stepper};
 
-/// z(t+Δt) = z(t) + D z(t) + Σ B_i F(t_i), the instants t_i being those the scheme reads.
+/// Map z(t+Δt) = z(t) + D z(t) + Σ B_i F(t_i) of one step; t_i are the instants at which the scheme
+/// reads the force.
 ///
-/// D = A − I; A is the amplification matrix. Near Δt = 0, D has the digits that A loses.
+/// The amplification matrix is A = I + D. Near Δt = 0, D has the digits that A loses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// D, state × state, in the units of the state.
@@ -74,9 +75,9 @@ impl Transition {
         }
     }
 
-    /// Scales `matrix`, a D or an A, to comparable rows and columns by powers of two; the scales s
-    /// with which z = s ∘ (balanced z). `None` if entries are too large for their squares to be
-    /// numbers, for which balancing has no end.
+    /// Scales `matrix`, a D or an A, to comparable rows and columns by powers of two, and returns
+    /// the scales s of z = s ∘ (balanced z). `None` if entries are too large for their squares to
+    /// be finite, because balancing would then not end.
     pub(crate) fn balance(matrix: &mut DMatrix<f64>) -> Option<DVector<f64>> {
         let representable = matrix.iter().all(|v| v.abs() < 1e150);
         representable.then(|| balance_parlett_reinsch(matrix))

@@ -1,4 +1,4 @@
-//! What cannot be computed is refused, with the numbers that are wrong; nothing panics.
+//! Impossible computations are refused with the wrong numbers named; nothing panics.
 
 use mechid_integrate::*;
 use mechid_model::{InitialState, ModelError, Sdof, SecondOrderSystem};
@@ -147,7 +147,7 @@ fn entries_of_any_size_are_computed_or_refused() {
         let Ok(system) = SecondOrderSystem::new(one(m), one(c), one(k)) else { continue };
         let force = force(Sampling::new(1e-3, 20).unwrap(), 1);
         for scheme in schemes() {
-            // Whatever comes of it, it is a result and not a panic or an endless loop.
+            // Any result is allowed here, but no panic and no endless loop.
             let _ = integrate(scheme.as_ref(), &system, &force, &InitialState::rest(1));
             let _ = integrate_periodic(scheme.as_ref(), &system, &force);
         }

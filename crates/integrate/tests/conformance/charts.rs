@@ -114,7 +114,8 @@ fn houbolt_steps_like_the_printed_row() {
     }
 }
 
-/// e^{z} to fourth order, z = −ζΩ ± iΩ√(1−ζ²): what Runge–Kutta makes of an eigenvalue.
+/// Returns e^{z} to fourth order, z = −ζΩ ± iΩ√(1−ζ²): the factor of an eigenvalue in a Runge–Kutta
+/// step.
 fn runge_kutta_factor(zeta: f64, w: f64) -> Complex<f64> {
     let z = Complex::new(-zeta * w, w * (1.0 - zeta * zeta).sqrt());
     1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))
@@ -189,7 +190,7 @@ fn anchors_at_ten_steps_per_period() {
     assert!(decay[0] > 2.0 * decay[1] && decay[1] > 1.0 && decay[2].abs() < 1e-9, "{decay:?}");
 }
 
-/// Period elongation and amplitude decay of the root that turns least.
+/// Returns period elongation and amplitude decay of the root with the smallest angle.
 fn principal_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
     let roots = Schur::new(matrix).complex_eigenvalues();
     // Of a spurious pair, were there one, the principal root is the larger.
@@ -198,10 +199,10 @@ fn principal_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
     [w / root.arg() - 1.0, 1.0 - (TAU * root.norm().ln() / root.arg()).exp()]
 }
 
-/// Curves of period elongation and amplitude decay over Δt/T, such as those of Bathe & Wilson (1973),
-/// Earthquake Eng. Struct. Dyn. 1, 283–291, draw the eigenvalues of the amplification matrices. A
-/// curve cannot be read to a digit and none was, so the points are computed from the matrices;
-/// Houbolt's is the companion of (2 + Ω²) λ³ − 5 λ² + 4 λ − 1.
+/// Curves of period elongation and amplitude decay over Δt/T, such as those of Bathe & Wilson
+/// (1973), Earthquake Eng. Struct. Dyn. 1, 283–291, show the eigenvalues of the amplification
+/// matrices. A curve cannot be read precisely, so the points are computed from the matrices;
+/// Houbolt's is the companion matrix of (2 + Ω²) λ³ − 5 λ² + 4 λ − 1.
 #[test]
 fn charts_follow_the_printed_matrices() {
     for ratio in (1..=20).map(|k| 0.01 * f64::from(k)) {
@@ -249,7 +250,7 @@ fn stability_limits_in_steps_per_period() {
     }
 }
 
-/// At very large steps ρ is ρ∞, by construction, of the schemes that have it as a parameter.
+/// For the schemes that have ρ∞ as a parameter, ρ at very large steps is ρ∞ by construction.
 #[test]
 fn the_spectral_radius_at_large_steps_is_the_parameter() {
     let far = |scheme: &dyn Scheme| accuracy(scheme, 0.0, 1e7).unwrap().spectral_radius;

@@ -1,4 +1,4 @@
-//! All schemes with all their conventions, and what the other files need to compare responses.
+//! All schemes with all their conventions, and functions to compare responses.
 
 use mechid_integrate::*;
 use mechid_model::{InitialState, Response, SecondOrderSystem};
@@ -67,7 +67,7 @@ pub fn moving(dof: usize) -> InitialState {
     .unwrap()
 }
 
-/// The stage that all quantities of a response play on: `[x, ẋ, ẍ]`.
+/// Returns the parts of a response, `[x, ẋ, ẍ]`.
 pub fn parts(response: &Response) -> [&DMatrix<f64>; 3] {
     [response.displacement(), response.velocity(), response.acceleration()].map(Record::data)
 }

@@ -1,4 +1,4 @@
-//! Superposition, shifts in time, units, and what diagonal and modal forms have in common.
+//! Superposition, shifts in time, units, and the agreement of diagonal and modal forms.
 
 use mechid_integrate::*;
 use mechid_model::{InitialState, Response, Sdof, SecondOrderSystem};
@@ -19,7 +19,7 @@ fn owned(response: &Response) -> [DMatrix<f64>; 3] {
     parts(response).map(Clone::clone)
 }
 
-/// Moving, or at rest for the scheme that has to be.
+/// Returns a moving initial state, or rest for the scheme that requires it.
 fn start(scheme: &dyn Scheme, dof: usize) -> InitialState {
     let rest = scheme.conventions().iter().any(|c| c.choice.contains("at rest"));
     if rest { InitialState::rest(dof) } else { moving(dof) }
@@ -68,7 +68,7 @@ fn the_displacement_alone_is_that_of_the_whole_response() {
 
 #[test]
 fn a_late_force_moves_the_machine_late() {
-    // Three samples of nothing first, so that every starting procedure starts from nothing.
+    // The first three samples are zero, so that every starting procedure starts without a force.
     let (late, len) = (17, 120);
     let sampling = Sampling::new(0.02, len).unwrap();
     for dof in [1, 3] {
@@ -84,7 +84,7 @@ fn a_late_force_moves_the_machine_late() {
             let a = integrate(scheme.as_ref(), &system, &soon, &rest).unwrap();
             let b = integrate(scheme.as_ref(), &system, &delayed, &rest).unwrap();
             for (a, b) in parts(&a).iter().zip(parts(&b)) {
-                // The last step of a record is the only one that may look beyond it.
+                // Only the last step of a record may depend on the force beyond it.
                 let (a, b) = (a.rows(0, len - late - 1), b.rows(late, len - late - 1));
                 assert!((a - b).amax() < 1e-13 * a.amax(), "{} n {dof}", scheme.name());
             }
@@ -225,8 +225,8 @@ fn modes_may_be_integrated_one_by_one() {
     }
 }
 
-/// Signals that set in at t = 0 and signals that do not: the flat Schroeder multisine from each of
-/// a few samples on, linear between samples, against its exact response.
+/// The signals set in at t = 0 or later: the flat Schroeder multisine from each of a few samples
+/// on, linear between samples, is compared with its exact response.
 #[test]
 fn small_steps_approach_the_exact_discretisation() {
     let len = 64;

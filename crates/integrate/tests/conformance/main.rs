@@ -1,4 +1,4 @@
-//! What every scheme must do: the suite that defines the word.
+//! Requirements on every scheme.
 
 mod bad_input;
 mod charts;

@@ -104,7 +104,7 @@ fn a_gyroscopic_system_has_the_modes_of_its_dense_form() {
     assert_same(&found, &all.iter().collect::<Vec<_>>());
 }
 
-/// The same chain in two planes that know nothing of one another: every frequency twice.
+/// The same chain in two planes without coupling: every frequency occurs twice.
 #[test]
 fn repeated_frequencies_have_independent_shapes() {
     let n = 200;
@@ -280,7 +280,8 @@ fn grounded_machines_have_the_lowest_modes_of_their_closed_form() {
     }
 }
 
-/// Modes whose damping sets them further from the axis than from one another.
+/// The distance of these modes from the imaginary axis is larger than their distance from one
+/// another.
 #[test]
 fn modes_near_a_frequency_are_found_beside_the_floor() {
     let n = 10_000;

@@ -409,11 +409,11 @@ fn the_energy_of_duffings_oscillator_does_not_drift() {
     for scheme in [&Newmark::AVERAGE_ACCELERATION as &dyn Scheme, &CentralDifference::default()] {
         let ((early, all), (_, fine)) = (worst(scheme, 0.02), worst(scheme, 0.01));
         let name = scheme.name();
-        // It swings within each period, by as much at the end as at the beginning.
+        // The energy oscillates within each period, by as much at the end as at the beginning.
         assert!(all < 1.05 * early && all < 2e-3, "{name}: {early:e} {all:e}");
         assert!((all / fine - 4.0).abs() < 0.2, "{name}: {all:e} {fine:e}");
     }
-    // Those that damp take energy away, those that do not must not add any by themselves.
+    // Schemes with numerical damping reduce the energy; all others must not add any.
     let (_, lost) = worst(&GeneralisedAlpha::new(0.8).unwrap(), 0.02);
     assert!(lost < 0.05, "{lost}");
 }
@@ -461,7 +461,7 @@ fn what_is_for_linear_systems_refuses_others() {
     let twice = ForceFunction::new(vec![0, 0], |_, x, _, g| g.copy_from_slice(x));
     let refused = SystemWithForces::new(&linear).with(twice).err();
     assert_eq!(refused, Some(IntegrateError::ForcedTwice { index: 0 }));
-    // Stability is checked of the linear part.
+    // Stability is checked for the linear part only.
     let step = CentralDifference::default().prepare(&system, 2.1).err();
     assert!(matches!(step, Some(IntegrateError::Unstable { .. })));
 }

@@ -145,7 +145,8 @@ fn waiting_gives_the_same() {
 
 #[test]
 fn a_response_at_resonance_still_closes() {
-    // Central difference sees 2 sin(θ/2)/Δt as frequency: put it on line 3 of 64, ζ = 1e-9.
+    // The frequency of central difference is 2 sin(θ/2)/Δt; it is placed on line 3 of 64, with ζ =
+    // 1e-9.
     let (dt, len) = (0.01, 64);
     let omega = 2.0 / dt * (std::f64::consts::PI * 3.0 / 64.0).sin();
     let system = Sdof::from_modal(1.0, 1e-9, omega).unwrap().system();

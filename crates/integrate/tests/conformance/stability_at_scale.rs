@@ -1,4 +1,4 @@
-//! What `prepare` refuses of systems too large for their whole amplification matrix.
+//! Steps that `prepare` refuses for systems too large for their whole amplification matrix.
 
 use mechid_integrate::*;
 use mechid_model::{Sdof, SecondOrderSystem, SparseSystem, band, lumped, triplets};
@@ -27,7 +27,7 @@ fn known_limits_are_those_of_one_degree_of_freedom() {
                 system.eigenvalues().unwrap().iter().map(|l| l.norm()).fold(0.0, f64::max);
             match scheme.stable_steps() {
                 StableSteps::All => assert_eq!(limit, None, "{name} ζ {ratio}"),
-                // Damping can but help.
+                // Damping can only help.
                 StableSteps::Frequencies(known) => {
                     let gap = limit.map(|limit| limit / known - 1.0);
                     assert!(gap.is_none_or(|gap| gap > -1e-9), "{name} ζ {ratio}: {gap:?}");
@@ -88,7 +88,7 @@ fn a_long_chain_is_refused_just_beyond_the_limit() {
             if n > 300 {
                 continue;
             }
-            // No limit known: found by the amplification itself.
+            // For this scheme no limit is known: the amplification itself gives it.
             let limit = critical_step(&wilson, &Sdof::new(1.0, 0.0, 1.0).unwrap().system());
             let limit = limit.unwrap().unwrap() / highest(n);
             assert!(wilson.prepare(&chain, 0.99 * limit).is_ok());
@@ -97,8 +97,8 @@ fn a_long_chain_is_refused_just_beyond_the_limit() {
     }
 }
 
-/// C and K full and without symmetry: the exact spectral radius is the judge, of the schemes that
-/// have a limit below and beyond it.
+/// C and K are full and not symmetric: the exact spectral radius is the judge, below and above the
+/// limit of the schemes that have one.
 #[test]
 fn full_systems_without_symmetry_are_judged_by_their_eigenvalues() {
     let wilson = WilsonTheta::new(1.4).unwrap();
@@ -124,7 +124,7 @@ fn full_systems_without_symmetry_are_judged_by_their_eigenvalues() {
     }
 }
 
-/// A shaft that whirls by itself is not the scheme's fault.
+/// The growth of a shaft that whirls by itself is no fault of the scheme.
 #[test]
 fn growth_of_its_own_is_no_instability_of_the_scheme() {
     let n = 60;

@@ -120,7 +120,7 @@ struct PrbsForce {
 #[serde(deny_unknown_fields)]
 struct RandomForce {
     standard_deviation: f64,
-    /// Lower and upper end; without them the noise is white.
+    /// Lower and upper end of the band; without a band the noise is white.
     band_hz: Option<[f64; 2]>,
     /// Fraction of the period after which the force is zero.
     burst: Option<f64>,
@@ -210,7 +210,7 @@ impl Excitation {
             (Between::Unknown(what), Some(_)) => Err(IoError::Description {
                 file: file.into(),
                 what: format!(
-                    "the scheme needs the force between samples, where {what} has none: choose load \
+                    "the scheme needs the force between samples, where {what} is not defined: choose load \
                      held or linear"
                 ),
             }),

@@ -76,7 +76,7 @@ pub enum SchemeChoice {
         #[serde(default, deserialize_with = "json::word")]
         load: SubStepLoad,
     },
-    /// The ρ∞-Bathe method, sub-steps chosen for one effective matrix.
+    /// The ρ∞-Bathe method, whose two sub-steps have the same effective matrix.
     RhoInfinityBathe {
         /// ρ∞, a pure number between 0 and 1, 0 by default.
         #[serde(default)]

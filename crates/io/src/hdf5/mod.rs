@@ -31,7 +31,7 @@ const MAX_GROUPS: usize = 4096;
 /// Maximum ratio of unpacked to stored bytes: deflate reaches 1032.
 const MAX_EXPANSION: u64 = 1100;
 
-/// Length, in bytes, that the file is assumed to have at least when its expansion is checked.
+/// Minimum length, in bytes, that is assumed for a file when its expansion is checked.
 const MIN_BYTES: u64 = 4096;
 
 /// Reads the data sets of a file as columns.

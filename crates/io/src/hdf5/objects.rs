@@ -17,7 +17,7 @@ use crate::limits::Budget;
 /// First word of a variable that refers to an object.
 const REFERENCE: u32 = 0xdd00_0000;
 
-/// Maximum number of words of such a variable: a single object needs six.
+/// Maximum number of words of a variable that refers to an object: a single object needs six.
 const MAX_WORDS: u64 = 16;
 
 /// Words of an object in the table: class, two unknown ones, two kinds of properties, dependencies.
@@ -157,7 +157,7 @@ enum RowTimes {
     Instants(Vec<f64>),
     /// A time step, in s.
     Step(f64),
-    /// Neither: they are in a calendar, or damaged.
+    /// No instants and no step: the times are calendar durations, or damaged.
     Unknown,
 }
 

@@ -44,7 +44,7 @@ const MOST_DIMENSIONS: usize = 64;
 const COMPLEX: u32 = 0x0800;
 
 impl Array {
-    /// Returns whether it contains numbers at any depth.
+    /// Returns whether the value contains numbers at any depth.
     pub fn has_numbers(&self) -> bool {
         match &self.value {
             Value::Real { .. } | Value::Complex { .. } => true,

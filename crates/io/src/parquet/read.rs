@@ -71,7 +71,7 @@ pub fn read_parquet_metadata(path: impl AsRef<Path>) -> Result<Vec<(String, Stri
 pub(super) enum Trouble {
     /// The file contradicts itself.
     Damaged(String),
-    /// The limit, and the number of rows read before.
+    /// Number of rows that were read before, and the limit that the file exceeds.
     TooLarge(usize, Limit),
 }
 
@@ -237,7 +237,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
     ) -> Result<(), Trouble> {
         let mut start = 0_usize;
         for (group, rows) in self.group_rows().enumerate() {
-            let negative = || Trouble::Damaged("a row group has less than no rows".into());
+            let negative = || Trouble::Damaged("a row group has a negative number of rows".into());
             let end = rows.and_then(|rows| start.checked_add(rows)).ok_or_else(negative)?;
             let within = |span: &Range<usize>| span.start.max(start)..span.end.min(end);
             if spans.iter().any(|span| !within(span).is_empty()) {

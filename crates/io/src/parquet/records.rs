@@ -221,6 +221,6 @@ impl Ids {
     /// Stops the reading; [`ParquetFile::records`] reports the reason.
     fn refused(&mut self, refusal: Refusal) -> Result<(), Trouble> {
         self.refusal = Some(refusal);
-        Err(Trouble::Damaged("its records cannot be told apart".into()))
+        Err(Trouble::Damaged("its records cannot be distinguished".into()))
     }
 }

@@ -41,7 +41,7 @@ impl TextEnd {
     pub fn remark(self) -> Option<String> {
         let bytes =
             message::count(usize::try_from(self.padding).ok().filter(|n| *n > 0)?, "zero byte");
-        Some(format!("left out: {bytes} behind the last line (a preallocated file not filled?)"))
+        Some(format!("left out: {bytes} after the last line (a preallocated file not filled?)"))
     }
 }
 
@@ -69,7 +69,7 @@ impl<'a> Blocks<'a> {
         for _ in 0..options.skip_lines {
             match reader.skip_until(terminator) {
                 Ok(0) => {
-                    let finding = "it has no more lines than are to be skipped";
+                    let finding = "all of its lines are skipped";
                     return Err(IoError::Empty { file, found: finding });
                 }
                 Ok(_) => {}
@@ -222,7 +222,7 @@ impl<'a> Blocks<'a> {
         Err(IoError::Malformed {
             file: self.file.clone(),
             at: Place::Line(line),
-            what: "zero bytes stand within the text: the file is damaged, or no text".into(),
+            what: "there are zero bytes within the text: the file is damaged, or no text".into(),
         })
     }
 

@@ -7,7 +7,7 @@ use memchr::memmem;
 
 use super::rows::text_of;
 
-/// First bytes of such a file.
+/// First bytes of a LabVIEW measurement file.
 const MAGIC: &[u8] = b"LabVIEW Measurement";
 
 /// Line that ends the header of the file, and the header of each segment.

@@ -78,7 +78,7 @@ impl Intervals {
         }
     }
 
-    /// Adds the intervals of `others`, which come after all of these.
+    /// Adds the intervals of `others`, which follow the intervals of `self`.
     fn append(&mut self, others: &Self) {
         self.is_curved |= others.is_curved;
         others.lower_ends.iter().for_each(|corner| add_corner(&mut self.lower_ends, *corner));

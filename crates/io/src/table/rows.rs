@@ -24,7 +24,7 @@ pub(super) struct Rows {
     stored: Stored,
     /// Decimal sign of the numbers, if it is known.
     decimal: Option<DecimalSign>,
-    /// `None` before the first row.
+    /// Properties of the first row; `None` before it is read.
     first: Option<FirstRow>,
     columns: Vec<Column>,
     /// Columns to read; `None` before the first row if all are wanted.

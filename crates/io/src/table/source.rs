@@ -24,7 +24,7 @@ pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Number of first bytes that are used to detect the format.
 const HEAD: u64 = 512;
 
-/// Place and bytes of the version of a MATLAB 7.3 file, which is little-endian as every one is.
+/// Position of the version in a MATLAB 7.3 file; such files are always little-endian.
 const VERSION: std::ops::Range<usize> = 124..128;
 const VERSION_73: [u8; 4] = *b"\x00\x02IM";
 

@@ -85,7 +85,7 @@ fn nodes(lines: &mut Lines<'_>, model: &mut Model, is_one_line: bool) -> Result<
             )));
         };
         if model.nodes.insert(node, [x, y, z]).is_some() {
-            return Err(line.fault(format!("node {node} is there twice")));
+            return Err(line.fault(format!("node {node} occurs twice")));
         }
     }
 }

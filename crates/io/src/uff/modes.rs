@@ -106,12 +106,16 @@ fn mode(lines: &mut Lines<'_>) -> Result<Option<Nodal>, Fault> {
         return Ok(None);
     }
     if !(1..=MOST_VALUES).contains(&width) || ![2, 5].contains(&data) {
-        return Err(kind.fault(format!("{width} values of type {data} at a node")));
+        return Err(
+            kind.fault(format!("{width} values of type {data} at a node are not values of a mode"))
+        );
     }
     let about = lines.required(SHORT)?;
     let (integers, reals) = (integer(&about, 0)?, integer(&about, 1)?);
     if integers > MOST_REALS || reals > MOST_REALS {
-        return Err(about.fault(format!("{integers} whole numbers and {reals} numbers of a mode")));
+        return Err(about.fault(format!(
+            "{integers} whole numbers and {reals} real numbers are too many for a mode"
+        )));
     }
     for _ in 1..(2 + integers).div_ceil(8) {
         lines.required(SHORT)?;
@@ -136,7 +140,7 @@ fn mode(lines: &mut Lines<'_>) -> Result<Option<Nodal>, Fault> {
         let numbers = numbers(lines, numbers_per_value * width)?;
         let complex = |part: &[f64]| Complex::new(part[0], part.get(1).copied().unwrap_or(0.0));
         if nodes.insert(node, numbers.chunks(numbers_per_value).map(complex).collect()).is_some() {
-            return Err(line.fault(format!("node {node} is there twice")));
+            return Err(line.fault(format!("node {node} occurs twice")));
         }
     }
     Ok(Some(Nodal { frequency_hz, damping_ratio, values: nodes }))

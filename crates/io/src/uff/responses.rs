@@ -119,10 +119,12 @@ fn add(
         return Ok(());
     }
     if !header.is_complex {
-        return Err(id.fault("a frequency response function of real numbers"));
+        return Err(
+            id.fault("a frequency response function needs complex numbers, it has real ones")
+        );
     }
     let Some(reference) = header.reference.clone() else {
-        return Err(id.fault("a frequency response function without a reference"));
+        return Err(id.fault("a frequency response function needs a reference"));
     };
     let denominator = header.ordinate[1];
     if ![0, GENERAL, EXCITATION_FORCE].contains(&denominator) {

@@ -58,7 +58,7 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
     let notes = brackets.iter().flat_map(|one| notes_of(&name[one.inner.clone()]));
     let in_brackets = unit_in_notes(&notes.collect::<Vec<_>>(), wanted);
     let stated = first_stated(in_brackets, &outside, &unit, wanted);
-    // It does not say whether the numbers have the factor or need it.
+    // A factor in a name does not say whether the numbers include it or still need it.
     match multiplier(&outside).filter(|_| wanted.is_some()) {
         Some(factor) => {
             let unit = stated.and_then(|stated| stated.used().cloned());

@@ -286,7 +286,7 @@ pub(super) fn is_ambiguous(unit: &str) -> bool {
 /// Words that are units without a single size, or no size: tons of three kinds, decibels.
 const UNCLEAR: &[&str] = &["ton", "tons", "tn", "db", "percent", "%", "%fs"];
 
-/// Returns whether a word is a unit of a size that it does not say.
+/// Returns whether a word is a unit whose size it does not determine.
 pub(super) fn is_unclear(word: &str) -> bool {
     UNCLEAR.contains(&word.to_lowercase().as_str())
 }

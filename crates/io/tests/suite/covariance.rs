@@ -1,4 +1,4 @@
-//! A covariance survives its file, and a wrong one is refused with what is wrong.
+//! A covariance is read back from its file, and a wrong one is refused with the reason.
 
 use mechid_io::{IoError, ParameterCovariance, read_covariance};
 use nalgebra::dmatrix;
@@ -39,7 +39,7 @@ fn a_wrong_covariance_is_refused() {
     assert!(matches!(read_covariance("/no/such/file"), Err(IoError::Read { .. })));
 }
 
-/// JSON has no infinity: what the data left undetermined is written as null.
+/// JSON has no infinity: an undetermined value is written as null.
 #[test]
 fn an_undetermined_parameter_is_named() {
     for (matrix, named) in [

@@ -1,4 +1,4 @@
-//! Descriptions of experiments: what they mean, and what is said about wrong ones.
+//! Descriptions of experiments: their meaning, and the messages about wrong ones.
 
 use mechid_io::{
     Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, IoError, LoadBeyond,
@@ -29,7 +29,7 @@ fn modal_and_physical_parameters_agree() {
     let modal = r#"{ "mass": 10, "natural_frequency_hz": 3.5588127170858854, "damping_ratio": 0.4024922359499621 }"#;
     let of = |system| parse(&description(system, FORCE, "")).unwrap().system().unwrap();
     let (a, b) = (of(SDOF), of(modal));
-    // ω = √500, ζ = 180 / (2·10·ω): seventeen digits given, a few roundings.
+    // ω = √500, ζ = 180 / (2·10·ω): given with seventeen digits, with a few rounding errors.
     assert!((a.stiffness()[0] - b.stiffness()[0]).abs() < 1e-10);
     assert!((a.damping()[0] - b.damping()[0]).abs() < 1e-12);
 }
@@ -248,7 +248,7 @@ fn the_system_of_a_report_is_read_back() {
     assert!(read_system(&path).unwrap_err().to_string().contains("missing field `system`"));
 }
 
-/// Judge: closed forms written out here.
+/// Judge: closed forms in this test.
 #[test]
 fn every_kind_of_excitation_is_sampled() {
     let force = |excitation: &str| {
@@ -287,7 +287,7 @@ fn every_kind_of_excitation_is_sampled() {
     let burst = force(&format!("{{ {random} }}"));
     assert!(burst[..16].iter().all(|f| *f != 0.0) && burst[16..].iter().all(|f| *f == 0.0));
     assert_ne!(burst, force(&format!("{{ {}, \"band_hz\": [4, 20] }}", random)));
-    // Several forces on one degree of freedom add up, and a kind that is left out is a multisine.
+    // Several forces on one degree of freedom add up, and multisine is the default kind.
     let one = r#"{ "kind": "multisine", "lines": "3", "amplitude": 2 }"#;
     let twice = force(&format!("{one}, {}", one.replace(r#""kind": "multisine", "#, "")));
     same(twice, force(one).iter().map(|f| 2.0 * f).collect());
@@ -349,7 +349,7 @@ fn wrong_excitations_say_what_is_wrong() {
     let random = r#"{ "kind": "random", "standard_deviation": 1 }"#;
     let experiment = parse(&description(SDOF, random, "")).unwrap();
     let e = experiment.force_within_steps(0.5).unwrap_err().to_string();
-    assert!(e.contains("a random force has none: choose load held or linear"), "{e}");
+    assert!(e.contains("a random force is not defined: choose load held or linear"), "{e}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Small files that stand for much memory are refused before it is taken.
+//! Small files that claim much memory are refused before it is allocated.
 
 use std::io::Write as _;
 
@@ -59,7 +59,7 @@ fn rows_have_a_limit() {
     assert_eq!(limit(long.as_bytes()), (row, Place::Line(1)));
     assert_eq!(limit(&gzip(long.as_bytes())), (row, Place::Line(1)));
     assert_eq!(limit(format!("t,f\n0,1\n1,{long}\n").as_bytes()), (row, Place::Line(3)));
-    // Shorter than what is read at a time.
+    // Shorter than one block of the reader.
     let some = "1".repeat(LIMITS.row_bytes);
     assert_eq!(limit(format!("t,f\n0,1\n1,{some}\n").as_bytes()), (row, Place::Line(3)));
     assert_eq!(limit(format!("{some},1\n").as_bytes()), (row, Place::Line(1)));
@@ -71,7 +71,7 @@ fn rows_have_a_limit() {
         "a, line 3: the row is longer than 65536 bytes (is a quote not closed?); if the record is \
          right, raise the limit"
     );
-    // As long as allowed.
+    // A row of the maximum length.
     let padded = format!("t,f\n0,{}1\n", " ".repeat(LIMITS.row_bytes - 3));
     assert_eq!(Table::parse_with("a", padded.as_bytes(), &OPTIONS).unwrap().len(), 1);
 }
@@ -84,7 +84,7 @@ fn columns_have_a_limit() {
     let many = compressed(&bytes_variable(8))[128..].repeat(101);
     let file = [&compressed(&bytes_variable(8))[..128], &many].concat();
     assert_eq!(limit(&file).0, columns);
-    // Empty variables in a struct take a few bytes each.
+    // Each empty variable in a struct takes a few bytes.
     let names = 1_000_u32;
     let mut data = [6, 8, 2, 0, 5, 8, 1, 1, 1, 1].map(u32::to_le_bytes).concat();
     data.extend(b"s\0\0\0\0\0\0\0");
@@ -105,7 +105,7 @@ fn what_is_packed_has_a_limit() {
     assert_eq!(limit(&gzip(&whole)), (unpacked, Place::Byte(LIMITS.unpacked_bytes)));
     let universal = [&b"    -1\n    15\n"[..], &vec![b'\n'; 1 << 21]].concat();
     assert_eq!(limit(&gzip(&universal)).0, unpacked);
-    // Twice is once too often.
+    // The limit holds for the sum of two variables.
     let twice = compressed(&file[128..]);
     let e = Table::parse_with("a", &twice, &OPTIONS).unwrap_err().to_string();
     assert!(e.contains("the compressed data are no variable"), "{e}");
@@ -118,7 +118,7 @@ fn numbers_held_have_a_limit() {
     assert!(Table::parse_with("a", &compressed(&bytes_variable(1 << 16)), &OPTIONS).is_ok());
     let text = format!("t,f\n{}", "0,1\n".repeat(1 << 18));
     assert_eq!(limit(&gzip(text.as_bytes())).0, numbers);
-    // A text that is not held may have more.
+    // A text that is not kept in memory may have more rows.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.csv.gz");
     std::fs::write(&path, gzip(text.as_bytes())).unwrap();
@@ -127,15 +127,15 @@ fn numbers_held_have_a_limit() {
     assert_eq!(survey.sampling.len(), 1 << 18);
 }
 
-/// Memory follows what a file holds: a small one that stands for much is refused, whatever the limits on
-/// numbers and unpacked bytes.
+/// The memory limit follows from the size of the file: a small file that claims much memory is
+/// refused, for any limits on numbers and unpacked bytes.
 #[test]
 fn memory_has_a_limit_by_the_size_of_the_file() {
     let memory = |bytes: &[u8]| match Table::parse("a", bytes) {
         Err(IoError::TooLarge { limit: limit @ Limit::Memory(_), .. }) => limit,
         other => panic!("{other:?}"),
     };
-    // 30 million bytes in zlib: 240 MB as numbers, and as much while they are read.
+    // 30 million bytes in zlib: 240 MB as numbers, and the same amount while they are read.
     let file = compressed(&bytes_variable(30_000_000));
     assert!(file.len() < 40_000, "{}", file.len());
     let allowed = Limits::DEFAULT.memory(file.len());
@@ -143,10 +143,10 @@ fn memory_has_a_limit_by_the_size_of_the_file() {
     assert_eq!(memory(&file), Limit::Memory(allowed));
     let e = Table::parse("a", &file).unwrap_err().to_string();
     assert!(e.contains("MiB of memory, which is the limit for a file of this size"), "{e}");
-    // The same around the whole file, for the gzip counts as it is stored.
+    // The same with gzip around the whole file: the stored size of the gzip counts.
     let whole = [&file[..128], &bytes_variable(160_000_000)].concat();
     assert!(matches!(memory(&gzip(&whole)), Limit::Memory(_)));
-    // Whoever says so gets it.
+    // The limit can be raised.
     let limits = Limits::DEFAULT.with_memory(1_000_000_000);
     let options = ReadOptions { skip_lines: 0, limits };
     let table = Table::parse_with("a", &file, &options).unwrap();
@@ -169,10 +169,10 @@ fn names_have_a_limit() {
 fn more_lines_are_skipped_than_there_are() {
     let options = ReadOptions { skip_lines: 1_000_000_000_000, ..OPTIONS };
     let e = Table::parse_with("a", b"t,f\n0,1\n", &options).unwrap_err();
-    assert_eq!(e.to_string(), "a holds no data: it has no more lines than are to be skipped");
+    assert_eq!(e.to_string(), "a holds no data: all of its lines are skipped");
 }
 
-/// Whatever a file holds, messages show it on one line and as it stands.
+/// Messages show any contents of a file on one line, unchanged except for escapes.
 #[test]
 fn messages_hold_nothing_that_a_terminal_obeys() {
     let name = "x\u{1b}[31m\u{202e}\u{7}";

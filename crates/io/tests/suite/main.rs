@@ -1,4 +1,4 @@
-//! Files read and written, judged by what other programs wrote and by numbers that stand here.
+//! Files read and written, compared with files of other programs and with numbers in these tests.
 
 mod covariance;
 mod experiment;

@@ -26,7 +26,8 @@ fn all_files_or_none() {
     };
     write_all(vec![], &[file("a", "one"), file("b", "two")]).unwrap();
     assert_eq!(names(folder.path()), ["a", "b"]);
-    // The second cannot be written: the first keeps its old content, nothing is left over.
+    // The second file cannot be written: the first one keeps its old content, and no temporary file
+    // remains.
     let error = write_all(vec![], &[file("a", "new"), file("no/such/folder", "x")]).unwrap_err();
     assert!(error.to_string().starts_with("cannot write "), "{error}");
     assert_eq!(fs::read_to_string(folder.path().join("a")).unwrap(), "one");
@@ -51,7 +52,7 @@ fn a_file_begun_takes_its_name_with_the_others_or_not_at_all() {
     assert_eq!(names(folder.path()), ["a"]);
     let error = write_all(vec![begun(&["new"])], &[file("no/such/folder")]).unwrap_err();
     assert!(error.to_string().contains("folder"), "{error}");
-    // One path for two files: neither is written over the other.
+    // Two files with one path: neither of them is overwritten.
     let error = write_all(vec![begun(&["new"])], &[file("a")]).unwrap_err();
     assert!(error.to_string().contains("cannot write "), "{error}");
     assert_eq!(
@@ -104,7 +105,7 @@ fn links_stay_links_and_devices_devices() {
     assert!(!fs::metadata(&null).unwrap().is_file());
 }
 
-/// What goes into a pipe waits until it is complete.
+/// Output to a pipe is held back until it is complete.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_pipe_gets_all_of_a_file_or_nothing() {
@@ -129,7 +130,7 @@ fn a_pipe_gets_all_of_a_file_or_nothing() {
 #[test]
 fn names_of_any_length_work() {
     let folder = tempfile::tempdir().unwrap();
-    // No longer than the 255 bytes that a name may have.
+    // A name has at most 255 bytes.
     for name in ["a".repeat(246), "a".repeat(255), "é".repeat(127), "加".repeat(85)] {
         let path = folder.path().join(&name);
         for content in ["one", "two"] {
@@ -155,7 +156,7 @@ fn a_replaced_file_keeps_its_mode_and_a_read_only_one_its_content() {
     let file = |content: &str| OutputFile { path: path.clone(), content: content.into() };
     let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o7777;
     write_all(vec![], &[file("one")]).unwrap();
-    // A new file has the mode that any program gives it here.
+    // A new file has the mode that any program would give it in this folder.
     fs::write(folder.path().join("b"), "").unwrap();
     assert_eq!(mode(&path), mode(&folder.path().join("b")));
     for wanted in [0o600, 0o640, 0o664, 0o777] {
@@ -171,7 +172,8 @@ fn a_replaced_file_keeps_its_mode_and_a_read_only_one_its_content() {
     assert_eq!(names(folder.path()), ["a", "b"]);
 }
 
-/// What a killed program left is removed, what a running one or somebody else wrote is not.
+/// Files that a killed program abandoned are removed; those of a running program or of another user
+/// are not.
 #[test]
 fn abandoned_files_of_the_same_output_are_removed() {
     let folder = tempfile::tempdir().unwrap();
@@ -197,7 +199,7 @@ fn abandoned_files_of_the_same_output_are_removed() {
     assert_eq!(names(folder.path()), expected);
 }
 
-/// However the program ends, nothing is left of a file that is not complete.
+/// No incomplete file remains, for any end of the program.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_file_has_no_name_before_it_is_complete() {
@@ -205,7 +207,8 @@ fn a_file_has_no_name_before_it_is_complete() {
     let path = folder.path().join("a");
     let mut begun = BegunFile::begin(&path).unwrap();
     begun.append(vec![b'x'; 100_000]).unwrap();
-    // Where the file system has such files; others are tested by what is left abandoned.
+    // Only on file systems with unnamed files; the others are covered by the test of abandoned
+    // files.
     if tempfile::tempfile_in(folder.path()).is_ok() && names(folder.path()).is_empty() {
         std::mem::forget(begun);
         assert!(names(folder.path()).is_empty());
@@ -242,7 +245,7 @@ fn an_output_that_is_an_input_is_refused() {
     refuse_replaced_inputs(&[path("rec.csv")], &[std::path::PathBuf::from("-")]).unwrap();
 }
 
-/// A link to a file that is not there yet stays a link.
+/// A link to a file that does not exist yet stays a link.
 #[cfg(unix)]
 #[test]
 fn a_dangling_link_stays_a_link() {
@@ -257,7 +260,7 @@ fn a_dangling_link_stays_a_link() {
     for link in ["first", "second"] {
         assert!(std::fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
     }
-    // Links in a ring, and into a folder that is not there.
+    // Links in a cycle, and a link into a folder that does not exist.
     std::os::unix::fs::symlink("ring", at("ring")).unwrap();
     std::os::unix::fs::symlink("none/new.csv", at("lost")).unwrap();
     for link in ["ring", "lost"] {

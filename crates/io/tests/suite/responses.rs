@@ -62,7 +62,7 @@ fn two_by_one(frequency_hz: Vec<f64>) -> FrequencyResponses {
     }
 }
 
-/// Numbers are written with 13 digits, frequencies with as many as fit into 13 columns.
+/// Numbers are written with 13 digits, frequencies with as many digits as fit into 13 columns.
 #[test]
 fn universal_files_are_read_back() {
     let even: Vec<f64> = (0..101).map(|k| 78.125 + 0.59604644775 * f64::from(k)).collect();
@@ -136,7 +136,7 @@ fn tables_in_every_form() {
     assert_eq!(whole.coherence[1].reference.as_deref(), Some("1"));
 }
 
-/// Judge: 20 log₁₀ of the size, and the order times the speed.
+/// Judge: 20 log₁₀ of the magnitude, and the order times the speed.
 #[test]
 fn levels_orders_and_points_in_brackets() {
     let level =
@@ -184,7 +184,7 @@ fn broken_tables_are_refused() {
     }
 }
 
-/// Segments that cannot be are not used, and told.
+/// Impossible segments are not used, and reported.
 #[test]
 fn impossible_segments_are_told() {
     let table = |segments: [&str; 5]| {
@@ -295,7 +295,7 @@ fn units_of_axes_and_responses_are_read() {
             let error = (function.values[at] - values[at]).norm() / values[at].norm();
             assert!(error < 1e-12, "{header}: {error}");
         }
-        // Nobody said what `w` is.
+        // The file does not state the meaning of `w`.
         assert_eq!(
             found.doubts.len(),
             usize::from(header.starts_with("w,")),

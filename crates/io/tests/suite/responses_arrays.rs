@@ -1,5 +1,6 @@
-//! Frequency responses in arrays of complex numbers. Judge: SciPy and h5py wrote the files (`data/make_arrays.py`), whose
-//! values name their places: line + 1 + 10 point + 100 reference + i line.
+//! Frequency responses in arrays of complex numbers. Judge: SciPy and h5py wrote the files
+//! (`data/make_arrays.py`); each value contains its position: line + 1 + 10 point + 100 reference +
+//! i line.
 
 use mechid_io::{FrequencyResponses, IoError};
 use mechid_model::ResponseQuantity;
@@ -71,7 +72,7 @@ fn vectors_are_known_by_the_points_in_their_names() {
 /// Name, lengths, real and imaginary parts.
 type Variable<'a> = (&'a str, &'a [u32], &'a [f64], &'a [f64]);
 
-/// A MATLAB file of vectors, complex if they have imaginary parts.
+/// Returns a MATLAB file of vectors, which are complex if they have imaginary parts.
 fn file(variables: &[Variable<'_>]) -> Vec<u8> {
     let mut file = b"MATLAB 5.0 MAT-file".to_vec();
     file.resize(124, b' ');
@@ -121,7 +122,7 @@ fn what_is_missing_or_does_not_go_together_is_said() {
     assert!(text.contains("entry 2 of H is not finite"), "{text}");
     let text = refused(&file(&[f, ("H", &[3, 1, 1, 1], three, three)]));
     assert!(text.contains("more dimensions"), "{text}");
-    // What is no response is left out.
+    // An array that is not a response is left out.
     let analytic: (&str, &[u32], &[f64], &[f64]) = ("z", &[4, 1], four, four);
     let responses = FrequencyResponses::parse("a.mat", &file(&[f, h, analytic])).unwrap();
     assert_eq!(responses.functions.len(), 1);

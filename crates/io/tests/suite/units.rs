@@ -1,8 +1,9 @@
-//! Units in headers as rigs and spreadsheets write them.
+//! Units in headers as test rigs and spreadsheets write them.
 
 use mechid_io::{Evidence, Quantity, Table, Unit, stated_unit};
 
-/// Words for a quantity, and spellings of its units with their size in SI units, worked from the definitions.
+/// Words for a quantity, and spellings of its units with their size in SI units, computed from the
+/// definitions.
 type Group = (Quantity, &'static [&'static str], &'static [(&'static str, f64)]);
 
 const POUND: f64 = 4.448_221_615_260_5;
@@ -64,7 +65,7 @@ const GROUPS: [Group; 4] = [
     ),
 ];
 
-/// Styles with a place for the word and the unit; the first ones state the unit in brackets.
+/// Styles with a position for the word and the unit; the first ones state the unit in brackets.
 const BRACKETED: [&str; 12] = [
     "W [U]",
     "W (U)",
@@ -107,8 +108,8 @@ fn header(style: &str, word: &str, unit: &str) -> String {
     style.replace('W', "\u{1}").replace('U', unit).replace('\u{1}', word)
 }
 
-/// Judge: the definitions of the units. A header in brackets has the right factor; one of another style has it, or a
-/// finding says that there is a doubt.
+/// Judge: the definitions of the units. A header in brackets gives the right factor; a header of
+/// another style gives it, or a finding reports the doubt.
 #[test]
 fn generated_headers_have_the_right_factor_or_a_finding() {
     let (mut all, mut right) = (0, 0);
@@ -131,7 +132,7 @@ fn generated_headers_have_the_right_factor_or_a_finding() {
                     all += 1;
                     right += usize::from(is_right);
                 }
-                // A line of units, in brackets of any kind or none.
+                // A line of units, in brackets of any kind or without.
                 for row in [
                     unit.to_string(),
                     format!("[{unit}]"),
@@ -187,7 +188,7 @@ fn a_text_that_is_not_understood_or_may_be_a_unit_is_reported() {
     }
 }
 
-/// Judge: 11.2 mV per newton makes 1 mV 1/11.2 N.
+/// Judge: with 11.2 mV per newton, 1 mV is 1/11.2 N.
 #[test]
 fn a_sensitivity_beside_the_unit_gives_the_factor() {
     for (name, quantity, factor) in [
@@ -256,7 +257,7 @@ fn a_name_is_what_stands_beside_the_unit() {
     ] {
         assert_eq!(table(name).short_name(0), bare, "{name}");
     }
-    // In any case, and with the other brackets kept.
+    // In upper or lower case, and with the other brackets kept.
     let columns = table("Force [N] (left)");
     for wanted in ["Force [N] (left)", "Force (left)", "Force", "force"] {
         assert_eq!(columns.find(wanted).unwrap(), 0, "{wanted}");
@@ -299,7 +300,7 @@ fn a_unit_may_stand_before_the_name_or_be_a_sign() {
         let unit = stated.unit.unwrap_or_else(|| panic!("{name}"));
         assert!((unit.in_si / factor - 1.0).abs() < 1e-12, "{name}: {}", unit.in_si);
     }
-    // A unit of the SI before a name changes nothing.
+    // An SI unit before a name has no effect.
     assert_eq!(stated_unit("N 12 left", "", Some(Quantity::Force)), None);
 }
 
@@ -331,7 +332,7 @@ fn headers_of_other_languages_and_encodings_are_read() {
     }
 }
 
-/// Judge: the definitions of the units. What is not taken is in the finding with its factor.
+/// Judge: the definitions of the units. A unit that is not used is in the finding, with its factor.
 #[test]
 fn factors_and_lost_signs_are_reported_with_what_they_would_make() {
     for (name, quantity, factor) in [

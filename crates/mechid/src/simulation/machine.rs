@@ -21,7 +21,7 @@ pub enum SimulatedSystem {
 }
 
 impl SimulatedSystem {
-    /// Number of degrees of freedom.
+    /// Returns the number of degrees of freedom.
     pub fn dof(&self) -> usize {
         match self {
             Self::Dense(system) => system.dof(),
@@ -37,7 +37,7 @@ impl SimulatedSystem {
         }
     }
 
-    /// The system, if all entries of its matrices are stored.
+    /// Returns the system if all entries of its matrices are stored.
     pub fn dense(&self) -> Option<&SecondOrderSystem> {
         match self {
             Self::Dense(system) => Some(system),

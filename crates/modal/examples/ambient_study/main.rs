@@ -1,8 +1,8 @@
-//! Coverage and errors of modes from responses alone, beside covariance-driven subspace models
-//! (SSI-cov) at the order that is best with the truth in hand.
+//! Coverage and errors of modes from responses alone, compared with covariance-driven subspace
+//! models (SSI-cov) of the order that is best when the true modes are known.
 //!
 //! `cargo run --release -p mechid-modal --example ambient_study -- SEEDS [CASE [FOLDER]]`; with a
-//! FOLDER the records and the modes of both truth and estimates are written there instead, for
+//! FOLDER the records, the true modes and the estimated modes are written there instead, for
 //! `pyoma2_ssi.py`.
 
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
@@ -381,8 +381,8 @@ impl SubspaceErrors {
                 let nearest = poles
                     .map(|p| &p.pole)
                     .min_by(|a, b| distance(a.pole).total_cmp(&distance(b.pole)));
-                // A pole further away, nearer to another mode or of another shape is no estimate of
-                // this mode: below the true order one pole stands for two modes.
+                // A pole that is farther away, nearer to another mode or has another shape is not
+                // an estimate of this mode: below the true order, one pole represents two modes.
                 let shape = truth.shapes.column(r).into_owned();
                 let is_mode = |p: &&Pole| {
                     let gap = distance(p.pole);
@@ -399,7 +399,7 @@ impl SubspaceErrors {
         }
     }
 
-    /// Returns the smallest RMS errors of f and ζ of one mode over the orders and settings that see
+    /// Returns the smallest RMS errors of f and ζ of one mode over the orders and settings that find
     /// every mode in 90 % of the records.
     fn best(&self, mode: usize) -> [BestSubspace; 2] {
         let seen = |row: usize, half: usize| {

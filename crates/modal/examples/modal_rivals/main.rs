@@ -1,16 +1,17 @@
-//! Errors of the usual tools over those of maximum likelihood, on the same records.
+//! Errors of common tools relative to those of maximum likelihood, on the same records.
 //!
 //! `cargo run --release -p mechid-modal --example modal_rivals -- SEEDS` compares root-mean-square
-//! errors of f and ζ, mode by mode; with a FOLDER after SEEDS the records and the modes of both truth
-//! and estimates are written there instead, for `sdypy_ema.py`. The usual tools here:
+//! errors of f and ζ, mode by mode; with a FOLDER after SEEDS the records, the true modes and the
+//! estimated modes are written there instead, for `sdypy_ema.py`. The common tools are:
 //!
-//! - random forces: responses by H1 from Hann-windowed segments with half of each in the next one,
-//!   then pLSCF, at the best of three lengths of segments;
-//! - hits: blocks from every hit on, with an exponential window whose damping is taken off again, H1
-//!   over the hits, then pLSCF, at the best of four windows.
+//! - random forces: responses by H1 from Hann-windowed segments that overlap by half, then pLSCF,
+//!   at the best of three lengths of segments;
+//! - hits: blocks from every hit on, with an exponential window whose damping is subtracted again,
+//!   H1 over the hits, then pLSCF, at the best of four windows.
 //!
-//! The usual tools are helped: their poles are chosen with the truth in hand, the cluster nearest to
-//! each true pole, and the best setting is chosen mode by mode by the errors themselves.
+//! The common tools have an advantage: their poles are chosen with the true modes known, as the
+//! cluster nearest to each true pole, and the best setting is chosen mode by mode by the errors
+//! themselves.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 #[path = "../../tests/suite/generator.rs"]
@@ -29,7 +30,7 @@ use generator::{Case, Excitation};
 
 type C = Complex<f64>;
 
-/// Damping ratio above which a pole of the usual tools is not one of a mode.
+/// Damping ratio above which a pole of the common tools does not belong to a mode.
 const MAX_DAMPING: f64 = 0.2;
 
 fn main() {
@@ -45,7 +46,7 @@ fn main() {
     }
 }
 
-/// Writes the records of a case (forces, then motion), and its modes: true ones and estimates.
+/// Writes the records of a case (forces, then motion), its true modes and the estimates.
 fn write(case: &Case, seeds: u64, folder: &Path) -> std::io::Result<()> {
     let name = case.name.split(',').next().unwrap_or_default().replace(' ', "-");
     let [low, high] = case.band_hz;
@@ -162,11 +163,12 @@ fn add(case: &Case, modes: &[usize], poles: &[C], squares: &mut [Squares]) {
     }
 }
 
-/// Way to frequency responses of the usual tools.
+/// Method of the common tools to compute frequency responses.
 enum Setting {
     /// Hann-windowed segments of a length in samples.
     Hann(usize),
-    /// Blocks of a length in samples from each hit, and what the exponential window leaves at the end.
+    /// Blocks of a length in samples from each hit, and the value of the exponential window at
+    /// their end.
     Exponential(usize, f64),
 }
 

@@ -1,10 +1,10 @@
 //! Cramér–Rao bound of natural frequencies and damping ratios, from the true structure alone.
 //!
-//! Nothing of the estimator is used. The derivatives are differences of records that the generator
-//! makes without noise: of f and ζ by central differences, of shapes, participations and initial
-//! states exactly, because the record is linear in them. All modes count, also those outside the
-//! band; unknown beside f and ζ are the complex shapes, the complex participations of all forces
-//! but one, and the complex state of every mode at the start of the record.
+//! The bound is independent of the estimator. The derivatives are differences of records that the
+//! generator makes without noise: of f and ζ by central differences, of shapes, participations and
+//! initial states exactly, because the record is linear in them. All modes count, also those
+//! outside the band; the other unknowns are the complex shapes, the complex participations of all
+//! forces but one, and the complex state of every mode at the start of the record.
 //!
 //! # Source
 //! Kay, *Fundamentals of Statistical Signal Processing: Estimation Theory* (1993), section 15.7
@@ -102,8 +102,8 @@ fn of_mode(
     alone.lines(seed).outputs().clone()
 }
 
-/// Returns the derivatives with respect to what all outputs share beside the poles: participations
-/// of all forces but the first, and initial states.
+/// Returns the derivatives with respect to the unknowns other than the poles that all outputs
+/// share: participations of all forces but the first, and initial states.
 fn shared_derivatives(case: &Case, seed: u64) -> Vec<DMatrix<C>> {
     let inputs = case.participation[0].len();
     let mut all = Vec::new();
@@ -144,8 +144,8 @@ fn decay(case: &Case, mode: usize, shape: &[C]) -> DMatrix<C> {
     LineData::from_open_record(None, &record, case.band_hz).unwrap().outputs().clone()
 }
 
-/// Power of a line of an unmeasured force in unitary lines: its amplitude S has E|S|² = 2, and half
-/// of it stands on either side of zero.
+/// Power of a line of an unmeasured force in unitary lines: its amplitude S has E|S|² = 2, with
+/// half of the power on either side of zero.
 const LINE_POWER: f64 = 0.5;
 
 enum Covariance {
@@ -175,7 +175,7 @@ fn noise_covariance(case: &Case, seed: u64) -> Covariance {
     let period = (4 * case.samples) as f64;
     let step = TAU * case.rate_hz / period;
     // The record is a window of a process with independent lines on a grid four times as fine: the
-    // power of a line is theirs, weighed by the transform of the window.
+    // power of a line is the power of those lines, weighted by the transform of the window.
     const REACH: i64 = 400;
     let responses: Vec<DMatrix<C>> = {
         let last = (data.omega()[data.len() - 1] / step) as i64 + REACH + 1;

@@ -1,8 +1,8 @@
 //! Coverage, scatter and counts of the modal estimator over many records with known modes.
 //!
 //! `cargo run --release -p mechid-modal --example modal_study -- SEEDS [CASE] [FIRST]` prints one
-//! row per case. The scatter stands over an independent Cramér–Rao bound (`bound.rs`); the bias over
-//! the scatter. The row "sensor noise only" leaves unmeasured forces out of the noise model; the
+//! row per case. The scatter is divided by an independent Cramér–Rao bound (`bound.rs`), the bias
+//! by the scatter. The row "sensor noise only" leaves unmeasured forces out of the noise model; the
 //! number of modes is given there.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
@@ -17,7 +17,8 @@ use mechid_modal::{DrivingPoint, ModalConstraint, ModalSettings};
 use bound::Bound;
 use score::Score;
 
-/// Records over which the bound is averaged, of structures with the same noise in every record.
+/// Number of records over which the bound is averaged, for structures with the same noise in every
+/// record.
 const BOUND_SEEDS: u64 = 3;
 
 fn main() {

@@ -23,8 +23,8 @@ pub enum AmbientError {
     },
     /// A channel has next to no signal in the band.
     #[error(
-        "channel {}: its RMS value in the band is {rms:.2e}, {:.0e} of the \
-         strongest channel's: the sensor is dead or in another unit",
+        "channel {}: its RMS value in the band is {rms:.2e}, {:.0e} times that of the \
+         strongest channel: the sensor is dead or in another unit",
         channel.saturating_add(1), ratio
     )]
     DeadChannel {
@@ -105,7 +105,7 @@ pub enum AmbientError {
     },
     /// There is no mode in the band.
     #[error(
-        "no mode between {from_hz} and {to_hz} Hz: none of {candidates} candidates stands out of \
+        "no mode between {from_hz} and {to_hz} Hz: none of {candidates} candidates exceeds \
          the noise"
     )]
     NoMode {

@@ -106,7 +106,7 @@ fn taper_sums(len: usize) -> Vec<f64> {
 fn padded_lines(samples: &[f64], padded: usize) -> Vec<Complex<f64>> {
     let plan = transform::forward(padded);
     let mut input = vec![0.0; padded];
-    // One sample later, as the tapers count: t + 1.
+    // The tapers count the samples from 1: the input begins one sample later.
     input[1..=samples.len()].copy_from_slice(samples);
     let mut output = plan.make_output_vec();
     // The lengths match the plan, so that this cannot fail.

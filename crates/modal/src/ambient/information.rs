@@ -12,8 +12,8 @@ use crate::dense::{product, transposed_product};
 /// Returns the Fisher information of the parameters; `None` where S is not positive definite.
 ///
 /// # Source
-/// Entry (a, b) is Σ tr S⁻¹ S_a S⁻¹ S_b over the lines; Zeira & Nehorai (1990), IEEE Transactions
-/// on Acoustics, Speech, and Signal Processing 38, 1031–1036.
+/// Entry (a, b) is Σ tr S⁻¹ S_a S⁻¹ S_b over the lines, with the derivatives S_a of S; Zeira &
+/// Nehorai (1990), IEEE Transactions on Acoustics, Speech, and Signal Processing 38, 1031–1036.
 pub(super) fn information(
     parameters: &Parameters,
     lines: &[PooledLines],

@@ -118,7 +118,7 @@ pub(super) fn match_amplitudes(
 /// Candidate of a further mode in the whitened lines.
 pub(super) struct Candidate {
     pub pole: Pole,
-    /// Expected increase of 2 ln L by a mode there.
+    /// Expected increase of 2 ln L by a mode at this pole.
     pub gain: f64,
 }
 

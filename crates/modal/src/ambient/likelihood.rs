@@ -50,7 +50,8 @@ pub(super) fn log_determinant(factor: &Cholesky<Complex<f64>, Dyn>) -> f64 {
     2.0 * factor.l_dirty().diagonal().iter().map(|z| z.re.ln()).sum::<f64>()
 }
 
-/// Sums over the lines for the gradient.
+/// Sums over the lines for the gradient, with Γ = S⁻¹ − S⁻¹ Ŝ S⁻¹, Ψ = ψ γᵀ, and the kernels k and
+/// k̃ with their derivatives k′ and k̃′.
 #[derive(Clone)]
 struct GradientSums {
     /// Σ k Γ + conj Σ k̃ Γ of each mode.

@@ -18,7 +18,7 @@ pub(super) const DEFAULT_MAX_MODES: usize = 12;
 pub(super) const MIN_LINES_PER_UNKNOWN: usize = 3;
 
 /// Minimum ratio of the RMS value of a channel to the RMS value of the strongest; a channel below
-/// it is dead. Twelve bits of a converter with a margin.
+/// it is dead. The limit is below the resolution of a twelve-bit converter, with a margin.
 pub(super) const DEAD_CHANNEL: f64 = 1e-7;
 
 /// Number of orders of the subspace models above twice the requested number of modes.
@@ -40,7 +40,8 @@ pub(super) const MIN_SHARE: f64 = 0.3;
 /// equals the spectrum at the centre within 0.25 %.
 pub(super) const POOLING: f64 = 0.1;
 
-/// Width of pooled lines for the comparison of initial estimates.
+/// Width of pooled lines for the comparison of initial estimates, as a share of the distance to the
+/// nearest pole.
 pub(super) const COARSE_POOLING: f64 = 0.3;
 
 /// Maximum mean share of leakage in the power of a line for which an interval is given. Leakage
@@ -57,7 +58,7 @@ pub(super) const NOISE_TERMS: usize = 3;
 /// Number of polynomials of the noise that are tried at a time: an even and an odd one.
 pub(super) const NOISE_TERMS_ADDED: usize = 2;
 
-/// Maximum number of polynomials of the noise; Akaike's criterion chooses within it.
+/// Maximum number of polynomials of the noise; Akaike's criterion chooses the number.
 pub(super) const MOST_NOISE_TERMS: usize = 15;
 
 /// Number of neighbouring modes on either side whose forces may be correlated with the force of a
@@ -74,13 +75,14 @@ pub(super) const LARGEST_STEP: f64 = 0.7;
 /// Number of refused candidates that ends the search for further modes.
 pub(super) const REFUSALS: usize = 2;
 
-/// Minimum ratio of the damping of a mode to its standard error.
+/// Minimum ratio of the damping of a mode to its standard error; below it the damping is
+/// undetermined.
 pub(super) const DAMPING_SIGNIFICANCE: f64 = 2.0;
 
 /// Probability of a false harmonic in a record.
 pub(super) const HARMONIC_LEVEL: f64 = 1e-3;
 
-/// Number of sine tapers in the test for harmonics; the resolution is as many half lines.
+/// Number of sine tapers in the test for harmonics; the resolution is this number of half lines.
 pub(super) const TAPERS: usize = 7;
 
 /// Number of lines excluded on either side of a harmonic: the subtraction of the sinusoid is not

@@ -2,8 +2,8 @@
 //!
 //! A subspace method ([`ssi_cov`]) gives initial poles and shapes. Poles, shapes, correlated white
 //! forces on the modes and smooth sensor noise then maximise Whittle's likelihood with the expected
-//! periodogram, which includes the leakage of the open record; no window, no averaging, no model
-//! order to choose.
+//! periodogram, which includes the leakage of the open record; no window, no averaging and no
+//! choice of a model order are needed.
 
 mod error;
 pub mod harmonics;

@@ -9,8 +9,9 @@ use super::search::{Effort, Fit, full_step, search_pooled};
 
 /// Adds polynomials to the noise of all sensors as long as Akaike's criterion falls.
 ///
-/// Noise that the polynomials cannot follow is taken for the tails of the resonances and biases
-/// the damping, the more so the longer the record is.
+/// Noise that the polynomials cannot follow is attributed to the tails of the resonances and biases
+/// the damping; longer records are affected more.
+///
 ///
 /// # Source
 /// Akaike (1974), IEEE Transactions on Automatic Control 19, 716–723.

@@ -17,9 +17,9 @@ use crate::stabilisation::Pole;
 /// Requested number of modes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wanted {
-    /// Stated number.
+    /// Number of modes, if it is stated.
     pub exactly: Option<usize>,
-    /// Largest number otherwise.
+    /// Largest number of modes, if the likelihood decides.
     pub most: usize,
 }
 

@@ -4,15 +4,15 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::limits::CORRELATED_NEIGHBOURS;
 
-/// Response of the output to a constant force.
+/// Kernel of a mode, distinguished by the response of the output to a constant force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kernel {
-    /// A static deflection, 1/(s − λ): displacements, and velocities too.
+    /// Static deflection, 1/(s − λ): for displacements and for velocities.
     Static,
-    /// A static deflection in a record without an anti-aliasing filter: frequencies above half the
+    /// Static deflection in a record without an anti-aliasing filter: frequencies above half the
     /// sampling rate fold into the band.
     Sampled,
-    /// Zero, s/(λ(s − λ)): accelerations, and velocities too.
+    /// No deflection, s/(λ(s − λ)): for accelerations and for velocities.
     Vanishing,
 }
 

@@ -62,7 +62,7 @@ pub(super) fn band_lines(
     let largest = scale.iter().copied().fold(0.0, f64::max);
     for (channel, &rms) in scale.iter().enumerate() {
         let ratio = rms / largest;
-        // NaN if all channels are zero.
+        // The ratio is NaN if all channels are zero.
         if ratio.is_nan() || ratio < DEAD_CHANNEL {
             return Err(AmbientError::DeadChannel { channel, rms, ratio });
         }

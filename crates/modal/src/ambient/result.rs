@@ -36,7 +36,7 @@ pub enum Uncertainty {
     Leakage {
         /// Mean part of the power of a line that is leakage.
         share: f64,
-        /// Largest part for an interval.
+        /// Largest share of leakage for which an interval is given.
         most: f64,
     },
 }
@@ -65,7 +65,7 @@ impl ModalValue {
         Self { value, uncertainty }
     }
 
-    /// Returns the standard error; `None` where it is refused.
+    /// Returns the standard error; `None` if it is not known well enough.
     pub fn standard_error(&self) -> Option<f64> {
         match self.uncertainty {
             Uncertainty::Known { standard_error, .. } => Some(standard_error),
@@ -73,7 +73,7 @@ impl ModalValue {
         }
     }
 
-    /// Returns the interval of 95 %; `None` where it is refused.
+    /// Returns the interval of 95 %; `None` if it is not known well enough.
     pub fn interval(&self) -> Option<[f64; 2]> {
         match self.uncertainty {
             Uncertainty::Known { interval, .. } => Some(interval),
@@ -144,7 +144,7 @@ pub struct DroppedCandidate {
     pub natural_frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Reason.
+    /// Reason for the rejection.
     pub reason: DropReason,
 }
 
@@ -163,7 +163,8 @@ pub struct AmbientEstimate {
     pub band_hz: [f64; 2],
     /// Number of spectral lines used.
     pub lines: usize,
-    /// ln L of the lines, each output over its RMS value in the band.
+    /// Logarithm ln L of the likelihood of the lines, with each output divided by its RMS value in
+    /// the band.
     pub log_likelihood: f64,
     /// Mean share of leakage of the open record in the power of a line.
     pub leakage_share: f64,

@@ -11,9 +11,9 @@
 //! ```
 //!
 //! The second term of k is the leakage of the open record; D is the value of H at high frequency.
-//! Of a record without an anti-aliasing filter, Δ coth((jω − λ)Δ)  and Δ/sinh((jω − λ)Δ) take the
-//! place of 1/(jω − λ), with half the time between two samples Δ: sums over all frequencies that
-//! fold onto ω.
+//! For a record without an anti-aliasing filter, Δ coth((jω − λ)Δ) and Δ/sinh((jω − λ)Δ) replace
+//! 1/(jω − λ), where Δ is half the time between two samples. These functions are sums over all
+//! frequencies that fold onto ω.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -26,15 +26,15 @@ const DIFFERENCE_STEP: f64 = 1e-5;
 #[derive(Debug, Clone)]
 pub(super) struct Coefficients {
     pub poles: Vec<Complex<f64>>,
-    /// ψ, outputs × modes.
+    /// Shapes ψ, outputs × modes.
     pub shapes: DMatrix<Complex<f64>>,
-    /// γ, outputs × modes.
+    /// Vectors γ of the covariance function, outputs × modes.
     pub covariances: DMatrix<Complex<f64>>,
-    /// Q, modes × modes.
+    /// Correlation Q of the forces on the modes, modes × modes.
     pub correlation: DMatrix<f64>,
-    /// D, outputs × modes.
+    /// Values D of the transfer functions at high frequency, outputs × modes.
     pub direct: DMatrix<f64>,
-    /// D Q Dᵀ.
+    /// Spectral matrix D Q Dᵀ of the direct response.
     pub direct_power: DMatrix<f64>,
     pub kernel: Kernel,
 }

@@ -20,8 +20,8 @@ use super::poles::linear_columns;
 /// polynomials P and W. A linear mode has P proportional to a, and W constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backbone {
-    /// Modes of the linear model that this one replaces: their indices among all modes by rising
-    /// frequency.
+    /// Modes of the linear model that the backbone replaces: their indices among all modes by
+    /// rising frequency.
     pub modes: Vec<usize>,
     /// Frequency and damping from the first amplitude down to the last one above the noise.
     pub points: Vec<BackbonePoint>,

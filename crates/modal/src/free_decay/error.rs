@@ -28,7 +28,7 @@ pub enum FreeDecayError {
         value: f64,
     },
     /// No, or too many, modes were asked for.
-    #[error("{} cannot be fitted: from 1 to {most}", message::count(*modes, "mode"))]
+    #[error("{} cannot be fitted: give a number from 1 to {most}", message::count(*modes, "mode"))]
     NumberOfModes {
         /// Modes asked for.
         modes: usize,
@@ -68,7 +68,7 @@ pub enum FreeDecayError {
         /// Standard error of the rate, in 1/s.
         standard_error: f64,
     },
-    /// No search for the best fit (maximum likelihood, output error or a constant) ended at one.
+    /// No search for the best fit (maximum likelihood, output error or a constant) converged.
     #[error(
         "the search for the best fit failed: {} reached no minimum within {steps} \
          steps. This says nothing about the model; more lines, more periods, a known mass or fewer \
@@ -78,7 +78,7 @@ pub enum FreeDecayError {
     NotConverged {
         /// Number of searches, each from another start.
         searches: usize,
-        /// Steps allowed for the first.
+        /// Maximum number of steps of the first search.
         steps: usize,
     },
     /// A record is not usable.

@@ -42,7 +42,7 @@ impl DecayMode {
 /// Fit of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DecayChannel {
-    /// Constant, in the unit of the record; 0 where none was fitted.
+    /// Constant, in the unit of the record; 0 if none was fitted.
     pub offset: f64,
     /// Standard deviation of the residual, in the unit of the record.
     pub noise: f64,
@@ -59,9 +59,9 @@ pub struct DecayChannel {
 /// Comparison of the residual in the first samples with the residual in the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onset {
-    /// Number of the first samples.
+    /// Number of samples of the onset.
     pub samples: usize,
-    /// Ratio of the mean square of their residual to that of the others.
+    /// Ratio of the mean square of the residual in the onset to that in the other samples.
     pub ratio: f64,
     /// Probability that noise has a larger ratio, a pure number.
     pub p_value: f64,
@@ -308,7 +308,7 @@ fn mode(
     };
     let cube = size * size * size;
     let weight = whole.conj() * (scale[reference] / whole.norm());
-    // Back to the first sample, for a mode whose amplitude is taken elsewhere.
+    // Refers the amplitude to the first sample.
     let back = (-growth * spread.fit.poles[at].origin(len) as f64).exp();
     let variance = spread.variance(at, &[(reference, weight)]) * back * back;
     let mode = IdentifiedMode {

@@ -9,8 +9,8 @@ pub(crate) const SAMPLES_PER_ORDER: usize = 20;
 /// Number of lags in the whiteness test of a residual.
 pub(crate) const ESTIMATE_LAGS: usize = 20;
 
-/// Ratio of the length of a record to the length of its onset, whose residual is compared with the
-/// others.
+/// Ratio of the length of a record to the length of its onset, whose residual is compared with that
+/// of the other samples.
 pub(crate) const ONSET_SHARE: usize = 50;
 
 /// Minimum number of samples of the onset.
@@ -36,19 +36,19 @@ pub(crate) const COARSE: f64 = 1e-2;
 /// Damping above which a search ends: no step lowers the cost.
 pub(crate) const MAX_DAMPING: f64 = 1e8;
 
-/// Residual of rounding, relative to the RMS of a channel.
+/// Maximum residual, relative to the RMS of a channel, that counts as rounding.
 pub(crate) const POLE_ROUNDING: f64 = 1e-12;
 
-/// Maximum number of modes.
+/// Maximum number of modes of a free decay.
 pub(crate) const MOST_MODES: usize = 40;
 
-/// Minimum number of samples per mode.
+/// Minimum number of samples of a free decay per mode.
 pub(crate) const SAMPLES_PER_MODE: usize = 12;
 
-/// Maximum number of samples.
+/// Maximum number of samples of a free decay.
 pub(crate) const MOST_SAMPLES: usize = 1 << 18;
 
-/// Minimum ratio of a growth rate to its standard error that is not scatter.
+/// Minimum ratio of a growth rate to its standard error for a growth that is not scatter.
 pub(crate) const FREE_DECAY_SURE: f64 = 4.0;
 
 /// Growth over the record, in nepers, above which the amplitude of a mode refers to the last
@@ -59,16 +59,16 @@ pub(crate) const FROM_THE_END: f64 = 3.0;
 /// before: limits rounding errors.
 pub(crate) const POLE_AFRESH: usize = 32;
 
-/// Fastest decay, in nepers per sample.
+/// Fastest decay of a mode, in nepers per sample.
 pub(crate) const FASTEST_DECAY: f64 = 1.5;
 
-/// Largest growth over a record, in nepers.
+/// Largest growth of a mode over a record, in nepers.
 pub(crate) const MOST_GROWTH: f64 = 30.0;
 
-/// Largest damping ratio.
+/// Largest damping ratio of a mode of a free decay.
 pub(crate) const MOST_DAMPING: f64 = 0.9;
 
-/// Highest frequency over half the sampling rate.
+/// Highest frequency of a mode, relative to half the sampling rate.
 pub(crate) const POLE_HIGHEST: f64 = 0.98;
 
 /// Probability that noise alone gains as much as is required of a further decay.
@@ -89,7 +89,7 @@ pub(crate) const INITIAL_ALIASED: f64 = 0.01;
 /// Slowest decay of the matched filters over the record, in nepers.
 pub(crate) const FIRST_DECAY: f64 = 2.0;
 
-/// Ratio of the decay of a matched filter to the one before.
+/// Ratio of the decay of a matched filter to the decay of the filter before.
 pub(crate) const INITIAL_FASTER: f64 = 3.0;
 
 /// Growth of the matched filter of a growing response over the record, in nepers.

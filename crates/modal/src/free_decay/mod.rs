@@ -85,7 +85,7 @@ impl Default for FreeDecay {
 /// can be fitted, [`FreeDecayError::NoOscillation`] if decays without oscillation describe it
 /// better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
 /// [`FreeDecayError::Grows`] if most of the response grows, [`FreeDecayError::NotConverged`] if the
-/// record does not determine as many modes.
+/// record does not determine the number of modes.
 ///
 /// # Source
 /// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627 (initial poles);
@@ -147,7 +147,8 @@ pub fn free_decay(
     Ok(estimate)
 }
 
-/// Returns the number of modes, given or at most, that the record and the limits allow.
+/// Returns the given or the maximum number of modes; refuses a number or a record outside the
+/// limits.
 fn checked_number_of_modes(record: &Record, settings: &FreeDecay) -> Result<usize, FreeDecayError> {
     let asked = settings.modes.unwrap_or(settings.max_modes);
     if asked == 0 || asked > MOST_MODES {

@@ -41,12 +41,12 @@ impl Pole {
         Self { growth: self.growth.clamp(least, MOST_GROWTH / len as f64), turn }
     }
 
-    /// Returns whether more than rounding remains of it at a sample.
+    /// Returns whether more than rounding remains of the response at a sample.
     pub(super) fn is_alive(&self, sample: usize) -> bool {
         self.growth * sample as f64 >= -DEAD
     }
 
-    /// Returns the sample to which its amplitude refers.
+    /// Returns the sample to which the amplitude of the pole refers.
     pub(super) fn origin(&self, len: usize) -> usize {
         if self.growth * len as f64 > FROM_THE_END { len - 1 } else { 0 }
     }

@@ -94,7 +94,7 @@ impl<'a> Search<'a> {
         Self { data, raw: Subspace::new(&centred) }
     }
 
-    /// Returns the fits with the number of decays of lowest cost, at most `most`.
+    /// Returns the fits whose number of decays, at most `most`, has the lowest cost.
     pub(super) fn best(&self, most: usize) -> Option<Selected> {
         let per_decay = least_gain(self.data.len(), self.data.channels());
         let cost = |of: &Candidate| of.cost + per_decay * of.fit.poles.len() as f64;

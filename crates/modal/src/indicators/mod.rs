@@ -127,7 +127,7 @@ pub fn mac_with_error(
 }
 
 /// Returns the modal phase collinearity |φᵀφ|²/(φᴴφ)²: 1 for a shape whose entries are all in phase
-/// or in opposition, as of a structure with proportional damping, and 0 for a travelling wave.
+/// or in opposition, as for a structure with proportional damping, and 0 for a travelling wave.
 ///
 /// # Source
 /// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627; Pappa, Elliott &

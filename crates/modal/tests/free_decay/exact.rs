@@ -1,4 +1,4 @@
-//! Free decays, judged by exact sums of decaying oscillations.
+//! Free decays, compared with exact sums of decaying oscillations.
 
 use std::f64::consts::TAU;
 
@@ -10,8 +10,8 @@ use crate::noisy::{Case, found_in_noise};
 
 const CASE: Case = Case { modes: 2, channels: 2, noise: 0.01, coloured: false, close: false };
 
-/// The number of modes, the intervals and the scatter hold in some experiments; the book
-/// (`studies/decays.md`) has the figures of more.
+/// Number of modes, coverage of the intervals, and scatter in some experiments; the book
+/// (`studies/decays.md`) has the results of more.
 #[test]
 fn intervals_hold_and_the_scatter_is_that_of_the_bound() {
     for (case, runs) in [
@@ -62,7 +62,7 @@ fn found(sampling: Sampling, channels: &[Vec<f64>]) -> Result<FreeDecayEstimate,
     free_decay(&Record::from_channels(sampling, channels).unwrap(), &FreeDecay::default())
 }
 
-/// Without noise, what remains is rounding.
+/// Without noise, the residual is rounding.
 #[test]
 fn exact_decays_are_found_to_rounding() {
     let sampling = Sampling::new(1e-3, 1500).unwrap();
@@ -89,7 +89,7 @@ fn exact_decays_are_found_to_rounding() {
     }
 }
 
-/// Noise of each channel has a level of its own: the quiet channel decides.
+/// The noise of each channel has its own level: the quiet channel determines the result.
 #[test]
 fn channels_count_by_their_own_noise() {
     let sampling = Sampling::new(1e-2, 600).unwrap();
@@ -109,7 +109,7 @@ fn channels_count_by_their_own_noise() {
     assert!((levels[0] / 0.01 - 1.0).abs() < 0.1 && (levels[1] - 1.0).abs() < 0.1, "{levels:?}");
 }
 
-/// A hum that does not decay is told from a mode, and leaves the modes as they are.
+/// A hum that does not decay is distinguished from a mode and does not change the modes.
 #[test]
 fn a_steady_hum_does_not_decay() {
     let sampling = Sampling::new(1e-3, 2000).unwrap();
@@ -122,7 +122,7 @@ fn a_steady_hum_does_not_decay() {
     assert!((hum.mode.natural_frequency_hz.value - 50.0).abs() < 0.01);
 }
 
-/// So many modes as asked for, and a mode asked for that is not there is of no account.
+/// The requested number of modes; a requested mode that does not exist has no effect on the others.
 #[test]
 fn the_number_of_modes_can_be_given() {
     let sampling = Sampling::new(1e-3, 800).unwrap();
@@ -164,7 +164,7 @@ fn what_is_no_free_decay_is_told() {
     }
 }
 
-/// A record too long to be squared in memory: low modes at a high rate.
+/// A record too long for a square matrix in memory: low modes at a high sampling rate.
 #[test]
 fn low_modes_of_a_long_record_are_found() {
     let sampling = Sampling::new(1e-4, 30_000).unwrap();

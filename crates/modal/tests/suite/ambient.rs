@@ -1,4 +1,4 @@
-//! Modes from responses alone, judged by exact discretisations of known structures.
+//! Modes from responses alone, compared with exact discretisations of known structures.
 
 use std::f64::consts::TAU;
 
@@ -78,8 +78,8 @@ fn mast() -> Structure {
     }
 }
 
-/// Judge: the truth behind twelve records; of 72 intervals of 95 % at least 61 hold, four standard
-/// deviations below the expectation. The long study is `examples/ambient_study`.
+/// Judge: the true modes of twelve records; at least 61 of 72 intervals of 95 % contain them, four
+/// standard deviations below the expectation. The long study is `examples/ambient_study`.
 #[test]
 fn intervals_hold_the_truth() {
     let truth = mast();
@@ -102,7 +102,7 @@ fn intervals_hold_the_truth() {
     assert!(covered >= 61, "{covered} of {all}");
 }
 
-/// The noise of the sensors falls over the band by a law that few polynomials do not follow.
+/// The noise of the sensors falls over the band in a way that a few polynomials cannot describe.
 #[test]
 fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
     let truth = tower();
@@ -118,8 +118,8 @@ fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
     assert!(errors.iter().sum::<f64>().abs() < 6.0, "{errors:?}");
 }
 
-/// Two records of which a wrong quantity has the larger maximum of the likelihood, at damping ratios
-/// a thirtieth of the true ones.
+/// Two records for which a wrong quantity has the larger maximum of the likelihood, at damping
+/// ratios a thirtieth of the true ones.
 #[test]
 fn no_resonance_becomes_a_sinusoid() {
     let truth = tower();
@@ -158,7 +158,7 @@ fn a_harmonic_is_named_and_left_out_on_request() {
     assert!((harmonic.amplitude / amplitude - 1.0).abs() < 0.1, "{harmonic:?}");
     assert!(harmonic.p_value < 1e-5 && harmonic.kurtosis < -1.0, "{harmonic:?}");
     assert_eq!((estimate.modes.len(), is_right(&estimate, &truth)), (4, 4));
-    // Stated by hand it gives the same, and next to nothing of the record is lost.
+    // If the frequency is stated, the result is the same, and hardly any of the record is lost.
     let stated = AmbientSettings { without_hz: vec![frequency_hz], ..AmbientSettings::default() };
     let again = identified(&disturbed, stated);
     let undisturbed = identified(&record, AmbientSettings::default());
@@ -168,7 +168,7 @@ fn a_harmonic_is_named_and_left_out_on_request() {
         let gap = (mode.damping_ratio.value - other.damping_ratio.value).abs();
         assert!(gap < 0.3 * error, "{gap} {error}");
     }
-    // Otherwise it is named, and what stands at its frequency is not called a mode without a note.
+    // Otherwise it is reported, and a mode at its frequency has a note.
     let estimate = identified(&disturbed, AmbientSettings::default());
     assert_eq!(estimate.harmonics.len(), 1);
     let at = |f: f64| (f - frequency_hz).abs() < 0.02;

@@ -20,7 +20,7 @@ pub struct Structure {
     pub forces: DMatrix<f64>,
 }
 
-/// What the sensors measure.
+/// Quantity that the sensors measure.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Quantity {
     Displacement,
@@ -50,7 +50,7 @@ impl Structure {
     }
 
     /// Record of displacements or velocities: the modal states are advanced exactly from sample to
-    /// sample, with the covariance of what white forces add in one.
+    /// sample, with the covariance that white forces add in one step.
     pub fn record(
         &self,
         quantity: Quantity,
@@ -97,7 +97,7 @@ impl Structure {
         with_noise(data, rate_hz, noise.into(), seed)
     }
 
-    /// Record of accelerations: a piece of a four times longer steady state under forces that are
+    /// Record of accelerations: a part of a steady state four times as long under forces that are
     /// white up to 90 % of half the sampling rate.
     pub fn accelerations(
         &self,

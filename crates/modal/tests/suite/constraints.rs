@@ -1,5 +1,5 @@
-//! Real shapes and reciprocity: true constraints narrow the intervals, false ones are rejected; and
-//! changes between two records.
+//! Real shapes and reciprocity: true constraints make the intervals shorter, false ones are
+//! rejected. Also changes between two records.
 
 use mechid_modal::compare::{Difference, ModePair};
 use mechid_modal::{DrivingPoint, ModalConstraint, ModalSettings, identify_modes};
@@ -36,7 +36,7 @@ fn true_constraints_hold_and_narrow_the_intervals() {
     assert_eq!(constrained.tests[0], 48);
     assert!(constrained.tests[1] <= 8, "{:?}", constrained.tests);
     assert!(constrained.shape_coverage() > 88.0, "{}", constrained.shape_coverage());
-    // Of the pair 1 % apart, the free shapes are the uncertain ones.
+    // For the pair 1 % apart, the free shapes are the most uncertain ones.
     let [free, constrained] = [free, constrained].map(|score| score.damping.standard_error());
     assert!(constrained.iter().zip(&free).all(|(with, without)| *with < 1.001 * without));
 }
@@ -45,7 +45,7 @@ fn true_constraints_hold_and_narrow_the_intervals() {
 fn false_constraints_are_rejected() {
     let reciprocity = ModalConstraint::Reciprocity { points: points() };
     assert!(smallest_p_value(&pair(8), reciprocity) < 1e-6);
-    // Velocities taken for accelerations are a quarter of a turn off.
+    // Velocities stated as accelerations are wrong by a quarter of a turn.
     assert!(smallest_p_value(&reciprocal(), ModalConstraint::RealShapes { derivative: 1 }) < 1e-6);
 }
 
@@ -61,7 +61,7 @@ fn constraints_that_name_no_channel_are_refused() {
 fn a_mode_that_changes_between_two_records_is_named() {
     let case = Case { samples: 4096, ..pair(8) };
     let mut warmer = case.clone();
-    // Forty standard errors.
+    // This is a change of forty standard errors.
     warmer.frequency_hz[1] *= 0.998;
     let estimate =
         |case: &Case, seed| identify_modes(&case.lines(seed), &ModalSettings::default()).unwrap();

@@ -3,8 +3,8 @@
 use crate::generator::{Case, beyond_the_edge, hammer, one_by_one, pair};
 use crate::score::Score;
 
-/// Identifies a few records of a case: every mode, no other, and intervals that hold about as often
-/// as stated.
+/// Identifies a few records of a case: every mode is found, no other mode, and the intervals
+/// contain the truth about as often as stated.
 fn check(case: &Case, seeds: u64) -> Score {
     let score = Score::of(case, 0..seeds);
     assert_eq!(score.found_share(), 100.0, "{}", case.name);
@@ -26,8 +26,8 @@ fn two_forces_and_a_close_pair() {
     check(&pair(8), 10);
 }
 
-/// In this record the first search sees one mode where there are two, 0.3 % apart; an unmeasured
-/// force on it takes up what the second one does.
+/// In this record the first search finds one mode instead of two that are 0.3 % apart; an
+/// unmeasured force on it absorbs the response of the second one.
 #[test]
 fn an_unmeasured_force_hides_no_mode() {
     let mut close = pair(8);
@@ -45,13 +45,14 @@ fn hits_with_decays_that_are_cut() {
 fn unmeasured_forces_are_in_the_intervals() {
     let case = Case { unmeasured: 0.05, ..pair(8) };
     let score = check(&case, 10);
-    // Intervals are no wider than they must be: the squared errors over the squared standard errors
-    // are 1 on average, 0.13 either way by chance.
+    // The intervals are not wider than necessary: the ratio of the squared errors to the squared
+    // standard errors is 1 on average, and scatters by 0.13.
     let mean = 0.5 * (score.frequency.mean_square() + score.damping.mean_square());
     assert!((0.75..1.4).contains(&mean), "{mean}");
 }
 
-/// With residual terms alone, 61 % of the intervals of f and 51 % of those of the shapes hold.
+/// With residual terms alone, 61 % of the intervals of f and 51 % of those of the shapes contain
+/// the truth.
 #[test]
 fn a_strong_mode_outside_the_band_does_not_bias_those_inside() {
     let score = Score::of(&beyond_the_edge(), 0..4);

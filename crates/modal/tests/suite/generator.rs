@@ -1,8 +1,8 @@
 //! Records of a known modal structure: a window cut out of a long, exactly band-limited steady
 //! state.
 //!
-//! Nothing of the estimator is used: the response is the closed modal sum on the lines of a period
-//! four times as long, so that the record is open and leaks as a measured one does.
+//! The generator is independent of the estimator: the response is the closed modal sum on the lines
+//! of a period four times as long, so that the record is open and leaks as a measured one does.
 #![allow(dead_code, reason = "the study and the tests use different cases")]
 
 use std::f64::consts::TAU;
@@ -16,7 +16,7 @@ use rand_distr::StandardNormal;
 
 type C = Complex<f64>;
 
-/// What excites the structure.
+/// Excitation of the structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Excitation {
     /// White forces up to 0.9 of half the sampling rate.
@@ -25,7 +25,7 @@ pub enum Excitation {
     Hammer { hits: usize },
 }
 
-/// A structure and the test of it.
+/// A structure and its test.
 #[derive(Debug, Clone)]
 pub struct Case {
     pub name: &'static str,
@@ -47,7 +47,7 @@ pub struct Case {
     pub unmeasured: f64,
     /// Noise of the measured forces, relative to their root-mean-square.
     pub force_noise: f64,
-    /// One record for each struck point in place of one record of all forces.
+    /// One record for each struck point instead of one record of all forces.
     pub roving: bool,
 }
 
@@ -314,7 +314,7 @@ pub fn beyond_the_edge() -> Case {
     case
 }
 
-/// Two forces that act where accelerometers 0 and 3 stand, on a structure with real shapes.
+/// Two forces that act at accelerometers 0 and 3, on a structure with real shapes.
 pub fn reciprocal() -> Case {
     let mut case = pair(8);
     case.name = "8x2, real and reciprocal";

@@ -1,4 +1,4 @@
-//! Data that cannot carry modes is refused, with what is wrong.
+//! Data that do not allow an identification of modes are refused, with the reason.
 
 use mechid_modal::{ModalError, ModalSettings, identify_modes};
 use mechid_spectra::{LineData, Transient};
@@ -70,7 +70,7 @@ fn settings_out_of_range_are_refused() {
     assert!(matches!(refused, Err(ModalError::Setting { setting: "modes", .. })));
 }
 
-/// Short records of noise, of any numbers of channels: modes or a reason, but no panic.
+/// Short records of noise with any numbers of channels: modes or a reason, but no panic.
 #[test]
 fn any_data_gives_modes_or_a_reason() {
     let mut normal = Normal::new(11);

@@ -7,8 +7,8 @@ use nalgebra::{Complex, DVector};
 
 use crate::generator::{Case, pair};
 
-/// Returns the sum over records, lines and outputs of the squared errors over that of the stated
-/// variances: resonances dominate it as they do the response to a force on all lines.
+/// Returns the ratio of the squared errors to the stated variances, both summed over records and
+/// lines: resonances dominate it like the response to a force on all lines.
 fn squared_ratio(case: &Case, seeds: std::ops::Range<u64>) -> f64 {
     let forces = [Complex::new(1.0, 0.0), Complex::new(0.3, -0.8)];
     let (mut squares, mut variances) = (0.0, 0.0);
@@ -30,7 +30,8 @@ fn squared_ratio(case: &Case, seeds: std::ops::Range<u64>) -> f64 {
 
 /// The judge is the modal sum of the true structure. The ratio is 1 on average; three records,
 /// whose errors a few resonances dominate, scatter by 40 %. Errors of a pair 0.3 % apart nearly
-/// cancel in the sum of the two modes: counted one by one they would give a ratio below 0.01.
+/// cancel in the sum of the two modes: if they counted as independent, they would give a ratio
+/// below 0.01.
 #[test]
 fn the_covariance_of_responses_is_that_of_their_errors() {
     let mut close = pair(8);

@@ -16,7 +16,7 @@ type C = Complex<f64>;
 pub struct Errors(Vec<Vec<(f64, f64)>>);
 
 impl Errors {
-    /// Returns the percentage of 95 % intervals that hold the truth.
+    /// Returns the percentage of 95 % intervals that contain the truth.
     pub fn coverage(&self) -> f64 {
         let all: Vec<_> = self.0.iter().flatten().collect();
         let holds = all.iter().filter(|(error, spread)| error.abs() < 1.96 * spread).count();
@@ -74,7 +74,7 @@ pub struct Score {
     pub false_modes: usize,
     /// Records that were refused.
     pub refused: usize,
-    /// Tests of constraints, and those that reject at 5 %.
+    /// Number of tests of constraints, and of those that reject at 5 %.
     pub tests: [usize; 2],
 }
 
@@ -161,14 +161,14 @@ impl Score {
     }
 
     fn add_shape(&mut self, error: C, spread: C) {
-        // What a constraint fixes has no error but rounding.
+        // A quantity that a constraint fixes has no error except rounding.
         const ROUNDING: f64 = 1e-9;
         self.shape_count += 2;
         self.shape_holds += usize::from(error.re.abs() < 1.96 * spread.re + ROUNDING);
         self.shape_holds += usize::from(error.im.abs() < 1.96 * spread.im + ROUNDING);
     }
 
-    /// Returns the percentage of 95 % intervals of shapes that hold the truth; NaN without shapes.
+    /// Returns the percentage of 95 % intervals of shapes that contain the truth; NaN without shapes.
     pub fn shape_coverage(&self) -> f64 {
         100.0 * self.shape_holds as f64 / self.shape_count as f64
     }

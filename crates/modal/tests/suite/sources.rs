@@ -1,5 +1,5 @@
-//! Other sources than a record with forces: tables, free decays, roving hammers, and what they have
-//! in common.
+//! Data other than a record with forces: tables, free decays, roving hammers, and common properties
+//! of all.
 
 use mechid_modal::{ModalEstimate, ModalSettings, identify_modes};
 
@@ -18,7 +18,7 @@ fn largest_deviation(case: &Case, estimate: &ModalEstimate) -> f64 {
     estimate.modes().iter().zip(&modes).map(deviation).fold(0.0, f64::max)
 }
 
-// Twelve numbers: one beyond 4.5 standard errors comes by chance once in 12,000 records.
+// Twelve numbers: by chance, one exceeds 4.5 standard errors once in 12,000 records.
 const BOUND: f64 = 4.5;
 
 #[test]
@@ -28,7 +28,7 @@ fn table_of_frequency_responses() {
     let estimate = identify_modes(&data, &ModalSettings::default()).unwrap();
     let deviation = largest_deviation(&case, &estimate);
     assert!(deviation < BOUND, "{deviation}");
-    // What is synthesised is the response without noise, far closer than the noise of 2 %.
+    // The synthesised response has no noise and is far closer than the noise of 2 %.
     let omega = data.omega()[700];
     let (model, truth) = (estimate.response(omega), case.response(omega, &case.participation));
     assert!((&model - &truth).norm() < 0.01 * truth.norm());
@@ -54,7 +54,7 @@ fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
         for (value, truth) in mode.shape_at_inputs().iter().zip(truth) {
             assert!((value - truth / largest).norm() < 0.02, "{value} {}", truth / largest);
         }
-        // The accelerometer stands where input 0 acts; its shape is 1 there, so the mass is 1/ψ².
+        // The accelerometer is at the point of input 0; its shape is 1 there, so the mass is 1/ψ².
         let mass = mode.modal_mass(0, 0, 2);
         assert!((mass * truth[0] * truth[0] - 1.0).norm() < 0.03, "{mass}");
     }

@@ -1,5 +1,5 @@
-//! Steel subframe with two shakers (DaISy 96-013), a public record that stands beside the project,
-//! not in it.
+//! Steel subframe with two shakers (DaISy 96-013), a public record that is stored beside the
+//! project.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use mechid_spectra::LineData;
 use nalgebra::DMatrix;
 
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
-/// Forces and accelerations of a part of the record; `None`, and a word on it, where the file is
-/// not.
+/// Forces and accelerations of a part of the record; `None`, with a message, if the file is
+/// missing.
 fn record(from: f64, to: f64) -> Option<LineData> {
     let file =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/subframe/subframe.csv");
@@ -47,7 +47,7 @@ fn modes_of_a_part_predict_the_rest() {
             difference.column(output).norm_squared() / rest.outputs().column(output).norm_squared();
         assert!(share < 0.01, "output {output}: {share}");
     }
-    // Modes that are known of this structure.
+    // Known modes of this structure.
     for known in [62.2, 119.0, 154.7, 156.5] {
         let is_known = |mode: &mechid_modal::IdentifiedMode| {
             (mode.natural_frequency_hz.value - known).abs() < 0.15

@@ -6,7 +6,7 @@ use super::channels::{InputColumn, SensorRow, unbalance};
 use super::{MachineError, Pattern, Power, Prior, Speed, Term};
 use crate::{Matrix, ModelError, SecondOrderSystem};
 
-/// Unknown of a machine.
+/// Unknown parameter of a machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MachineParameter {
     /// Name of the shared parameter, or of the element and its coefficient.
@@ -23,7 +23,7 @@ pub struct MachineParameter {
     pub prior: Option<Prior>,
 }
 
-/// Unknown load: forces of an unbalance per unit of a parameter.
+/// Load of an unbalance element: forces per unit of its parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct OwnLoad {
     pub(super) at: [usize; 2],
@@ -42,7 +42,8 @@ pub type ParameterLoad = (Option<usize>, Vec<(usize, Complex<f64>)>);
 /// D(ω) x = F − D_g(ω) x_g
 /// ```
 ///
-/// with the motion x_g of the support.
+/// with the dynamic stiffness D(ω), the displacements x, the forces F, the motion x_g of the
+/// support, and the column D_g of the dynamic stiffness that belongs to the support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assembly {
     pub(super) dofs: Vec<String>,

@@ -85,11 +85,12 @@ pub(super) enum Factor {
     Unknown(usize),
 }
 
-/// Terms of the elements so far.
+/// Terms of the elements that were converted so far.
 pub(super) struct Builder<'a> {
     pub(super) machine: &'a Machine,
     index: HashMap<&'a str, usize>,
-    /// Motion of each degree of freedom with the support: 1 or 0.
+    /// 1 for each degree of freedom in the direction of the motion of the support, 0 for the
+    /// others.
     pub(super) direction: Vec<f64>,
     pub(super) speed: Speed,
     terms: Vec<Term>,
@@ -151,7 +152,8 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Returns e_i − e_j for two ends. One may be the support, which moves only in its direction.
+    /// Returns the entries of e_i − e_j for two ends i and j. One end may be the support, which
+    /// moves only in its direction.
     pub(super) fn difference(
         &self,
         what: &'static str,

@@ -75,7 +75,7 @@ impl FreeCoefficient {
             return Err(MachineError::PriorDeviation { name: name(), standard_deviation });
         }
         let between = self.min.zip(self.max).map(|(min, max)| match min > 0.0 {
-            // Coefficients of unknown size differ by factors.
+            // The geometric mean suits bounds between which the order of magnitude is unknown.
             true => (min * max).sqrt(),
             false => 0.5 * (min + max),
         });

@@ -50,9 +50,9 @@ pub struct Bearing {
     pub at: [String; 2],
     /// Degrees of freedom of x and y of the housing; the support without them.
     pub to: Option<[String; 2]>,
-    /// k, in N/m.
+    /// Stiffness k, in N/m.
     pub stiffness: [Coefficient; 4],
-    /// c, in N·s/m.
+    /// Damping c, in N·s/m.
     pub damping: [Coefficient; 4],
     /// Fluid mass m, in kg.
     pub mass: [Coefficient; 4],

@@ -2,7 +2,7 @@
 
 use super::{Assembly, Input, Instruments, Machine, MachineError};
 
-/// A machine with its sensors and inputs: all that a description in JSON says.
+/// A machine with its sensors and inputs: the full content of a description in JSON.
 ///
 /// ```
 /// # #[cfg(feature = "serde")] {
@@ -47,7 +47,7 @@ pub struct Candidates {
     /// Sensors; each has the noise level of the sensors with the same quantity.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub sensors: Vec<super::Sensor>,
-    /// Forces of a second test; each has the level of the forces in the first test.
+    /// Forces of a second test; each has the level of the forces of the first test.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub forces: Vec<Input>,
 }

@@ -261,7 +261,8 @@ impl ElementForm {
             MatrixForm::Sparse { size, rows, columns, values } => {
                 if size > MAX_MATRIX_ORDER {
                     let problem = format!(
-                        "`{what}` has {size} rows; all entries are held, of {MAX_MATRIX_ORDER} at most"
+                        "`{what}` has {size} rows, but at most {MAX_MATRIX_ORDER} are possible, because \
+                         all entries are stored"
                     );
                     return Err(self.error(problem));
                 }

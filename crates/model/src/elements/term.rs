@@ -5,15 +5,15 @@ use nalgebra::{Complex, DMatrix};
 /// Frequency factor of a term of the dynamic stiffness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Power {
-    /// 1.
+    /// Factor 1.
     Stiffness,
-    /// i.
+    /// Factor i.
     Hysteresis,
-    /// iω.
+    /// Factor iω.
     Damping,
-    /// iωΩ.
+    /// Factor iωΩ, with the rotor speed Ω.
     Gyroscopic,
-    /// −ω².
+    /// Factor −ω².
     Mass,
 }
 
@@ -45,7 +45,7 @@ impl Power {
 /// freedom, is the support, whose motion is prescribed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Pattern {
-    /// a bᵀ, from the non-zero entries of a and b.
+    /// Matrix a bᵀ, given by the non-zero entries of a and b.
     Dyad {
         /// Entries of a, pure numbers.
         left: Vec<(usize, f64)>,
@@ -56,17 +56,17 @@ pub enum Pattern {
     Block {
         /// Degrees of freedom of the rows and columns.
         dofs: Vec<usize>,
-        /// Entries.
+        /// Entries of the matrix, row by row.
         matrix: DMatrix<f64>,
         /// Column of the support, d entries.
         support: Vec<f64>,
     },
 }
 
-/// Pattern × frequency factor × scale × product of parameters.
+/// Part of the dynamic stiffness: pattern × frequency factor × scale × product of parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Entries to which it contributes.
+    /// Entries of the dynamic stiffness to which the term contributes.
     pub pattern: Pattern,
     /// Frequency factor.
     pub power: Power,
@@ -98,7 +98,7 @@ impl Term {
         })
     }
 
-    /// Returns whether it has no parameter.
+    /// Returns whether the term has no parameter.
     pub fn is_known(&self) -> bool {
         self.parameters.is_empty()
     }

@@ -59,7 +59,7 @@ impl UncertainNonlinearSystem {
     ) -> Result<Vec<BackbonePoint>, ModelError> {
         let (mut motion, dof) = start(self.system(), mode)?;
         let balance = Balance::new(self.system());
-        // The initial motion is a linear mode, which has no particular amplitude.
+        // The initial motion is a linear mode, whose amplitude is arbitrary.
         let (mut points, mut reached) = (Vec::new(), 0.0);
         for &amplitude in amplitudes {
             require("amplitude of a backbone", amplitude, "positive", amplitude > 0.0)?;
@@ -72,7 +72,8 @@ impl UncertainNonlinearSystem {
         Ok(points)
     }
 
-    /// Returns the variance of the frequency; `None` at a fold, where it has no derivative.
+    /// Returns the variance of the frequency; `None` at a fold, where the frequency has no
+    /// derivative.
     fn variance(
         &self,
         balance: &Balance<'_>,
@@ -103,10 +104,10 @@ impl UncertainNonlinearSystem {
     }
 }
 
-/// A motion x(t) = Σ a_h cos hωt.
+/// Motion x(t) = Σ a_h cos hωt, with the harmonics h from 0.
 #[derive(Clone)]
 struct Motion {
-    /// Degrees of freedom × (harmonics + 1), in m.
+    /// Amplitudes a_h, degrees of freedom × (harmonics + 1), in m.
     cosines: DMatrix<f64>,
     /// Frequency (rad/s).
     omega: f64,
@@ -131,10 +132,10 @@ fn start(system: &NonlinearSystem, mode: usize) -> Result<(Motion, usize), Model
     Ok((Motion { cosines, omega: mode.damped_frequency() }, dof))
 }
 
-/// Balance of the harmonics of a free motion without damping.
+/// Balance of the harmonics of a free undamped motion.
 struct Balance<'a> {
     system: &'a NonlinearSystem,
-    /// cos hτ: instants × (harmonics + 1).
+    /// Values of cos hτ: instants × (harmonics + 1).
     waves: DMatrix<f64>,
 }
 
@@ -145,7 +146,7 @@ impl<'a> Balance<'a> {
         Self { system, waves: DMatrix::from_fn(limits::INSTANTS, limits::HARMONICS + 1, wave) }
     }
 
-    /// Continues one motion to another amplitude; `None` if no motion is found.
+    /// Continues a motion to another amplitude; `None` if no motion is found there.
     fn reach(
         &self,
         from: &Motion,
@@ -254,7 +255,7 @@ impl<'a> Balance<'a> {
     }
 }
 
-/// Returns the weight of each instant in the harmonic.
+/// Returns the weight of each instant in the Fourier sum of a harmonic.
 fn share(harmonic: usize) -> f64 {
     if harmonic == 0 { 1.0 / limits::INSTANTS as f64 } else { 2.0 / limits::INSTANTS as f64 }
 }

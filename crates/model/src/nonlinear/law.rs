@@ -53,7 +53,7 @@ pub struct Constant {
     pub value: f64,
 }
 
-/// q^p q̇^r: springs (r = 0), dampers (p = 0), damping that depends on the displacement, and a
+/// Law q^p q̇^r: springs (r = 0), dampers (p = 0), damping that depends on the displacement, and a
 /// constant force (p = r = 0).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Power {
@@ -113,7 +113,8 @@ impl Law for Power {
     }
 }
 
-/// |q̇| q̇: turbulent drag, and a first approximation of damping that increases with the amplitude.
+/// Law |q̇| q̇: turbulent drag, and a first approximation of damping that increases with the
+/// amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QuadraticDamping;
 
@@ -135,8 +136,8 @@ impl Law for QuadraticDamping {
     }
 }
 
-/// q̇³ / (1 + (q̇/b)²): cubic damping for small velocities that becomes linear above b, so that it
-/// remains moderate beyond the amplitudes of the data.
+/// Law q̇³ / (1 + (q̇/b)²): cubic damping for small velocities that becomes linear above b, so that
+/// it remains moderate beyond the amplitudes of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SaturatingDamping {
     velocity: f64,
@@ -182,15 +183,15 @@ impl Law for SaturatingDamping {
     }
 }
 
-/// A stop with clearance on either side, then a spring: gap(q, a) is q − a beyond a, q + a below −a
-/// and zero between; its coefficient is the stiffness of the spring.
+/// Spring behind a clearance a on either side: gap(q, a) is q − a above a, q + a below −a and zero
+/// between; its coefficient is the stiffness of the spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     clearance: f64,
 }
 
 impl Gap {
-    /// Creates a stop with the clearance a (m) on either side.
+    /// Creates a spring behind the clearance a (m) on either side.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] unless a is positive and finite.
@@ -227,15 +228,15 @@ impl Law for Gap {
     }
 }
 
-/// tanh(q̇/b): regularised Coulomb friction, whose coefficient is the force of sliding; below the
-/// velocity b it creeps whereas dry friction sticks.
+/// Regularised Coulomb friction tanh(q̇/b); its coefficient is the sliding force. Below the
+/// velocity b it creeps, whereas dry friction sticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
     velocity: f64,
 }
 
 impl Friction {
-    /// Creates a friction with the velocity b (m/s) above which it slides.
+    /// Creates a friction law with the velocity b (m/s) above which it slides.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] unless b is positive and finite.

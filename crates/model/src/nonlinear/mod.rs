@@ -64,7 +64,8 @@ impl NonlinearSystem {
         Ok(Self { linear, terms, coefficients })
     }
 
-    /// Returns M, C and K: the system at small amplitudes, except for terms with a slope at zero.
+    /// Returns M, C and K: the system at small amplitudes, except for terms whose slope at zero is
+    /// not zero.
     pub fn linear(&self) -> &SecondOrderSystem {
         &self.linear
     }

@@ -26,7 +26,7 @@ impl FromStr for Terms {
     }
 }
 
-/// Splits `text` at the commas outside parentheses.
+/// Splits `text` at the commas that are outside parentheses.
 fn apart(text: &str) -> impl Iterator<Item = &str> {
     let mut depth = 0_usize;
     text.split(move |c| {
@@ -67,18 +67,18 @@ impl FromStr for Term {
 /// Letter (displacement or velocity) and coordinate.
 type Variable = (char, Coordinate);
 
-/// Exponents in a product whose factors all have one coordinate.
+/// Exponents in a product whose factors all have the same coordinate.
 #[derive(Default)]
 struct Product {
     coordinate: Option<Coordinate>,
     displacement: u32,
     velocity: u32,
-    /// Factors |q̇|.
+    /// Number of factors |q̇|.
     absolute: u32,
 }
 
 struct Parser {
-    /// Text without spaces.
+    /// The text without spaces.
     text: Vec<char>,
     at: usize,
 }
@@ -107,7 +107,7 @@ impl Parser {
                 (.., Some(_)) => return Err("only v^3 can be divided".to_owned()),
                 (p, r, 0, None) => Arc::new(Power::new(p, r).map_err(named)?),
                 (0, 1, 1, None) => Arc::new(QuadraticDamping),
-                _ => return Err("|v| stands in |v| v only".to_owned()),
+                _ => return Err("|v| is allowed only in |v| v".to_owned()),
             };
         Ok((coordinate, law))
     }
@@ -132,8 +132,8 @@ impl Parser {
         }
     }
 
-    /// Parses the argument of a function: a displacement or velocity (as `letter` says), a
-    /// separator and the text up to the closing parenthesis.
+    /// Parses the argument of a function: a displacement or velocity (according to `letter`), a
+    /// separator, and the text up to the closing parenthesis.
     fn argument(&mut self, letter: char, sign: char) -> Option<(Coordinate, String)> {
         let (found, coordinate) = self.variable().ok()?;
         if found != letter || !self.take(sign) {
@@ -217,7 +217,7 @@ impl Parser {
 
     /// Returns b of `(1+(v1/b)^2)`.
     fn saturation(&mut self, coordinate: Coordinate) -> Result<f64, String> {
-        let form = || "after / stands (1 + (v/b)^2) with the v of v^3".to_owned();
+        let form = || "only (1 + (v/b)^2), with the v of v^3, can follow /".to_owned();
         for c in ['(', '1', '+', '('] {
             self.expect(c).map_err(|_| form())?;
         }
@@ -320,7 +320,7 @@ mod tests {
             ("k3: x1^99", "at most 9"),
             ("k3: x1^", "expected a whole number, found the end"),
             ("c: |x| x", "|x| is not among the laws"),
-            ("c: |v|", "stands in |v| v only"),
+            ("c: |v|", "allowed only in |v| v"),
             ("c: v^2/(1+(v/2)^2)", "only v^3 can be divided"),
             ("c: v^3/(1+(v/a)^2)", "a is not a number"),
             ("c: v^3/(1+(v/-2)^2)", "must be positive"),

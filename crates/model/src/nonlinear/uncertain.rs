@@ -15,9 +15,9 @@ pub enum NonlinearParameter {
     Coefficient(usize),
     /// A constant inside the law of a term.
     Constant {
-        /// Number of the term.
+        /// Index of the term.
         term: usize,
-        /// Number of the constant among [`Law::constants`](crate::Law::constants).
+        /// Index of the constant among [`Law::constants`](crate::Law::constants).
         constant: usize,
     },
 }

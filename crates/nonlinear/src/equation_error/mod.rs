@@ -33,10 +33,10 @@ pub struct EquationErrorOptions {
 /// the lines of steady periods.
 ///
 /// The terms are evaluated on a grid four times finer than the samples, to avoid aliasing, and
-/// transformed to regressors. Lines without force are used, too: there the nonlinear forces and the
-/// linear response cancel. The rows are weighted by the estimated spectrum of the equation error
-/// ([`Weighting`]); the standard errors follow from the scatter of the periods or of the scores
-/// ([`StandardErrors`](super::StandardErrors)).
+/// transformed to regressors. Lines without force are used, too: on them the nonlinear forces and
+/// the linear response cancel. The rows are weighted by the estimated spectrum of the equation
+/// error ([`Weighting`]); the standard errors follow from the scatter of the periods or of the
+/// scores ([`StandardErrors`](super::StandardErrors)).
 ///
 /// Shape constants are estimated by Gauss–Newton steps on the residual with optimal linear
 /// parameters (variable projection); the covariance is the joint one of all parameters.
@@ -82,7 +82,7 @@ pub fn equation_error(
     fit.finish(&equations, &shape)
 }
 
-/// Coefficients with weights that follow from their residuals.
+/// Coefficients of a fit, with weights that follow from its residuals.
 pub(super) struct Fit {
     pub(super) columns: Vec<Columns>,
     pub(super) coefficients: Vec<f64>,
@@ -127,7 +127,7 @@ fn settled(before: &DMatrix<f64>, after: &DMatrix<f64>, tolerance: f64) -> bool 
     })
 }
 
-/// Refuses undetermined parameters with an error that names them.
+/// Returns an error that names the undetermined parameters, if there are any.
 fn check_determined(names: &[String], open: &[Direction]) -> Result<(), EstimateError> {
     if open.is_empty() {
         return Ok(());

@@ -14,7 +14,8 @@ use crate::shape::Shape;
 
 impl Fit {
     /// Returns the covariance of all parameters: from the scatter of the periods if the residual
-    /// does not exceed it, otherwise from blocks of time or, for a short record, as for a white
+    /// does not exceed it, otherwise from blocks of time. For a record too short for blocks, it is
+    /// the scatter increased to the size of the residual or, for a single period, that for a white
     /// residual.
     pub(super) fn uncertainty(
         &self,
@@ -32,8 +33,9 @@ impl Fit {
     /// Returns the scatter of the parameters from period to period, their bias, and the test of the
     /// residual against the scatter; `None` unless all experiments have several periods.
     ///
-    /// The bias comes from the product of the noise in regressors and residual: an estimate by
-    /// instrumental variables, with one period as instrument of the others, does not have it.
+    /// The bias comes from the product of the noise in the regressors and in the residual. An
+    /// estimate by instrumental variables, with one period as the instrument for the others, does
+    /// not have it.
     ///
     /// # Source
     /// Söderström (2018), *Errors-in-Variables Methods in System Identification*, chapters 6 and 7.

@@ -45,8 +45,8 @@ pub struct NonlinearFit {
 /// Noise of any spectrum on the response does not bias the estimate. Noise on the force acts, to
 /// first order, as noise on the response; its effect on the derivatives is of second order.
 /// Gauss–Newton steps (damped if needed) begin at `start`, usually from
-/// [`equation_error`](super::equation_error); its delay and phase of the channels are kept.
-/// Channels are weighted by the size of their residuals.
+/// [`equation_error`](super::equation_error); the delay and the phase of the channels in `start`
+/// are kept. Channels are weighted by the size of their residuals.
 ///
 /// The standard errors follow from the noise of force and response in several periods
 /// ([`Periods`](super::StandardErrors::Periods)), propagated through the system, if the residual
@@ -104,7 +104,7 @@ pub fn output_error(
     problem.finish(&theta, start, steps)
 }
 
-/// Record with its interpolated force and the deviations of its periods.
+/// Record with its interpolated force, and the deviations of its periods from their mean.
 struct Prepared {
     response: Record,
     force: FineForce,

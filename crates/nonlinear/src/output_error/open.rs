@@ -43,7 +43,7 @@ fn factors(terms: &Terms) -> &'static [f64] {
     if has_constants { &[1.0, 0.5, 2.0] } else { &[1.0] }
 }
 
-/// Returns the terms with their constants multiplied; `None` if a law refuses it.
+/// Returns the terms with their constants multiplied; `None` if a law refuses a constant.
 fn scaled(terms: &Terms, factor: f64) -> Option<Terms> {
     let scaled_term = |term: &mechid_model::Term| {
         let constants = term.law().constants();

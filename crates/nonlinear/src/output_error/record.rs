@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::ChannelPhase;
 
-/// Record for [`output_error`](super::output_error()).
+/// Record of force and response for [`output_error`](super::output_error()).
 #[derive(Debug, Clone)]
 pub struct SteppedRecord {
     /// Force, samples × degrees of freedom, in N.

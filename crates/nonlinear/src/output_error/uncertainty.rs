@@ -42,7 +42,8 @@ impl Problem<'_> {
     }
 
     /// Returns the covariance of all parameters: from the noise of the periods if the residual does
-    /// not exceed it, otherwise from blocks of time or, for a short record, as for a white
+    /// not exceed it, otherwise from blocks of time. For a record too short for blocks, it is the
+    /// scatter increased to the size of the residual or, for a single period, that for a white
     /// residual.
     pub(super) fn uncertainty(
         &self,
@@ -140,7 +141,8 @@ impl Problem<'_> {
         let (len, periods) = (record.response.len(), noise.len());
         for line in 0..residual.nrows() {
             let (weight, is_real) = product_weight(line, len);
-            // Noise on a force reaches all channels: they are added and count as one observation.
+            // Noise on a force reaches all channels, so that their powers are added and count as
+            // one observation.
             let power = |lines: &DMatrix<Complex<f64>>| {
                 let of = |(dof, level): (usize, &f64)| (lines[(line, dof)] / *level).norm_sqr();
                 weight * self.levels.iter().enumerate().map(of).sum::<f64>()

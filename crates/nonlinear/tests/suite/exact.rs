@@ -1,5 +1,5 @@
 //! Nonlinear systems whose force is known in closed form: the displacement is prescribed, and the
-//! force that it takes computed from it.
+//! force follows from it.
 
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{
@@ -46,8 +46,8 @@ fn prescribed_on(sampling: Sampling, channels: usize) -> Response {
     Response::new(record(0), record(1), record(2)).unwrap()
 }
 
-/// The force of a prescribed response on its lines below half the sampling rate: formed on a grid so
-/// fine that nothing folds back.
+/// Returns the force of a prescribed response on its lines below half the sampling rate, computed
+/// on a grid fine enough to avoid aliasing.
 fn band_limited_force(system: &NonlinearSystem) -> Record {
     const FINER: usize = 32;
     let fine = Sampling::new(sampling().dt() / FINER as f64, FINER * LEN).unwrap();
@@ -71,7 +71,7 @@ fn coupled() -> NonlinearSystem {
     NonlinearSystem::new(linear.unwrap(), terms, vec![120.0, 3.0]).unwrap()
 }
 
-/// Lines that hold the ninth power of what is prescribed.
+/// Returns lines that contain the ninth power of the prescribed response.
 fn data(force: &Record, response: &Record, measured: ResponseQuantity) -> SteadyExperiments {
     let lines = Lines::new(sampling(), 1..=250).unwrap();
     let mut data = SteadyExperiments::new(&lines, force.channels(), measured);
@@ -126,7 +126,7 @@ fn points_of_the_surface_are_those_of_the_springs_and_dampers() {
         let response = prescribed(channels);
         let force = system.force(&response).unwrap();
         let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
-        // The mean of x² is no line of the fit: what is compared is the rest.
+        // The mean of x² is not on the lines of the fit, so that only the rest is compared.
         let found =
             fitted(&all, &system.terms().to_string(), &EquationErrorOptions::default()).unwrap();
         let points = &found.restoring_forces(&all).unwrap()[0];
@@ -150,8 +150,8 @@ fn points_of_the_surface_are_those_of_the_springs_and_dampers() {
     }
 }
 
-/// Judge: powers. A cubic spring is held by the data as far as one and a half times its range; of the
-/// fifth order it is not, nor is one that noise drowns.
+/// Judge: powers. The data determine a cubic spring up to one and a half times their range, but not
+/// a spring of fifth order, nor one that is hidden by noise.
 #[test]
 fn terms_that_extrapolate_badly_are_told() {
     let response = prescribed(1);
@@ -175,7 +175,7 @@ fn terms_that_extrapolate_badly_are_told() {
         let [k1, k3, k5] = [900.0 * x, 80.0 * x.powi(3), 20.0 * x.powi(5)];
         assert!((fifth[1].share[at] / (k5 / (k1 + k3 + k5)) - 1.0).abs() < 0.02, "{fifth:?}");
     }
-    // The constant force is no growth; noise drowns the damper.
+    // The constant force does not grow; the damper is hidden by noise.
     let drowned = with("f: x^0, c3: v^3", vec![1.5, 1e-4], 0.3);
     assert_eq!(drowned.len(), 1);
     assert!(drowned[0].is_poor() && !drowned[0].grows_fast(), "{drowned:?}");
@@ -223,7 +223,8 @@ fn phase_delay_and_bend_are_found_by_variable_projection() {
     let response = prescribed(1);
     let force = band_limited_force(&system);
     let channels = ChannelPhase { delay: 4e-4, cubic: 1.2, quintic: 2.5 };
-    // What the channels make of it: back and forth is the identity.
+    // The measuring channels are applied to the response; correction of the result gives the
+    // response again.
     let measured = channels.as_measured(response.displacement()).unwrap();
     let undo = ChannelPhase { delay: -4e-4, cubic: -1.2, quintic: -2.5 };
     let (seen, _) = undo.correct(&force, &measured).unwrap();
@@ -263,7 +264,8 @@ fn a_prescribed_response_is_predicted_and_fitted() {
     assert!(gap(found.displacement(), response.displacement()) < 1e-4);
     assert!(gap(found.acceleration(), response.acceleration()) < 1e-3);
 
-    // From the middle, the start found from displacements alone, far from the record's ends.
+    // The initial state in the middle is found from displacements alone, far from the ends of the
+    // record.
     let part = |record: &Record| record.window(50, 300).unwrap();
     let (push, seen) = (part(&force), part(response.displacement()));
     let start = fitted_start(&system, &push, &[(ResponseQuantity::Displacement, &seen)]).unwrap();
@@ -271,7 +273,7 @@ fn a_prescribed_response_is_predicted_and_fitted() {
     let inner = |record: &Record| record.window(50, 200).unwrap();
     assert!(gap(&inner(open.displacement()), &inner(&seen)) < 1e-2);
 
-    // Output error begins elsewhere and comes back.
+    // Output error starts from another estimate and returns to this one.
     let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
     let begin = fitted(&all, "kc: (x1-x2)^3, cq: x2^2 v2", &EquationErrorOptions::default());
     let record = SteppedRecord {
@@ -294,7 +296,7 @@ fn the_right_terms_are_chosen_and_named() {
     let system = single("k3: x^3, c2: v^3", vec![80.0, 0.02]);
     let response = prescribed(1);
     let force = system.force(&response).unwrap();
-    // Rounding to a ten-thousandth of the force stands in for noise.
+    // Rounding to a ten-thousandth of the force is used instead of noise.
     let rounded = force.data().map(|f| (f / 0.05).round() * 0.05);
     let force = Record::new(force.sampling(), rounded).unwrap();
     let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
@@ -354,7 +356,7 @@ fn what_cannot_be_told_apart_is_named() {
     ));
 }
 
-/// A spring that softens lets go: the response grows beyond all bounds.
+/// A spring that softens fails: the response grows without bound.
 #[test]
 fn a_system_that_lets_go_is_told() {
     let system = single("k3: x^3", vec![-5e4]);

@@ -1,4 +1,4 @@
-//! Stops with clearance, searched for from the clearance given and from that of least squares.
+//! Stops with clearance, estimated from a given initial clearance and from that of least squares.
 
 use mechid_estimate::Unknowns;
 use mechid_model::{ResponseQuantity, Terms};
@@ -31,7 +31,7 @@ fn measure(amplitude: f64, seed: u64) -> [Record; 2] {
     [with(&force, 2 * seed), with(&response, 2 * seed + 1)]
 }
 
-/// The clearance found from a first value, in its standard errors from the truth; or why there is none.
+/// Returns the error of the estimated clearance in its standard errors, or the reason of a failure.
 fn search(amplitude: f64, clearance: f64, seed: u64) -> Result<f64, String> {
     let [force, response] = measure(amplitude, seed);
     let unknowns = Unknowns::unknown_mass(1).unwrap();

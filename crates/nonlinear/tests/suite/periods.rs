@@ -21,13 +21,14 @@ const STIFFNESS: f64 = 315.827;
 const TRUTH: [(&str, f64); 4] =
     [("m", 2.0), ("c", 4.0), ("k", STIFFNESS), ("k3", 0.35 * STIFFNESS)];
 
-/// 2 ẍ + 4 ẋ + k x + 0.35 k x³, in periods with some lines of motion or force from the first on.
+/// Oscillator 2 ẍ + 4 ẋ + k x + 0.35 k x³ with periods whose motion or force has some lines, from
+/// the first on.
 struct Oscillator {
     sampling: Sampling,
     last: usize,
 }
 
-/// White noise of these parts of the RMS on periods of force and response.
+/// Adds white noise to periods of force and response, with these fractions of their RMS values.
 fn with_noise(period: [Record; 2], levels: [f64; 2], seed: u64) -> [Record; 2] {
     let with = |record: &Record, level: f64, seed: u64| {
         let record = record.repeated(PERIODS).unwrap();
@@ -56,8 +57,8 @@ impl Oscillator {
         with_noise([force, response], levels, seed)
     }
 
-    /// A motion on these lines, as of the linear part under equal lines of force, and the force in closed form: its
-    /// lines end at three times the last.
+    /// Returns a motion on these lines, as that of the linear part under equal lines of force, and
+    /// the force in closed form, whose lines end at three times the last line of the motion.
     fn moved(&self, levels: [f64; 2], seed: u64) -> [Record; 2] {
         let phases = random_phases(8..=self.last, 3.5, seed);
         let record = |order: i32| {
@@ -98,8 +99,8 @@ impl Oscillator {
     }
 }
 
-/// Judge: the scatter over the seeds. 40 runs of four parameters: the share of intervals that hold has a standard
-/// deviation of 2 to 3 %.
+/// Judge: the scatter over the seeds. With 40 runs of four parameters, the share of intervals that
+/// contain the truth has a standard deviation of 2 to 3 %.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn intervals_of_a_short_record_hold_with_noise_on_the_force() {
@@ -131,7 +132,8 @@ fn intervals_of_a_short_record_hold_with_noise_on_the_force() {
     }
 }
 
-/// Judge: the generator. A right model leaves noise; one without the cubic spring leaves more.
+/// Judge: the generator. The residual of a right model is noise; without the cubic spring it is
+/// larger.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn a_residual_is_compared_with_the_noise_of_the_periods() {
@@ -154,8 +156,9 @@ fn a_residual_is_compared_with_the_noise_of_the_periods() {
     assert!(wrong.len() >= 5 && wrong.iter().all(|p| *p < 1e-6), "{wrong:?}");
 }
 
-/// Judge: the generator. Most of what a record tells of a cubic spring is in a few blocks of time, whose scatter has
-/// one degree of freedom: a spring known to 0.4 % passed for none in one of ten records.
+/// Judge: the generator. Most of the information of a record about a cubic spring is in a few
+/// blocks of time, whose scatter has one degree of freedom: in one of ten records, a spring known
+/// to 0.4 % was not significant.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn a_true_term_is_kept_and_a_false_one_is_not() {

@@ -1,4 +1,5 @@
-//! A measured spring that hardens: what nonlinear terms explain, and how honest their errors are.
+//! A measured spring that hardens: the part that nonlinear terms explain, and the validity of their
+//! standard errors.
 
 use mechid_estimate::Unknowns;
 use mechid_model::{InitialState, NonlinearSystem, ResponseQuantity, Terms};
@@ -69,7 +70,8 @@ fn realised(record: &Record, which: &[usize]) -> SteadyExperiments {
     data
 }
 
-/// RMS error of the displacement of some realisations, in mV, predicted through the whole record.
+/// Returns the RMS error of the displacement of some realisations, in mV, predicted through the
+/// whole record.
 fn rmse(
     record: &Record,
     system: &NonlinearSystem,
@@ -107,7 +109,7 @@ fn four_realisations_predict_two() {
     assert!(errors.iter().all(|e| *e <= 0.22), "{errors:?} mV");
 }
 
-/// Two realisations, for time's sake; the book has the numbers of four.
+/// Two realisations, to save time; the book has the numbers of four.
 #[test]
 fn output_error_predicts_as_well() {
     let Some(record) = realisations() else { return };
@@ -126,7 +128,7 @@ fn output_error_predicts_as_well() {
     assert!(errors.iter().all(|e| *e <= 0.22), "{errors:?} mV");
 }
 
-/// The scatter of six realisations is what each of them states.
+/// The scatter of six realisations agrees with the standard error that each of them states.
 #[test]
 fn standard_errors_are_those_of_the_six_realisations() {
     let Some(record) = realisations() else { return };
@@ -166,8 +168,8 @@ fn held_out_realisations_choose_the_springs_first() {
     assert_eq!(names[..2], ["k3", "k2"], "{found:?}");
 }
 
-/// Six realisations, four nonlinear columns. Judged in an optimised build alone; the shortest of three,
-/// for the machine does other things, too.
+/// Six realisations and four nonlinear columns are timed in an optimised build only; the shortest
+/// of three runs counts, because the computer has other tasks, too.
 #[test]
 #[allow(clippy::print_stderr, reason = "the time is read")]
 fn six_realisations_are_fitted_within_a_second() {

@@ -6,7 +6,8 @@ use mechid_signal::{Record, Sampling};
 /// Amplitude and phase on a line: A cos(n ω₀ t + φ).
 pub type Cosine = (usize, f64, f64);
 
-/// Periods after which a system that decays within a tenth of one has forgotten how it started.
+/// Number of periods after which a system that decays within a tenth of a period is independent of
+/// its initial state.
 const SETTLED: usize = 3;
 
 /// Numbers of substeps of the extrapolated midpoint rule: order 12.
@@ -24,7 +25,7 @@ pub fn steady<const N: usize>(
     steady_after(SETTLED, sampling, forces, acceleration)
 }
 
-/// The same in the last of so many periods from rest.
+/// Returns force and displacement in the last of this many periods from rest.
 pub fn steady_after<const N: usize>(
     settled: usize,
     sampling: Sampling,

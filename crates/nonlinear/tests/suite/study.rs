@@ -74,7 +74,8 @@ fn identify(
     let (force, response) = (force.clone(), response.clone());
     let record = SteppedRecord { force, response, extent: Extent::WholePeriod, periods: PERIODS };
     let found = output_error(&[record], DISPLACEMENT, &start).unwrap().estimate;
-    // A start that is estimated rests on the first block alone; the intervals of the rest do not.
+    // An estimated initial state depends on the first block alone; the intervals of the other
+    // parameters do not.
     let freedom = found.linear().degrees_of_freedom();
     assert!(freedom >= 5, "{freedom} degrees of freedom, {:?}", found.standard_errors());
     found
@@ -103,7 +104,7 @@ fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String, f64
 
 #[track_caller]
 fn assert_honest(judged: &[(String, f64, f64, f64)], runs: u64) {
-    // Three standard deviations of a share, and of a mean.
+    // The limits are three standard deviations of a share, and of a mean.
     let slack = 3.0 * (0.05 * 0.95 / runs as f64).sqrt();
     for (name, coverage, bias, stated) in judged {
         let told = format!("{name}: {coverage:.3}, bias {bias:.3} σ, stated {stated:.3} σ");

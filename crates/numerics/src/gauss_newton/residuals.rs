@@ -1,10 +1,10 @@
-//! Sums of squares given by residuals and their Jacobian.
+//! Sums of squares of problems that return residuals and their Jacobian.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{Minimum, SumOfSquares, Triangle, minimise};
 
-/// Residuals with their derivatives.
+/// Residuals with their derivatives with respect to the parameters.
 pub trait Residuals {
     /// Returns the number of residuals.
     fn len(&self) -> usize;
@@ -18,8 +18,8 @@ pub trait Residuals {
     /// are a list in any unit.
     fn residual(&mut self, parameters: &DVector<f64>, residual: &mut DVector<f64>) -> bool;
 
-    /// Writes their derivatives, residuals × parameters, at the most recent parameters. Entries are
-    /// in the unit of the residual divided by the unit of the parameter.
+    /// Writes the Jacobian of the residuals, residuals × parameters, at the most recent parameters.
+    /// Entries are in the unit of the residual divided by the unit of the parameter.
     fn jacobian(&self, jacobian: &mut DMatrix<f64>);
 }
 
@@ -44,7 +44,7 @@ pub fn minimise_residuals(
     minimise(&mut buffered, parameters, max_steps)
 }
 
-/// Residuals at the most recently accepted and tried parameters.
+/// Residuals at the most recently accepted and at the most recently tried parameters.
 struct Buffered<'a, R> {
     residuals: &'a mut R,
     accepted: DVector<f64>,
@@ -64,8 +64,8 @@ impl<R: Residuals> SumOfSquares for Buffered<'_, R> {
         std::mem::swap(&mut self.accepted, &mut self.tried);
     }
 
-    /// The linearisation follows an accepted trial, so the most recent evaluation is the accepted
-    /// one.
+    /// A linearisation always follows an accepted trial, so the most recent evaluation is the
+    /// accepted one.
     fn linearise(&mut self) -> Option<Triangle> {
         self.residuals.jacobian(&mut self.jacobian);
         Some(Triangle::new(&self.jacobian, &self.accepted))

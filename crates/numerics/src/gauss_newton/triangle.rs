@@ -19,7 +19,7 @@ pub struct Triangle {
     scale: DVector<f64>,
 }
 
-/// Triangle R of JᵀJ + λI = RᵀR, and the step R⁻¹q.
+/// Triangle R of JᵀJ + λI = RᵀR, and the step R⁻¹q, with λ the damping.
 #[derive(Debug, Clone)]
 pub struct DampedTriangle {
     r: DMatrix<f64>,
@@ -33,7 +33,7 @@ impl Triangle {
         let columns = jacobian.ncols();
         let mut factor = TriangularFactor::new(columns + 1);
         let is_finite = factor.push(&[jacobian.as_view(), residual.as_view()]);
-        // A factor that took no rows has no triangle.
+        // If a value is not finite, the factor has no rows and no triangle.
         let none = || DMatrix::from_element(columns + 1, columns + 1, f64::NAN);
         let mut upper = if is_finite { factor.r().clone() } else { none() };
         let mut scale = DVector::from_element(columns, 1.0);
@@ -49,7 +49,7 @@ impl Triangle {
         Self { gradient: r.tr_mul(&q), r, q, scale }
     }
 
-    /// Returns the triangle of \[R q; √λ I 0\].
+    /// Returns the triangle of \[R q; √λ I 0\], with λ the damping.
     fn damped(&self, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
         let columns = self.r.ncols();
         let mut stacked = DMatrix::zeros(2 * columns, columns + 1);

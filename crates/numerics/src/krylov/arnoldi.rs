@@ -7,8 +7,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::krylov::eigenvector::eigenvector;
 use crate::real_schur::RealSchur;
 
-/// Orthonormal basis V of the space of b, Φ b, Φ² b …, and Φ in this basis: Φ V = V H + a remainder
-/// outside the space. Vectors and Φ are in any consistent unit.
+/// Orthonormal basis V of the space of b, Φ b, Φ² b …, and the matrix H of Φ in this basis: Φ V = V
+/// H + a remainder outside the space. Vectors and Φ are in any consistent unit.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
@@ -21,8 +21,8 @@ pub struct Arnoldi {
 }
 
 impl Arnoldi {
-    /// Creates the space of `start` (n entries) alone, without products; its maximum dimension is
-    /// `most`.
+    /// Creates the space of `start` (n entries) alone, without products with Φ; its maximum
+    /// dimension is `most`.
     pub fn new(start: DVector<f64>, most: usize) -> Self {
         let hessenberg = DMatrix::zeros(most + 1, most);
         Self { basis: vec![start.normalize()], hessenberg, size: 0 }
@@ -33,8 +33,8 @@ impl Arnoldi {
         self.size
     }
 
-    /// Adds one product; `apply` writes Φ v (n entries) into its second argument. Returns whether
-    /// the space can grow further.
+    /// Adds one product with Φ; `apply` writes Φ v (n entries) into its second argument. Returns
+    /// whether the space can grow further.
     ///
     /// # Errors
     /// The error of `apply`.
@@ -106,7 +106,7 @@ impl Arnoldi {
     }
 }
 
-/// Approximate eigenvalue of largest modulus.
+/// Approximation of the eigenvalue of largest modulus.
 #[derive(Debug, Clone)]
 pub struct Dominant {
     /// The eigenvalue μ, in the unit of Φ.
@@ -117,8 +117,8 @@ pub struct Dominant {
     pub vector: DVector<Complex<f64>>,
 }
 
-/// Returns the dominant eigenvalue after at most `steps` Arnoldi steps from `start` (n entries);
-/// `apply` writes A x into its second argument. `None` if numbers overflow.
+/// Returns the dominant eigenvalue of A after at most `steps` Arnoldi steps from `start` (n
+/// entries); `apply` writes A x into its second argument. `None` if numbers overflow.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.

@@ -1,4 +1,4 @@
-//! Eigenvectors of a matrix with few diagonals below the main diagonal.
+//! Eigenvectors of matrices that have few diagonals below the main diagonal.
 
 use std::collections::VecDeque;
 
@@ -32,7 +32,7 @@ pub fn eigenvector(
 }
 
 /// L and U of A − σI with row exchanges, for a matrix with few diagonals below the main diagonal:
-/// each needs O(size²) operations.
+/// factorisation and solution need O(size²) operations each.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.4.
@@ -40,7 +40,7 @@ struct HessenbergFactors {
     below: usize,
     /// Rows of U from the diagonal on.
     upper: Vec<Vec<Complex<f64>>>,
-    /// For each column, the row with which it was exchanged, and the factors of the rows below.
+    /// For each column, the row with which it was exchanged, and the multipliers of the rows below.
     steps: Vec<(usize, Vec<Complex<f64>>)>,
 }
 
@@ -52,7 +52,8 @@ impl HessenbergFactors {
             if i == j { value_at - shift } else { value_at }
         };
         let row = |i: usize| (i.saturating_sub(below)..size).map(|j| entry(i, j)).collect();
-        // The elimination of a column changes these rows; all begin with its entry.
+        // Active rows are those that the elimination of the column changes; each begins with its
+        // entry in this column.
         let mut active: VecDeque<Vec<Complex<f64>>> = (0..size.min(below)).map(row).collect();
         let (mut upper, mut steps) = (Vec::with_capacity(size), Vec::with_capacity(size));
         for column in 0..size {

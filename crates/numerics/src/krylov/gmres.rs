@@ -64,8 +64,8 @@ pub fn solve<E: From<NumericsError>>(
     }
 }
 
-/// Least squares with I − H, which has one more row than columns: rotations of neighbouring rows
-/// make it triangular.
+/// Least squares with I − H, which has one more row than columns; rotations of neighbouring rows
+/// make it triangular. H is the matrix of Φ in the Krylov space.
 struct Triangle {
     entries: DMatrix<f64>,
     /// Cosine and sine of each rotation.
@@ -80,7 +80,7 @@ impl Triangle {
         Self { entries, rotations: Vec::with_capacity(most), right: vec![norm] }
     }
 
-    /// Appends a column, whose last entry is below the diagonal.
+    /// Appends a column; its last entry is below the diagonal.
     fn append(&mut self, mut column: Vec<f64>) {
         let j = self.rotations.len();
         for (i, [cos, sin]) in self.rotations.iter().enumerate() {
@@ -103,7 +103,8 @@ impl Triangle {
         self.right[self.rotations.len()].abs()
     }
 
-    /// Returns the solution, if it is finite, and the reciprocal condition of the triangle.
+    /// Returns the solution, if it is finite, and the reciprocal of the condition number of the
+    /// triangle.
     fn solve(&self) -> Result<(Option<DVector<f64>>, f64), NumericsError> {
         let len = self.rotations.len();
         let triangle = self.entries.view((0, 0), (len, len));

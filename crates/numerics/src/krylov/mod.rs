@@ -1,5 +1,5 @@
-//! Krylov spaces of operators given by their products: linear equations and the largest
-//! eigenvalues.
+//! Krylov spaces of operators that are given by their products with vectors: linear equations and
+//! the largest eigenvalues.
 
 pub mod arnoldi;
 pub mod eigenvector;

@@ -8,7 +8,8 @@ pub fn start_vector(len: usize) -> DVector<f64> {
     numbered_start_vector(len, 0)
 }
 
-/// Returns one of many such vectors of `len` entries, pure numbers, by its `number`.
+/// Returns a pseudo-random vector of norm 1 and `len` entries, pure numbers; each `number` gives
+/// another vector, the same in every run.
 pub fn numbered_start_vector(len: usize, number: usize) -> DVector<f64> {
     let vector = DVector::from_iterator(len, pseudo_random(number).take(len));
     vector.normalize()

@@ -34,7 +34,7 @@ fn equations_are_solved_in_few_products() {
     assert!((found.vector - &exact).norm() < 1e-10 * exact.norm());
     assert!(found.products < 50, "{}", found.products);
     assert!(found.residual <= 1e-12 && found.reciprocal_condition > 0.01);
-    // Too small a space leaves what it says it leaves.
+    // A space that is too small gives a residual as large as reported.
     let found = solve(&right, 1e-12, 5, apply).unwrap();
     let left = &right - (DMatrix::identity(len, len) - &matrix) * found.vector;
     assert!((left.norm() / right.norm() - found.residual).abs() < 1e-12);
@@ -65,7 +65,7 @@ fn the_residual_of_the_largest_eigenvalue_tells_its_error() {
             });
         }
         let Dominant { value, residual, .. } = space.dominant().unwrap();
-        // Of a symmetric matrix the error is no larger than the residual.
+        // For a symmetric matrix, the error of the eigenvalue is not larger than the residual.
         assert!((value - 0.95).norm() <= residual + 1e-13, "{size}: {residual:e}");
         assert!(residual < before, "{size}: {residual:e}");
         before = residual;
@@ -75,7 +75,7 @@ fn the_residual_of_the_largest_eigenvalue_tells_its_error() {
 
 #[test]
 fn the_largest_of_many_eigenvalues_is_found() {
-    // A block that turns and grows by 1.2 among 200 factors below 1.
+    // The operator has a block that rotates and grows by 1.2, beside 200 factors below 1.
     let apply = |x: &[f64], y: &mut [f64]| {
         for (i, (y, x)) in y.iter_mut().zip(x).enumerate() {
             *y = x * (0.9 * (i as f64 * 0.7).cos());

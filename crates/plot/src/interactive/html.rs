@@ -73,7 +73,7 @@ mod tests {
         }
     }
 
-    /// Judge: the hash of "abc" in FIPS 180-2.
+    /// Reference: the hash of "abc" in FIPS 180-2.
     #[test]
     fn the_policy_names_the_hash_of_the_script() {
         let hash = STANDARD.encode(Sha256::digest(b"abc"));

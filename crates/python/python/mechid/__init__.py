@@ -7,7 +7,7 @@
 
 Everything is in SI units, and in Hz where a name ends in ``_hz``. A record is a file, or arrays of
 shape ``(samples,)`` or ``(samples, degrees of freedom)``. Failures are `MechidError`, a
-`ValueError` whose message says what would have been right.
+`ValueError` with a message that states the cause and the remedy.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from ._results import Uncertain as Uncertain
     from ._results import Validation as Validation
 
-# Where each name is: imported when it is used, so that the program starts without NumPy.
+# Module of each name; it is imported when the name is used, so that the program starts without NumPy.
 _HOMES = {
     "bearing": "_doors",
     "bearing_campaign": "_doors",

@@ -1,4 +1,4 @@
-"""The questions one asks of a record; each is a function."""
+"""Functions that analyse records: one for each question about a machine."""
 
 from __future__ import annotations
 
@@ -115,8 +115,8 @@ def identify(
 ) -> Identified:
     """Identify mass, damping and stiffness from measured forces and responses.
 
-    Every option of the program's ``mechid identify`` is a keyword of the same name, but those of
-    ``--machine``, which `identify_elements` has.
+    Every option of ``mechid identify`` is a keyword of the same name, except the options of
+    ``--machine``: these are keywords of `identify_elements`.
 
     Parameters
     ----------
@@ -125,19 +125,19 @@ def identify(
         mappings, SEP 5 channels), or `Measurement` objects. Or the force and the displacement as
         arrays of shape (samples,) or (samples, degrees of freedom), in N and m.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
-        Estimator of the parameters. Without it, maximum likelihood if the periods show the
-        noise, if noise biases least squares, or with `from_frf`; otherwise least squares.
+        Estimator of the parameters. Default: maximum likelihood if the periods show the noise, if
+        noise biases least squares, or with `from_frf`; otherwise least squares.
     noise : str, optional
         Noise spectrum that weights the lines in maximum likelihood: ``"white"``, ``"smooth"``,
-        ``"neighbours:N"`` (means over N lines to either side), ``"per-line"`` or ``"auto"``,
-        which chooses.
+        ``"neighbours:N"`` (means over N lines to either side), ``"per-line"``, or ``"auto"`` for an
+        automatic choice.
     force_noise : float or sequence of float, optional
-        Standard deviation of the noise on the force samples, in N: one for all forces, or one
-        per degree of freedom; for open records, so the record is fitted as one. Without it,
-        estimated above the excited band, or between hits.
+        Standard deviation of the noise on the force samples, in N: one value for all forces, or one
+        per degree of freedom. It applies to open records, and makes the fit treat the record as an
+        open one. Default: estimated above the excited band, or between hits.
     lines : str, optional
         Spectral lines: ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as
-        ``"1:2:335"``. Without it, every line at which the force exceeds its noise.
+        ``"1:2:335"``. Default: every line at which the force exceeds its noise.
     band_hz : (float, float), optional
         Use the lines with force between two frequencies, in Hz.
     without_lines : str, optional
@@ -161,52 +161,52 @@ def identify(
         (hann, hamming, blackman, rectangular), as does a dict of ``segment``,
         ``overlap_percent`` and ``window``.
     between_samples : {"euler", "held", "linear"}, optional
-        Force between the samples: held or linear for open records, hits and the time domain,
-        euler for the time domain only. Without it, the force is band-limited.
+        Assumed force between the samples: held or linear for open records, hits and the time
+        domain, euler for the time domain only. Default: band-limited.
     ac_coupling : sequence of str or dict
-        Channels behind a first-order high-pass, for open records and hits, such as ``"a1=0.5"``
-        with the corner frequency in Hz, or a dict of ``channel`` and ``corner_hz``.
+        Channels behind a first-order high-pass filter, for open records and hits, such as
+        ``"a1=0.5"`` with the corner frequency in Hz, or a dict of ``channel`` and ``corner_hz``.
     extent : {"open", "period"}, optional
-        Extent of the window: open (its transient is estimated with the machine) or period.
-        Without it, a period if `period` is given; otherwise a period unless a transient is
-        found (in the time domain open).
+        Extent of the window: open (any part of a response; its transient is estimated with the
+        machine) or period (whole periods). Default: a period if `period` is given, otherwise a
+        period unless a transient is found; in the time domain open.
     hits : bool or str or dict, optional
-        Divide the records of a hammer test into hits, exclude bad ones and fit each of the
-        others as a separate record; ``"trigger=0.5,double=5"`` changes the rule, or a dict of
-        ``trigger_percent``, ``double_percent``, ``weak_percent``, ``bounce_s``, and ``before``
-        and ``samples`` of a hit in samples.
+        Divide the records of a hammer test into hits, exclude bad ones and fit each of the others
+        as a separate record. A text such as ``"trigger=0.5,double=5"`` changes the rule, or a dict
+        of ``trigger_percent``, ``double_percent``, ``weak_percent``, ``bounce_s``, and the numbers
+        of samples ``before`` (before the pulse) and ``samples`` (of the whole hit).
     derivatives : str, optional
         Method for velocity and acceleration that were not measured: ``"spectral"`` or
         ``"savitzky-golay:WINDOW:ORDER"``.
     refine : str or dict, optional
-        Steps in every sampling interval and the interpolation between the samples (linear, spline,
-        band-limited), such as ``"8:band-limited"``.
+        Number of steps in every sampling interval, and interpolation between the samples (linear,
+        spline, band-limited), such as ``"8:band-limited"``.
     nonlinear : str, optional
         Springs and dampers to fit in addition to mass, damping and stiffness, such as ``"k3:
         x1^3, c2: |v1| v1"``.
     candidates : str, optional
-        Further terms to try, written in the same way; the useful ones are added.
+        Candidate terms, written as for `nonlinear`; those that improve the fit are added.
     criterion : {"information", "held-out"}, optional
-        Criterion for the addition of a candidate: the extended Bayesian information criterion,
-        or the misfit of each record, predicted by the fit to the others (three records at
-        least).
+        Criterion for the addition of a candidate: the extended Bayesian information criterion, or
+        the error of the prediction of each record by the fit to the others (at least three
+        records).
     search : sequence of {"laws", "delay", "phase"}
-        Constants to estimate as well: those inside the laws, the delay of the force, the phase
+        Further constants to estimate: those inside the laws, the delay of the force, a phase error
         common to all channels.
     weighting : {"automatic", "white-force", "response", "smooth-spectrum"}, optional
         Weighting of the lines of a fit with nonlinear terms.
     validate : Measurement or dict, optional
-        Record to predict that is not fitted. A dict of ``record``, ``start`` (first sample,
-        counted from 1) and ``samples`` (their number) selects its samples; without ``record``
-        they are those of the first fitted record.
+        Record to predict that is not fitted. A dict of ``record``, ``start`` (first sample, counted
+        from 1) and ``samples`` (number of samples) selects a part of it; without ``record``, of the
+        first fitted record.
     settings : dict, optional
-        ``settings`` of another result, instead of the options above; they are keywords, too.
+        ``settings`` of another result, instead of the options above; the keys are those options.
     threads : int, optional
-        Number of threads; as many as there are processors, without.
+        Number of threads. Default: one per processor.
     **record
-        What is in the records, as `RecordOptions`: ``force``, ``displacement``, ``velocity``,
-        ``acceleration``, ``fs``, ``start``, ``period``, ``periods``, ``time``, ``skip_lines``,
-        ``detrend``, ``record_column``, ``record_id``.
+        Columns and samples of the records, as in `RecordOptions`: ``force``, ``displacement``,
+        ``velocity``, ``acceleration``, ``fs``, ``start``, ``period``, ``periods``, ``time``,
+        ``skip_lines``, ``detrend``, ``record_column``, ``record_id``.
 
     Returns
     -------
@@ -215,9 +215,9 @@ def identify(
     Raises
     ------
     MechidError
-        If a record cannot be read, or the fit fails; the message says why.
+        If a record cannot be read, or the fit fails; the message states the reason.
     TypeError
-        If an array holds other than real numbers, or options do not go together.
+        If an array contains anything but real numbers, or options exclude each other.
 
     Examples
     --------
@@ -266,41 +266,43 @@ def identify_elements(
 ) -> IdentifiedElements:
     """Identify the unknown coefficients of a machine of named elements, with sensors anywhere.
 
-    It is ``mechid identify --machine``.
+    Same as ``mechid identify --machine``.
 
     Parameters
     ----------
     *sources
-        Records (files by path, tables, or `Measurement` objects) whose columns have the names of the
-        sensors and inputs; or `ResponseTable` objects whose points have them; or, with `speed_table`,
-        files with a row for each speed of a run.
+        Records (files by path, tables, or `Measurement` objects) whose columns have the names of
+        the sensors and inputs; or `ResponseTable` objects whose points have these names; or, with
+        `speed_table`, files with one row per speed of a run.
     machine : path or mapping
-        The machine: degrees of freedom, elements, sensors and inputs, as the program reads it. The
-        matrices of an element may be NumPy arrays or sparse matrices of SciPy, such as ``rotor.M()``,
-        ``rotor.C(speed)``, ``rotor.G()`` and ``rotor.K(speed)`` of a ROSS rotor without its bearings.
+        Description of the machine: degrees of freedom, elements, sensors and inputs, as the program
+        reads it. The matrices of an element may be NumPy arrays or sparse matrices of SciPy, such
+        as ``rotor.M()``, ``rotor.C(speed)``, ``rotor.G()`` and ``rotor.K(speed)`` of a ROSS rotor
+        without its bearings.
     parts : sequence
-        Tables of frequency responses of the parts whose receptance stands for a model of them.
+        Tables of frequency responses of parts of the machine; their receptance replaces a model of
+        the part.
     speed_table : bool
         Whether the sources are tables of synchronous responses over the speed.
     band_hz : (float, float), optional
-        Frequencies to use, in Hz; those that the inputs drive, without.
+        Frequencies to use, in Hz. Default: those that the inputs excite.
     without_hz : sequence of float or dict
-        Frequencies whose lines are left out, as in `identify`.
+        Frequencies whose lines are excluded, as in `identify`.
     hits : bool or str or dict, optional
-        Cut the records of a hammer test into its good hits, as in `identify`.
+        Divide the records of a hammer test into hits and use the good ones, as in `identify`.
     noise : str
-        Noise spectrum by which the lines are weighted, as in `identify`.
+        Noise spectrum that weights the lines, as in `identify`.
     starts : int, optional
-        Number of searches at most; 12, without.
+        Maximum number of searches. Default: 12.
     seed : int
-        Seed of the random first values.
+        Seed of the random initial values.
     confidence : float
         Probability with which the intervals contain the unknowns.
     threads : int, optional
-        Number of threads; as many as there are processors, without.
+        Number of threads. Default: one per processor.
     **record
-        What is in the records, as `RecordOptions`, without columns. A record with ``period`` is taken as
-        whole periods, otherwise as an open record.
+        Samples of the records, as in `RecordOptions`, without columns. A record with ``period`` is
+        read as whole periods, otherwise as an open record (any part of a response).
 
     Returns
     -------
@@ -309,7 +311,7 @@ def identify_elements(
     Raises
     ------
     MechidError
-        If the description does not make sense, a record cannot be read, or nothing is determined.
+        If the description is inconsistent, a record cannot be read, or the data determine nothing.
 
     Examples
     --------
@@ -373,7 +375,7 @@ def identify_responses(
 ) -> IdentifiedResponses:
     """Identify mass, damping and stiffness from frequency responses measured elsewhere.
 
-    It is ``mechid identify --frf-table``.
+    Same as ``mechid identify --frf-table``.
 
     Parameters
     ----------
@@ -381,22 +383,22 @@ def identify_responses(
         One or several tables, fitted together: texts or universal files by path, or `ResponseTable`
         objects made of arrays.
     quantity : {"displacement", "velocity", "acceleration"}, optional
-        Measured quantity, where the table does not state it.
+        Measured quantity, if the table does not state it.
     averages : float, optional
-        Number of independent averages behind the coherence.
+        Number of independent averages of the coherence.
     points : sequence of str
-        Points to use, one per degree of freedom; all of them, without.
+        Points to use, one per degree of freedom. Default: all.
     band_hz : (float, float), optional
-        Frequencies to use, in Hz; all above zero, without.
+        Frequencies to use, in Hz. Default: all above zero.
     mass : float or sequence of float or None, optional
         Known masses in kg, one per degree of freedom or all entries row by row; None for an unknown
         one.
     structure : str or sequence of str
-        What is known of the form of M, C and K, as in `identify`.
+        Known structure of M, C and K, as in `identify`.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
-        Estimator; maximum likelihood, without.
+        Estimator. Default: maximum likelihood.
     threads : int, optional
-        Number of threads; as many as there are processors, without.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -457,40 +459,40 @@ def bearing(
 ) -> IdentifiedBearing:
     """Identify the stiffness, damping and mass coefficients of a journal bearing from rig tests.
 
-    Every option of the program's ``mechid bearing`` but `campaign` is a keyword of the same name.
+    Every option of ``mechid bearing``, except ``--campaign``, is a keyword of the same name.
 
     Parameters
     ----------
     *tests, **record
-        Records as in `identify`, all of one speed and load: the forces of the shakers, the accelerations
-        of the housing and its displacements relative to the shaft, x before y, and the `period`. Or
-        tables of frequency responses, as `ResponseTable` objects, or by path with `frf_table`:
-        displacement and acceleration per shaker force by turns.
+        Records as in `identify`, all at one speed and load, with the `period`: the forces of the
+        shakers, the accelerations of the housing and its displacements relative to the shaft, x
+        before y. Or tables of frequency responses, as `ResponseTable` objects, or by path with
+        `frf_table`: alternately displacement and acceleration per shaker force.
     baseline : object or sequence
-        Baseline tests (no film, shaft at rest), likewise.
+        Baseline tests (no film, shaft at rest), in the same form as the tests.
     stator_mass : float
-        Mass of the housing with all that moves with it, in kg.
+        Mass of the housing and all parts that move with it, in kg.
     rotation_hz : float, optional
-        Speed of rotation in Hz; its lines and multiples are left out.
+        Speed of rotation in Hz; lines at this frequency and its multiples are excluded.
     load : float, optional
         Static load, in N.
     clearance, diameter, length, viscosity : float, optional
         Size of the bearing in m, and viscosity of the oil in Pa·s, for dimensionless coefficients and the
         Sommerfeld number.
     coefficients : {"automatic", "eight", "twelve"}
-        Coefficients to identify; a likelihood-ratio test at 5 % chooses, without.
+        Coefficients to identify. Default: chosen by a likelihood-ratio test at 5 %.
     lines, band_hz, without_lines, without_hz : optional
         Spectral lines, as in `identify`.
     frf_table : bool
         Whether paths name tables of frequency responses.
     averages : float, optional
-        Number of independent averages behind the coherence of tables.
+        Number of independent averages of the coherence of tables.
     points : sequence of str
-        Two points of the tables to use, x before y; all of them, without.
+        Two points of the tables to use, x before y. Default: all.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     threads : int, optional
-        Number of threads; as many as there are processors, without.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -550,11 +552,11 @@ def bearing_campaign(
     Parameters
     ----------
     campaign : mapping or path
-        Description, or its JSON file: ``points``, each with ``tests``, ``baseline``, ``rotation_hz`` and
-        ``load``, beside ``channels``, ``window`` (or ``frf_table``), a common ``baseline`` and ``settings``
-        as `bearing` has them.
+        Description, or its JSON file. It has ``points``, each with ``tests``, ``baseline``,
+        ``rotation_hz`` and ``load``, and, common to all points, ``channels``, ``window`` (or
+        ``frf_table``), ``baseline`` and ``settings`` as in `bearing`.
     threads : int, optional
-        Number of threads; as many as there are processors, without.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -594,27 +596,28 @@ def frf(
 ) -> FrequencyResponses:
     """Estimate frequency responses and coherence from measured forces and responses.
 
-    With a periodic excitation (`period`) the periods are the segments that are averaged; with a random
-    excitation say `segment`.
+    With a periodic excitation (`period`) the periods are the segments that are averaged; for a
+    random excitation give `segment`.
 
     Parameters
     ----------
     *sources, **record
-        The record, as in `identify`; of a list of files the segments are averaged together.
+        Record or records, as in `identify`; the segments of several records are averaged together.
     estimator : {"h1", "h2", "hv"}
-        Where the noise is: on the response, on the force, or on both.
+        Frequency response estimator: h1 for noise on the response, h2 on the force, hv on both.
     lines, band_hz, without_lines, without_hz : optional
         Spectral lines of a segment, as in `identify`.
     segment : int or str or dict, optional
-        Samples of a segment, and more, as in `identify`.
+        Number of samples of a segment, with overlap and window as in `identify`.
     hits : bool or dict, optional
         Average over the good hits of a hammer test, as in `identify`.
     exponential_percent : float, optional
-        Weight at the end of a hit of an exponential window on force and response, in per cent.
+        Weight of an exponential window on force and response at the end of a hit, in per cent of
+        its weight at the beginning.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     threads : int, optional
-        Number of threads.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -652,26 +655,26 @@ def decay(
 ) -> Decayed:
     """Find natural frequencies, damping ratios and shapes in a response without force.
 
-    For a structure that was plucked or struck, or whose shaker was switched off.
+    For a structure that was released or struck, or whose shaker was switched off.
 
     Parameters
     ----------
     *sources, **record
-        The record: a file, table or `Measurement` with columns of one kind of response and no force.
-        Arrays are given by keyword: ``acceleration=a, fs=…``.
+        The record: a file, table or `Measurement` with columns of one kind of response and no
+        force. Give arrays by keyword: ``acceleration=a, fs=…``.
     from_s, to_s : float, optional
-        Beginning of the decay and end of what is used, in s from the first sample of the window; the
-        beginning is found, and the end is that of the window, without.
+        Beginning of the decay and end of the part that is used, in s from the first sample of the
+        window. Default: the beginning is detected, and the end is the end of the window.
     modes : int, optional
-        Number of modes; as many as the record shows, without.
+        Number of modes. Default: as many as the record shows.
     max_modes : int
-        Largest number of modes to look for.
+        Maximum number of modes if the number is not given.
     offset : bool
         Whether each channel has an unknown constant.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     threads : int, optional
-        Number of threads.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -719,36 +722,38 @@ def modes(
     Parameters
     ----------
     *sources, **record
-        One or several records, fitted together, as in `identify`; forces and responses need not belong
-        to the same degrees of freedom. Files without any option of a record, and `ResponseTable`, are
-        tables of frequency responses.
+        One or several records, fitted together, as in `identify`; forces and responses may belong
+        to different degrees of freedom. Files without any option of a record, and `ResponseTable`
+        objects, are tables of frequency responses.
     band_hz : (float, float), optional
-        Frequencies to use, in Hz; those that the forces drive, without.
+        Frequencies to use, in Hz. Default: those that the forces excite.
     modes, max_modes : int, optional
-        Number of modes, or the largest one; as many as the record shows, without.
+        Number of modes, or its maximum. Default: as many as the record shows.
     near_hz : sequence of float
-        Frequencies, in Hz, near which a mode is looked for whatever the start shows.
+        Frequencies, in Hz, near which a mode is estimated even if it is weak.
     force_at, response_at : sequence of str or int
-        Places of the force and response columns; where one force column of several records is that of a
-        hammer, the place that it strikes in each of them.
+        Points of the force and response columns, such as ``3`` or ``"12+Z"``. If several records
+        have one force column, of a roving hammer: the struck point of each record.
     hits : bool or dict, optional
-        Cut the records into the good hits of a hammer, as in `identify`.
+        Divide the records into hits of a hammer and use the good ones, as in `identify`.
     ambient : bool
         Whether forces act that are not measured, such as wind or traffic.
     without_hz : sequence of float
-        Frequencies of machines near an ambient record, in Hz, whose lines are left out.
+        Frequencies of nearby machines in an ambient record, in Hz, whose lines are excluded.
     without_harmonics : bool
-        Whether the harmonics that an ambient record shows are left out, too.
+        Whether the lines of the harmonics that are found in an ambient record are excluded, too.
     validate : float
-        Share of each record, at its end, that a second fit leaves out and predicts; none, without.
+        Share at the end of each record that a second fit excludes and predicts. Default: no such
+        validation.
     quantity : {"displacement", "velocity", "acceleration"}, optional
         Measured quantity of the responses of tables that do not state it.
     diagrams : bool
-        Whether the result has the stabilisation diagram and the mode indicator, as ``diagrams``.
+        Whether the result contains the stabilisation diagram and the mode indicator, as
+        ``diagrams``.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     threads : int, optional
-        Number of threads.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -793,8 +798,8 @@ def modes(
 def compare_modes(first: object, second: object) -> ModeComparison:
     """Compare two sets of modes: a structure before and after a change, or a test and a model.
 
-    Modes are paired by frequency and shape, at the points that both sets have; differences stand beside
-    their standard errors and the probability of such a difference without a change.
+    Modes are paired by frequency and shape, at the points that both sets have. Each difference has
+    its standard error and the probability of such a difference without a change.
 
     Parameters
     ----------
@@ -871,30 +876,31 @@ def reconstruct(
     Parameters
     ----------
     machine : Machine, Identified, Modes, or path
-        The machine, or the modes of a test with forces; the uncertainty of identified ones counts in
-        the standard error of the force. A path is that of the program's JSON.
+        The machine, or the modes of a test with forces; the standard error of the force includes
+        the uncertainty of identified ones. A path is that of the JSON of the program.
     *sources, **record
-        The record: a file, table or `Measurement` with response columns and no force. Arrays are given
+        The record: a file, table or `Measurement` with response columns and no force. Give arrays
         by keyword: ``displacement=x, fs=…``.
     method : str
-        Method, as ``mechid force --method`` has them.
+        Method, one of those of ``mechid force --method``.
     forced : sequence of int
-        Degrees of freedom, or forces of the modes, on which a force acts, counted from 1; all, without.
+        Degrees of freedom, or forces of the modes, on which a force acts, counted from 1. Default:
+        all.
     lines : str, optional
         Spectral lines with force.
     band_hz : (float, float), optional
-        Frequencies between which the force is sought, in Hz; all, without, or of records without a
-        displacement those at which the responses show a force.
+        Frequencies between which the force is estimated, in Hz. Default: all, or, without a
+        displacement, those at which the responses show a force.
     at_rest : bool
         Whether an open record begins at rest.
     noise : sequence of float
-        Standard deviation of the noise in each measured column, in its unit; estimated, without.
+        Standard deviation of the noise in each measured column, in its unit. Default: estimated.
     rule, parameter : optional
-        How to choose the regularisation parameter, or the parameter itself.
+        Rule for the regularisation parameter, or the parameter itself.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     threads : int, optional
-        Number of threads.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -941,16 +947,16 @@ def inspect(
     memory_gb: float | None = None,
     **window: Unpack[Window],
 ) -> Inspected:
-    """Tell what is in a record file: format, columns, sampling, levels, strongest lines, period.
+    """Inspect a record file: format, columns, sampling, levels, strongest lines, period.
 
     Parameters
     ----------
     path : path
         The file.
     columns : sequence of str
-        Columns to show, by name or number; every column that holds numbers only, without.
+        Columns to show, by name or number. Default: every column that contains only numbers.
     curves : bool
-        Whether to gather the curves that `plot` and `to_svg` of the result draw.
+        Whether to compute the curves that `plot` and `to_svg` of the result draw.
     fs, time, skip_lines, detrend, record_column, record_id, memory_gb, **window
         As in `Measurement.open`.
 
@@ -990,25 +996,25 @@ def sweep(
     Parameters
     ----------
     *sources, **record
-        A record, as in `identify`, or the description of an experiment: a mapping as `simulate` takes
-        it, or the path of a JSON file, which is simulated at each setting.
+        A record, as in `identify`, or the description of an experiment (a mapping as for
+        `simulate`, or the path of a JSON file), which is simulated at each setting.
     npi, rate_hz, decimate : sequence of float
-        The settings, of one of these kinds: cycles of the natural frequency in a period, sampling
-        rates in Hz, or every n-th sample.
+        Values of the setting, of one kind: cycles of the natural frequency in a period, sampling
+        rates in Hz, or n for every n-th sample.
     estimator : str
-        Estimator, as ``mechid sweep --estimator`` has them.
+        Estimator, one of those of ``mechid sweep --estimator``.
     unknown_mass, mass : optional
-        Whether the mass of a described machine is to be found, too; known masses, as in `identify`.
+        Whether to identify the mass of a described machine, too; known masses, as in `identify`.
     natural_frequency_hz : float, optional
-        Natural frequency that `npi` counts; the lowest of the machine, without.
+        Natural frequency that `npi` counts. Default: the lowest of the machine.
     reference : Machine, Identified or path, optional
-        The machine that errors of a record's estimates are measured against.
+        Reference machine: the errors of a record's estimates are differences from it.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     progress : callable, optional
-        Called with the number of settings done, now and then.
+        Function that is called at intervals with the number of completed settings.
     threads : int, optional
-        Number of threads.
+        Number of threads. Default: one per processor.
 
     Returns
     -------
@@ -1055,10 +1061,10 @@ def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulati
     Parameters
     ----------
     experiment : mapping or path
-        ``system``, ``sampling``, ``excitation``, ``scheme``, ``response``, ``periods`` and ``noise``,
-        as in the JSON that ``mechid simulate`` takes, or the path of such a file. The matrices of a
-        ``system`` may be NumPy arrays, or sparse ones of SciPy: of more than 64 degrees of freedom the
-        record has the columns that ``outputs`` and ``excitation`` name.
+        ``system``, ``sampling``, ``excitation``, ``scheme``, ``response``, ``periods`` and
+        ``noise``, as in the JSON for ``mechid simulate``, or the path of such a file. The matrices
+        of a ``system`` may be NumPy arrays, or sparse matrices of SciPy; with more than 64 degrees
+        of freedom the record has only the columns that ``outputs`` and ``excitation`` name.
 
     Returns
     -------
@@ -1086,8 +1092,8 @@ def selected_modes(
 ) -> SelectedModes:
     """Find some modes of a machine of any size: the lowest, or those nearest to a frequency.
 
-    Of a machine of a few degrees of freedom `Machine.modes` are all of them. Each mode is exact to
-    rounding; that none between them was missed is likely, not proved.
+    For a machine of a few degrees of freedom, `Machine.modes` has all of them. Each mode is exact
+    to rounding; it is likely, but not proved, that no mode between them is missed.
 
     Parameters
     ----------
@@ -1097,7 +1103,7 @@ def selected_modes(
     count : int
         Number of modes.
     near_hz : float, optional
-        Frequency that the modes are nearest to, in Hz.
+        Frequency whose nearest modes are computed, in Hz. Default: the lowest modes.
 
     Returns
     -------
@@ -1106,7 +1112,7 @@ def selected_modes(
     Raises
     ------
     MechidError
-        If the matrices make no machine, or the search finds too few modes.
+        If the matrices do not form a machine, or the search finds too few modes.
     """
     if count < 1:
         raise ValueError(f"`count` must be at least 1, got {count}")
@@ -1148,9 +1154,9 @@ def integrate(
     response : {"from-rest", "periodic"}
         Whether the motion begins at the first sample, or repeats with the force.
     displacement, velocity : array_like, optional
-        Motion at the first sample, in m and m/s; zero, without.
+        Motion at the first sample, in m and m/s. Default: zero.
     allow_unstable : bool
-        Whether steps are allowed at which the motion grows by itself.
+        Whether steps are allowed at which the free motion grows numerically.
 
     Returns
     -------
@@ -1161,7 +1167,7 @@ def integrate(
     Raises
     ------
     MechidError
-        If the scheme refuses, or the force does not fit the machine.
+        If the scheme does not apply, or the force does not fit the machine.
     """
     start = {"displacement": displacement, "velocity": velocity}
     given = {name: _vector(name, values) for name, values in start.items() if values is not None}
@@ -1212,7 +1218,7 @@ def predict(
     extent : {"open", "period"}
         Whether the motion begins at the first sample, or repeats with the force.
     displacement, velocity : array_like, optional
-        Motion at the first sample, in m and m/s; zero, without.
+        Motion at the first sample, in m and m/s. Default: zero.
 
     Returns
     -------
@@ -1268,10 +1274,10 @@ def multisine(
     lines : str
         ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as ``"1:2:801"``.
     phases : str
-        How the phases are chosen, as ``mechid multisine --phases`` has it.
+        Rule for the phases, one of those of ``mechid multisine --phases``.
     amplitude, rms, peak : float, optional
-        Level, one of them: amplitude of every line (1 without), RMS value, or peak between samples
-        too, in N.
+        Level, as one of these: amplitude of every line (default: 1), RMS value, or peak including
+        values between samples, in N.
     seed, starts : int
         Seed of random phases, and number of starting points of the search for a low crest factor.
 
@@ -1306,14 +1312,14 @@ def _given(**keywords: Any) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Return what NumPy or a mapping holds as JSON has it."""
+    """Return the content of NumPy objects and mappings in the form of JSON."""
     if isinstance(value, Mapping):
         return dict(value)
     return np.asarray(value).tolist()
 
 
 def _levels(force_noise: float | Sequence[float] | None) -> tuple[float, ...] | None:
-    """Return the noise levels of the forces as they are saved."""
+    """Return the noise levels of the forces in their saved form."""
     if force_noise is None:
         return None
     levels = force_noise if isinstance(force_noise, Iterable) else [force_noise]
@@ -1321,7 +1327,7 @@ def _levels(force_noise: float | Sequence[float] | None) -> tuple[float, ...] | 
 
 
 def _without(lines: str | None, hz: Sequence[float | Mapping[str, Any]]) -> str:
-    """Return the lines to leave out as JSON."""
+    """Return the excluded lines as JSON."""
     frequencies = [dict(one) if isinstance(one, Mapping) else {"frequency_hz": float(one)} for one in hz]
     return json.dumps({"lines": lines, "frequencies": frequencies})
 

@@ -1,4 +1,4 @@
-"""Drawings of the figures of pages with Matplotlib, which is imported with this module."""
+"""Drawings of the figures of pages with Matplotlib; importing this module imports Matplotlib."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _POINTS = 0.75
 
 _MARKERS = {"c": "o", "s": "s", "t": "^", "d": "D", "v": "v", "x": "x", "p": "+"}
 
-# Matplotlib leaves this label out of a legend.
+# Matplotlib does not show this label in a legend.
 _NO_LEGEND = "_nolegend_"
 
 # Largest number of labels on an axis with a step.
@@ -34,7 +34,7 @@ _LABELS = 9
 def draw_panels(
     panels: Sequence[Panel], ax: Axes | Sequence[Axes] | None, columns: int, shares_x: bool
 ) -> list[Axes]:
-    """Draw panels into the axes given, or into those of a new figure."""
+    """Draw panels into the given axes, or into those of a new figure."""
     axes = _new_axes(len(panels), columns, shares_x) if ax is None else _given(ax)
     if len(axes) != len(panels):
         raise ValueError(f"the figure has {len(panels)} panels, got {len(axes)} axes; `panel` chooses one")
@@ -47,7 +47,7 @@ def draw_panels(
 
 
 def new_axes(ax: Axes | None) -> Axes:
-    """Return the axes given, or those of a new figure."""
+    """Return the given axes, or those of a new figure."""
     return pyplot.subplots()[1] if ax is None else ax
 
 
@@ -106,7 +106,7 @@ def _new_axes(count: int, columns: int, shares_x: bool) -> list[Axes]:
 
 
 def _draw_panel(panel: Panel, axes: Axes) -> None:
-    # Curves that were drawn before stay in view.
+    # Curves that are already in the axes remain visible.
     is_empty = not axes.has_data()
     for axis, set_scale, scale in (
         (panel.x, axes.set_xscale, axes.get_xscale()),
@@ -116,7 +116,7 @@ def _draw_panel(panel: Panel, axes: Axes) -> None:
         if scale != wanted:
             set_scale(wanted)
         if is_empty and not axis.is_logarithmic:
-            # Long numbers would run into each other.
+            # Long numbers would overlap.
             axes.ticklabel_format(axis="x" if axis is panel.x else "y", scilimits=(-2, 5))
     for line in panel.references:
         across = axes.axhline if line.is_horizontal else axes.axvline

@@ -22,31 +22,31 @@ _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "0": "\0"}
 
 
 class MechidError(ValueError):
-    """A failure of an analysis, told as the program ``mechid`` tells it.
+    """A failure of an analysis, with the message of the program ``mechid``.
 
     Attributes
     ----------
     code : str
-        Which failure it is, such as ``"analysis.window"`` or ``"estimate.too-few-rows"``: stable,
-        for programs; the reference of the book lists all of them.
+        Identifier of the failure for programs, such as ``"analysis.window"`` or
+        ``"estimate.too-few-rows"``; it never changes. The reference of the book lists all of them.
     fields : mapping
         The numbers and names of the message, such as ``{"first": 1, "last": 600, "len": 512}``.
     """
 
     def __init__(self, message: str, variant: str = "Failure") -> None:
-        # The settings are spelled as the keywords of this package.
+        # Settings in the message have the names of the keywords of this package.
         super().__init__(message.replace("`sample_rate`", "`fs`"))
         self._variant = variant
 
     @cached_property
     def _parts(self) -> tuple[list[str], dict[str, object]]:
-        # Read when it is asked for: a caller that only goes on does not wait for it.
+        # The code is computed only on request: a caller that ignores it does not wait for it.
         return _read(self._variant)
 
     @property
     def code(self) -> str:
-        """Which failure it is, such as ``"analysis.window"``."""
-        # The layers in between only pass a failure on.
+        """Identifier of the failure, such as ``"analysis.window"``."""
+        # Intermediate layers only pass a failure on, so the code names the innermost one.
         return ".".join(_kebab(name) for name in self._parts[0][-2:])
 
     @property
@@ -63,10 +63,11 @@ _Answer = TypeVar("_Answer")
 
 
 def careful(door: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]:
-    """Return a function that raises `MechidError` where a number or a text does not fit.
+    """Return a function that raises `MechidError` if a number or a text is outside the accepted
+    range.
 
-    The compiled half takes integers without a sign, and text that has a UTF-8 form; what is outside of
-    them would be an exception of the layer in between.
+    The compiled module accepts non-negative integers, and text with a UTF-8 form; other values
+    would raise an exception of the layer between Python and Rust.
     """
 
     @wraps(door)
@@ -133,7 +134,7 @@ def _plain(value: object) -> object:
 
 
 class _Reader:
-    """Reads what Rust's derived `Debug` writes."""
+    """Reader of the text that Rust's derived `Debug` writes."""
 
     def __init__(self, tokens: list[tuple[str, str]]) -> None:
         self._tokens, self._at = tokens, 0

@@ -1,8 +1,8 @@
-"""Figures of the HTML pages: what a page draws, read from it and drawn again with Matplotlib.
+"""Figures of the HTML pages: the numbers of a page, read from it and drawn with Matplotlib.
 
-A page carries the numbers of its figures for the script that zooms in them; they are read here, so that
-every figure of a page has a drawing with Matplotlib. Like on the page, curves have single precision,
-phases four digits and standard errors two, and of more than 8,192 points the extremes remain.
+A page contains the numbers of its figures for its script. They are read here, so that every figure
+of a page can be drawn with Matplotlib. As on the page, curves have single precision, phases four
+digits and standard errors two; a curve of more than 8,192 points is reduced to its extremes.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ _NUMBERS = re.compile(r"<metadata>(.*?)</metadata>", re.DOTALL)
 _SQUARE = re.compile(r'<g opacity="([\d.]+)">\s*<rect x="([\d.]+)" y="([\d.]+)"')
 _CAPTION = re.compile(r"<figcaption>(.*?)</figcaption>", re.DOTALL)
 
-# Responses per unit force by rising derivative of the displacement.
+# Responses per unit force, in the order of the derivatives of the displacement.
 _ORDERS = (("Receptance", "m/N"), ("Mobility", "m/(s·N)"), ("Accelerance", "m/(s²·N)"))
 
-# Bytes of single precision that a list is written with.
+# Number of bytes of single precision with which a list is written.
 _BYTES = {"h": 2, "m": 3, "f": 4}
 
 # Largest displacement of a drawn mode, relative to the size of the structure, as on the page.
@@ -68,8 +68,9 @@ class Axis:
 class Curve:
     """A curve: points in the units of the axes, and how they are drawn.
 
-    ``kind`` is "line", "marked line", "points", "stems" or "band"; a band lies between ``y`` and
-    ``upper``. ``std_error`` belongs to ``y``, ``phase_deg`` to a magnitude.
+    ``kind`` is "line", "marked line", "points", "stems" or "band"; a band is between ``y`` and
+    ``upper``. ``std_error`` has the standard errors of ``y``, and ``phase_deg`` the phases of a
+    magnitude.
     """
 
     name: str
@@ -111,7 +112,8 @@ class Panel:
 
 @dataclass(frozen=True)
 class _Member:
-    """Panels of one of the figures of a chart; the part of each is "m", "p" or empty."""
+    """Panels of one of the figures of a chart; each has a part: "m" (magnitude), "p" (phase) or
+    none."""
 
     panels: tuple[Panel, ...]
     parts: tuple[str, ...]
@@ -121,17 +123,18 @@ class _Member:
 
 @dataclass(frozen=True)
 class Chart:
-    """Curves in one panel or several, as a page draws them; of several members one at a time.
+    """Curves in one panel or several, as on a page; a chart with several members shows one at a
+    time.
 
     Attributes
     ----------
     name : str
         Name of the figure, such as ``"receptance"``.
     caption : str
-        What the page writes below it.
+        Caption of the figure on the page.
     members : tuple of str
-        Names of the figures to choose from, such as a response to each force; one empty name if there is
-        nothing to choose.
+        Names of the figures to choose from, such as the responses to each force; one empty name if
+        there is only one figure.
     """
 
     name: str
@@ -185,28 +188,28 @@ class Chart:
         Parameters
         ----------
         member : str or int
-            Which of the figures, by its name or its number from 1.
+            Name of the figure, or its number from 1.
         panel : str or int, optional
-            Panel to draw alone, by the quantity of its ordinate, such as ``"Phase"``, or its number from
-            1. All, without; the first, if ``ax`` is a single one.
+            Panel to draw alone, by the quantity of its ordinate, such as ``"Phase"``, or its number
+            from 1. Default: all panels, or the first if ``ax`` is a single one.
         show : {"bode", "complex", "nyquist"}
-            Responses per unit force as magnitude and phase, as real and imaginary part, or one over
-            the other.
+            Responses per unit force as magnitude and phase, as real and imaginary part, or as
+            imaginary over real part.
         quantity : {"receptance", "mobility", "accelerance"}, optional
-            Quantity of responses per unit force; the measured one, without.
+            Quantity of responses per unit force. Default: the measured one.
         scale : {"log", "linear", "decibel"}, optional
             Scale of their magnitude.
         phase : {"wrapped", "continuous"}
             Whether their phase stays between −180° and 180°.
         ax : matplotlib.axes.Axes or sequence of them, optional
-            Axes to draw into, one for each panel; a new figure, without.
+            Axes to draw into, one for each panel. Default: those of a new figure.
 
         Raises
         ------
         KeyError
             If there is no such member or panel.
         ValueError
-            If a choice has no such value, or the number of axes is not that of the panels.
+            If a choice has no such value, or the number of axes differs from the number of panels.
         ImportError
             If Matplotlib is not installed: ``pip install "mechid[plot]"``.
         """
@@ -223,20 +226,20 @@ class Chart:
 
 @dataclass(frozen=True)
 class ShapeFigure:
-    """Mode shapes on the points of a structure, in the projection of the page.
+    """Mode shapes on the points of a structure, in the same projection as on the page.
 
     Attributes
     ----------
     name, caption : str
-        Name of the figure, and what the page writes below it.
+        Name of the figure, and its caption on the page.
     members : tuple of str
         The modes with frequency and damping.
     points : tuple of str
         Names of the points.
     positions : array
-        Their coordinates, shape (points, 3), in the unit of the geometry.
+        Coordinates of the points, shape (points, 3), in the unit of the geometry.
     lines : tuple of pairs of int
-        Points that a line joins, counted from 0.
+        Pairs of points, counted from 0, that a line joins.
     displacements : tuple of arrays of complex
         Displacement of each mode at the points along x, y and z, shape (points, 3), with four digits;
         the largest is 1.
@@ -264,11 +267,12 @@ class ShapeFigure:
         Parameters
         ----------
         member : str or int
-            Which mode, by its name or its number from 1.
+            Name of the mode, or its number from 1.
         phase_deg : float
             Instant of the motion, in degrees: the largest deflection of a real mode is at 0.
         amplitude : float
-            Deflection relative to that of the page, which is 16 % of the size of the structure.
+            Deflection relative to the deflection on the page, which is 16 % of the size of the
+            structure.
         ax : matplotlib.axes.Axes, optional
             Axes to draw into.
 
@@ -302,11 +306,12 @@ class MatrixFigure:
     Attributes
     ----------
     name, caption : str
-        Name of the figure, and what the page writes below it.
+        Name of the figure, and its caption on the page.
     members : tuple of str
-        One empty name: there is nothing to choose.
+        One empty name, because there is only one figure.
     values : array
-        The numbers, shape (modes, modes); to 0.02 if they are those of a page that compares two sets of modes.
+        The numbers, shape (modes, modes); with an accuracy of 0.02 for a page that compares two
+        sets of modes.
     """
 
     name: str
@@ -331,7 +336,7 @@ Figure: TypeAlias = Chart | ShapeFigure | MatrixFigure
 
 
 def read_page(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
-    """Return the figures of a page by their names: its HTML, or the path of its file."""
+    """Return the figures of a page, given as HTML or as the path of its file, by their names."""
     text = page if isinstance(page, str) and page.lstrip().startswith("<!") else Path(page).read_text("utf-8")
     found: dict[str, Figure] = {}
     for name, content in _FIGURE.findall(text):
@@ -341,7 +346,7 @@ def read_page(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
             data = json.loads(html.unescape(numbers))
             found[name] = _chart(name, caption, data) if "v" in data else _shapes(name, caption, data)
         else:
-            # The matrix of a page of shapes compares these; that of a comparison has its shades alone.
+            # The matrix is computed from the shapes of the page; a page that compares two sets has only shades.
             shapes = next((one for one in found.values() if isinstance(one, ShapeFigure)), None)
             values = _shades(content) if shapes is None else assurance(_rows(shapes))
             found[name] = MatrixFigure(name, caption, ("",), values)
@@ -349,7 +354,7 @@ def read_page(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
 
 
 def assurance(shapes: NDArray[np.complex128]) -> Values:
-    """Return the modal assurance criterion of every pair of shapes, which are the rows."""
+    """Return the modal assurance criterion of every pair of shapes; each row is a shape."""
     power = np.sum(np.abs(shapes) ** 2, axis=1)
     values: Values = np.abs(shapes.conj() @ shapes.T) ** 2 / np.outer(power, power)
     return values
@@ -360,7 +365,7 @@ def _rows(shapes: ShapeFigure) -> NDArray[np.complex128]:
 
 
 def _shades(content: str) -> Values:
-    """Return the numbers of a matrix of squares by their opacity, to 0.02."""
+    """Return the numbers of a matrix of squares from the opacity of the squares, to 0.02."""
     squares = [(float(y), float(x), float(opacity)) for opacity, x, y in _SQUARE.findall(content)]
     columns = len({x for _, x, _ in squares})
     values = np.array([opacity for _, _, opacity in sorted(squares)]).reshape(-1, columns)
@@ -373,7 +378,7 @@ def _text(pattern: re.Pattern[str], content: str) -> str:
 
 
 def _index(names: Sequence[str], wanted: str | int, what: str) -> int:
-    """Return the index of a name, or of a number from 1."""
+    """Return the index of a name or of a number from 1."""
     if isinstance(wanted, str) and wanted in names:
         return list(names).index(wanted)
     if isinstance(wanted, int) and 1 <= wanted <= len(names):
@@ -388,7 +393,8 @@ def _check(name: str, value: object, known: Any) -> None:
 
 
 def _decoded(text: str) -> Values:
-    """Return a list of a page: decimal digits, evenly spaced, or the first bytes of single precision."""
+    """Return a list of a page, written as decimal digits, as even spacing, or as bytes of single
+    precision."""
     kind, rest = text.split(" ", 1)
     if kind == "t":
         return np.array(rest.split(), dtype=np.float64)
@@ -513,7 +519,7 @@ class _View:
         return [Panel(panel.title, axes[0], axes[1], over, is_equal=True)]
 
     def _converted(self, curve: Curve, unit: str) -> Curve:
-        """Return the curve in the quantity wanted, as a magnitude in its unit."""
+        """Return the curve in the requested quantity, as a magnitude in its unit."""
         omega = curve.x if unit == "rad/s" else 2 * np.pi * curve.x
         gain = omega**self._turn if self._turn else np.ones_like(omega)
         is_linear = self._drawn_scale != "decibel"
@@ -561,7 +567,7 @@ def _imaginary(curve: Curve) -> Values:
 
 
 def _near(angle: Values, other: Values | float) -> Values:
-    """Return angles on the branch nearest to others, in degrees."""
+    """Return angles on the branch nearest to other angles, in degrees."""
     turned: Values = angle - 360.0 * np.floor((angle - other) / 360.0 + 0.5)
     return turned
 

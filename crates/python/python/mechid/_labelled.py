@@ -1,6 +1,6 @@
 """Results as xarray datasets: dimensions with coordinates, variables with units.
 
-xarray is imported with this module, which is imported when a result is asked for its dataset.
+xarray is imported with this module, and this module only if a dataset is requested.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def frequency_responses(found: FrequencyResponses) -> xarray.Dataset:
 def identified(found: Identified) -> xarray.Dataset:
     """Return responses over time, receptances over frequency, and the parameters.
 
-    Responses are left out where the identified system is unstable, receptances where the records
-    show none.
+    Responses are omitted if the identified system is unstable, receptances if the records show
+    none.
     """
     told = found.to_dict()
     data: dict[str, Any] = {}
@@ -104,7 +104,7 @@ def reconstructed(found: Reconstructed) -> xarray.Dataset:
 
 
 def simulation(found: Simulation) -> xarray.Dataset:
-    """Return force and responses over time, as the sensors tell them and without noise."""
+    """Return force and responses over time, measured and without noise."""
     data: dict[str, Any] = {}
     for kind, unit in _UNITS.items():
         data[kind] = _channels(getattr(found, kind), unit)

@@ -1,4 +1,5 @@
-"""The compiled half of the package: the library and the program `mechid`, settings and results as JSON."""
+"""Compiled module of the package: the library and the program `mechid`; settings and results are
+JSON."""
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
@@ -8,7 +9,7 @@ from typing import TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
-# A record of a fleet: its file and, of a file of many records, its name and its rows (from, to).
+# A record of a fleet: its file and, in a file of many records, its name and its rows (from, to).
 _Place: TypeAlias = tuple[Path, tuple[str, int, int] | None]
 
 __all__ = [

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @runtime_checkable
 class Table(Protocol):
-    """Columns by name: a data frame, an xarray dataset, a mapping of arrays."""
+    """Columns by name: a data frame, an xarray dataset, or a mapping of arrays."""
 
     def __getitem__(self, name: str, /) -> ArrayLike: ...
     def keys(self) -> object: ...
@@ -53,15 +53,15 @@ _OF_FILES = (
     "memory_gb",
 )
 _NAME_BYTES = 4096
-"""Longest name of a column or record, in bytes."""
+"""Maximum length of the name of a column or record, in bytes."""
 
 
 class Window(TypedDict, total=False):
     """Samples of a record to use.
 
     ``start`` is the first sample, counted from 1; ``period`` the number of samples in one period
-    (without it, all samples from ``start`` on are one window); ``periods`` the number of whole
-    periods (without it, as many as there are).
+    (default: all samples from ``start`` on are one window); ``periods`` the number of whole periods
+    (default: as many as there are).
     """
 
     start: int
@@ -70,17 +70,20 @@ class Window(TypedDict, total=False):
 
 
 class RecordOptions(Window, total=False):
-    """What is in a record, and which samples of it to use.
+    """Columns of a record, and the samples of it to use.
 
-    ``force``, ``displacement``, ``velocity`` and ``acceleration`` are columns of a file or table, or
-    arrays of shape (samples,) or (samples, degrees of freedom) in N, m, m/s and m/s². ``fs`` is the
-    sampling rate in Hz, which arrays need, and tables without a column or an index of time. Of files and
-    tables: ``time`` names the time column, ``unit`` states units of columns (``{"acc": "g"}``) and
-    ``scale`` factors that take columns to SI units, whatever their names say. Of files:
-    ``skip_lines`` counts header lines to skip, ``detrend="mean"`` subtracts the mean of every
-    channel, ``record_column`` names the column that tells the records of a Parquet file apart,
-    ``record_id`` the record by its value there, and ``memory_gb`` is the memory in GB that the numbers
-    and the work on them may take.
+    ``force``, ``displacement``, ``velocity`` and ``acceleration`` are columns of a file or table,
+    or arrays of shape (samples,) or (samples, degrees of freedom) in N, m, m/s and m/s². ``fs`` is
+    the sampling rate in Hz; arrays need it, and tables without a column or an index of time.
+
+    For files and tables: ``time`` names the time column, ``unit`` states units of columns
+    (``{"acc": "g"}``) and ``scale`` factors that convert columns to SI units; both have priority
+    over the names of the columns.
+
+    For files: ``skip_lines`` is the number of header lines to skip, ``detrend="mean"`` subtracts
+    the mean of every channel, ``record_column`` is the column that names the records of a Parquet
+    file, ``record_id`` the record to read, by its name in this column, and ``memory_gb`` the
+    maximum memory, in GB, for the numbers and the work on them.
     """
 
     force: Names | ArrayLike
@@ -102,7 +105,7 @@ class RecordOptions(Window, total=False):
 class Measurement:
     """Forces and responses of a machine, and the window of them to use.
 
-    Make one with `open`, `from_arrays` or `from_table`. It never changes, and a long text file is
+    Create one with `open`, `from_arrays` or `from_table`. It never changes, and a long text file is
     not held in memory.
     """
 
@@ -132,17 +135,17 @@ class Measurement:
         scale: Mapping[str, float] | None = None,
         **window: Unpack[Window],
     ) -> Measurement:
-        """Open a record file: text, MATLAB, HDF5 or universal file, packed with gzip or not.
+        """Open a record file: text, MATLAB, HDF5 or universal file, also compressed with gzip.
 
         Parameters
         ----------
         path : path
             The file.
         force, displacement, velocity, acceleration : str or sequence of str
-            Columns, by name or number counted from 1, one per degree of freedom; ``"0"`` where no
-            force acts. Columns in other units are converted where their name says so.
+            Columns, by name or number counted from 1, one per degree of freedom; ``"0"`` if no
+            force acts. Columns are converted to SI units if their names state other units.
         fs : float, optional
-            Sampling rate in Hz, where there is no time column.
+            Sampling rate in Hz, if there is no time column.
         time : str, optional
             The time column.
         skip_lines : int
@@ -150,16 +153,18 @@ class Measurement:
         detrend : {"none", "mean"}
             Constant to subtract from every channel.
         record_column : str, optional
-            Column whose value names the record of each row, where a Parquet file holds many records.
+            Column that names the record of each row, if a Parquet file holds many records.
         record_id : str, optional
-            The record of such a file, by its value in that column; its only one, without.
+            Record to read from a file of many records, by its name in `record_column`. Default: the
+            only one.
         memory_gb : float, optional
-            Memory that the numbers and the work on them may take, in GB; 0.27 GB and 512 bytes for each
-            byte of the file, without, and 8.6 GB at most.
+            Maximum memory for the numbers and the work on them, in GB. Default: 0.27 GB plus 512
+            bytes per byte of the file, at most 8.6 GB.
         unit : mapping of str to str, optional
-            Units of columns, whatever their names say: ``{"acc": "g", "time": "ms"}``.
+            Units of columns, with priority over their names: ``{"acc": "g", "time": "ms"}``.
         scale : mapping of str to float, optional
-            Factors that take columns to SI units, such as those of sensors: ``{"force": 0.0893}``.
+            Factors that convert columns to SI units, such as those of sensors: ``{"force":
+            0.0893}``.
         **window
             ``start``, ``period`` and ``periods``, as in `window`.
 
@@ -189,7 +194,7 @@ class Measurement:
         name: str = "the record",
         **window: Unpack[Window],
     ) -> Measurement:
-        """Copy arrays.
+        """Create a measurement from copies of arrays.
 
         Parameters
         ----------
@@ -208,7 +213,7 @@ class Measurement:
         TypeError
             If an array holds other than real numbers.
         MechidError
-            If arrays differ in length, hold NaN or infinity, or have not the samples of the window.
+            If arrays differ in length, contain NaN or infinity, or are shorter than the window.
         """
         columns: list[NDArray[np.float64]] = []
         counts: list[int] = []
@@ -241,25 +246,26 @@ class Measurement:
         name: str = "the record",
         **window: Unpack[Window],
     ) -> Measurement:
-        """Copy columns of a data frame, an xarray dataset, a mapping, or channels in SEP 5 form.
+        """Create a measurement from a data frame, an xarray dataset, a mapping, or SEP 5 channels.
 
         Parameters
         ----------
         table : mapping of names to columns, or sequence of SEP 5 dictionaries
-            Columns in other units than N, m, m/s and m/s² are converted where the name says so, such
-            as ``"x [um]"``, the ``units`` among the ``attrs``, or the ``unit_str`` of a SEP 5 channel.
+            Columns are converted to N, m, m/s and m/s² if another unit is stated: in the name, such
+            as ``"x [um]"``, in the ``units`` among the ``attrs``, or in the ``unit_str`` of a SEP 5
+            channel.
         force, displacement, velocity, acceleration : str or sequence of str
-            Names of columns, with their units or without, one per degree of freedom; ``"0"`` where no
+            Names of columns, with their units or without, one per degree of freedom; ``"0"`` if no
             force acts.
         fs : float, optional
-            Sampling rate, in Hz. Without, that of the time column, of the index (numbers in s, or dates)
-            or of SEP 5 channels (``fs`` or ``time``).
+            Sampling rate, in Hz. Default: that of the time column, of the index (numbers in s, or
+            dates) or of SEP 5 channels (``fs`` or ``time``).
         time : str, optional
             The time column.
         unit : mapping of str to str, optional
-            Units of columns, whatever their names say: ``{"acc": "g"}``.
+            Units of columns, with priority over their names: ``{"acc": "g"}``.
         scale : mapping of str to float, optional
-            Factors that take columns to SI units, such as those of sensors.
+            Factors that convert columns to SI units, such as those of sensors.
         name : str
             Name of the record in messages and results.
         **window
@@ -329,20 +335,20 @@ class Measurement:
         start : int
             First sample, counted from 1.
         period : int, optional
-            Number of samples in one period; without it, all samples from ``start`` on.
+            Number of samples in one period. Default: all samples from ``start`` on are one window.
         periods : int, optional
-            Number of whole periods; without it, as many as there are.
+            Number of whole periods. Default: as many as there are.
 
         Raises
         ------
         MechidError
-            If the record has not all of these samples.
+            If the record does not contain all of these samples.
         """
         return Measurement(self._inner.window(_window_json(window)))
 
     @property
     def name(self) -> str:
-        """Name in messages: the file, as it was written."""
+        """Name in messages: the file name as the caller wrote it."""
         return self._inner.name
 
     @property
@@ -362,7 +368,7 @@ class Measurement:
 
     @property
     def plan(self) -> dict[str, object] | None:
-        """What opens the same record again; None for arrays."""
+        """Settings that open the same record again; None for arrays."""
         plan = self._inner.plan
         return None if plan is None else json.loads(plan)
 
@@ -450,7 +456,8 @@ class _Sep5:
         return (f"{name} [{unit}]" if unit else name), 1.0
 
     def check_starts(self, names: Sequence[str]) -> None:
-        """Refuse channels that begin at different instants, by any field that says so."""
+        """Refuse channels that begin at different instants, according to any field that states
+        it."""
         used = {name: self._channels[self._find(name)] for name in names}
         for field in ("start_timestamp", "start_time", "timestamp", "time"):
             starts = {name: _start(channel.get(field)) for name, channel in used.items()}
@@ -478,7 +485,7 @@ class _Sep5:
 
 
 def _start(value: object) -> str | None:
-    """Return the first of some instants, or the only one, as text; None where it is not known."""
+    """Return the first of some instants, or the only one, as text; None if it is not known."""
     if value is None:
         return None
     first = np.asarray(value).ravel()[:1]
@@ -486,7 +493,7 @@ def _start(value: object) -> str | None:
 
 
 def _same_labels(arrays: Iterable[tuple[str, object]]) -> None:
-    """Refuse columns whose labels differ: their positions say nothing of what belongs together."""
+    """Refuse columns with different labels: equal positions do not mean the same sample then."""
     known: tuple[str, Any] | None = None
     for name, values in arrays:
         labels = _labels(values)
@@ -502,7 +509,7 @@ def _same_labels(arrays: Iterable[tuple[str, object]]) -> None:
 
 
 def _labels(values: object) -> Any:
-    """Return the labels of the samples: the index of pandas, or that of xarray; None where none are."""
+    """Return the labels of the samples: the index of pandas or xarray; None without labels."""
     index = getattr(values, "index", None)
     if index is not None and hasattr(index, "equals"):
         return index
@@ -522,7 +529,7 @@ class _Frame:
         self, table: Table, unit: Mapping[str, str] | None, scale: Mapping[str, float] | None
     ) -> None:
         self._table = table
-        # Each name by what it is called in messages and found by.
+        # The name of each column in messages, and the key that finds it.
         self._names = {str(name): name for name in table.keys()}  # type: ignore[attr-defined]
         self._unit = {self._find(name): text for name, text in (unit or {}).items()}
         self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
@@ -534,7 +541,7 @@ class _Frame:
         at = None if wanted.isdigit() else _mechid.find_column(names, wanted)
         if at is None:
             try:
-                # What the table knows and its keys do not list, such as a coordinate.
+                # The table may have columns that its keys do not list, such as a coordinate.
                 self._table[wanted]
             except Exception:
                 raise no_column(wanted, names) from None
@@ -562,12 +569,12 @@ class _Frame:
         units = shared.get("units") if isinstance(shared, Mapping) else None
         if isinstance(units, Mapping) and name in units:
             return str(units[name])
-        # The column of a data frame has the attributes of the whole.
+        # A column of a data frame has the attributes of the whole frame.
         stated = own.get("units", own.get("unit")) if isinstance(own, Mapping) else None
         return stated if isinstance(stated, str) else None
 
     def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
-        """Return the sampling rate by a time column, or by the index or coordinate of time."""
+        """Return the sampling rate from a time column, or from the index or coordinate of time."""
         if time is not None:
             return self._rate(self._find(time))
         coords = getattr(self._table, "coords", None)
@@ -595,7 +602,7 @@ class _Frame:
 
 
 def _instants(values: object) -> NDArray[Any]:
-    """Return instants as an array: dates with a time zone as those of UTC."""
+    """Return instants as an array: dates with a time zone are converted to UTC."""
     if np.asarray(values).dtype.kind == "O":
         convert = getattr(getattr(values, "dt", values), "tz_convert", None)
         if convert is not None:
@@ -607,7 +614,7 @@ def _rate_of(name: str, instants: object) -> float:
     """Return the sampling rate, in Hz, of numbers in the unit that the name states, or of dates."""
     array = _instants(instants)
     if array.dtype.kind in "mM":
-        # Whole nanoseconds: the differences are exact.
+        # The numbers are whole nanoseconds, so that the differences are exact.
         nanoseconds = array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]")
         array = (nanoseconds - nanoseconds[:1]).astype(np.int64).astype(np.float64) * 1e-9
         name = "time [s]"
@@ -619,7 +626,7 @@ def _rate_of(name: str, instants: object) -> float:
 def measurements(
     sources: Sequence[object], threads_of: str, options: RecordOptions
 ) -> list[Measurement]:
-    """Return the records that a call names, by whatever way it does.
+    """Return the records that the arguments of a call name.
 
     Either the sources are records (measurements, or files or tables with columns), or they are the
     force and the displacement as arrays.
@@ -662,11 +669,11 @@ _SYNONYMS = {
     "f": "force",
     "units": "unit",
 }
-"""Keywords of other packages, by what they are here."""
+"""Keywords of other packages, with the keyword of this package."""
 
 
 def _unexpected(function: str, name: str, known: Iterable[str]) -> TypeError:
-    """Return the error for a keyword that there is not."""
+    """Return the error for an unknown keyword."""
     import difflib
     import inspect
 
@@ -691,7 +698,7 @@ def reading_of(
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, float] | None = None,
 ) -> dict[str, object]:
-    """Return how a file is read."""
+    """Return the settings for reading a file."""
     return {
         "units": dict(unit or {}),
         "scales": {column: float(factor) for column, factor in (scale or {}).items()},
@@ -711,7 +718,7 @@ def plan_of(
     reading: Mapping[str, object],
     window: Window,
 ) -> dict[str, object]:
-    """Return what opens a file."""
+    """Return the settings that open a file."""
     return {
         "path": os.fspath(path),
         "channels": dict(channels),
@@ -722,7 +729,7 @@ def plan_of(
 
 @lru_cache(maxsize=64)
 def _named(counts: tuple[int, ...]) -> tuple[list[str], str]:
-    """Return names for so many columns of each kind, and the channels that they are, as JSON."""
+    """Return names for this number of columns of each kind, and their channels, as JSON."""
     channels = {
         kind: [f"{kind} {dof}" for dof in range(1, count + 1)]
         for kind, count in zip(_KINDS, counts, strict=True)
@@ -742,26 +749,27 @@ class ResponseTable:
         Responses per unit of force, in m/N, m/(s·N) or m/(s²·N): shape (frequencies,) of one degree of
         freedom, otherwise (frequencies, degrees of freedom, forces).
     quantity : {"displacement", "velocity", "acceleration"}, optional
-        Measured quantity; without, `identify_responses` is told it as ``quantity``.
+        Measured quantity. Without it, give ``quantity`` to `identify_responses`.
     std_error : array_like, optional
-        Standard error of the real and of the imaginary part alike, of the shape of ``response``.
+        Standard error of the real part and of the imaginary part, in the shape of ``response``.
     coherence : array_like, optional
         Multiple coherence, shape (frequencies,) or (frequencies, degrees of freedom).
     points : sequence of str, optional
-        Names of the degrees of freedom; ``"1"``, ``"2"`` …, without.
+        Names of the degrees of freedom. Default: ``"1"``, ``"2"`` …
     forces : sequence of str, optional
-        Points at which the forces act; the first ones, without.
+        Points at which the forces act. Default: the first ones.
     segments : mapping, optional
-        Segments of a record that the responses are averages over, so that what their window blunts is
-        known: ``samples`` and ``count``, ``fs`` in Hz, and ``hop`` (``samples``, without) and ``window``
-        (``"hann"``, ``"hamming"``, ``"blackman"``, ``"rectangular"``; whole periods, without).
+        Segments of a record, if the responses are averages over segments; the bias of the window is
+        then corrected. Keys: ``samples`` and ``count``, ``fs`` in Hz, ``hop`` (default:
+        ``samples``) and ``window`` (``"hann"``, ``"hamming"``, ``"blackman"`` or ``"rectangular"``;
+        default: whole periods).
     name : str
         Name of the table in messages.
 
     Raises
     ------
     ValueError
-        If the shapes do not go together, or a number is not finite.
+        If the shapes do not match, or a number is not finite.
     """
 
     def __init__(
@@ -850,7 +858,7 @@ class ResponseTable:
 
 
 def _made_again(made: tuple[Any, ...]) -> ResponseTable:
-    """Return a table that was pickled: of arrays, or of the file that it was read from."""
+    """Return a table that was pickled: from its arrays, or from its file."""
     if len(made) == 1:
         return ResponseTable.read(made[0])
     table = ResponseTable.__new__(ResponseTable)
@@ -886,7 +894,7 @@ def _finite(name: str, values: _Numbers) -> _Numbers:
 
 
 def _series_unit(values: object) -> str | None:
-    """Return what a series of pandas or xarray states about its unit, in an attribute or in brackets."""
+    """Return the unit that a series of pandas or xarray states, in an attribute or in brackets."""
     attrs, name = getattr(values, "attrs", None), getattr(values, "name", None)
     units = attrs.get("units", attrs.get("unit")) if isinstance(attrs, Mapping) else None
     if isinstance(units, Mapping):
@@ -940,7 +948,7 @@ def _window(window: Window) -> dict[str, int | None]:
 
 
 def _window_json(window: Window) -> str:
-    # Whole numbers: four times as fast as the general way.
+    # Whole numbers are written here, four times as fast as by the general function.
     kept = (f'"{name}": {"null" if count is None else count}' for name, count in _window(window).items())
     return f"{{{', '.join(kept)}}}"
 
@@ -1001,7 +1009,8 @@ def _columns(name: str, values: object) -> list[NDArray[np.float64]]:
 
 
 def _array(name: str, values: object) -> NDArray[np.float64]:
-    """Return an array of samples × degrees of freedom, of any layout; no copy where none is needed."""
+    """Return an array of samples × degrees of freedom, of any layout; it is copied only if
+    necessary."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise ValueError(f"`{name}` has masked values: fill or leave them out")
     array = np.asarray(values)

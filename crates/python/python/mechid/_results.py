@@ -1,4 +1,4 @@
-"""Results, which never change."""
+"""Results of the analyses; they never change."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _pandas() -> Any:
 class Uncertain:
     """A number with its standard error and 95 % confidence interval, in its unit.
 
-    Both are None for a number that is known.
+    Standard error and interval are None for a number that is known.
     """
 
     value: float
@@ -73,15 +73,15 @@ class Parameter:
     value : float
         The estimate, in ``unit``.
     std_error : float or None
-        Its standard error; None for a value that was given.
+        Standard error of the value; None for a value that was given.
     unit : str
         SI unit.
     matrix : str
         ``"mass"``, ``"damping"`` or ``"stiffness"``.
     row, column : int
-        Place in the matrix, counted from 1.
+        Row and column in the matrix, counted from 1.
     known : bool
-        Whether the value was given, not estimated.
+        Whether the value was given and not estimated.
     """
 
     name: str
@@ -117,15 +117,15 @@ class Mode:
     Attributes
     ----------
     oscillates : bool
-        Whether it is underdamped.
+        Whether the mode is underdamped.
     natural_frequency_hz, damped_frequency_hz : Uncertain
-        In Hz.
+        Natural and damped frequency, in Hz.
     damping_ratio : Uncertain
-        Dimensionless.
+        Damping ratio, a pure number.
     eigenvalue : complex
-        In rad/s.
+        Eigenvalue, in rad/s.
     shape : array of complex
-        One entry per degree of freedom, the largest is 1.
+        Mode shape, with one entry per degree of freedom; the largest is 1.
     shape_std_error : array of complex, or None
         Standard errors of the real and imaginary parts of ``shape``.
     """
@@ -147,15 +147,15 @@ class Finding:
     Attributes
     ----------
     when : {"before", "after"}
-        Whether it looks at the data or at what the fit leaves.
+        Whether the data were checked before the fit, or the residual after it.
     record : str or None
-        The record, where there are several.
+        The record, if there are several.
     subject : str
-        What was looked at.
+        Subject of the check.
     verdict : {"good", "doubtful", "bad"}
-        What came of it.
+        Result of the check.
     value : float or None
-        The number that decides; None where it is infinite.
+        The number that decides; None if it is infinite.
     text : str
         The finding, in a sentence.
     numbers : mapping
@@ -174,14 +174,14 @@ class Finding:
 @final
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """How well an identified machine predicts a record that was not fitted.
+    """Accuracy with which an identified machine predicts a record that was not fitted.
 
     Attributes
     ----------
     fit_percent : mapping of str to float
         Predicted part of each channel, in per cent; 100 is perfect.
     values : mapping
-        Everything, as in the JSON of the program.
+        All values, as in the JSON of the program.
     """
 
     fit_percent: Mapping[str, float]
@@ -201,7 +201,7 @@ class Validation:
 
 
 class Result:
-    """What results have in common; they never change."""
+    """Common part of all results; they never change."""
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise AttributeError(f"a result never changes: `{name}` cannot be set")
@@ -226,11 +226,11 @@ class Result:
         return restored, (type(self), stored(self.__dict__))
 
     def to_json(self) -> str:
-        """Return the result as the program prints it with ``--json``."""
+        """Return the JSON that the program prints with ``--json``."""
         raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as dictionaries, lists and numbers, as `to_json` has them."""
+        """Return the result as dictionaries, lists and numbers, with the structure of `to_json`."""
         told: dict[str, Any] = json.loads(self.to_json())
         return told
 
@@ -251,17 +251,17 @@ class Bare(Result):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Nothing: there are no remarks."""
+        """Empty: this result has no remarks."""
         return ()
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Nothing: there are no settings."""
+        """Empty: this result has no settings."""
         return {}
 
 
 class _Compiled(Protocol):
-    """What every compiled result can do."""
+    """Methods that every compiled result has."""
 
     def to_json(self) -> str: ...
     def text(self) -> str: ...
@@ -271,7 +271,7 @@ class _Compiled(Protocol):
 
 def framed(page: str, text: str) -> str:
     """Return a page above a text, as an element of a notebook."""
-    # A document of its own, whose script and style reach nothing of the notebook.
+    # The page is a separate document, whose script and style do not affect the notebook.
     frame = '<iframe sandbox="allow-scripts" srcdoc="{}" width="100%" height="640" style="border:0"></iframe>'
     return f"<div>{frame.format(html.escape(page))}{_text_element(text)}</div>"
 
@@ -283,7 +283,7 @@ def _text_element(text: str) -> str:
 class Plotted:
     """A result with figures to draw with Matplotlib."""
 
-    # Figures that show a result best, in order.
+    # Names of the figures that show a result best, in order.
     _usual: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -297,12 +297,12 @@ class Plotted:
         Parameters
         ----------
         name : str, optional
-            Name of the figure; the one that shows the result best, without.
+            Name of the figure. Default: the one that shows the result best.
         member : str or int, optional
-            Which of the figures of a set, such as the responses to each force, by its name or its number
-            from 1; the first, without.
+            Figure of a set, such as the response to one of the forces, by its name or its number
+            from 1. Default: the first.
         **options
-            As ``plot`` of the figure takes them: ``ax``, ``panel``, and of responses per unit force
+            Options of ``plot`` of the figure: ``ax``, ``panel``, and for responses per unit force
             ``show``, ``quantity``, ``scale`` and ``phase``.
 
         Raises
@@ -310,7 +310,7 @@ class Plotted:
         KeyError
             If there is no such figure, member or panel.
         ValueError
-            If a choice has no such value, or the number of axes is not that of the panels.
+            If a choice has no such value, or the number of axes differs from the number of panels.
         MechidError
             If there is nothing to draw.
         ImportError
@@ -325,7 +325,7 @@ class Plotted:
 
 
 class Drawn(Result, Plotted):
-    """A result that the program draws."""
+    """A result for which the program draws a figure."""
 
     @property
     def _compiled(self) -> _Compiled:
@@ -333,11 +333,11 @@ class Drawn(Result, Plotted):
         return inner
 
     def to_json(self) -> str:
-        """Return the result as the program prints it with ``--json``."""
+        """Return the JSON that the program prints with ``--json``."""
         return self._compiled.to_json()
 
     def to_svg(self) -> str:
-        """Return the picture that the program draws with ``--plot``, as SVG.
+        """Return the figure that the program draws with ``--plot``, as SVG.
 
         Raises
         ------
@@ -347,7 +347,7 @@ class Drawn(Result, Plotted):
         return self._compiled.svg()
 
     def to_html(self) -> str:
-        """Return the picture as an HTML page that zooms and has a cursor and loads nothing.
+        """Return the figure as an HTML page, which has zoom and cursor and loads no other file.
 
         Raises
         ------
@@ -388,7 +388,7 @@ class _Paged(Protocol):
 
 
 class Reported(Drawn):
-    """A result that the program writes a report of."""
+    """A result for which the program writes a report."""
 
     def report(
         self,
@@ -397,17 +397,17 @@ class Reported(Drawn):
         title: str | None = None,
         about: Mapping[str, str] | None = None,
     ) -> str:
-        """Return one HTML page with everything that the result has to show, and write it.
+        """Return one HTML page with the whole result, and write it if a path is given.
 
         Parameters
         ----------
         path : path, optional
-            Where the page goes, too.
+            File to write the page into.
         title : str, optional
-            Heading; the name of the record, without.
+            Heading. Default: the name of the record.
         about : mapping of str to str, optional
-            Further lines of the page, such as sensors, operator, date, place and comment. What the head of
-            the record states is shown, too.
+            Further lines of the page, such as sensors, operator, date, place and comment. Details
+            in the head of the record are shown, too.
 
         Raises
         ------
@@ -445,7 +445,7 @@ class Reported(Drawn):
 
     @property
     def _record(self) -> str:
-        """First record, whose head may say more; empty without one."""
+        """First record, whose head may contain further details; empty without a record."""
         fields = self._told
         records = fields.get("records") or fields.get("tests") or [fields]
         return str(records[0].get("file", ""))
@@ -462,16 +462,16 @@ class Shaped(Reported):
         about: Mapping[str, str] | None = None,
         geometry: str | os.PathLike[str] | None = None,
     ) -> str:
-        """Return one HTML page with everything that the result has to show, and write it.
+        """Return one HTML page with the whole result, and write it if a path is given.
 
         Parameters
         ----------
         path, title, about : optional
-            As of the other results: where the page goes, its heading, and further lines.
+            File to write the page into, its heading, and further lines, as for the other results.
         geometry : path, optional
-            Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411, and
-            82), or a table with rows ``name,x,y,z`` in m and ``line,name,name``. A row or a grid by the
-            names of the channels, without.
+            Points of the channels, on which the mode shapes are drawn: a universal file (datasets
+            15 or 2411, and 82), or a table with rows ``name,x,y,z`` in m and ``line,name,name``.
+            Default: a row or a grid from the names of the channels.
 
         Raises
         ------
@@ -492,7 +492,7 @@ class Shaped(Reported):
         path : path
             The file.
         geometry : path, optional
-            As in `report`.
+            Points of the channels, as in `report`.
 
         Raises
         ------
@@ -524,10 +524,11 @@ class Receptances:
     frequency_hz : array
         Frequencies, in Hz.
     measured : array of complex
-        Motion over force in m/N, shape (frequencies, motions, forces); NaN where another force acts at
-        the same frequency.
+        Response per unit force in m/N, shape (frequencies, responses, forces); NaN where another
+        force acts at the same frequency.
     model : array of complex
-        Receptance of the identified machine, likewise; NaN for forces to which it is not known (`unscaled`).
+        Receptance of the identified machine, in the same shape; NaN for forces for which it is not
+        known (`unscaled`).
     """
 
     frequency_hz: NDArray[np.float64]
@@ -536,7 +537,7 @@ class Receptances:
 
 
 class Estimated(Drawn):
-    """A machine with the uncertainty of its parameters, and what speaks for and against it."""
+    """A machine with the uncertainty of its parameters, and the checks of the identification."""
 
     _inner: _mechid.Identified | _mechid.IdentifiedResponses
 
@@ -544,7 +545,7 @@ class Estimated(Drawn):
     def parameters(self) -> Mapping[str, Parameter]:
         """Entries of M, C and K by name, with standard errors.
 
-        Those of equations of motion whose scale the data leave open are left out; see `unscaled`.
+        Entries of equations of motion whose scale is not known are omitted; see `unscaled`.
         """
         rows = self._told["parameters"]
         return MappingProxyType({row["name"]: self._parameter(row) for row in rows})
@@ -553,8 +554,8 @@ class Estimated(Drawn):
     def unscaled(self) -> Mapping[str, Any] | None:
         """Degrees of freedom without force and known mass, and equations that are not given.
 
-        Keys ``degrees_of_freedom`` and ``equations``, counted from 1. None where M, C and K are known;
-        otherwise the modes are all that follows from the data.
+        Keys ``degrees_of_freedom`` and ``equations``, counted from 1. None if M, C and K are known;
+        otherwise the data determine only the modes.
         """
         told = self._told.get("unscaled")
         return None if told is None else MappingProxyType(told)
@@ -593,17 +594,17 @@ class Estimated(Drawn):
 
     @property
     def damping(self) -> NDArray[np.float64]:
-        """C, in N·s/m, likewise."""
+        """C, in N·s/m, shape (degrees of freedom, degrees of freedom)."""
         return self._matrix("damping")
 
     @property
     def stiffness(self) -> NDArray[np.float64]:
-        """K, in N/m, likewise."""
+        """K, in N/m, shape (degrees of freedom, degrees of freedom)."""
         return self._matrix("stiffness")
 
     def _matrix(self, name: str) -> NDArray[np.float64]:
         if "system" not in self._told:
-            # Says why there is none.
+            # This call raises the exception that states why there is no machine.
             self.machine()
         return _array(self._told["system"][name])
 
@@ -649,7 +650,7 @@ class Estimated(Drawn):
         Raises
         ------
         MechidError
-            If the data give the modes alone; see `unscaled`.
+            If the data determine only the modes; see `unscaled`.
         """
         return Machine._of(self._inner.machine())
 
@@ -661,7 +662,7 @@ class Estimated(Drawn):
 class Identified(Shaped, Estimated):
     """A machine identified from records.
 
-    ``print`` shows it as the program does; `to_json` is the JSON of the program.
+    ``print`` shows the text of the program; `to_json` returns its JSON.
     """
 
     _usual = ("restoring-force", "receptance", "fit")
@@ -697,7 +698,7 @@ class Identified(Shaped, Estimated):
         *sources, **record
             The record, as in `identify`.
         validate_start, validate_samples : int, optional
-            First sample to predict, counted from 1, and their number.
+            First sample to predict, counted from 1, and number of samples.
 
         Raises
         ------
@@ -717,7 +718,7 @@ class Identified(Shaped, Estimated):
     def residual(self) -> Mapping[str, NDArray[np.float64]]:
         """Measured minus predicted response of the first record by quantity, in SI units.
 
-        Shape (samples, degrees of freedom); without their means where the steady state was fitted.
+        Shape (samples, degrees of freedom); the means are subtracted if a steady state was fitted.
         """
         return MappingProxyType({kind: m - p for kind, m, p in self._inner.compared()})
 
@@ -725,13 +726,13 @@ class Identified(Shaped, Estimated):
     def frf(self) -> Receptances:
         """Measured and identified receptance, at the frequencies at which it was measured.
 
-        Those of the lines fitted; of a fit in the time domain, those of whole periods, or averaged over
-        segments.
+        The frequencies are the fitted lines or, for a fit in the time domain, the lines of whole
+        periods or of segments.
 
         Raises
         ------
         MechidError
-            If the records show none.
+            If the records show no receptance.
         """
         omega, measured, model = self._inner.receptances()
         n = len(self.modes[0].shape)
@@ -760,21 +761,21 @@ class Identified(Shaped, Estimated):
         geometry: str | os.PathLike[str] | None = None,
         reconstruct_force: bool = False,
     ) -> str:
-        """Return one HTML page with everything the identification has to show, and write it.
+        """Return one HTML page with the whole identification, and write it if a path is given.
 
         Parameters
         ----------
         path : path, optional
-            Where the page goes, too.
+            File to write the page into.
         title : str, optional
-            Heading; the name of the record, without.
+            Heading. Default: the name of the record.
         about : mapping of str to str, optional
-            Further lines of the page, such as sensors, operator, date, place and comment. What the head of
-            the record states is shown, too.
+            Further lines of the page, such as sensors, operator, date, place and comment. Details
+            in the head of the record are shown, too.
         geometry : path, optional
-            Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411, and
-            82), or a table with rows ``name,x,y,z`` in m and ``line,name,name``. A row or a grid by the
-            names of the channels, without.
+            Points of the channels, on which the mode shapes are drawn: a universal file (datasets
+            15 or 2411, and 82), or a table with rows ``name,x,y,z`` in m and ``line,name,name``.
+            Default: a row or a grid from the names of the channels.
         reconstruct_force : bool
             Whether to reconstruct the force with the identified machine and compare it.
 
@@ -791,7 +792,8 @@ class Identified(Shaped, Estimated):
         )
 
     def to_xarray(self) -> Dataset:
-        """Return measured, predicted and residual responses, receptances, and M, C and K with their covariance, as an xarray dataset with units.
+        """Return responses, receptances, and M, C and K with their covariance, as an xarray dataset
+        with units.
 
         Raises
         ------
@@ -811,7 +813,7 @@ class Identified(Shaped, Estimated):
 class IdentifiedResponses(Estimated):
     """A machine identified from tables of frequency responses.
 
-    ``print`` shows it as the program does; `to_json` is the JSON of the program.
+    ``print`` shows the text of the program; `to_json` returns its JSON.
     """
 
     def __init__(self, inner: _mechid.IdentifiedResponses) -> None:
@@ -832,7 +834,7 @@ class IdentifiedResponses(Estimated):
 class IdentifiedBearing(Drawn):
     """The coefficients of a journal bearing, from tests on a rig.
 
-    ``print`` shows them as the program does; `to_json` is the JSON of the program.
+    ``print`` shows the text of the program; `to_json` returns its JSON.
     """
 
     _inner: _mechid.Answer
@@ -852,12 +854,12 @@ class IdentifiedBearing(Drawn):
 
     @property
     def damping(self) -> NDArray[np.float64]:
-        """C, in N·s/m, likewise."""
+        """C, in N·s/m, shape (2, 2)."""
         return self._matrix("c")
 
     @property
     def mass(self) -> NDArray[np.float64]:
-        """M, in kg, likewise; zero where eight coefficients were identified."""
+        """M, in kg, shape (2, 2); zero if eight coefficients were identified."""
         return self._matrix("m")
 
     def _matrix(self, kind: str) -> NDArray[np.float64]:
@@ -867,12 +869,13 @@ class IdentifiedBearing(Drawn):
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the coefficients, in their order."""
+        """Covariance of the coefficients, in the order of `coefficients`."""
         return _array(self._told["covariance"]["matrix"])
 
     @cached_property
     def dimensionless(self) -> Mapping[str, Uncertain] | None:
-        """Coefficients over W/c, W/(c Ω) and W/(c Ω²); None without load or clearance."""
+        """Coefficients divided by W/c, W/(c Ω) and W/(c Ω²), with load W, clearance c and speed Ω;
+        None without load or clearance."""
         told = self._told["dimensionless"]
         if told is None:
             return None
@@ -880,12 +883,14 @@ class IdentifiedBearing(Drawn):
 
     @property
     def whirl_frequency_ratio(self) -> Uncertain | None:
-        """Whirl frequency of a rigid rotor over that of rotation; None where it does not whirl."""
+        """Ratio of the whirl frequency of a rigid rotor to the frequency of rotation; None without
+        whirl."""
         return self._of_rotor("whirl_frequency_ratio")
 
     @property
     def critical_mass(self) -> Uncertain | None:
-        """Mass per bearing above which a rigid rotor is unstable, in kg; None if there is none."""
+        """Mass per bearing above which a rigid rotor is unstable, in kg; None if there is no such
+        mass."""
         return self._of_rotor("critical_mass")
 
     def _of_rotor(self, name: str) -> Uncertain | None:
@@ -900,8 +905,8 @@ class IdentifiedBearing(Drawn):
     def ross(self, release: int = 2) -> dict[str, list[float]]:
         """Return keyword arguments of ``ross.BearingElement``: coefficients in its axes, and the speed in rad/s.
 
-        The load acts along x here and along −y there. Releases 1 and 2 call the speed ``frequency``, release 3
-        ``speed``.
+        The load acts along x here and along −y in ROSS. Releases 1 and 2 of ROSS call the speed
+        ``frequency``, release 3 calls it ``speed``.
         """
         turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
         arguments = {"frequency" if release < 3 else "speed": [2.0 * np.pi * (self._told["rotation_hz"] or 0.0)]}
@@ -932,7 +937,7 @@ class BearingTable(Bare, Drawn):
 
     @property
     def load(self) -> NDArray[np.float64]:
-        """Static load of each row in N; NaN where it is not stated."""
+        """Static load of each row in N; NaN if it is not stated."""
         loads = [row["load"] for row in self._told["rows"]]
         return np.array([np.nan if load is None else load for load in loads], dtype=np.float64)
 
@@ -950,13 +955,13 @@ class BearingTable(Bare, Drawn):
 
 @final
 class Machine(Bare, Shaped):
-    """M, C and K, with the covariance of those of their entries that were identified.
+    """M, C and K, with the covariance of the entries that were identified.
 
     Parameters
     ----------
     mass, damping, stiffness : array_like
-        Numbers, or matrices of shape (degrees of freedom, degrees of freedom), in kg, N·s/m and N/m,
-        taken as exactly known. They need not be symmetric.
+        Numbers, or matrices of shape (degrees of freedom, degrees of freedom), in kg, N·s/m and
+        N/m; they are treated as exactly known and need not be symmetric.
 
     Raises
     ------
@@ -984,18 +989,18 @@ class Machine(Bare, Shaped):
         Raises
         ------
         MechidError
-            If the file cannot be read or describes no machine.
+            If the file cannot be read or does not describe a machine.
         """
         return cls._of(_mechid.Machine.read(os.fspath(path)))
 
     @property
     def name(self) -> str:
-        """Where the machine comes from."""
+        """Source of the machine, such as the file it was read from."""
         return self._inner.name
 
     @property
     def is_exact(self) -> bool:
-        """Whether the machine is taken as exactly known."""
+        """Whether the machine is treated as exactly known."""
         return self._inner.is_exact
 
     @property
@@ -1005,21 +1010,21 @@ class Machine(Bare, Shaped):
 
     @property
     def damping(self) -> NDArray[np.float64]:
-        """C, in N·s/m, likewise."""
+        """C, in N·s/m, shape (degrees of freedom, degrees of freedom)."""
         return self._inner.damping
 
     @property
     def stiffness(self) -> NDArray[np.float64]:
-        """K, in N/m, likewise."""
+        """K, in N/m, shape (degrees of freedom, degrees of freedom)."""
         return self._inner.stiffness
 
     def receptance(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Return the receptance in m/N, shape (frequencies, motions, forces).
+        """Return the receptance in m/N, shape (frequencies, responses, forces).
 
         Raises
         ------
         MechidError
-            If a frequency is not finite, or an undamped resonance.
+            If a frequency is not finite, or is an undamped resonance.
         """
         n = len(self.mass)
         omega = 2 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
@@ -1031,7 +1036,7 @@ class Machine(Bare, Shaped):
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """Modes by rising frequency, with standard errors where the machine was identified.
+        """Modes by rising frequency, with standard errors if the machine was identified.
 
         Raises
         ------
@@ -1043,7 +1048,7 @@ class Machine(Bare, Shaped):
     def state_space(
         self, output: Literal["displacement", "velocity", "acceleration"] = "displacement"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return A, B, C and D for the state [x, ẋ], the input F and the output chosen.
+        """Return A, B, C and D for the state [x, ẋ], the input F and the requested output.
 
         ``scipy.signal.StateSpace(*machine.state_space())`` takes them.
         """
@@ -1058,18 +1063,19 @@ class Machine(Bare, Shaped):
     def predict(
         self, *sources: object, settle: int | None = None, **record: Unpack[RecordOptions]
     ) -> Predicted:
-        """Predict the response to the force of a record, and compare it with what was measured.
+        """Predict the response to the force of a record, and compare it with the measured response.
 
-        With a period it is the steady state under the mean period, otherwise the whole window from
-        its first sample on; between the samples the force is band-limited. Nonlinear terms count.
+        With a period, the prediction is the steady state under the mean period, otherwise the
+        response over the whole window. Between the samples the force is band-limited. Nonlinear
+        terms are included.
 
         Parameters
         ----------
         *sources, **record
             The record, as in `identify`; arrays of force and, if measured, response.
         settle : int, optional
-            Number of first samples that the initial state is fitted to, and that do not count in the
-            errors; at rest, without.
+            Number of samples at the beginning to which the initial state is fitted; the errors do
+            not count them. Default: at rest.
 
         Raises
         ------
@@ -1102,7 +1108,7 @@ class SelectedModes(Bare):
 
     @property
     def natural_frequency_hz(self) -> NDArray[np.float64]:
-        """Natural frequencies, in Hz, shape (modes,): those that were searched for first."""
+        """Natural frequencies, in Hz, shape (modes,), in the order of the search."""
         return self._each("natural_frequency_hz")
 
     @property
@@ -1166,7 +1172,8 @@ class FrequencyResponses(Drawn):
         return str(self._told["unit"])
 
     def response(self, motion: int = 1, force: int = 1) -> NDArray[np.complex128]:
-        """Return the complex response of a degree of freedom to the force on another, counted from 1.
+        """Return the complex response of a degree of freedom to the force on another, both counted
+        from 1.
 
         Raises
         ------
@@ -1177,7 +1184,7 @@ class FrequencyResponses(Drawn):
         return np.array(row["real"], dtype=float) + 1j * np.array(row["imaginary"], dtype=float)
 
     def std_error(self, motion: int = 1, force: int = 1) -> NDArray[np.float64]:
-        """Return the standard error of real part, imaginary part and magnitude alike.
+        """Return the standard error, which real part, imaginary part and magnitude have in common.
 
         Raises
         ------
@@ -1188,7 +1195,7 @@ class FrequencyResponses(Drawn):
         return np.array([_number(value) for value in values], dtype=np.float64)
 
     def coherence(self, motion: int = 1) -> NDArray[np.float64]:
-        """Return the part of a motion's power that is linear in the forces.
+        """Return the coherence: the part of the power of a response that is linear in the forces.
 
         Raises
         ------
@@ -1202,7 +1209,7 @@ class FrequencyResponses(Drawn):
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """Motion and force of each response, counted from 1."""
+        """Response and force of each frequency response, by degrees of freedom counted from 1."""
         return tuple((row["motion"], row["force"]) for row in self._told["responses"])
 
     def _row(self, motion: int, force: int) -> dict[str, Any]:
@@ -1213,7 +1220,8 @@ class FrequencyResponses(Drawn):
         raise KeyError((motion, force))
 
     def to_frame(self) -> DataFrame:
-        """Return the responses as a pandas data frame: a column of complex numbers for each motion and force.
+        """Return the responses as a pandas data frame, with a complex column for each response and
+        force.
 
         Raises
         ------
@@ -1247,7 +1255,7 @@ class FrequencyResponses(Drawn):
 
 @final
 class Inspected(Drawn):
-    """What is in a record file."""
+    """Contents of a record file."""
 
     _inner: _mechid.Answer
     _has_curves: bool
@@ -1294,17 +1302,18 @@ class Decayed(Shaped):
 
     @property
     def amplitudes(self) -> tuple[Uncertain, ...]:
-        """Amplitude of each mode at the first sample used, where its shape is largest, in SI units."""
+        """Amplitude of each mode at the first sample used, in the channel where its shape is
+        largest, in SI units."""
         return tuple(_uncertain(row["amplitude"]) for row in self._told["modes"])
 
     @property
     def energy_shares(self) -> NDArray[np.float64]:
-        """Part of the sum of squares of all modes that each mode has."""
+        """Share of each mode in the sum of squares of all modes."""
         return np.array([row["energy_share"] for row in self._told["modes"]], dtype=np.float64)
 
     @property
     def decays(self) -> tuple[bool, ...]:
-        """Whether the growth rate of each mode is below zero with its 95 % interval."""
+        """Whether the 95 % interval of the growth rate of each mode is below zero."""
         return tuple(bool(row["decays"]) for row in self._told["modes"])
 
     @property
@@ -1314,7 +1323,7 @@ class Decayed(Shaped):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know of the numbers."""
+        """Remarks to read before using the numbers."""
         return tuple(self._told["remarks"])
 
     def __repr__(self) -> str:
@@ -1344,7 +1353,7 @@ class Modes(Shaped):
 
     @property
     def driven_shares(self) -> NDArray[np.float64]:
-        """Share of the motion of each mode that the measured forces drive; NaN without forces."""
+        """Share of the motion of each mode due to the measured forces; NaN without forces."""
         shares = [row["driven_share"] for row in self._told["modes"]]
         return np.array([np.nan if share is None else share for share in shares], dtype=np.float64)
 
@@ -1361,12 +1370,13 @@ class Modes(Shaped):
 
     @property
     def dropped(self) -> tuple[Mapping[str, Any], ...]:
-        """Candidates that are no modes: ``frequency_hz``, ``damping_ratio`` and ``reason`` of each."""
+        """Candidates that are not modes: ``frequency_hz``, ``damping_ratio`` and ``reason`` of
+        each."""
         return tuple(MappingProxyType(row) for row in self._told["dropped"])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know of the numbers."""
+        """Remarks to read before using the numbers."""
         return tuple(self._told["notes"])
 
     @property
@@ -1376,7 +1386,7 @@ class Modes(Shaped):
 
     @property
     def diagrams(self) -> Mapping[str, Any] | None:
-        """Stabilisation diagram and mode indicator, if they were asked for."""
+        """Stabilisation diagram and mode indicator, if they were requested."""
         told = self._told.get("diagrams")
         return None if told is None else MappingProxyType(told)
 
@@ -1385,28 +1395,29 @@ class Modes(Shaped):
     ) -> Predicted:
         """Predict the response to the forces of a record in the band of the modes, and compare it.
 
-        With a period it is the steady state under the mean period, otherwise the whole window from
-        its first sample on; between the samples the forces are band-limited.
+        With a period, the prediction is the steady state under the mean period, otherwise the
+        response over the whole window. Between the samples the forces are band-limited.
 
         Parameters
         ----------
         *sources, **record
             The record, as in `modes`; arrays of forces and, if measured, responses.
         settle : int, optional
-            Number of first samples that the motion at the beginning is fitted to, and that do not count
-            in the errors; at rest, without.
+            Number of samples at the beginning to which the initial motion is fitted; the errors do
+            not count them. Default: at rest.
 
         Raises
         ------
         MechidError
-            If the modes are not those of a test with forces, or the record has other columns.
+            If the modes are not from a test with forces, or the record has other columns.
         """
         found = one(sources, "predict", record)
         settings = json.dumps({"settle": settle})
         return Predicted(_mechid.predict_record(found._inner, system_of(self), settings))
 
     def to_frame(self) -> DataFrame:
-        """Return the modes as a pandas data frame, one row each: frequency, damping ratio, their errors.
+        """Return the modes as a pandas data frame, one row each: frequency and damping ratio with
+        their errors.
 
         Raises
         ------
@@ -1443,7 +1454,8 @@ class IdentifiedElements(Reported):
     def parameters(self) -> Mapping[str, Uncertain]:
         """Unknowns by name: value, standard error and interval, in SI units.
 
-        The standard error is None of an unknown at its bound, or that the data do not determine.
+        The standard error is None for an unknown at its bound, and for one that the data do not
+        determine.
         """
         return MappingProxyType({row["name"]: _unknown(row) for row in self._told["parameters"]})
 
@@ -1455,22 +1467,23 @@ class IdentifiedElements(Reported):
 
     @property
     def at_bound(self) -> tuple[str, ...]:
-        """Names of the unknowns that lie at a bound beyond which the data would have them."""
+        """Names of the unknowns at a bound; without the bound, their estimates would lie beyond
+        it."""
         return tuple(row["name"] for row in self._told["parameters"] if row["at_bound"])
 
     @property
     def combinations(self) -> tuple[str, ...]:
-        """What the data determine only together, a sentence each."""
+        """Combinations of unknowns that the data determine only together, a sentence each."""
         return tuple(row["text"] for row in self._told["combinations"])
 
     @property
     def minima(self) -> tuple[Mapping[str, Any], ...]:
-        """Minima that the searches ended at, the lowest first."""
+        """Minima at which the searches ended, the lowest first."""
         return tuple(MappingProxyType(row) for row in self._told["minima"])
 
     @property
     def candidates(self) -> tuple[Mapping[str, Any], ...]:
-        """Measurements that could be added, the best first."""
+        """Possible additional measurements, the best first."""
         return tuple(MappingProxyType(row) for row in self._told.get("candidates", ()))
 
     @property
@@ -1492,7 +1505,7 @@ class IdentifiedElements(Reported):
 
     @property
     def notes(self) -> tuple[Mapping[str, Any], ...]:
-        """What to know of the numbers: ``kind`` and the numbers of each note."""
+        """Remarks to read before using the numbers: ``kind`` and the numbers of each."""
         return tuple(MappingProxyType(row) for row in self._told["notes"])
 
     def machine(self) -> Machine:
@@ -1512,7 +1525,7 @@ class IdentifiedElements(Reported):
 
 @final
 class ModeComparison(Bare, Plotted):
-    """Two sets of modes side by side."""
+    """Comparison of two sets of modes."""
 
     _found: tuple[str, str]
 
@@ -1521,7 +1534,8 @@ class ModeComparison(Bare, Plotted):
 
     @property
     def pairs(self) -> tuple[Mapping[str, Any], ...]:
-        """Modes that are one: their numbers, frequencies, damping ratios, MAC and probabilities."""
+        """Corresponding modes: their numbers, frequencies, damping ratios, MAC and
+        probabilities."""
         return tuple(MappingProxyType(row) for row in self._told["pairs"])
 
     @property
@@ -1536,7 +1550,7 @@ class ModeComparison(Bare, Plotted):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Points that both sets have."""
+        """Points in both sets."""
         return tuple(self._told["points"])
 
     @property
@@ -1546,12 +1560,12 @@ class ModeComparison(Bare, Plotted):
 
     @property
     def figures(self) -> Mapping[str, Figure]:
-        """The modal assurance criterion, ``"assurance"``, to draw with Matplotlib."""
+        """Figure of the modal assurance criterion, ``"assurance"``, to draw with Matplotlib."""
         caption = "Likeness of the mode shapes: rows are the modes of the first set, columns those of the second."
         return MappingProxyType({"assurance": MatrixFigure("assurance", caption, ("",), self.mac)})
 
     def to_json(self) -> str:
-        """Return the comparison as ``mechid modes --compare FILE --json`` prints it."""
+        """Return the JSON that ``mechid modes --compare FILE --json`` prints."""
         return self._found[0]
 
     def __str__(self) -> str:
@@ -1572,12 +1586,12 @@ class Sweep(Drawn):
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """Settings: NPI, rates in Hz, or decimations."""
+        """Values of the setting: NPI, rates in Hz, or decimations."""
         return np.array([point["setting"] for point in self._told["points"]], dtype=np.float64)
 
     @property
     def error(self) -> NDArray[np.float64]:
-        """Error at each setting, relative; NaN where there is no estimate."""
+        """Relative error at each setting; NaN without an estimate."""
         errors = [point["error"] for point in self._told["points"]]
         return np.array([np.nan if error is None else error for error in errors], dtype=np.float64)
 
@@ -1588,7 +1602,7 @@ class Sweep(Drawn):
 
     @property
     def points(self) -> tuple[Mapping[str, Any], ...]:
-        """Everything at each setting."""
+        """All values at each setting."""
         return tuple(MappingProxyType(point) for point in self._told["points"])
 
     def to_xarray(self) -> Dataset:
@@ -1610,7 +1624,7 @@ class Sweep(Drawn):
 
 @final
 class Reconstructed(Drawn):
-    """The force that drove a machine, and how it was found."""
+    """The force on a machine, and the method that reconstructed it."""
 
     _inner: _mechid.Reconstructed
 
@@ -1619,12 +1633,13 @@ class Reconstructed(Drawn):
 
     @property
     def force(self) -> NDArray[np.float64]:
-        """The force, shape (samples, degrees of freedom), in N; of whole periods, one period."""
+        """The force, shape (samples, degrees of freedom), in N; one period if the record has whole
+        periods."""
         return self._inner.force
 
     @property
     def std_error(self) -> NDArray[np.float64] | None:
-        """Standard error of the force, likewise; None where it is not known."""
+        """Standard error of the force, in the same shape; None if it is not known."""
         return self._inner.std_error
 
     @property
@@ -1666,10 +1681,11 @@ class Predicted(Result):
 
     @cached_property
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
-        """Prediction of every measured response, in m, m/s or m/s²; without measured responses all.
+        """Prediction of every measured response, in m, m/s or m/s²; without measured responses, of
+        all.
 
-        Those of a machine are its displacements then, and have the names ``"displacement 1"`` …, those
-        of modes the names in the record of the test.
+        Without measured responses, those of a machine are its displacements, called ``"displacement
+        1"`` …; those of modes have the names in the record of the test.
         """
         return MappingProxyType(dict(self._inner.columns()))
 
@@ -1686,12 +1702,12 @@ class Predicted(Result):
 
     @property
     def velocity(self) -> NDArray[np.float64]:
-        """Velocity of a machine, likewise, in m/s."""
+        """Velocity of a machine, shape (samples, degrees of freedom), in m/s."""
         return self._responses("velocity")
 
     @property
     def acceleration(self) -> NDArray[np.float64]:
-        """Acceleration of a machine, likewise, in m/s²."""
+        """Acceleration of a machine, shape (samples, degrees of freedom), in m/s²."""
         return self._responses("acceleration")
 
     @property
@@ -1700,7 +1716,7 @@ class Predicted(Result):
         return tuple(MappingProxyType(row) for row in self.to_dict()["channels"])
 
     def to_json(self) -> str:
-        """Return the result as the program prints it with ``--json``."""
+        """Return the JSON that the program prints with ``--json``."""
         return self._inner.to_json()
 
     def __str__(self) -> str:
@@ -1713,20 +1729,20 @@ class Predicted(Result):
 
 @final
 class Simulation:
-    """The record that an experiment gives, and the truth behind it.
+    """The record of a simulated experiment, with and without noise.
 
     Attributes
     ----------
     scheme : str
-        How the response was computed.
+        Scheme that computed the response, with its parameters.
     fs : float
         Sampling rate, in Hz.
     force : array
-        The force as the sensors tell it, shape (samples, degrees of freedom), in N.
+        Measured force (with noise), shape (samples, degrees of freedom), in N.
     displacement, velocity, acceleration : array
-        The response as the sensors tell it, shape (samples, outputs), in m, m/s and m/s².
+        Measured response (with noise), shape (samples, outputs), in m, m/s and m/s².
     truth : mapping
-        The four without noise.
+        Force, displacement, velocity and acceleration without noise.
     """
 
     __slots__ = ("_machine", "acceleration", "displacement", "force", "fs", "scheme", "truth", "velocity")
@@ -1749,14 +1765,14 @@ class Simulation:
         Raises
         ------
         ValueError
-            If it is a large one in sparse matrices.
+            If it is a large machine in sparse matrices.
         """
         if self._machine is None:
             raise ValueError("the machine is a large one in sparse matrices, which are in the description")
         return self._machine
 
     def measurement(self, *quantities: str, **window: Unpack[Window]) -> Measurement:
-        """Return force and the responses named (the displacement, without) as a record."""
+        """Return force and the requested responses (default: the displacement) as a record."""
         chosen: dict[str, Any] = {name: getattr(self, name) for name in quantities or ("displacement",)}
         return Measurement.from_arrays(self.force, fs=self.fs, **chosen, **window)
 
@@ -1791,9 +1807,10 @@ class Multisine:
     lines : tuple of int
         Lines of the period with force.
     amplitudes, phases : array
-        Of each line, in N and rad: the force is the sum of amplitude · cos(2π line t / period + phase).
+        Amplitude and phase of each line, in N and rad: the force is the sum of amplitude · cos(2π
+        line t / period + phase).
     rms, peak, crest_factor : float
-        RMS value and peak in N, between samples too, and their ratio.
+        RMS value and peak in N, including values between samples, and their ratio.
     """
 
     fs: float
@@ -1817,7 +1834,7 @@ class Multisine:
 def machine_of(
     given: Machine | Estimated | IdentifiedElements | str | os.PathLike[str],
 ) -> Machine:
-    """Return the machine that is meant."""
+    """Return the machine that an argument names."""
     if isinstance(given, (Estimated, IdentifiedElements)):
         return given.machine()
     if isinstance(given, Machine):
@@ -1828,7 +1845,7 @@ def machine_of(
 def system_of(
     given: Machine | Estimated | IdentifiedElements | Modes | str | os.PathLike[str],
 ) -> _mechid.Machine | _mechid.ModalSystem:
-    """Return the machine or the modes that are meant."""
+    """Return the machine or the modes that an argument names."""
     if isinstance(given, Modes):
         return _mechid.ModalSystem.from_json("the modes", given.to_json())
     if isinstance(given, (str, os.PathLike)):
@@ -1839,9 +1856,10 @@ def system_of(
 
 
 def description_of(given: object) -> tuple[str, str | None] | None:
-    """Return the experiment that is meant: a file, or a name and JSON; None if it is something else.
+    """Return the experiment that an argument names: a file, or a name and JSON; None for anything
+    else.
 
-    A file is not read here: what it names lies in its own folder.
+    A file is not read here, because the names of files in it are relative to its own folder.
     """
     if isinstance(given, Mapping) and "system" in given:
         return "the description", json.dumps(given, default=listed)
@@ -1851,7 +1869,7 @@ def description_of(given: object) -> tuple[str, str | None] | None:
 
 
 def listed(value: object) -> object:
-    """Return an array as lists, and a sparse matrix, of SciPy or alike, as its entries."""
+    """Return an array as lists, and a sparse matrix as its entries."""
     if hasattr(value, "tocoo"):
         entries = value.tocoo()
         if entries.shape[0] != entries.shape[1]:

@@ -1,4 +1,4 @@
-"""Results as they are pickled: what they say, and the arrays that they hold."""
+"""Results in pickled form: the answers and arrays of a compiled result."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ._errors import MechidError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# What the compiled results answer without a question, by the names of their methods and properties.
+# Methods without arguments and properties of the compiled results, by their names.
 _ANSWERS = (
     "to_json",
     "text",
@@ -32,7 +32,7 @@ _ANSWERS = (
 
 
 class Stored:
-    """What a compiled result answered when it was pickled."""
+    """Answers of a compiled result at the time at which it was pickled."""
 
     def __init__(self, answers: Mapping[str, tuple[bool, Any]]) -> None:
         self._answers = dict(answers)
@@ -49,14 +49,14 @@ class Stored:
 
 def _refuse(name: str) -> NoReturn:
     raise MechidError(
-        f"this result was pickled, which keeps its numbers and no more: ask for `{name}` before",
+        f"this result was pickled, which keeps only its numbers: call `{name}` before pickling",
         "Python(Pickled {})",
     )
 
 
 def stored(held: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a result holds, with answers in place of the compiled one."""
-    # What is public was computed from the rest, and is again.
+    """Return the contents of a result, with its answers instead of the compiled result."""
+    # Public attributes were computed from the others, and are computed again.
     kept = {name: value for name, value in held.items() if name.startswith("_") and name != "_inner"}
     inner = held.get("_inner")
     if isinstance(inner, Stored):
@@ -70,7 +70,7 @@ def stored(held: Mapping[str, Any]) -> dict[str, Any]:
             try:
                 answers[name] = (True, value()) if callable(value) else (False, value)
             except (MechidError, TypeError):
-                # What needs arguments is a question.
+                # A method that needs arguments is not stored.
                 continue
         kept["_inner"] = answers
     return kept

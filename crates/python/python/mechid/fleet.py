@@ -1,4 +1,4 @@
-"""Many records by one analysis, over any engine of ``concurrent.futures``.
+"""Many records by one analysis, with any engine of ``concurrent.futures``.
 
 >>> import tempfile
 >>> from mechid import fleet
@@ -43,8 +43,8 @@ __all__ = ["Failure", "Summary", "Trends", "identify_batch", "run", "simulate", 
 class Failure:
     """Records that failed for one reason.
 
-    ``code`` is that of `MechidError`; ``record`` is the first of the records by name, and ``message``
-    what is wrong with it.
+    ``code`` is that of `MechidError`; ``record`` is the first of the records by name, and
+    ``message`` states its failure.
     """
 
     code: str
@@ -55,11 +55,11 @@ class Failure:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run over many records did; ``str`` tells it as the program does.
+    """Summary of a run over many records; ``str`` returns the text of the program.
 
-    ``other_parts`` counts the parts in the folder that are of other records, of another version of
-    these, or of another analysis; ``left_out`` names paths that can be no records (named pipes, sockets,
-    devices); ``elapsed_s`` is in s.
+    ``other_parts`` is the number of parts in the folder with other records, other versions of these
+    records, or another analysis; ``left_out`` names paths that cannot be records (named pipes,
+    sockets, devices); ``elapsed_s`` is in s.
     """
 
     records: int
@@ -79,11 +79,11 @@ class Summary:
 
 @dataclass(frozen=True)
 class Trends(Plotted):
-    """The results of many records side by side; ``str`` tells them as the program does.
+    """Trends of the results of many records; ``str`` returns the text of the program.
 
-    ``fields`` is what ``mechid trends --json`` prints: ``series`` with ``name``, ``unit``, ``median``,
-    ``spread``, ``standard_error`` and ``points``, ``failures`` and counts. ``page`` is the report, HTML;
-    ``figures`` are its figures by the names of the quantities.
+    ``fields`` is the JSON of ``mechid trends --json``: ``series`` with ``name``, ``unit``,
+    ``median``, ``spread``, ``standard_error`` and ``points``, ``failures`` and counts. ``page`` is
+    the report as HTML; ``figures`` are its figures by the names of the quantities.
     """
 
     fields: Mapping[str, Any]
@@ -111,25 +111,24 @@ def simulate(
 ) -> str:
     """Simulate many runs of a described experiment, into one Parquet file.
 
-    Its column ``run`` tells the runs apart; with ``"record_column": "run"`` in ``reading`` of the
-    analysis, `run` identifies them all.
+    Its column ``run`` names the run of each row; with ``"record_column": "run"`` in ``reading`` of
+    the analysis, `run` identifies all of them.
 
     Parameters
     ----------
     experiment : mapping or path
-        As `mechid.simulate` takes it.
+        Description of the experiment, as for `mechid.simulate`.
     out : path
         The file.
     runs : int or mapping
-        Number of runs with noise of their own, whose seed counts up from the one described; or the
-        values of the fields that change, a number for each run, such as
-        ``{"system.damping": [1, 2], "noise.seed": [1, 2]}``. List entries are counted from 1:
-        ``excitation.1.amplitude``.
+        Number of runs with different noise, whose seed increases by 1 from run to run; or the
+        values of the fields that change, one number per run, such as ``{"system.damping": [1, 2],
+        "noise.seed": [1, 2]}``. List entries are counted from 1: ``excitation.1.amplitude``.
 
     Returns
     -------
     str
-        What was written, as the program tells it.
+        Summary of the written file, as the program prints it.
 
     Raises
     ------
@@ -175,16 +174,16 @@ def trends(
     *,
     title: str | None = None,
 ) -> Trends:
-    """Read the results of many records, to see them side by side.
+    """Read the results of many records as trends over the records.
 
     Parameters
     ----------
     results : path
-        The folder that `run` or ``mechid fleet`` has written.
+        The folder of results of `run` or ``mechid fleet``.
     over : {"order", "number"}
         Order of the records: as their names sort, or by the last number in the name.
     title : str, optional
-        Heading of the page; the folder, without.
+        Heading of the page. Default: the folder.
 
     Returns
     -------
@@ -217,46 +216,48 @@ def run(
 ) -> Summary:
     """Identify many records, into a folder of Parquet files with one row per record.
 
-    The records are divided into parts, by rising path. A part is one file of the folder, complete or
-    not there; one that is there is not computed again. So a run that was interrupted, at whatever
-    moment, is continued by calling it again.
+    The records are divided into parts, in the order of their paths. A part is one file of the
+    folder, complete or absent; an existing part is not computed again. A run that was interrupted
+    at any time is therefore continued by the same call.
 
     Parameters
     ----------
     records : path or iterable of paths
-        The records, of any format; a folder stands for the files in it, and a Parquet file for the
-        records in it that the ``record_column`` of ``reading`` tells apart.
+        The records, of any format; a folder means the files in it, and a Parquet file the records
+        in it that the ``record_column`` of ``reading`` names.
     analysis : mapping or path
-        The analysis: ``channels``, ``reading``, ``window`` and ``identify``; or a JSON file of it.
+        The analysis: ``channels``, ``reading``, ``window`` and ``identify``; or the path of its
+        JSON file.
     out : path
-        The folder of results; it is made if it is not there. Every worker must reach it, and the
-        records, by the same paths.
+        The folder of results; it is created if it does not exist. Every worker must reach it, and
+        the records, by the same paths.
     executor : concurrent.futures.Executor, optional
         Engine of the work: a pool of threads or processes, or that of a Dask client
-        (``client.get_executor()``). Without, as many threads as there are processors.
+        (``client.get_executor()``). Default: one thread per processor.
     part_records : int
         Number of records in a part.
     progress : callable, optional
-        Called with the number of records done, and of all.
+        Function that is called with the number of completed records and the number of all records.
     isolate : bool
-        Whether to work on records in processes of their own, which every worker starts with its own
-        interpreter: a record that takes too much memory or time, or ends its process, becomes a row with
-        its error. Without, a worker computes in its own process.
+        Whether to process records in separate processes, which every worker starts with its own
+        interpreter: a record that takes too much memory or time, or ends its process, becomes a row
+        with its error. If false, a worker computes in its own process.
     record_memory_gb : float
-        Memory that a record may take, in GB, with the 0.1 GB of its process; Linux alone limits it.
+        Memory that a record may take, in GB, including the 0.1 GB of its process; only Linux
+        enforces it.
     record_seconds : float
         Time that a record may take, in s.
 
     Returns
     -------
     Summary
-        How many records, how fast, and which failed why.
+        Number of records, speed, and the failures with their reasons.
 
     Raises
     ------
     MechidError
-        If the analysis cannot be understood, or a part cannot be written. What is wrong with a record
-        is in its row.
+        If the analysis is invalid, or a part cannot be written. The error of a record is in its
+        row.
     """
     saved = _saved(analysis)
     folder = os.fspath(out)
@@ -287,7 +288,7 @@ def identify_batch(
 ) -> pyarrow.Table:
     """Identify the records of an Arrow batch: a table of results with one row per record.
 
-    A pure function of its arguments, for engines that hand out batches: ``mapInArrow`` and
+    This is a pure function of its arguments, for engines that pass batches: ``mapInArrow`` and
     ``applyInArrow`` of Spark, ``map_batches`` of Ray, ``map_partitions`` of Dask.
 
     Parameters
@@ -297,18 +298,19 @@ def identify_batch(
         ``record_column`` of ``reading`` names them; without it the rows of lists are numbered from 1,
         and rows of samples are one record.
     analysis : mapping or path
-        The analysis, as in `run`; the sampling rate is its ``sample_rate_hz``, or that of a column of
-        instants.
+        The analysis, as in `run`; the sampling rate is its ``sample_rate_hz``, or that of a time
+        column.
 
     Returns
     -------
     pyarrow.Table
-        The columns that `run` writes, in the order of the records. What is wrong with a record is in its row.
+        The columns that `run` writes, in the order of the records. The error of a record is in its
+        row.
 
     Raises
     ------
     MechidError
-        If the analysis cannot be understood, or the batch has no ``record_column``.
+        If the analysis is invalid, or the batch has no ``record_column``.
 
     Examples
     --------
@@ -377,7 +379,7 @@ def _is_list(kind: pyarrow.DataType) -> bool:
 
 
 def _numbers(values: pyarrow.Array | pyarrow.ChunkedArray | None) -> NDArray[np.float64]:
-    """Return numbers, NaN where there is none; no number for a list that is missing."""
+    """Return numbers, with NaN for missing ones; none for a list that is missing."""
     if values is None:
         return np.empty(0)
     return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
@@ -394,7 +396,7 @@ def _rows_of(names: list[Any]) -> dict[Any, NDArray[np.intp]]:
 def _part(
     records: list[_mechid._Place], analysis: str, folder: str, limits: tuple[float, float] | None
 ) -> str:
-    """Compute one part, wherever the engine has put it: by the interpreter that is there."""
+    """Compute one part in the process that the engine has chosen, with its own interpreter."""
     isolation = None if limits is None or not sys.executable else (sys.executable, *limits)
     return _mechid.fleet_part(records, analysis, folder, isolation)
 

@@ -1,8 +1,8 @@
-"""Plots of results with Matplotlib, each into the axes given or into new ones.
+"""Plots of results with Matplotlib, each into given axes or into new ones.
 
-Every figure of a page is one of ``result.figures``, and ``result.plot`` draws it. The functions here draw
-one panel of the most frequent ones, and what no page has. Matplotlib is imported when a function is
-called: ``pip install "mechid[plot]"`` brings it.
+Every figure of a page is one of ``result.figures``, and ``result.plot`` draws it. The functions
+here draw one panel of the most frequent figures, and plots that no page has. Matplotlib is imported
+when a function is called; ``pip install "mechid[plot]"`` installs it.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ Shaped = Machine | Modes | Decayed | Identified | IdentifiedResponses
 def figures(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
     """Return the figures of a page by their names, to draw with Matplotlib.
 
-    Pages are those of ``report`` and ``to_html`` and those that the program writes.
+    Pages are the HTML of ``report`` and ``to_html``, and the files that the program writes.
 
     Parameters
     ----------
@@ -103,12 +103,13 @@ def receptance(
     found : Identified
         An identification.
     motion, force : int
-        Degree of freedom that moves and the one that is driven, counted from 1. Measured points are
-        shown on lines where no other force acts, and where several records separate the forces.
+        Degree of freedom of the response and of the force, counted from 1. Measured points are
+        shown on lines on which no other force acts, and on lines on which several records separate
+        the forces.
     phase : bool
         Whether to plot the phase in degrees instead of the magnitude.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        Response per unit force; that of the measured quantity, without.
+        Response per unit force. Default: that of the measured quantity.
     scale : {"log", "linear", "decibel"}, optional
         Scale of the magnitude.
     ax : matplotlib.axes.Axes, optional
@@ -123,11 +124,11 @@ def receptance(
     MechidError
         If the records show no receptance.
     KeyError
-        If they show none of this pair.
+        If the records show no receptance of this pair.
     """
     drawn = found.figures.get("receptance")
     if drawn is None or drawn.members == ("",):
-        # Says why there is none.
+        # This call raises the exception that states why there is no receptance.
         _ = found.frf
     driven = _channel(found, "force", force)
     pairs = (f"{_channel(found, kind, motion)} / {driven}" for kind in ("displacement", "velocity", "acceleration"))
@@ -174,18 +175,18 @@ def frf(
     phase: Phase = "wrapped",
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot a frequency response with twice its standard error, the magnitude without a choice.
+    """Plot a frequency response with twice its standard error; by default its magnitude.
 
     Parameters
     ----------
     found : FrequencyResponses
         Frequency responses.
     motion, force : int
-        Degree of freedom that moves and the one that is driven, counted from 1.
+        Degree of freedom of the response and of the force, counted from 1.
     panel : str or int
         Number or quantity of the panel: 1 is the magnitude, ``"Phase"`` the phase.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        Response per unit force; that of the measured quantity, without.
+        Response per unit force. Default: that of the measured quantity.
     scale : {"log", "linear", "decibel"}, optional
         Scale of the magnitude.
     phase : {"wrapped", "continuous"}
@@ -219,7 +220,7 @@ def coherence(found: FrequencyResponses, motion: int = 1, *, ax: Axes | None = N
 
 
 def force(found: Reconstructed, dof: int = 1, *, ax: Axes | None = None) -> Axes:
-    """Plot a reconstructed force over time, with twice its standard error where that is known.
+    """Plot a reconstructed force over time, with twice its standard error if it is known.
 
     Parameters
     ----------
@@ -237,7 +238,7 @@ def force(found: Reconstructed, dof: int = 1, *, ax: Axes | None = None) -> Axes
     Raises
     ------
     KeyError
-        If no force was sought there.
+        If no force was reconstructed there.
     """
     label = "Force" if (found.force.shape[1], dof) == (1, 1) else f"Force_{dof}"
     figure = found.figures["figure"]
@@ -269,7 +270,7 @@ def shape(machine: Shaped, mode: int = 1, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     machine : Machine, Modes, Decayed, Identified or IdentifiedResponses
-        Something with modes.
+        A result with modes.
     mode : int
         Number of the mode, counted from 1.
     ax : matplotlib.axes.Axes, optional

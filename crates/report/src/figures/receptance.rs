@@ -320,7 +320,8 @@ mod tests {
         .unwrap()
     }
 
-    /// A record with the force of one shaker and a part of it, turned, at the other place.
+    /// Returns a record with the force of one shaker, and a part of this force with another phase
+    /// at the other degree of freedom.
     fn record(driven: usize, crosstalk: f64) -> FrequencyData {
         let omega: Vec<f64> = (1..=20).map(|line| f64::from(line) * 5.0).collect();
         let force = DMatrix::from_fn(omega.len(), 2, |row, dof| {
@@ -335,7 +336,7 @@ mod tests {
             .unwrap()
     }
 
-    /// Judge: (K − ω²M + iωC)⁻¹.
+    /// Reference: (K − ω²M + iωC)⁻¹.
     #[test]
     fn records_with_crosstalk_are_separated_and_one_alone_is_drawn_as_responses() {
         let both = record(0, 0.02).and(&record(1, 0.02)).unwrap();
@@ -357,7 +358,7 @@ mod tests {
         let drawn = curves(&record(1, 0.0)).expect("one force acts alone");
         let titles: Vec<&str> = drawn.panels().iter().map(Panel::name).collect();
         assert_eq!(titles, ["x1 / F2", "", "x2 / F2", ""]);
-        // Forces in a fixed ratio say no more in two records than in one.
+        // Forces in a fixed ratio give no more information in two records than in one.
         let same = record(0, 0.5).and(&record(0, 0.5)).unwrap();
         for data in [record(0, 0.02), same] {
             assert!(curves(&data).is_none());

@@ -102,7 +102,7 @@ mod tests {
         ModeShapes { geometry: geometry.clone(), modes }
     }
 
-    /// Judge: (1, 1) and (1, −1) are orthogonal, (1, i) is equally far from both, and a rotated
+    /// Reference: (1, 1) and (1, −1) are orthogonal, (1, i) is equally far from both, and a rotated
     /// shape is the same.
     #[test]
     fn assurance_is_that_of_the_definition() {

@@ -9,8 +9,8 @@ use crate::ReportError;
 use crate::figures::shapes::ModeShapes;
 
 /// Caption of the mode shapes.
-pub(super) const SHAPES: &str = "Mode shapes: lines of the largest deflection over those at rest; of a complex mode \
-                                 the points do not reach theirs together.";
+pub(super) const SHAPES: &str = "Mode shapes: lines at the largest deflection, over the lines at rest. In a complex mode \
+                                 the points reach their largest deflections at different times.";
 
 /// Caption of the modal assurance criterion.
 pub(super) const LIKENESS: &str = "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, \

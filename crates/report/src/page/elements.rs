@@ -117,7 +117,7 @@ fn candidates(found: &ElementSummary) -> Markup {
     let rows: Vec<Vec<String>> = found.candidates.iter().map(row).collect();
     html! {
         @if !rows.is_empty() {
-            (Table { caption: "What could be measured besides", header: &header, numbers_from: 1, rows }.html())
+            (Table { caption: "Possible additional measurements", header: &header, numbers_from: 1, rows }.html())
             p.note {
                 "Information: the logarithm of the factor by which the volume of the confidence region of all \
                  unknowns shrinks."
@@ -141,7 +141,7 @@ fn residual(found: &ElementSummary) -> Markup {
     let rows = found.sensors.iter().map(row).collect();
     let misfit = found.misfit_ratio.map(|ratio| significant(ratio, 4));
     html! {
-        (Table { caption: "What is left of the motion", header: &["sensor", "residual, of RMS"], numbers_from: 1, rows }.html())
+        (Table { caption: "Residual of the response", header: &["sensor", "residual, of RMS"], numbers_from: 1, rows }.html())
         @if let Some(ratio) = misfit {
             p { "Power of the residual over what the noise explains: " strong { (ratio) } "; 1 is expected." }
         }

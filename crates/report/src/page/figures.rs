@@ -212,7 +212,7 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
     }
     let caption = format!(
         "Amplitude of the response, {origin}, and predicted by the identified machine from the \
-         forces; no receptance, for {}.{below}",
+         forces; no receptance, because {}.{below}",
         picture::WHY
     );
     let names = Names { displacement: &|dof| displacement_name(channels, kind, dof), ..names };
@@ -321,7 +321,7 @@ pub fn residual_spectrum(
         part.id("residual-spectrum"),
         (0..motion.channels()).map(of_channel).collect(),
         format!(
-            "{}: noise lies flat, what the model misses has the shape of a resonance or of the force.",
+            "{}: noise is flat, an effect that the model lacks has the shape of a resonance or of the force.",
             part.period_caption(&format!(
                 "Spectra of the measured {} and of the residual",
                 compared.kind
@@ -407,10 +407,10 @@ pub fn correlations(
     };
     let spanned = match widest {
         0 => String::new(),
-        span => format!(" Noise on the response correlates it over {span} lags by itself."),
+        span => format!(" Noise on the response alone correlates it over {span} lags."),
     };
     let caption =
-        format!("{what}; 95 % of the stems of noise stay between the dashed lines.{spanned}");
+        format!("{what}; 95 % of the stems of pure noise are between the dashed lines.{spanned}");
     drawn_set(part.id("correlations"), members, caption)
 }
 
@@ -429,7 +429,7 @@ pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<
 pub fn restoring(identified: &Identified) -> Result<Option<Drawn>, ReportError> {
     let Some((fitted, points)) = surface::whole_periods(identified) else { return Ok(None) };
     let caption = "Restoring force of the first record: points of its surface, springs and dampers with their \
-                   confidence intervals, drawn to 1.2 times the amplitudes measured, and what they leave.";
+                   confidence intervals, drawn to 1.2 times the amplitudes measured, and the residual.";
     let figure = surface::figure("first record", fitted, points)?;
     drawn("restoring-force".into(), figure, caption.into()).map(Some)
 }

@@ -123,7 +123,8 @@ trait Captions {
     /// all samples.
     fn buffered_caption(&self, caption: &str) -> String;
 
-    /// Returns such a caption for a figure of [`RecordReview::period`].
+    /// Returns a caption for a figure of [`RecordReview::period`], with the numbers of its samples
+    /// if they are not all samples.
     fn period_caption(&self, caption: &str) -> String;
 }
 
@@ -344,7 +345,7 @@ fn repeat(command: Option<&str>) -> Markup {
         section id="repeat" aria-labelledby="repeat-heading" {
             h2 id="repeat-heading" { "How to repeat it" }
             @if let Some(command) = command {
-                p { "With mechid " (env!("CARGO_PKG_VERSION")) ", in the folder from which the record is named as above:" }
+                p { "With mechid " (env!("CARGO_PKG_VERSION")) ", in the folder that the names of the files refer to:" }
                 div.scroll role="region" tabindex="0" aria-label="The command" { pre { code { (command) } } }
             } @else {
                 p { "With mechid " (env!("CARGO_PKG_VERSION")) "." }

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::ReportError;
 
-/// Words and tables of a page beside its figures.
+/// Texts and tables of a page in addition to its figures.
 pub struct Words {
     /// Heading without the name of the record.
     pub what: &'static str,

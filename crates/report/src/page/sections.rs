@@ -84,8 +84,8 @@ fn part_held(part: &RecordReview<'_>) -> Option<String> {
     let (first, last) = (part.held().first_sample, part.held().held_to()?);
     Some(format!(
         "The record is long: levels, time histories and what is averaged over periods or segments are those of all \
-         samples used. What is told of single samples (the residual in time, its correlations, checks of it) \
-         is that of samples {first} to {last}; captions say where else."
+         samples used. Results for single samples (the residual in time, its correlations and its checks) \
+         are those of samples {first} to {last}; captions of other figures name these samples, too."
     ))
 }
 
@@ -151,7 +151,7 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         p.note {
             "Peak factor: half the range over √2 times the RMS, 1 for a sine. Excited lines are those within "
             (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of persistent \
-             excitation is the number of parameters that they can tell apart."
+             excitation is the number of parameters that they can distinguish."
         }
         (checks::list(&contents.review.identified.summary().checks, When::Before))
     })
@@ -323,13 +323,13 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         Err(reason) => Ok(html! { p.note { "There is no residual to judge: " (reason) } }),
     })?;
     Ok(html! {
-        p { "The residual is the measured motion less the one that the identified machine has under the measured force." }
+        p { "The residual is the measured response minus the response of the identified machine to the measured force." }
         (records)
         (checks::list(&contents.review.identified.summary().checks, When::After))
         @if contents.review.identified.summary().checks.iter().any(|check| check.when == When::After) {
             p.note {
-                "p is the share of experiments with nothing but noise left that look as bad, adjusted for the \
-                 number of tests: below 0.01 it is a warning. In noise 5 % of the stems lie outside the bounds."
+                "p is the probability of a result at least as bad if the residual is only noise, adjusted for the \
+                 number of tests: below 0.01 it is a warning. For pure noise, 5 % of the stems are outside the bounds."
             }
         }
     })
@@ -355,7 +355,7 @@ fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, R
         }
     }
     Ok(html! {
-        (Table { caption: &part.buffered_caption("What is left of the motion"), header: &header, numbers_from: 2, rows }.html())
+        (Table { caption: &part.buffered_caption("Residual of the response"), header: &header, numbers_from: 2, rows }.html())
         (figures_of(&drawn))
     })
 }
@@ -376,8 +376,8 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
     let (first_sample, last_sample) = (validation.first_sample, validation.last_sample);
     Ok(Some(html! {
         p {
-            "The identified machine under the force of " (validation.file) ", samples " (first_sample) " to " (last_sample)
-            ", against the motion measured there."
+            "The response of the identified machine to the force of " (validation.file) ", samples " (first_sample) " to " (last_sample)
+            ", compared with the measured response."
             @if judgement::was_fitted(contents.review) { " Some of these samples were fitted, so agreement proves little." }
         }
         (Table { caption: "What is predicted", header: &["motion", "fit"], numbers_from: 1, rows }.html())
@@ -398,8 +398,8 @@ pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, ReportE
     Ok(Some(html! {
         (records)
         p.note {
-            "The machine was fitted to the same record, so agreement says that the fit is consistent, not that \
-             another record would do as well."
+            "The machine was fitted to the same record, so agreement shows that the fit is consistent, not that \
+             another record would be predicted as well."
         }
     }))
 }

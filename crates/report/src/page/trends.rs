@@ -44,13 +44,13 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
                         section id="changes" aria-labelledby="changes-heading" {
                             h2 id="changes-heading" { "Steps and drifts" }
                             (changes.sortable())
-                            p.note { "p is the share of orders at random in which the ranks of the records look as changed, times the number of quantities; below " (SIGNIFICANT) " a change is told." }
+                            p.note { "p is the share of random orders of the records in which the ranks show at least this change, times the number of quantities; a change below " (SIGNIFICANT) " is reported." }
                         }
                     }
                     section id="quantities" data-filter aria-labelledby="quantities-heading" {
                         h2 id="quantities-heading" { "Quantities" }
                         (quantities.html_with_categories(&categories))
-                        p.note { "Spread: 1.4826 times the median distance from the median, the standard deviation of normal values. Where it is larger than the standard error, the machine changes from record to record, or the standard errors are too small." }
+                        p.note { "Spread: 1.4826 times the median distance from the median; for normally distributed values it is the standard deviation. If it is larger than the standard error, the machine changes from record to record, or the standard errors are too small." }
                         div.figures { @for (one, category) in figures.iter().zip(&categories) { div data-category=(category) { (figure(one)) } } }
                     }
                     @if !outliers.rows.is_empty() {

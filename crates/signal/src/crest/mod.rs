@@ -15,9 +15,9 @@ use p_norm::PNorm;
 
 /// Exponents of the continuation, and the samples per Nyquist interval for each.
 ///
-/// Below 16 the norm is almost insensitive to the peak; above 1024 it differs from the peak by less
-/// than the grid does: between 32 samples per interval a sine at the highest line rises by at most
-/// 0.1 %.
+/// Below 16 the norm is almost insensitive to the peak. Above 1024 it differs from the peak by less
+/// than the grid does: with 32 samples per Nyquist interval, a sine at the highest line exceeds its
+/// largest sample by at most 0.1 %.
 const STAGES: [(&[i32], usize); 2] = [(&[16, 32, 64], 8), (&[128, 256, 512, 1024], 32)];
 
 /// A search for the phases of minimum crest factor, the same on every run.
@@ -94,8 +94,8 @@ impl CrestSearch {
         if start > 0 {
             return Ok(random);
         }
-        // Phases of only 0 and π make the signal even and the norm stationary; a small change
-        // avoids this.
+        // If all phases are 0 or π, the signal is even and the norm is stationary; a small change
+        // of the phases avoids this.
         let nudged =
             multisine.phases().iter().zip(random).map(|(own, r)| own + limits::PHASE_CHANGE * r);
         Ok(nudged.collect())

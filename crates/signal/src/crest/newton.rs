@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DVector};
 use super::p_norm::{Derivatives, PNorm, norm};
 use crate::limits;
 
-/// Phases, with the norm and its derivatives there.
+/// Phases, and the norm and its derivatives at these phases.
 pub(super) struct Point {
     pub(super) phases: Vec<f64>,
     signal: Vec<f64>,
@@ -20,7 +20,7 @@ impl Point {
     }
 }
 
-/// Reduces ‖x‖_p from given phases; `damping` continues from one exponent to the next.
+/// Reduces ‖x‖_p from given phases; `damping` is passed on from one exponent p to the next.
 pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mut f64) -> Vec<f64> {
     let mut point = Point::new(objective, phases, p);
     let mut small_gains = 0;
@@ -42,7 +42,8 @@ pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mu
 /// point.
 fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Point> {
     let derivatives = objective.derivatives(&from.phases, &from.signal, p);
-    // Levenberg's multiple of the identity: a common shift in time has zero curvature.
+    // The damping is a multiple of the identity (Levenberg), because a common shift in time has
+    // zero curvature.
     let scale = derivatives.mean_curvature();
     let hessian = (from.phases.len() <= limits::DENSE_HESSIAN).then(|| derivatives.hessian());
     while *damping < limits::LARGEST_DAMPING {

@@ -9,7 +9,7 @@ use crate::phases::gcd;
 use crate::transform;
 use crate::transform::{ComplexToReal, RealToComplex};
 
-/// The norm for given lines and amplitudes, of unit RMS.
+/// P-norm of multisines with given lines and given amplitudes, which are scaled to unit RMS.
 pub(super) struct PNorm {
     lines: Vec<usize>,
     amplitudes: Vec<f64>,
@@ -31,13 +31,13 @@ impl PNorm {
         Self { lines, amplitudes, forward, inverse }
     }
 
-    /// Returns the period on the grid.
+    /// Returns the samples of one period on the grid.
     pub(super) fn signal(&self, phases: &[f64]) -> Vec<f64> {
         let terms = self.amplitudes.iter().zip(phases);
         self.synthesise(terms.map(|(a, phase)| Complex::from_polar(*a, *phase)))
     }
 
-    /// Re Σ z_n exp(i n θ_k), one z per line.
+    /// Returns Re Σ z_n exp(i n θ_k) at each grid point θ_k, from one z per line.
     fn synthesise(&self, values: impl Iterator<Item = Complex<f64>>) -> Vec<f64> {
         let (mut input, mut output) =
             (self.inverse.make_input_vec(), self.inverse.make_output_vec());
@@ -48,7 +48,7 @@ impl PNorm {
         output
     }
 
-    /// Σ y_k exp(+i n θ_k) for n = 0, 1, 2, …
+    /// Returns Σ y_k exp(+i n θ_k) for n = 0, 1, 2, …, from one sample y per grid point θ_k.
     fn transform(&self, mut samples: Vec<f64>) -> Vec<Complex<f64>> {
         let mut output = self.forward.make_output_vec();
         self.forward.process(&mut samples, &mut output).expect("buffers come from the plan");
@@ -56,17 +56,18 @@ impl PNorm {
         output
     }
 
-    /// First and second derivatives of (1/p) Σ_k (x_k / s)^p, with s the present peak.
+    /// Computes the first derivatives g and the second derivatives H of (1/p) Σ_k (x_k / s)^p with
+    /// respect to the phases φ_n; s is the present peak.
     ///
-    /// With x'_n = −A_n sin(nθ + φ_n) the derivative with respect to φ_n, x''_n = −A_n cos(nθ +
-    /// φ_n) and without mixed second derivatives:
+    /// The signal has the derivatives x'_n = −A_n sin(nθ + φ_n) and x''_n = −A_n cos(nθ + φ_n) with
+    /// respect to φ_n, and no mixed second derivatives. Hence:
     ///
     /// ```text
     /// g_n  = Σ_k (x/s)^(p−1) x'_n / s
     /// H_nm = (p−1) Σ_k (x/s)^(p−2) x'_n x'_m / s² + δ_nm Σ_k (x/s)^(p−1) x''_n / s
     /// ```
     ///
-    /// The sums over k are Fourier sums of the two powers of x.
+    /// The sums over k are Fourier sums of (x/s)^(p−1) and (x/s)^(p−2).
     pub(super) fn derivatives(&self, phases: &[f64], signal: &[f64], p: i32) -> Derivatives<'_> {
         let s = peak(signal);
         let weight: Vec<f64> = signal.iter().map(|x| (x / s).powi(p - 2)).collect();
@@ -92,7 +93,7 @@ impl PNorm {
 pub(super) struct Derivatives<'a> {
     norm: &'a PNorm,
     pub(super) gradient: DVector<f64>,
-    /// The second term of the Hessian, a diagonal.
+    /// Second term of the Hessian, which is diagonal.
     own: Vec<f64>,
     /// (A_n / s) exp(i φ_n).
     turned: Vec<Complex<f64>>,
@@ -103,7 +104,8 @@ pub(super) struct Derivatives<'a> {
 }
 
 impl Derivatives<'_> {
-    /// Mean of the diagonal of the first term of the Hessian, with sin² = ½.
+    /// Returns the mean of the diagonal of the first term of the Hessian, with ½ as the mean of
+    /// sin².
     pub(super) fn mean_curvature(&self) -> f64 {
         let power: f64 = self.turned.iter().map(|z| 0.5 * z.norm_sqr()).sum();
         self.factor * power * self.weight.iter().sum::<f64>() / self.turned.len() as f64

@@ -251,7 +251,8 @@ pub fn hits(force: &[f64], dt: f64, rule: &HitRule) -> Result<Hits, SignalError>
     let sign = if furthest.unwrap_or(0.0) < 0.0 { -1.0 } else { 1.0 };
     let push: Vec<f64> = force.iter().map(|f| sign * (f - offset)).collect();
     let largest = furthest.unwrap_or(0.0).abs();
-    // The steps of a short pulse without noise are large.
+    // In a short pulse without noise, the smallest change between samples is large and not a step
+    // of the converter.
     let floor = (limits::HIT_OVER_NOISE * noise)
         .max((limits::HIT_OVER_STEP * step(force)).min(limits::MEDIAN_PEAK_FRACTION * largest));
     if largest <= floor || largest == 0.0 {
@@ -383,9 +384,9 @@ fn find_faults(all: &mut [Hit], force: &[f64], push: &[f64], dt: f64, floor: f64
     }
 }
 
-/// Returns whether a maximum is the ringing of an anti-alias filter: the next lobe towards the
-/// main pulse pulls as much as it pushes, but for noise. A hammer does not pull, and ringing falls
-/// off on both sides of a pulse.
+/// Returns whether a maximum is ringing of an anti-alias filter: apart from noise, the force in the
+/// neighbouring lobe towards the main pulse is as negative as the maximum is positive. A hammer
+/// does not pull, and ringing decays on both sides of a pulse.
 fn rings(push: &[f64], maxima: &[usize], at: usize, main: usize, noise: f64) -> bool {
     let peak = maxima[at];
     let inner = if peak > main {
@@ -402,10 +403,10 @@ fn rings(push: &[f64], maxima: &[usize], at: usize, main: usize, noise: f64) -> 
     push[peak] < pull + noise
 }
 
-/// Returns a band-limited signal `part` of a step after a sample.
+/// Returns the value of a band-limited signal at the fraction `part` of a step after a sample.
 ///
 /// # Source
-/// Whittaker's interpolation under a raised cosine.
+/// Whittaker's interpolation formula, with its weights tapered by a raised cosine.
 fn between_samples(values: &[f64], sample: usize, part: f64) -> f64 {
     let reach = limits::INTERPOLATION_REACH;
     let range = (sample + 1).saturating_sub(reach)..(sample + 1 + reach).min(values.len());
@@ -417,8 +418,8 @@ fn between_samples(values: &[f64], sample: usize, part: f64) -> f64 {
     range.map(|k| values[k] * weight(k)).sum()
 }
 
-/// Returns the indices of the maxima after which, and between which, the values fall by at least
-/// `prominence`.
+/// Returns the indices of the maxima. Between two maxima, and after the last, the values fall by at
+/// least `prominence`.
 fn peaks(values: &[f64], prominence: f64) -> Vec<usize> {
     let mut maxima = Vec::new();
     let (mut rising, mut extreme) = (true, 0);
@@ -436,8 +437,8 @@ fn peaks(values: &[f64], prominence: f64) -> Vec<usize> {
     maxima
 }
 
-/// Returns the smallest change from one sample to the next: a step of the converter, or almost zero
-/// if it has very many.
+/// Returns the smallest change from one sample to the next. It is a step of the converter, or
+/// almost zero if the converter has very many levels.
 fn step(values: &[f64]) -> f64 {
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|d| *d > 0.0);
     changes.fold(f64::INFINITY, f64::min)

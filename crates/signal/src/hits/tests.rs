@@ -84,14 +84,14 @@ fn double_hits_are_found_whichever_is_larger() {
         assert!((percent - expected).abs() < 3.0, "{percent} {expected}");
         assert!((after_s - after).abs() < 2.5e-3, "{after_s} {after}");
     }
-    // The second is below the limit, the third below the noise.
+    // The second pulse is below the limit, the third below the noise.
     assert_eq!(with((3.0, 1.04), 0.1), []);
     assert_eq!(with((8.0, 1.04), 1.0), []);
 }
 
 #[test]
 fn light_hits_between_good_ones_end_the_window_and_are_told() {
-    // Steps from 14 standard deviations of the noise to a fifth of the hit before.
+    // The peaks range from 14 standard deviations of the noise to a fifth of the previous hit.
     for peak in [1.4, 2.0, 4.0, 7.0, 12.0, 20.0] {
         let all = [&FOUR[..1], &[(peak, 2.0)], &FOUR[1..]].concat();
         for seed in 0..20 {
@@ -234,7 +234,7 @@ fn ringing_of_a_filter_is_no_second_hit() {
     };
     let mut bounces = 0;
     for seed in 0..40 {
-        // Anywhere between two samples.
+        // The pulses begin anywhere between two samples.
         let [a, b] = [0.4, 1.4].map(|start| start + seed as f64 / 40.0 * dt);
         let all = found(&[(100.0, a), (70.0, b)], seed);
         assert_eq!(all.len(), 2);

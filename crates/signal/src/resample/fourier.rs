@@ -9,7 +9,7 @@ use crate::record::Record;
 use crate::sampling::Sampling;
 use crate::spectrum::Spectrum;
 
-/// Re Σ X_n exp(i n ω0 t), by Horner's rule.
+/// Returns Re Σ X_n exp(i n ω0 t), by Horner's rule.
 pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
     let turn = (t / spectrum.sampling().duration()).fract() * TAU;
     let z = Complex::from_polar(1.0, turn);
@@ -18,7 +18,7 @@ pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
 }
 
 /// Returns the same period with at least as many samples, by a longer inverse transform; `None` if
-/// the new time axis is another period.
+/// the new time axis has another duration or fewer samples.
 pub(super) fn same_period(
     spectrum: &Spectrum,
     sampling: Sampling,

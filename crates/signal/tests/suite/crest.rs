@@ -2,7 +2,7 @@
 
 use mechid_signal::{CrestSearch, Multisine, Phases, Sampling, lines};
 
-/// The crest factor on a period sampled plainly at 16 times the Nyquist rate.
+/// Returns the crest factor of a period sampled at 16 times the Nyquist rate.
 fn judged(m: &Multisine) -> f64 {
     let last = *m.lines().last().unwrap();
     let record = m.sample(Sampling::new(1.0, 16 * 2 * (last + 1)).unwrap()).unwrap();
@@ -55,10 +55,11 @@ fn few_lines_reach_the_global_optimum() {
         let best = scanned.fold(f64::INFINITY, f64::min);
         let m = Multisine::flat(lines.clone(), 1.0, Phases::Zero).unwrap();
         let found = judged(&minimised(&m));
-        // The scan is half a degree from the optimum, the norm for p = 1024 a little off the peak.
+        // The scan is up to half a degree off the optimum, and the norm for p = 1024 differs a
+        // little from the peak.
         assert!((found - best).abs() < 0.01, "{lines:?}: {found} against {best}");
     }
-    // A shift in time takes out one phase, leaving two of three.
+    // A shift in time makes one phase redundant, so that two of three are varied.
     let steps_each = (0..steps).step_by(4);
     let scanned = steps_each.flat_map(|j| (0..steps).step_by(4).map(move |k| (j, k)));
     let best = scanned
@@ -82,7 +83,8 @@ fn repeats_itself_and_never_makes_it_worse() {
     assert!(judged(&left) < 1.6, "{}", judged(&left));
     let single = Multisine::flat([9], 1.0, Phases::Zero).unwrap();
     let sine = search.minimise(&single).unwrap().crest_factor().unwrap();
-    // The parabola through three samples of a sine, 64 to a period, misses the top by 2e-6.
+    // The parabola through three samples of a sine with 64 samples per period misses the top by
+    // 2e-6.
     assert!((sine - f64::sqrt(2.0)).abs() < 1e-5, "{sine}");
 }
 

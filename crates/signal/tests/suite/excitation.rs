@@ -37,8 +37,8 @@ fn flat_multisine_is_as_white_as_its_lines_allow() {
     }
 }
 
-/// The table of the book, choose/excitation.md: a period of 1023 samples, 1 s long, of which lines 1 to 400
-/// matter, and a largest force of 1 N.
+/// Table of the page studies/excitation.md of the book: a period of 1023 samples, 1 s long, lines
+/// 1 to 400 are of interest, and the largest force is 1 N.
 #[test]
 fn excitations_side_by_side() {
     let s = Sampling::from_rate_hz(1023.0, 1023).unwrap();
@@ -70,8 +70,8 @@ fn excitations_side_by_side() {
     }
 }
 
-/// Crest factor of the samples, flatness of lines 1 to 400, and the amplitude of the weakest of
-/// them for a peak of 1.
+/// Returns the crest factor of the samples, the flatness of lines 1 to 400, and the smallest
+/// amplitude of these lines for a peak of 1.
 fn figures(record: &Record) -> (f64, f64, f64) {
     let spectrum = Spectrum::from_record(record);
     let flatness = measures::spectral_flatness(&spectrum, 0, 1..=400).unwrap();

@@ -27,7 +27,7 @@ proptest! {
         }
     }
 
-    /// By definition: the largest order whose autocorrelation matrix is regular.
+    /// By definition, this is the largest order whose autocorrelation matrix is regular.
     #[test]
     fn excitation_order_is_the_rank_of_the_autocorrelation_matrix(
         amplitudes in prop::collection::vec(prop_oneof![Just(0.0), 1.0..3.0f64], 1..8),
@@ -40,7 +40,7 @@ proptest! {
         let r = circular_autocorrelation(&x);
         prop_assume!(r[0] > 0.1);
         let matrix = DMatrix::from_fn(19, 19, |i, j| r[(19 + i - j) % 19]);
-        // The least line has power 1/2 of at most 37; rounding leaves 1e-15 of it.
+        // The weakest line has a power of 1/2 of at most 37; rounding leaves 1e-15 of it.
         #[allow(clippy::disallowed_methods, reason = "mechid-signal has no linear algebra")]
         let rank = matrix.svd(false, false).rank(1e-6);
         let order = persistent_excitation_order(&Spectrum::from_record(&record(&x)), 0, 1e-9).unwrap();

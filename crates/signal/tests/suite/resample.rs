@@ -100,7 +100,7 @@ proptest! {
     }
 }
 
-/// In a natural spline the wrong ends matter less and less inside, by 2 − √3 per sample.
+/// In a natural spline the error of its ends decreases inwards by the factor 2 − √3 per sample.
 #[test]
 fn natural_splines_forget_their_ends() {
     let cubic = |t: f64| t * t * t;

@@ -12,7 +12,7 @@ impl FrequencyData {
         self.open.clear();
     }
 
-    /// Returns lines of whole periods with other forces (N), rows × n.
+    /// Returns the lines with other forces (N), rows × n, as lines of whole periods.
     pub(crate) fn with_closed_force(&self, force: DMatrix<Complex<f64>>) -> Self {
         let mut closed = Self { force, ..self.clone() };
         closed.no_longer_open();
@@ -25,9 +25,11 @@ impl FrequencyData {
         Self { force, ..self.clone() }
     }
 
-    /// Returns the same data as if all channels passed the first-order high-pass of a corner
-    /// frequency (rad/s) that those of some `responses` and `forces`, counted from 0, have passed
-    /// already: alike in all channels it leaves the system as it is, and amplifies no noise.
+    /// Returns the same data with the same first-order high-pass filter on all channels. The
+    /// `responses` and `forces` listed here, counted from 0, were already filtered during the
+    /// measurement with the `corner` frequency (rad/s); the filter is applied to all others. A
+    /// filter that is equal on all channels does not change the system, and the high-pass amplifies
+    /// no noise.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 2 (first-order systems).

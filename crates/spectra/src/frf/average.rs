@@ -26,13 +26,13 @@ pub struct FrfAverage {
     segments: Segments,
     weights: Option<Vec<f64>>,
     pub(super) pieces: usize,
-    /// One entry per line.
+    /// Sums of cross-spectra, one entry per line.
     pub(super) sums: Vec<CrossSpectra>,
 }
 
 impl FrfAverage {
-    /// Creates an average without segments, for this many forces and responses; `lines` belong to
-    /// one segment.
+    /// Creates an average without segments, for this many forces and responses; `lines` are those
+    /// of a segment.
     ///
     /// # Errors
     /// [`SpectraError::Hop`], and [`NumericsError::Size`] if the lines have another length than a
@@ -51,8 +51,8 @@ impl FrfAverage {
     }
 
     /// Adds every whole segment of a part of the records of force (N) and response; the first
-    /// segment begins with it. The next part must begin where the next segment does:
-    /// [`Segments::hop`] samples after the beginning of the last whole segment.
+    /// segment begins where the part begins. The next part must begin where the next segment
+    /// begins: [`Segments::hop`] samples after the beginning of the last whole segment.
     ///
     /// # Errors
     /// [`SpectraError::Signal`] if the time axes of the records differ or their time step differs
@@ -197,12 +197,11 @@ impl FrfAverage {
 
     /// Returns the indices of the excited lines, counted from 0.
     ///
-    /// A line is not excited if every force there has less than a hundredth of the power of its
-    /// strongest line, and if on eight neighbouring lines no response is coherent with it: the
-    /// channel contains noise, and the estimated responses would be responses to noise. The whole
-    /// range of weak lines around these eight, and as many lines as the peak of a window is wide,
-    /// are excluded too, because leakage reaches them. If no line remained, all are returned.
-    ///
+    /// A line is not excited if every force has less than a hundredth of the power of its strongest
+    /// line there, and if no response is coherent with it on eight neighbouring lines: the channel
+    /// contains noise, and the estimated responses would be responses to noise. The whole range of
+    /// weak lines around these eight is excluded, and as many further lines as the peak of a window
+    /// is wide, because leakage reaches them. If no line remained, all are returned.
     /// # Source
     /// The coherence is that in [`FrfAverage::idle_inputs`]; the limits are ours.
     pub fn driven(&self) -> Vec<usize> {
@@ -251,7 +250,8 @@ impl FrfAverage {
         if driven.is_empty() { all_lines() } else { driven }
     }
 
-    /// Returns the same average on some of the lines, by their indices, counted from 0.
+    /// Returns the same average restricted to some of the lines, given by their indices, counted
+    /// from 0.
     ///
     /// # Errors
     /// As [`Lines::new`].
@@ -283,7 +283,7 @@ impl FrfAverage {
         averages > self.inputs as f64 && (0..self.inputs).any(follows)
     }
 
-    /// Returns the same average of some of the force channels, counted from 0.
+    /// Returns the same average restricted to some of the force channels, counted from 0.
     ///
     /// # Panics
     /// If there is no such channel.
@@ -337,8 +337,8 @@ impl FrfAverage {
     }
 }
 
-/// Returns whether the mean and the largest of −ln p are plausible without coherence, when each is
-/// exponentially distributed; `false` if a value is unknown.
+/// Returns whether the mean and the largest of the values −ln p are plausible without coherence,
+/// for which each is exponentially distributed; `false` if a value is unknown.
 fn shows_nothing(evidence: impl Iterator<Item = Option<Vec<f64>>>) -> bool {
     let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0.0);
     for of_line in evidence {

@@ -73,7 +73,7 @@ impl CrossSpectra {
         if power > 0.0 { self.force[(input, driver)] / power } else { Complex::ZERO }
     }
 
-    /// Returns the sums of some of the forces.
+    /// Returns the sums restricted to some of the forces.
     pub(super) fn select_inputs(&self, inputs: &[usize]) -> Self {
         Self {
             force: self.force.select_rows(inputs).select_columns(inputs),
@@ -82,9 +82,9 @@ impl CrossSpectra {
         }
     }
 
-    /// Returns −ln p of each response, where p is the probability of its partial coherence with a
-    /// force, given the other forces, if there is no relation, for this many independent averages;
-    /// `None` if the forces are dependent.
+    /// Returns −ln p for each response. Here p is the probability that its partial coherence with a
+    /// force, given the other forces, is as large as observed without any relation, for this many
+    /// independent averages; `None` if the forces are dependent.
     pub(super) fn evidence_of_motion(&self, input: usize, averages: f64) -> Option<Vec<f64>> {
         let inverse = self.inverse_force(0.0).ok()?;
         let h = &self.motion_force * &inverse;
@@ -98,8 +98,8 @@ impl CrossSpectra {
         Some(of_motion.collect())
     }
 
-    /// Returns −ln p of the coherence of a force with the other forces: without a relation, 1 − γ²
-    /// has a beta distribution.
+    /// Returns −ln p for the coherence of a force with the other forces: p is the probability of a
+    /// value as large as observed without any relation, for which 1 − γ² has a beta distribution.
     pub(super) fn evidence_of_forces(&self, input: usize, averages: f64) -> Option<f64> {
         let inverse = self.inverse_force(0.0).ok()?;
         let other_forces = inverse.nrows() as f64 - 1.0;
@@ -141,8 +141,8 @@ impl CrossSpectra {
         solution.map(|h| h.transpose()).filter(|h| h.iter().all(|z| z.is_finite()))
     }
 
-    /// Returns, for each response, the ratio from the eigenvector of the smallest eigenvalue of the
-    /// cross-spectra of forces and response.
+    /// Returns the Hv estimate of each response: the ratio of entries in the eigenvector of the
+    /// smallest eigenvalue of the cross-spectra of forces and response.
     pub(super) fn hv(&self) -> Result<ComplexMatrix, SpectraError> {
         let (outputs, inputs) = self.motion_force.shape();
         let mut h = DMatrix::zeros(outputs, inputs);

@@ -29,13 +29,13 @@ pub struct Crosstalk {
 }
 
 impl InterleavedResponses {
-    /// Estimates the responses from averages of all forces, one average over the lines of each
-    /// force in turn.
+    /// Estimates the responses from averages of all forces: one average for each force, over the
+    /// lines that it excites.
     ///
-    /// If another force is more coherent with the force that excites the lines (the driver) than
-    /// channel noise can be, it acts on the system there. Its part of the response is subtracted,
-    /// by interpolation of the responses to it between its own lines. The possible interpolation
-    /// error is added to the variance.
+    /// The force that excites the lines is their driver. If another force is more coherent with the
+    /// driver than channel noise can be, it acts on the system on these lines. Its part of the
+    /// response is subtracted, by interpolation of the responses to it between its own lines. The
+    /// possible interpolation error is added to the variance.
     ///
     /// # Errors
     /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is one average of
@@ -81,7 +81,7 @@ impl InterleavedResponses {
 struct Coupling {
     force: usize,
     driver: usize,
-    /// Ratio of the amplitudes on each line.
+    /// Ratio of its amplitude to the amplitude of the driver, on each line.
     ratio: Vec<Complex<f64>>,
 }
 
@@ -131,8 +131,8 @@ struct Between {
     response: DVector<Complex<f64>>,
     variance: DVector<f64>,
     /// Possible interpolation error: the error of an interpolation over twice the distance, between
-    /// the neighbours of the two lines. It has the same size if there is a resonance between the
-    /// two lines, and is four times as large otherwise.
+    /// the neighbours of the two lines. This error has the same size as the actual one if there is
+    /// a resonance between the two lines, and is four times as large otherwise.
     missed: DVector<f64>,
 }
 

@@ -32,7 +32,7 @@ pub enum FrfEstimator {
     /// S_XF S_FF⁻¹: unbiased if only the response is noisy; noise on the force makes it too small.
     H1,
     /// S_XX S_FX⁻¹: unbiased if only the force is noisy; noise on the response makes it too large.
-    /// With several forces it needs as many responses.
+    /// It needs as many responses as forces if there are several forces.
     H2,
     /// Total least squares, with force and response scaled to equal power; for one force, the
     /// geometric mean of H1 and H2.
@@ -45,7 +45,8 @@ pub struct Frf {
     omega: Vec<f64>,
     /// Numbers of the lines of a segment.
     lines: Vec<usize>,
-    /// See [`Segments::line_correlation`].
+    /// Correlation of the errors of two lines, by their distance: see
+    /// [`Segments::line_correlation`].
     line_correlation: Vec<f64>,
     measured: ResponseQuantity,
     response: Vec<ComplexMatrix>,
@@ -85,9 +86,9 @@ impl Frf {
         average.frf(estimator)
     }
 
-    /// Creates responses that were measured elsewhere: per frequency a matrix responses × forces,
-    /// and the coherence of every response (frequencies × responses) from this many independent
-    /// averages.
+    /// Creates responses that were measured elsewhere: a matrix responses × forces for each
+    /// frequency, and the coherence of every response (frequencies × responses), from this many
+    /// independent averages.
     ///
     /// With several forces the coherence is the multiple one, and the forces are assumed
     /// uncorrelated and of equal size.
@@ -232,7 +233,8 @@ impl Frf {
             }
             FrfEstimator::Hv => spectra.hv()?,
         };
-        // The standard deviation grows in proportion to the estimator.
+        // The variance of H1 is known; that of another estimate is taken in proportion to its
+        // square.
         for (v, (h, h1)) in variance.iter_mut().zip(response.iter().zip(h1.iter())) {
             if h1.norm_sqr() > 0.0 {
                 *v *= h.norm_sqr() / h1.norm_sqr();
@@ -300,10 +302,11 @@ impl Frf {
         self.scatter.as_ref().map_or(per_line, |scatter| scatter.freedom)
     }
 
-    /// Returns the information of the responses about a system: the sum over lines and responses of
-    /// γ²/(1 − γ²), the explained over the unexplained power, without the bias of a sample
-    /// coherence, times the averages that remain after the forces and the weights are estimated
-    /// (pure number). Longer segments have more lines and less leakage, but fewer averages.
+    /// Returns the information of the responses about a system, a pure number. It is the sum over
+    /// lines and responses of γ²/(1 − γ²), the ratio of explained to unexplained power, corrected
+    /// for the bias of a sample coherence, times the number of averages that remain after the
+    /// forces and the weights are estimated. Longer segments have more lines and less leakage, but
+    /// fewer averages.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (variance of a response by its
@@ -328,7 +331,7 @@ impl Frf {
         &self.lines
     }
 
-    /// Returns the correlation of the noise of two lines, by their distance in lines.
+    /// Returns the correlation of the noise of two lines, by their distance in lines, from 0.
     pub fn line_correlation(&self) -> &[f64] {
         &self.line_correlation
     }

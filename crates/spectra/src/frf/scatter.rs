@@ -18,16 +18,16 @@ pub(super) struct Scatter {
     inverse_force: Vec<ComplexMatrix>,
     /// Variances for weights, averaged over neighbouring lines.
     pub(super) pooled: Vec<DMatrix<f64>>,
-    /// Number of independent complex deviations behind these variances.
+    /// Number of independent complex deviations behind the pooled variances.
     pub(super) freedom: f64,
-    /// See [`Segments::smoothing`].
+    /// Weights of the smoothing by the window: see [`Segments::smoothing`].
     smoothing: Vec<f64>,
     /// Number of samples in a segment.
     samples: usize,
 }
 
 impl Scatter {
-    /// Creates the covariances for `frf`, which has its lines with unpooled variances already.
+    /// Creates the covariances for `frf`, whose lines already have variances that are not pooled.
     pub(super) fn new(
         frf: &Frf,
         unexplained: Vec<ComplexMatrix>,
@@ -43,7 +43,7 @@ impl Scatter {
         Self::pooled(frf, unexplained, inverse_force, segments, widest)
     }
 
-    /// Creates the covariances for responses that were measured elsewhere: with few averages over
+    /// Creates the covariances for responses that were measured elsewhere. With few averages over
     /// periods, neighbouring lines are pooled, too.
     pub(super) fn for_table(
         frf: &Frf,
@@ -108,8 +108,8 @@ impl Scatter {
         }
     }
 
-    /// Returns the covariance of the errors of two responses at a line, (output, input) each,
-    /// divided by the standard deviations that weight them.
+    /// Returns the covariance of the errors of two responses at a line, each given as (output,
+    /// input), divided by the standard deviations that weight them.
     pub(super) fn covariance(
         &self,
         line: usize,
@@ -132,10 +132,9 @@ fn independent(lines: usize, correlation: &[f64]) -> f64 {
 }
 
 /// Returns the bias that averaging over segments with these weights ([`Segments::smoothing`])
-/// causes in a frequency response, given as a function of ω (rad/s), on some of their lines, which
-/// are `spacing` (rad/s) apart: the window smooths the response and reduces a resonance. `None` on
-/// a line without a finite response.
-///
+/// causes in a frequency response: the window smooths the response and reduces a resonance. The
+/// response is given as a function of ω (rad/s), the lines as numbers, `spacing` (rad/s) apart.
+/// `None` on a line without a finite response.
 /// # Source
 /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral
 /// estimates).
@@ -207,8 +206,8 @@ impl Frf {
         self.scatter.is_some()
     }
 
-    /// Returns the covariance of the errors of two responses at a line, (output, input) each,
-    /// divided by the standard deviations that weight them; `None` for responses measured
+    /// Returns the covariance of the errors of two responses at a line, each given as (output,
+    /// input), divided by the standard deviations that weight them; `None` for responses measured
     /// elsewhere.
     pub fn error_covariance(&self, line: usize, pair: [(usize, usize); 2]) -> Option<Complex<f64>> {
         Some(self.scatter.as_ref()?.covariance(line, self.averages, pair))

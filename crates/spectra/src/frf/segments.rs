@@ -58,13 +58,14 @@ impl Segments {
         }
     }
 
-    /// Returns the correlation of the errors of a frequency response on two lines, by their
-    /// distance in lines from 0 up to the last noticeable one (pure numbers); for this many
-    /// segments.
+    /// Returns the correlation of the errors of a frequency response on two lines (pure numbers),
+    /// for this many segments. The entries belong to the distances 0, 1 … in lines, up to the last
+    /// noticeable correlation.
     ///
     /// The window leaks noise and force in the same way from a line to its neighbours, and
-    /// overlapping segments share samples: Σ_j |ρ_j(d)|² over segments j hops apart, with ρ_j(d) =
-    /// Σ w(k) w(k + j hop) exp(−2πi d k/len), relative to the value at d = 0.
+    /// overlapping segments share samples. The correlation is Σ_j |ρ_j(d)|² over segments j hops
+    /// apart, with ρ_j(d) = Σ w(k) w(k + j hop) exp(−2πi d k/len) for the window w, relative to the
+    /// value at the distance d = 0.
     ///
     /// # Source
     /// Welch (1967), IEEE Transactions on Audio and Electroacoustics 15, 70–73 (segments that
@@ -91,9 +92,9 @@ impl Segments {
     }
 
     /// Returns the weights with which averaging over segments smooths a frequency response under a
-    /// random force, at distances from a line in steps of 1/`SMOOTHING_STEPS`, symmetric: |W|² of
-    /// the window (pure numbers). Empty without smoothing: for periods, and for the rectangular
-    /// window, which is for segments that begin and end at rest.
+    /// random force: |W|² of the window (pure numbers), at distances from a line in steps of
+    /// 1/`SMOOTHING_STEPS`, symmetric. The list is empty without smoothing: for periods, and for
+    /// the rectangular window, which is for segments that begin and end at rest.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral
@@ -135,7 +136,7 @@ impl Segments {
     }
 }
 
-/// Writes a segment, with its mean removed and weighted if there is a window, otherwise unchanged.
+/// Writes a segment: with its mean removed and weighted if there is a window, otherwise unchanged.
 pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) {
     let Some(window) = window else { return weighed.copy_from_slice(piece) };
     let mean = DVectorView::from_slice(piece, piece.len()).mean();
@@ -144,8 +145,8 @@ pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) 
     }
 }
 
-/// Returns the variance of an average of overlapping windowed segments relative to independent
-/// ones: 1 + 2 Σ (1 − j/count) ρ_j², where ρ_j is the common fraction of two segments j apart.
+/// Returns the variance of an average of overlapping windowed segments, relative to independent
+/// ones: 1 + 2 Σ (1 − j/count) ρ_j², where ρ_j is the correlation of two segments j hops apart.
 ///
 /// # Source
 /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.

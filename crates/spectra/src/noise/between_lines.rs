@@ -1,4 +1,4 @@
-//! Noise between the lines of several periods taken as one record, where a periodic signal is zero.
+//! Noise between the lines of several periods taken as one record; a periodic signal is zero there.
 
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -7,10 +7,10 @@ use crate::limits::{MAX_HELD, MAX_PERIODS, MIN_PERIODS};
 
 /// Consecutive periods, buffered until their spectrum can be taken as the spectrum of one record.
 ///
-/// The spectrum of B periods has B − 1 lines between two lines of one period. A noise with a long
-/// correlation time (an unmeasured force through a resonance) has there the same level as on the
-/// lines of the mean, whereas the scatter of single periods also contains their transients, which
-/// nearly cancel in the mean.
+/// The spectrum of B periods has B − 1 lines between two lines of one period. On these lines, noise
+/// with a long correlation time (an unmeasured force through a resonance) has the same level as on
+/// the lines of the mean. The scatter of single periods is larger, because it also contains their
+/// transients, which nearly cancel in the mean.
 #[derive(Debug, Clone)]
 pub(crate) struct BetweenLines {
     /// Number of samples in a period.
@@ -61,11 +61,12 @@ impl BetweenLines {
         (self.held == self.periods).then_some(self.periods)
     }
 
-    /// Adds B Σ z zᴴ, where z are the amplitudes between lines, to the scatter of each line of a
-    /// period: the expectation is the same as for the scatter of B periods about their mean.
+    /// Adds B Σ z zᴴ, where z are the amplitudes between lines of B periods, to the scatter of each
+    /// line of a period: the expectation is the same as for the scatter of B periods about their
+    /// mean.
     ///
-    /// Each line uses the lines nearer to it than to another line of a period, and the one in the
-    /// middle above it, so that each is used once.
+    /// Each line of a period uses the lines that are nearest to it. A line in the middle between
+    /// two lines of a period belongs to the lower one, so that each is used once.
     pub(crate) fn add_scatter(&self, lines: &[usize], scatter: &mut [DMatrix<Complex<f64>>]) {
         if self.periods == 1 {
             return;

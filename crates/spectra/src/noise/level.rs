@@ -2,9 +2,9 @@
 
 use crate::limits::{LEVEL_LEAST, LEVEL_ROUNDS, LEVEL_SETTLED};
 
-/// Returns the standard deviation s with which residuals of powers |e|² and known variances g, in
-/// pairs (|e|², g) of one unit, are most likely as circular Gaussian numbers of variances s² + g;
-/// almost zero if g alone explains them.
+/// Returns the most likely standard deviation s of white noise in residuals e, which are circular
+/// Gaussian numbers of variances s² + g. Each residual is a pair (|e|², g) with its known variance
+/// g, all in one unit. The result is almost zero if g alone explains the residuals.
 ///
 /// # Source
 /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring).

@@ -26,17 +26,17 @@ type Covariances = Vec<DMatrix<Complex<f64>>>;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
 pub enum Pooling {
-    /// The one of the other choices that predicts the samples best.
+    /// The choice, among all others, that predicts the samples best.
     #[default]
     Automatic,
-    /// One covariance for all lines: white noise in the quantity measured.
+    /// One covariance for all lines: white noise in the measured quantity.
     AllLines,
     /// A spectrum of each channel whose logarithm is a polynomial in the logarithm of the
     /// frequency, with other levels in some bands; the correlations of channels are equal on all
     /// lines. Order and bands are chosen from the samples, so that white noise is recognised.
     Smooth,
-    /// Mean of the covariances of this many chosen lines to either side; at the ends of the band,
-    /// of the same total number of lines.
+    /// Mean of the covariances over this many chosen lines to either side of a line; at the ends of
+    /// the band, over the same total number of lines.
     Neighbours(usize),
     /// A separate covariance for every line: for many periods.
     PerLine,
@@ -229,7 +229,7 @@ struct Candidate {
     /// Channels with noise.
     noisy: Vec<usize>,
     smooth: Option<Smooth>,
-    /// `true` if the ratio to the relative powers is smooth rather than the power itself.
+    /// `true` if the ratio to the relative powers is smooth, not the power itself.
     is_relative: bool,
 }
 
@@ -353,8 +353,8 @@ impl Candidate {
     }
 }
 
-/// Returns the number of complex deviations n/ν at which a sample covariance of n displacements has
-/// the same relative uncertainty as a smooth spectrum on average over the lines.
+/// Returns the number of complex deviations at which a sample covariance of n displacements has the
+/// same relative uncertainty as a smooth spectrum, on average over the lines.
 ///
 /// A level from `terms` fitted to `lines` has the leverage `terms/lines`; correlations are
 /// estimated from all lines.
@@ -402,14 +402,15 @@ fn scaled(
     covariance.iter().enumerate().map(one).collect()
 }
 
-/// Returns log det S + tr(S⁻¹Ŝ): minus the log likelihood of a sample Ŝ, per complex deviation.
-/// `None` for a singular S.
+/// Returns log det S + tr(S⁻¹Ŝ): minus the log likelihood of the covariance S for a sample
+/// covariance Ŝ, per complex deviation. `None` for a singular S.
 fn sample_cost(s: &DMatrix<Complex<f64>>, sample: &DMatrix<Complex<f64>>) -> Option<f64> {
     let factor = s.clone().cholesky()?;
     Some(log_determinant(factor.l_dirty())? + factor.solve(sample).trace().re)
 }
 
-/// Returns twice the sum of the logarithms of a triangle's diagonal; `None` unless it is positive.
+/// Returns twice the sum of the logarithms of the diagonal of a triangular matrix; `None` unless
+/// all of them are positive.
 fn log_determinant(lower: &DMatrix<Complex<f64>>) -> Option<f64> {
     let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
     let diagonal = lower.diagonal();
@@ -417,8 +418,8 @@ fn log_determinant(lower: &DMatrix<Complex<f64>>) -> Option<f64> {
 }
 
 /// Returns the sum over lines of the expected [`sample_cost`] when each sample covariance predicts
-/// other samples of the same line: the expectation of the logarithm and the inverse of a sample of
-/// `nu` complex deviations.
+/// other samples of the same line. It uses the expectations of the logarithm and of the inverse of
+/// a sample covariance of `nu` complex deviations.
 ///
 /// # Source
 /// Goodman (1963), Annals of Mathematical Statistics 34, 152–177 (complex Wishart distribution).

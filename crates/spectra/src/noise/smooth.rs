@@ -1,4 +1,4 @@
-//! Noise spectrum from few periods: smooth, with bumps.
+//! Smooth noise spectrum with bumps, estimated from few periods.
 
 mod bump;
 
@@ -25,7 +25,7 @@ pub(crate) struct Form {
 }
 
 impl Form {
-    /// Returns the same form on `times` as many lines.
+    /// Returns the same form for `times` as many lines.
     fn finer(&self, times: f64) -> Self {
         Self { order: self.order, bumps: self.bumps.iter().map(|bump| bump.finer(times)).collect() }
     }
@@ -94,7 +94,8 @@ pub struct Smooth {
     pub basis: DMatrix<f64>,
     /// Logarithm of the power in the unit of the variances, lines × channels.
     pub log_power: DMatrix<f64>,
-    /// Σ log p + v/p over lines and channels: minus the log likelihood over the degrees of freedom.
+    /// Sum of log p + v/p over lines and channels, with the power p and the sample variance v:
+    /// minus the log likelihood divided by the degrees of freedom.
     pub(crate) misfit: f64,
     /// Bayesian information criterion of the chosen form.
     pub(crate) cost: f64,
@@ -132,8 +133,8 @@ pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     Smooth { cost: coarse.cost, ..fitted }
 }
 
-/// Returns the better of this spectrum and one whose ratio to the `relative` powers (lines ×
-/// channels) is smooth, and whether it is the second.
+/// Returns the better of two spectra: a smooth one, and one whose ratio to the `relative` powers
+/// (lines × channels) is smooth; and `true` if it is the second.
 pub(crate) fn choose_beside(
     omega: &[f64],
     variances: &DMatrix<f64>,
@@ -144,13 +145,15 @@ pub(crate) fn choose_beside(
     if !log.iter().all(|log| log.is_finite()) {
         return (choose(omega, variances, nu), false);
     }
-    // A common factor has no effect; without it the numbers have the size of the variances.
+    // A common factor of the relative powers has no effect; without it, the ratios have the size of
+    // the variances.
     let mean = log.row_mean();
     let log = DMatrix::from_fn(log.nrows(), log.ncols(), |line, at| log[(line, at)] - mean[at]);
     let ratios = variances.zip_map(&log, |v, log| v * (-log).exp());
     let (smooth, mut relative_smooth) =
         rayon::join(|| choose(omega, variances, nu), || choose(omega, &ratios, nu));
-    // The logarithms of the factors have the sum zero, so that the likelihoods can be compared.
+    // The logarithms of the relative powers of each channel have the mean zero, so that the
+    // likelihoods can be compared.
     if relative_smooth.cost >= smooth.cost {
         return (smooth, false);
     }
@@ -162,7 +165,7 @@ pub(crate) fn choose_beside(
 fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let (lines, channels) = (omega.len(), variances.ncols() as f64);
     let per_term = (nu * lines as f64).max(2.0).ln();
-    // This is the number of intervals that are tried.
+    // This is the logarithm of the number of intervals that are tried.
     let per_place = ((lines * widths(lines).count()).max(2) as f64).ln();
     let cost = |smooth: &Smooth| {
         2.0 * nu * smooth.misfit
@@ -239,8 +242,8 @@ fn fit_within(
     Smooth { form, basis, log_power, misfit, cost: f64::INFINITY }
 }
 
-/// Returns the maximum-likelihood log power in a basis, for the sample variances of a channel, and
-/// Σ log p + v/p.
+/// Returns the maximum-likelihood log power log p in a basis, for the sample variances v of a
+/// channel, and Σ log p + v/p.
 fn most_likely(
     basis: &DMatrix<f64>,
     variances: &DVector<f64>,
@@ -264,8 +267,8 @@ fn most_likely(
             column.zip_zip_apply(&own, &ratio, |w, own, ratio| *w = own * ratio);
         }
         information.gemm(1.0, &transposed, &weighted, 0.0);
-        // The expected information, which is the identity, replaces a Hessian that is not positive
-        // definite in Newton's step.
+        // If the Hessian is not positive definite, the expected information, which is the identity
+        // matrix, replaces it in Newton's step.
         let mut step = match information.clone().cholesky() {
             Some(factors) => factors.solve(&slope),
             None => slope,
@@ -287,7 +290,7 @@ fn most_likely(
     (log_power, misfit)
 }
 
-/// Returns Σ log p + v/p and writes each v/p.
+/// Returns Σ log p + v/p of the power p and the variances v, and writes each v/p.
 fn deviance(log_power: &DVector<f64>, variances: &DVector<f64>, ratio: &mut DVector<f64>) -> f64 {
     let lines = ratio.iter_mut().zip(log_power.iter().zip(variances.iter()));
     let terms = lines.map(|(ratio, (log, v))| {
@@ -301,7 +304,7 @@ fn deviance(log_power: &DVector<f64>, variances: &DVector<f64>, ratio: &mut DVec
 mod tests {
     use super::*;
 
-    /// A band of noise a hundred times as high is found in many lines as in few.
+    /// A band of noise a hundred times as high is found in many lines as well as in few.
     #[test]
     fn many_lines_show_the_band_that_few_do() {
         let deviation = |line: usize| -(1.0 - (0.618_033_988_75 * line as f64).fract()).ln();
@@ -338,7 +341,7 @@ mod tests {
                 assert!(first > 0.1, "order {order}: {first}");
             }
         }
-        // Where the lines are many, the end is as low as they say.
+        // If there are many lines, the power at the end of the band is as low as the lines show.
         let falling = DMatrix::from_fn(100, 1, |line, _| omega[line].powi(3));
         let smooth = fit(Form { order: 3, bumps: Vec::new() }, &omega, &falling, 8.0);
         assert!(smooth.log_power[(0, 0)].abs() < 1e-3, "{}", smooth.log_power[(0, 0)]);

@@ -27,8 +27,7 @@ pub struct NoiseSpectrum {
 /// Functions with which the log powers of an experiment were fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothPart {
-    /// Orthonormal columns, rows × terms.
-    /// Dimensionless.
+    /// Orthonormal columns, rows × terms, dimensionless.
     pub basis: DMatrix<f64>,
     /// Number of complex deviations behind each sample covariance, a pure number.
     pub nu: f64,
@@ -245,14 +244,15 @@ impl NoiseSpectrum {
         self.covariance.iter().any(|c| (n..2 * n).any(|i| c[(i, i)].re > 0.0))
     }
 
-    /// Returns the degrees of freedom of a variance averaged over all rows, for Student's t; for
-    /// known noise it is a large number, with which that is the normal distribution.
+    /// Returns the degrees of freedom of a variance averaged over all rows, for Student's t. For
+    /// known noise it is a large number, so that Student's t is a normal distribution.
     pub fn total_degrees_of_freedom(&self) -> usize {
         // Real and imaginary deviations both count.
         (2.0 * self.total_degrees_of_freedom).min(1e6) as usize
     }
 
-    /// Returns E[Ŝ⁻¹] S of a sample covariance Ŝ of `channels` channels: ν/(ν − n).
+    /// Returns ν/(ν − n), the factor E[Ŝ⁻¹] S of a sample covariance Ŝ of n = `channels` channels
+    /// from ν complex deviations.
     pub fn mean_inverse_ratio(&self, channels: usize) -> f64 {
         let nu = self.degrees_of_freedom;
         if nu.is_infinite() { 1.0 } else { nu / (nu - channels as f64) }
@@ -265,7 +265,7 @@ impl NoiseSpectrum {
         self
     }
 
-    /// Returns the rows of `self`, then those of `other`: the noise of two experiments.
+    /// Returns the rows of `self` followed by the rows of `other`: the noise of two experiments.
     pub fn chain(&self, other: &Self) -> Self {
         Self {
             omega: [&self.omega[..], &other.omega].concat(),

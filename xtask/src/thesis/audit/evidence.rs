@@ -56,7 +56,7 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Table 5.6.10 comes after 5.6.9: the numbers in the name decide the order.
+/// Returns the sorting key of a table: the numbers in its name, so that 5.6.10 comes after 5.6.9.
 fn sorting(table: &str) -> Vec<(bool, u32, String)> {
     let part = |p: &str| (p.parse::<u32>().is_err(), p.parse().unwrap_or(0), p.to_owned());
     table.split('.').map(part).collect()
@@ -71,7 +71,7 @@ pub enum Source {
     Corrected,
 }
 
-/// The tables seen through one [`Source`].
+/// The tables with the numbers of one [`Source`].
 #[derive(Clone, Copy)]
 pub struct View<'a> {
     evidence: &'a Evidence<'a>,
@@ -80,7 +80,7 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// Errors in % against NPI of one column; of a table with several parameters, of this one.
+    /// Returns the errors in % over NPI of one column, for one parameter if the table has several.
     pub fn series_of(&self, table: &str, parameter: &str, method: Method) -> Vec<(f64, f64)> {
         self.evidence
             .rows(table)
@@ -128,7 +128,7 @@ impl View<'_> {
         cells.filter_map(|c| c.error_percent.parse().ok()).collect()
     }
 
-    /// The error in % of one cell.
+    /// Returns the error in % of one cell.
     ///
     /// NaN if the table has no such cell: every comparison with it is false.
     pub fn error(&self, table: &str, method: Method, npi: f64) -> f64 {
@@ -141,7 +141,7 @@ impl View<'_> {
         mean(self.series(table, method).iter().map(|(_, e)| *e))
     }
 
-    /// The mean errors of a table, best first, in words.
+    /// Returns the mean errors of a table in words, the smallest first.
     pub fn ranking(&self, table: &str) -> String {
         let mut means = Method::ALL.map(|m| (self.mean(table, m), m.name()));
         means.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -15,7 +15,7 @@ use super::super::simulate::{self, Sequences};
 use super::evidence::Source;
 use super::markdown::number;
 
-/// One period of motion and force, with the slips or without.
+/// Returns one period of motion and force, with the slips or without.
 ///
 /// # Errors
 /// The message of the integrator.
@@ -98,7 +98,7 @@ pub fn percent(estimates: &[f64], machine: Machine) -> Vec<f64> {
     pairs.map(|(e, t)| 100.0 * ((e - t) / t).abs()).collect()
 }
 
-/// The machine an estimate describes.
+/// Returns the machine with the parameters of an estimate.
 fn system(listed: &[f64], machine: Machine) -> Result<SecondOrderSystem, String> {
     let mass = machine.system().mass().clone();
     let n = mass.nrows();
@@ -114,7 +114,7 @@ fn system(listed: &[f64], machine: Machine) -> Result<SecondOrderSystem, String>
 /// Machine for the identification of a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameters {
-    /// The true one.
+    /// The true machine.
     Exact,
     /// The machine identified from the same data.
     From(Domain),
@@ -125,7 +125,7 @@ pub enum Parameters {
 pub enum Equation {
     /// Sample by sample, eq. (4.8.1).
     Continuous,
-    /// Step by step, eqs. (4.7.1)–(4.7.3) or better.
+    /// Step by step, by eqs. (4.7.1)–(4.7.3) or by a better discretisation.
     Discretised(Discretisation),
     /// Step by step, with the Taylor series cut after the term of this order.
     Taylor(usize),
@@ -170,19 +170,19 @@ impl Ratios {
         Ok(Self { omega0: sampling.omega0(), ratios })
     }
 
-    /// Smallest and largest.
+    /// Returns the smallest and the largest ratio.
     pub fn range(&self) -> [f64; 2] {
         let pick = |f: fn(f64, f64) -> f64, from| self.ratios.iter().copied().fold(from, f);
         [pick(f64::min, f64::INFINITY), pick(f64::max, f64::NEG_INFINITY)]
     }
 
-    /// Largest minus smallest.
+    /// Returns the largest minus the smallest ratio.
     pub fn spread(&self) -> f64 {
         let [low, high] = self.range();
         high - low
     }
 
-    /// Root mean square of the distance from 1.
+    /// Returns the root mean square of the distance from 1.
     pub fn rms(&self) -> f64 {
         let squares: f64 = self.ratios.iter().map(|r| (r - 1.0).powi(2)).sum();
         (squares / self.ratios.len() as f64).sqrt()

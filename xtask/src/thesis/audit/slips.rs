@@ -7,7 +7,8 @@ use super::super::verdict::Verdict;
 use super::evidence::Evidence;
 use super::markdown::table;
 
-/// Printed estimates that are reproduced with all slips, but not without this one.
+/// Returns the number of printed estimates that are reproduced with all slips, but not without this
+/// one.
 ///
 /// # Errors
 /// The message of the first estimation that fails.
@@ -28,7 +29,8 @@ fn explained(row: &cells::Row) -> bool {
     row.estimate.verdict != Verdict::Unexplained
 }
 
-/// The misprints of whole columns are signs.
+/// Returns whether the misprint of a cell is a lost sign; the misprints of whole columns are lost
+/// signs.
 fn sign_is_lost(row: &cells::Row) -> bool {
     let misprint =
         misprints::find(&row.cell.table, row.cell.method, row.cell.npi, misprints::Field::Estimate);

@@ -39,7 +39,8 @@ enum Noise<'a> {
 /// squares is the likelihood after the true force and displacement of each row have been
 /// eliminated.
 ///
-/// The Jacobian of row l is the Kronecker product W_l E_ij X̂_l s^p with W = L⁻¹G. X̂ is the
+/// The Jacobian of row l has the columns W_l E_ij X̂_l s^p for the entry (i, j) of K, C or M (p =
+/// 0, 1, 2), with W = L⁻¹G, s = iω and the matrix E_ij of zeros with a 1 at this entry. X̂ is the
 /// displacement under the most likely force F̂. Because F̂ is a minimum, Jᵀr is the gradient of the
 /// sum of squares, and JᵀJ is the Fisher information.
 ///
@@ -275,8 +276,8 @@ impl SumOfSquares for Misfit<'_> {
 }
 
 impl Restartable for Misfit<'_> {
-    /// Returns the step to the minimum of |W (D X − F)|² for fixed W: the Gauss–Newton equations
-    /// with the measured X instead of X̂.
+    /// Returns the step to the minimum of |W (D X − F)|² for fixed W and the dynamic stiffness D:
+    /// the Gauss–Newton equations with the measured X instead of X̂.
     fn linear_step(&mut self) -> Option<DVector<f64>> {
         let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
         let NormalEquations { gram, gradient, coordinates } =
@@ -290,7 +291,8 @@ impl Restartable for Misfit<'_> {
             let rows = Sampling::new(1.0, self.shares.len()).ok()?;
             noise::white(rows, 2, 1.0, seed).ok()
         });
-        // |z|²/2 of a complex normal number is exponential; half its square has the mean 1.
+        // With a complex normal number z, |z|²/2 has an exponential distribution; half the square
+        // of this has the mean 1.
         for (share, pair) in
             self.shares.iter_mut().zip(drawn.iter().flat_map(|d| d.data().row_iter()))
         {

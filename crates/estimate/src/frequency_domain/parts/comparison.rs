@@ -1,4 +1,4 @@
-//! Test that the parts of the data say the same about the parameters.
+//! Test that the parts of the data agree about the parameters.
 
 use mechid_model::Parameter;
 use mechid_numerics::linear_algebra::hermitian_eigen;
@@ -49,24 +49,24 @@ pub struct Difference {
 struct Scores<'a> {
     /// Orthonormal columns Q that the parameters explain.
     basis: &'a DMatrix<f64>,
-    /// Change of every parameter by one of each column, parameters × columns.
+    /// Change of every parameter per unit of each column, parameters × columns.
     root: &'a DMatrix<f64>,
     /// Values of the parameters, each in its unit.
     values: &'a DVector<f64>,
-    /// D_p Q of every part.
+    /// Products D_p Q of every part p, with its selection D_p of the rows.
     parts: Vec<DMatrix<f64>>,
-    /// Qᵀ D_p e, one below the other.
+    /// Scores Qᵀ D_p e of the parts, one below the other, with the residual e.
     scores: DVector<f64>,
     covariance: DMatrix<f64>,
 }
 
 /// Variance of the residual in units of the noise.
 enum Level {
-    /// Variance of the stated noise, times a factor for weights that are sampled, with its degrees
-    /// of freedom.
+    /// Variance of the stated noise, times an `inflation` for sampled weights, with its degrees of
+    /// freedom.
     Known { inflation: f64, degrees_of_freedom: f64 },
-    /// Variance of a residual with a sum of squares and a number of free values, times such a
-    /// factor.
+    /// Variance of a residual from its sum of squares and its number of free values, times an
+    /// `inflation` for sampled weights.
     Residual { inflation: f64, cost: f64, free: f64 },
 }
 
@@ -229,7 +229,7 @@ impl PartsOfFit<'_> {
         }
     }
 
-    /// Returns the level of the noise as [`Level::without`].
+    /// Returns the level of the noise like [`Level::without`].
     pub(super) fn level(&self, squares: f64, rank: usize) -> Option<(f64, f64)> {
         self.noise_level().without(squares, rank)
     }
@@ -260,7 +260,7 @@ impl PartsOfFit<'_> {
     }
 }
 
-/// Returns the inverse of a covariance on the directions that it has, and their number.
+/// Returns the pseudo-inverse of a covariance, and its rank.
 pub(super) fn pseudo_inverse(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, usize)> {
     let eigen = hermitian_eigen(covariance.clone()).ok()?;
     let least = PART_INFORMS * eigen.eigenvalues.max();

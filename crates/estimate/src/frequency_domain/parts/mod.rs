@@ -30,17 +30,17 @@ pub use terms::{OmittedTerm, Power, SampledRows};
 /// The residual e and its orthonormal sensitivities Q are weighted by the noise, without the
 /// components that the transients of open records explain. D_p selects part p, with Σ D_p = I; the
 /// part contributes the score Qᵀ D_p e to the estimate. The scores have the sum zero and, if the
-/// parts differ by noise alone, the covariance of (I − QQᵀ) D_p Q.
+/// parts differ by noise alone, a covariance that follows from the columns (I − QQᵀ) D_p Q.
 pub struct PartsOfFit<'a> {
     data: &'a FrequencyData,
-    /// The same without the loads of the ends of open records.
+    /// Data without the transient loads of open records.
     closed: Cow<'a, FrequencyData>,
     noise: Cow<'a, NoiseSpectrum>,
     unknowns: Unknowns,
     parameters: Vec<Parameter>,
     /// Most likely values, in the order of the parameters.
     values: DVector<f64>,
-    /// Linearisation at these values.
+    /// Linearisation at the most likely values.
     linear: Linearised,
     /// Averaged responses, with correlated errors of neighbouring lines, if the data come from
     /// them.

@@ -18,13 +18,14 @@ use crate::limits::PART_INFORMS;
 pub struct OmittedTerms {
     /// Term that is most likely.
     pub term: OmittedTerm,
-    /// Part of the residual power that it explains (pure number).
+    /// Fraction of the residual power that the most likely term explains (pure number).
     pub explained: f64,
     /// Probability that noise alone makes one of the terms explain as much.
     pub p_value: f64,
-    /// Change of each parameter with that term, in the order and the unit of the parameters.
+    /// Change of each parameter with the most likely term, in the order and the unit of the
+    /// parameters.
     pub changes: DVector<f64>,
-    /// Standard errors of these changes, one for each parameter, in its unit.
+    /// Standard errors of `changes`, one for each parameter, in its unit.
     pub errors: DVector<f64>,
     /// Mean square error that the terms add to the covariance of the parameters (parameters ×
     /// parameters), each weighted by its likelihood: the squares of the changes plus their
@@ -35,9 +36,10 @@ pub struct OmittedTerms {
 /// Test of one term.
 struct Explained {
     term: OmittedTerm,
-    /// sᵀV⁺s over the number of its columns and the level of the noise.
+    /// Probability that noise alone makes the term explain as much, by Fisher's distribution of
+    /// sᵀV⁺s, with the scores s of its columns and their covariance V.
     p_value: f64,
-    /// Part of the residual power.
+    /// Fraction of the residual power that the term explains.
     part: f64,
     columns: usize,
     changes: DVector<f64>,
@@ -51,9 +53,11 @@ impl PartsOfFit<'_> {
     ///
     /// C are the weighted changes of the response by a term, and Z what remains of them without the
     /// part that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and the
-    /// parameters change by −(QR)⁺C a. Around the estimate of the smaller model, the mean square
-    /// error of the larger one is the covariance of these changes plus their square. Terms that
-    /// explain the same are weighted by their likelihoods, as in an average of models.
+    /// parameters change by −(QR)⁺C a, where QR are their sensitivities and e is the residual.
+    /// Around the estimate of the smaller model, the mean square error of the larger one is the
+    /// covariance of these changes plus their square. Terms that explain the residual equally well
+    /// are weighted by
+    /// their likelihoods, as in an average of models.
     ///
     /// # Source
     /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for
@@ -131,7 +135,7 @@ impl PartsOfFit<'_> {
 }
 
 impl Explained {
-    /// Half of Schwarz's criterion, less that of the model without the term.
+    /// Returns half of Schwarz's criterion minus that of the model without the term.
     fn evidence(&self, fit: &PartsOfFit<'_>) -> f64 {
         let (count, left) = (fit.linear.residual.len() as f64, (1.0 - self.part).max(f64::EPSILON));
         0.5 * (count * left.ln() + self.columns as f64 * count.ln())

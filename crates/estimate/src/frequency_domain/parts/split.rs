@@ -41,7 +41,7 @@ pub enum Part {
     Time {
         /// First sample.
         first: usize,
-        /// First sample after them.
+        /// First sample after the interval.
         end: usize,
     },
 }

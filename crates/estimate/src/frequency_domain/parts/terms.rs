@@ -19,7 +19,8 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 #[cfg_attr(feature = "serde", serde(tag = "term", rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum OmittedTerm {
-    /// Displacement in phase with the forces and as large at every frequency: modes above the band.
+    /// Displacement in phase with the forces and equally large at every frequency: modes above the
+    /// band.
     ResidualFlexibility,
     /// Force that grows with the fourth power of the frequency: masses on springs, with modes above
     /// the band.
@@ -66,7 +67,7 @@ impl Power {
     /// All powers that are tested.
     pub const ALL: [Self; 4] = [Self::Square, Self::Cube, Self::VelocityCube, Self::VelocitySign];
 
-    /// Returns the power of a displacement or of its rate, in the power of the unit of either.
+    /// Returns the power of a displacement (m) or a velocity (m/s), in the same power of its unit.
     fn value(self, displacement: f64, velocity: f64) -> f64 {
         match self {
             Self::Square => displacement * displacement,
@@ -144,7 +145,7 @@ impl<'a> LikelyMotion<'a> {
         all
     }
 
-    /// Returns the known entries, of each symmetric pair one.
+    /// Returns the known entries, one of each symmetric pair.
     fn known_entries(&self) -> impl Iterator<Item = OmittedTerm> {
         let unknowns = &self.fit.unknowns;
         let known = Parameter::all(unknowns.dof()).filter(move |entry| {
@@ -208,7 +209,7 @@ impl<'a> LikelyMotion<'a> {
         })
     }
 
-    /// Returns the force of a unit of an entry, and of its equal in a symmetric matrix.
+    /// Returns the force of a unit of an entry; in a symmetric matrix, of the mirrored entry, too.
     fn by_entry(&self, entry: Parameter) -> Change {
         let (n, omega) = (self.fit.data.dof(), self.fit.data.omega());
         let (row, column) = (entry.row(), entry.column());
@@ -290,7 +291,7 @@ fn from_one<S: serde::Serializer>(index: &usize, serializer: S) -> Result<S::Ok,
     serializer.serialize_u64(*index as u64 + 1)
 }
 
-/// The same of an index that may be missing.
+/// Serialises an optional index as a number counted from 1.
 #[cfg(feature = "serde")]
 fn maybe_from_one<S: serde::Serializer>(
     index: &Option<usize>,

@@ -31,7 +31,8 @@ enum JointPattern {
 /// The [`ResponseModel`] of a machine.
 ///
 /// With the receptance H₀ of the nominal machine and the change Δ of the dynamic stiffness at the
-/// joints, the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹. The order of this
+/// joints, the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹, the nominal
+/// response x₀, the motion x_g of the support and its column Δ_g of the change. The order of this
 /// system is the number of joints, for any number of known degrees of freedom.
 ///
 /// # Source

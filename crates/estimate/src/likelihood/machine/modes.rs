@@ -65,8 +65,8 @@ impl MachineEstimate {
     }
 }
 
-/// Returns ∂λ/∂θ = −ψᵀ ∂D φ / ψᵀ D′ φ with the left and right vectors of D(λ); `None` for
-/// coincident eigenvalues.
+/// Returns ∂λ/∂θ = −ψᵀ ∂D φ / ψᵀ D′ φ with the left and right eigenvectors ψ and φ of the dynamic
+/// stiffness D(λ) and D′ = dD/dλ; `None` for coincident eigenvalues.
 fn slopes(
     assembly: &Assembly,
     values: &[f64],

@@ -19,7 +19,7 @@ const NOMINAL_LOSS: f64 = 0.05;
 pub(super) struct NominalLine {
     /// Receptance H₀ from the joints to all degrees of freedom of [`Places`], r × j.
     pub(super) from_joints: DMatrix<Complex<f64>>,
-    /// Response of these degrees of freedom to a unit of each load, r × loads.
+    /// Response of the degrees of freedom of [`Places`] to a unit of each load, r × loads.
     pub(super) loads: DMatrix<Complex<f64>>,
     /// Motion of the support per unit of each load.
     pub(super) support: Vec<Complex<f64>>,
@@ -158,7 +158,7 @@ pub(super) fn prepare(
     }
     let solved: Option<Vec<NominalLine>> =
         first_rows.par_iter().map(|row| plan.line(omega[*row], *row)).collect();
-    let failed = || LikelihoodError::NoResponse { at: "the first values" };
+    let failed = || LikelihoodError::NoResponse { at: "the initial values" };
     Ok((solved.ok_or_else(failed)?, lines))
 }
 

@@ -1,9 +1,9 @@
 //! Tables of the documentation that a study computes.
 
 /// Fails unless the rows between two marks of the page on estimators, below their two header lines,
-/// are those computed; a row that is none is not looked at.
+/// equal the computed ones; a row of `None` is not compared.
 ///
-/// With the variable `MECHID_BLESS` set the rows are rewritten instead, from all of them.
+/// With the variable `MECHID_BLESS` set, the rows are rewritten instead, from all computed ones.
 pub fn documented(start: &str, end: &str, computed: &[Option<String>]) {
     let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/book/src/studies/estimators.md");
     let text = std::fs::read_to_string(place).expect("studies/estimators.md");
@@ -23,7 +23,7 @@ pub fn documented(start: &str, end: &str, computed: &[Option<String>]) {
         for (left, right) in printed.split('|').zip(computed.split('|')) {
             let (left, right) = (left.trim(), right.trim());
             match (left.parse::<f64>(), right.parse::<f64>()) {
-                // Other processors round the last digit otherwise.
+                // Other processors may round the last digit differently.
                 (Ok(l), Ok(r)) => {
                     let decimals = left.find('.').map_or(0, |dot| left.len() - dot - 1);
                     let unit = 10f64.powi(-(decimals as i32));

@@ -1,4 +1,4 @@
-//! Closed-form steady states: the judges of the estimators.
+//! Closed-form steady states: the references for the estimators.
 
 pub mod documentation;
 pub mod monte_carlo;

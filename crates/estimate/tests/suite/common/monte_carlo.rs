@@ -1,4 +1,5 @@
-//! Repeated experiments with seeded noise, and the bound no unbiased estimator can beat.
+//! Repeated experiments with seeded noise, and the lower bound of the scatter of unbiased
+//! estimators.
 
 use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{Estimate, Unknowns};
@@ -10,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{displacements, forces, sampling, synthesise};
 
-/// The estimators compared.
+/// Estimators that are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
     LeastSquares,
@@ -18,7 +19,7 @@ pub enum Estimator {
     MaximumLikelihood,
 }
 
-/// A machine driven by a multisine on every line of 256 samples, its displacement noisy.
+/// A machine driven by a multisine on every line of 256 samples, with noise on its displacement.
 pub struct Experiment {
     pub system: SecondOrderSystem,
     pub unknowns: Unknowns,
@@ -30,11 +31,11 @@ pub struct Experiment {
     motion: Record,
 }
 
-/// What an estimator does over many experiments, per parameter.
+/// Results of an estimator over many experiments, per parameter.
 pub struct Scatter {
     pub bias: DVector<f64>,
     pub deviation: DVector<f64>,
-    /// Share of 95 % intervals that hold the true value.
+    /// Share of 95 % intervals that contain the true value.
     pub coverage: DVector<f64>,
 }
 
@@ -88,7 +89,7 @@ impl Experiment {
         DVector::from_iterator(free.len(), free.iter().map(entry))
     }
 
-    /// Runs many experiments, the same ones whatever the number of threads.
+    /// Runs many experiments, the same ones for any number of threads.
     pub fn scatter(&self, estimators: &[Estimator], runs: u64) -> Vec<Scatter> {
         let found: Vec<Vec<Estimate>> = (0..runs)
             .into_par_iter()
@@ -117,10 +118,10 @@ impl Experiment {
         Scatter { bias, deviation: variance.map(f64::sqrt), coverage }
     }
 
-    /// Standard deviations no unbiased estimator can beat, by the Cramér–Rao inequality.
+    /// Smallest standard deviations of unbiased estimators, by the Cramér–Rao inequality.
     ///
     /// Independent of the estimators: sensitivities of the closed-form displacement by central
-    /// differences, white noise of 4 s²/N per line of one of the periods.
+    /// differences, with white noise of 4 s²/N per line of one of the periods.
     pub fn bound(&self) -> DVector<f64> {
         let (truth, omega) = (self.truth(), self.lines.omega());
         let force = forces(self.lines.as_slice(), self.system.dof(), 50.0);
@@ -131,7 +132,7 @@ impl Experiment {
         let size = truth.amax();
         let sensitivities: Vec<_> = (0..truth.len())
             .map(|at| {
-                // Parameters of zero value need a step too.
+                // Parameters whose value is zero need a step, too.
                 let step = 1e-5 * truth[at].abs().max(1e-3 * size);
                 let (mut up, mut down) = (truth.clone(), truth.clone());
                 up[at] += step;

@@ -1,4 +1,5 @@
-//! Where all degrees of freedom are measured the likelihood is that of the estimator of M, C and K.
+//! If all degrees of freedom are measured, the likelihood equals that of the estimator of M, C and
+//! K.
 
 use std::f64::consts::TAU;
 
@@ -26,7 +27,7 @@ fn truth() -> [DMatrix<f64>; 3] {
     ]
 }
 
-/// All twelve entries of M, C and K as one block, starting nearby.
+/// All twelve entries of M, C and K as one block, with initial values near the truth.
 fn machine() -> Machine {
     let start = |matrix: &DMatrix<f64>| {
         [(0, 0), (0, 1), (1, 0), (1, 1)].map(|at: (usize, usize)| {
@@ -59,12 +60,12 @@ fn identified(data: &LineData, quantity: ResponseQuantity) -> LikelihoodEstimate
     identify_machine(data, &machine(), &instruments, &settings).unwrap().likelihood
 }
 
-/// Steps that promise less than 10⁻¹² of the sum of squares end a search, which leaves 10⁻⁶·√(residuals) standard
-/// errors of about 400 residuals.
+/// A predicted decrease below 10⁻¹² of the sum of squares ends a search; this leaves an error of
+/// 10⁻⁶·√(residuals) standard errors for about 400 residuals.
 const SEARCH_END: f64 = 2e-5;
 
-/// Values agree to `tolerance` of the largest entry of the matrix beside what ends a search, standard errors to
-/// 10⁻⁶.
+/// Checks that values agree to `tolerance` of the largest entry of the matrix, in addition to the
+/// end of a search, and standard errors to 10⁻⁶.
 fn check(data: &FrequencyData, likelihood: &LikelihoodEstimate, tolerance: f64) {
     let before = output_error(data, &Unknowns::unknown_mass(2).unwrap()).unwrap();
     let places = [("xx", 0, 0), ("xy", 0, 1), ("yx", 1, 0), ("yy", 1, 1)];
@@ -82,7 +83,7 @@ fn check(data: &FrequencyData, likelihood: &LikelihoodEstimate, tolerance: f64) 
     }
 }
 
-/// The same noisy amplitudes for both, with noise on the forces or none.
+/// The same noisy amplitudes for both estimators, with noise on the forces or without.
 fn both(force_noise: f64, seed: u64) -> (FrequencyData, LineData) {
     let omega: Vec<f64> = (10..=90).map(|line| TAU * 0.5 * f64::from(line)).collect();
     let lines = omega.len();
@@ -123,8 +124,9 @@ fn known_noise_on_forces_and_responses() {
     }
 }
 
-/// The transient of an open record: loads of order 5 on every degree of freedom before, loads of order 1 and
-/// a polynomial of order 3 of every output now, which span the same.
+/// The transient of an open record: one estimator has loads of order 5 on every degree of freedom,
+/// the other loads of order 1 and a polynomial of order 3 for every output; both span the same
+/// space.
 #[test]
 fn open_records() {
     let rig = RandomTest {

@@ -39,7 +39,7 @@ fn data(stiffnesses: &[f64; 5], seed: u64) -> LineData {
     measured(&omega, phases, all.select_columns(&[0, 4]), 0.005, seed)
 }
 
-/// The chain with springs and dampers that start at one value each.
+/// The chain with one initial value for all springs, and one for all dampers.
 fn machine() -> Machine {
     let mut machine = Machine::new(["x1", "x2", "x3", "x4", "x5"]);
     let dofs = machine.dofs.clone();
@@ -74,8 +74,8 @@ pub fn fit(seed: u64, settings: &Settings) -> Option<LikelihoodEstimate> {
     Some(identify_machine(&data, &machine(), &instruments(), settings).ok()?.likelihood)
 }
 
-/// The same with a spring from the last mass to the support, which does not exist: `k >= 0` is active in about
-/// half of the experiments.
+/// The chain with a spring from the last mass to the support, which does not exist: `k >= 0` is
+/// active in about half of the experiments.
 pub fn fit_with_bound(seed: u64) -> Option<LikelihoodEstimate> {
     let free = FreeCoefficient::from_start(1e3).at_least(0.0);
     let machine = machine().with("absent", Element::spring(["x5", "support"], free));
@@ -89,7 +89,8 @@ pub fn truth_with_bound() -> Vec<(String, f64)> {
     [truth(), vec![("absent".into(), 0.0)]].concat()
 }
 
-/// The same with a prior of 1 % on the first spring, `away` of its standard deviations from the truth.
+/// The chain with a prior of 1 % on the first spring, `away` of its standard deviations from the
+/// truth.
 pub fn fit_with_prior(seed: u64, away: f64) -> Option<LikelihoodEstimate> {
     let deviation = 0.01 * STIFFNESSES[0];
     let mut machine = machine();
@@ -109,7 +110,7 @@ fn a_bound_is_active_in_half_of_the_experiments() {
     assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
     let is_active = |seed| fit_with_bound(seed).unwrap().parameter("absent").unwrap().at_bound;
     let active = (0..20).filter(|seed| is_active(*seed)).count();
-    // Of 20 experiments fewer than 4 or more than 16 with a probability of 0.003.
+    // Of 20 experiments, fewer than 4 or more than 16 are active with a probability of 0.003.
     assert!((4..=16).contains(&active), "{active}");
 }
 
@@ -123,12 +124,13 @@ fn a_prior_that_is_wrong_by_five_standard_deviations_is_told() {
     assert!((0..4).all(|seed| p_value(0.5, seed) > 0.01));
 }
 
-/// Of 200 intervals of 95 % fewer than 90 % hold with a probability of 0.002 if they are independent.
+/// Of 200 intervals of 95 %, fewer than 90 % contain the truth with a probability of 0.002 if they
+/// are independent.
 #[test]
 fn intervals_of_springs_and_dampers_hold() {
     let judged = judge(&truth(), 20, |seed| fit(seed, &Settings::default()));
     assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
-    // Of 20 experiments 14 intervals or fewer hold with a probability of 3e-4.
+    // In 20 experiments, 14 intervals or fewer contain the truth with a probability of 3e-4.
     assert!(judged.worst >= 0.7 && judged.worst_scatter < 1.6, "{judged:?}");
     assert!((0.85..1.15).contains(&judged.scatter), "{judged:?}");
 }
@@ -153,7 +155,7 @@ fn the_misfit_is_that_of_the_noise() {
     assert!(estimate.relative_residual.iter().all(|r| (r - 0.005).abs() < 0.001));
 }
 
-/// The modes of the chain that was identified, with their standard errors.
+/// The modes of the identified chain, with their standard errors.
 #[test]
 fn modes_of_the_identified_chain_have_honest_errors() {
     let mass = DMatrix::from_diagonal(&MASSES.to_vec().into());

@@ -73,7 +73,7 @@ fn entries_are_found_where_the_unmeasured_mass_is_known() {
     assert!((0.5..1.6).contains(&mean), "{mean}");
 }
 
-/// The displacement of a mass that no sensor reads may count in any unit.
+/// The displacement of a mass without a sensor may be scaled by any factor.
 #[test]
 fn the_scale_of_an_unmeasured_motion_is_undetermined() {
     let estimate = identified(&chain(), 1);

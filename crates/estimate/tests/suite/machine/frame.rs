@@ -16,11 +16,11 @@ const MASSES: [f64; 2] = [120.0, 100.0];
 const STIFFNESSES: [f64; 2] = [2e5, 1.5e5];
 const DAMPINGS: [f64; 2] = [150.0, 90.0];
 
-/// Delay of the logger of the roof, in s, where it has a clock of its own.
+/// Delay of the logger of the roof, in s, if it has a separate clock.
 const DELAY: f64 = 0.013;
 
-/// Accelerations of the storeys, each relative to the table or absolute, under that of the table; the roof
-/// comes `delay` later (s).
+/// Accelerations of the storeys, each relative to the table or absolute, under the acceleration of
+/// the table; the roof is delayed by `delay` (s).
 fn data(is_relative: [bool; 2], delay: f64, seed: u64) -> LineData {
     let omega: Vec<f64> = (5..=160).map(|line| TAU * 0.1 * f64::from(line)).collect();
     let ground = random_phases(omega.len(), 1, 2000 + seed);
@@ -43,7 +43,7 @@ pub fn fit(is_relative: [bool; 2], seed: u64) -> Option<LikelihoodEstimate> {
     fit_of_clocks(is_relative, None, seed)
 }
 
-/// The same with an unknown delay of the roof between bounds.
+/// The frame with an unknown delay of the roof between bounds.
 fn fit_of_clocks(
     is_relative: [bool; 2],
     delay: Option<FreeCoefficient>,
@@ -88,7 +88,7 @@ pub fn truth() -> Vec<(String, f64)> {
 fn absolute_and_relative_accelerations_give_the_frame() {
     for is_relative in [[false, false], [true, true], [true, false]] {
         let judged = judge(&truth(), 12, |seed| fit(is_relative, seed));
-        // Of 60 intervals of 95 % fewer than 51 hold with a probability of 0.002.
+        // Of 60 intervals of 95 %, fewer than 51 contain the truth with a probability of 0.002.
         assert!(judged.failed == 0 && judged.held >= 0.85, "{is_relative:?} {judged:?}");
         assert!((0.75..1.3).contains(&judged.scatter), "{is_relative:?} {judged:?}");
     }
@@ -100,7 +100,7 @@ fn the_delay_of_a_logger_with_a_clock_of_its_own_is_found() {
     let delay = || FreeCoefficient::from_start(0.0).at_least(-0.05).at_most(0.05);
     let truth = [truth(), vec![("roof.delay".to_owned(), DELAY)]].concat();
     let judged = judge(&truth, 12, |seed| fit_of_clocks([false; 2], Some(delay()), seed));
-    // Of 72 intervals of 95 % fewer than 61 hold with a probability of 0.001.
+    // Of 72 intervals of 95 %, fewer than 61 contain the truth with a probability of 0.001.
     assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
     let error = fit_of_clocks([false; 2], Some(delay()), 0).unwrap();
     assert!(error.parameter("roof.delay").unwrap().standard_error.unwrap() < 1e-4);

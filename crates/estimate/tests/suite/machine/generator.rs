@@ -33,7 +33,7 @@ pub fn responses(
     all
 }
 
-/// Outputs with noise of a share of their root mean square, and data that know its covariance.
+/// Outputs with noise of a share of their root mean square, and data that state its covariance.
 pub fn measured(
     omega: &[f64],
     inputs: DMatrix<Complex<f64>>,

@@ -15,11 +15,11 @@ use super::judge::judge;
 const STIFFNESS: f64 = 5e6;
 const DAMPING: f64 = 40.0;
 
-/// Nodes of each beam.
+/// Number of nodes of each beam.
 const NODES: usize = 9;
 
-/// A free steel beam of a length (m), 20 mm square, on Euler–Bernoulli elements with deflection and slope at each
-/// node, with damping in proportion to stiffness: M, C and K.
+/// M, C and K of a free steel beam of a length (m), 20 mm square, with Euler–Bernoulli elements
+/// (deflection and slope at each node) and damping proportional to stiffness.
 fn beam(length: f64) -> [DMatrix<f64>; 3] {
     let (n, l) = (2 * NODES, length / (NODES - 1) as f64);
     let (area, inertia) = (4e-4, 0.02_f64.powi(4) / 12.0);
@@ -122,7 +122,7 @@ pub fn truth() -> Vec<(String, f64)> {
 #[test]
 fn the_joint_of_two_measured_beams_is_found() {
     let judged = judge(&truth(), 10, fit);
-    // Of 20 intervals of 95 % fewer than 16 hold with a probability of 0.003.
+    // Of 20 intervals of 95 %, fewer than 16 contain the truth with a probability of 0.003.
     assert!(judged.failed == 0 && judged.held >= 0.8, "{judged:?}");
     assert!((0.6..1.5).contains(&judged.scatter) && judged.bias < 4.0, "{judged:?}");
     let estimate = fit(3).unwrap();

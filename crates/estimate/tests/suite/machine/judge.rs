@@ -3,18 +3,18 @@
 use mechid_estimate::likelihood::LikelihoodEstimate;
 use rayon::prelude::*;
 
-/// What intervals and standard errors of many experiments are worth.
+/// Quality of the intervals and standard errors of many experiments.
 #[derive(Debug)]
 pub struct Judged {
     /// Share of the intervals that contain the truth, over all parameters.
     pub held: f64,
-    /// The same of the worst parameter.
+    /// Share of the intervals of the worst parameter that contain the truth.
     pub worst: f64,
     /// Root mean square error over root mean square standard error, over all parameters.
     pub scatter: f64,
-    /// The same of the worst parameter.
+    /// Root mean square error over root mean square standard error of the worst parameter.
     pub worst_scatter: f64,
-    /// Mean error, in standard errors of the mean, of the parameter where it is largest.
+    /// Largest mean error of a parameter, in standard errors of the mean.
     pub bias: f64,
     /// Number of experiments whose search failed.
     pub failed: usize,

@@ -1,4 +1,4 @@
-//! Machines of named elements, judged by generators of their own: exact receptances line by line.
+//! Machines of named elements, compared with separate generators: exact receptances line by line.
 
 mod agreement;
 mod chain;

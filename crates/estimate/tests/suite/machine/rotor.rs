@@ -30,7 +30,7 @@ pub struct Rotor {
 }
 
 impl Rotor {
-    /// With Young's modulus times a factor.
+    /// Creates a rotor with Young's modulus times a factor.
     pub fn new(nodes: usize, modulus_factor: f64) -> Self {
         let n = 4 * nodes;
         let zero = || DMatrix::<f64>::zeros(n, n);
@@ -91,7 +91,8 @@ impl Rotor {
         load: &DVector<Complex<f64>>,
     ) -> DVector<Complex<f64>> {
         let mut dynamic = self.stiffness.zip_zip_map(&self.mass, &self.gyroscopic, |k, m, g| {
-            // 0.2 ms of stiffness-proportional damping of the shaft would be too much; take 2 µs.
+            // 0.2 ms of stiffness-proportional damping of the shaft would be too much; 2 µs is
+            // used.
             Complex::new(k - omega * omega * m, omega * (speed * g + 2e-6 * k))
         });
         for (node, [stiffness, damping]) in self.bearing_nodes().into_iter().zip(BEARINGS) {
@@ -103,7 +104,7 @@ impl Rotor {
         dynamic.lu().solve(load).unwrap()
     }
 
-    /// The machine with bearings that start at one stiffness and damping.
+    /// The machine with equal initial stiffness and damping of all bearings.
     pub fn machine(&self) -> Machine {
         let shaft = MatrixElement::new(
             self.dofs(),
@@ -195,7 +196,8 @@ fn sixteen_coefficients_from_four_probes() {
     let rotor = Rotor::new(13, 1.0);
     let judged =
         judge(&truth(), 6, |seed| Some(fit(&shaken(&rotor, 120, seed), &rotor).ok()?.likelihood));
-    // Coefficients of one experiment err together: 96 intervals say less than so many.
+    // Errors of the coefficients of one experiment are correlated: 96 intervals have less
+    // information than independent ones.
     assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
     assert!((0.75..1.25).contains(&judged.scatter), "{judged:?}");
 }
@@ -209,11 +211,11 @@ fn a_rotor_that_is_too_soft_by_a_percent_shows_in_the_misfit() {
     assert_eq!(estimate.error_scale, ratio.sqrt());
 }
 
-/// Residual unbalance in kg·m, beside the trial weights.
+/// Residual unbalance in kg·m, in addition to the trial weights.
 const RESIDUAL: Complex<f64> = Complex::new(-1e-4, 2e-4);
 
-/// Bearings and residual unbalance from runs with trial weights at eight speeds each: one weight at two places,
-/// and none.
+/// Bearings and residual unbalance from runs at eight speeds each: with one trial weight at each of
+/// two places, and without a weight.
 pub fn fit_unbalance(rotor: &Rotor, seed: u64) -> Option<LikelihoodEstimate> {
     let omega: Vec<f64> = (0..8).map(|at| 100.0 + 60.0 * f64::from(at)).collect();
     let trial = Complex::new(4e-4, 0.0);

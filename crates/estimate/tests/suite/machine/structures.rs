@@ -1,4 +1,5 @@
-//! Shake tables, bounds, priors, what is not determined, measured parts, open records, bad input.
+//! Shake tables, bounds, priors, undetermined parameters, measured parts, open records, wrong
+//! input.
 
 use std::f64::consts::TAU;
 
@@ -43,8 +44,8 @@ fn deviation(estimate: &LikelihoodEstimate, name: &str, truth: f64) -> f64 {
     (parameter.value - truth) / parameter.standard_error.unwrap()
 }
 
-/// Two storeys on a table whose acceleration is the input: the roof reads absolute, the first storey relative
-/// acceleration.
+/// Two storeys on a table whose acceleration is the input: the sensor of the roof measures absolute
+/// acceleration, that of the first storey relative acceleration.
 #[test]
 fn a_frame_on_a_shake_table() {
     let (m, k, c) = ([120.0, 100.0], [2e5, 1.5e5], [150.0, 90.0]);
@@ -84,7 +85,7 @@ fn a_frame_on_a_shake_table() {
     assert!((estimate.misfit_ratio.unwrap() - 1.0).abs() < 0.3);
 }
 
-/// One mass on two springs; the true damper is none.
+/// One mass on two springs; the true machine has no damper.
 fn oscillator(damping: f64, seed: u64) -> LineData {
     let omega = omega(10..=110, 0.25);
     let force = random_phases(omega.len(), 1, seed);
@@ -121,7 +122,7 @@ fn profile_intervals_of_weak_parameters_hold() {
         let omega = omega(10..=60, 0.1);
         let force = random_phases(omega.len(), 1, seed);
         let [m, c, k] = [dmatrix![2.0], dmatrix![5.0], dmatrix![2e4]];
-        // Far below the resonance the damper hardly shows.
+        // Far below the resonance the damper has little effect.
         let data =
             measured(&omega, force.clone(), responses([&m, &c, &k], &omega, &force), 0.06, seed);
         let estimate = identified(&data, &machine, &instruments);
@@ -129,7 +130,7 @@ fn profile_intervals_of_weak_parameters_hold() {
         profiles += usize::from(damper.interval_kind != IntervalKind::Wald);
         held += usize::from((damper.interval[0]..=damper.interval[1]).contains(&5.0));
     }
-    // Fewer than 34 of 40 intervals of 95 % hold with a probability of 0.003.
+    // Of 40 intervals of 95 %, fewer than 34 contain the truth with a probability of 0.003.
     assert!(held >= 34 && profiles >= 35, "{held} {profiles}");
 }
 
@@ -184,7 +185,7 @@ fn springs_in_series_and_side_by_side_are_named() {
     let values = ["k3", "k4"].map(|name| estimate.parameter(name).unwrap().value);
     let sum = values.iter().map(|k| k.recip()).sum::<f64>().recip();
     assert!((sum / 2e4 - 1.0).abs() < 0.01, "{sum}");
-    // A sensor between the springs tells them apart; a second one on the mass does not.
+    // A sensor between the springs separates them; a second one on the mass does not.
     let estimate = identify_machine(&data, &series, &instruments, &Settings::default()).unwrap();
     let candidates = ["x", "between"].map(|dof| Candidate::Sensor(Sensor::new(dof, Displacement)));
     let gains = estimate.rank_candidates(&data, &series, &instruments, &candidates).unwrap();
@@ -303,7 +304,7 @@ fn bad_descriptions_are_refused_by_name() {
     let machine = with_mass().with("k1", foot(free(2e4)));
     let result = identify_machine(&data, &machine, &read(), &settings);
     assert!(matches!(result, Err(LikelihoodError::Setting { name: "confidence", .. })));
-    // Nothing unknown, or sizes that do not fit, are no error of the machine.
+    // A machine without unknowns, and data of wrong size, are not errors of the description.
     let known = with_mass().with("k1", Element::spring(["x", "support"], 2e4));
     let result = identify_machine(&data, &known, &read(), &Settings::default());
     assert_eq!(result.unwrap_err(), LikelihoodError::NoParameter);
@@ -362,7 +363,8 @@ fn noisy_forces_are_allowed_for() {
     assert!((0.5..1.7).contains(&mean), "{mean}");
 }
 
-/// Open records, cut from a far longer period; taken as periods they mislead by far more than the intervals.
+/// Open records, windows of a far longer period; if they are assumed to be periods, the errors are
+/// far larger than the intervals.
 #[test]
 fn open_records_of_one_sensor() {
     let settings = Settings { noise: NoiseSource::WhiteResidual, starts: 1, ..Settings::default() };
@@ -376,7 +378,7 @@ fn open_records_of_one_sensor() {
     let rig = super::open::rig();
     let data: Vec<LineData> = (0..12).map(|seed| super::open::data(&rig, seed, &[1])).collect();
     let mean = data.iter().map(squares).sum::<f64>() / data.len() as f64;
-    // 48 squares of unit mean, of which those of one record err together.
+    // 48 squares of unit mean; those of one record are correlated.
     assert!((0.4..1.9).contains(&mean), "{mean}");
     let errors = |data: &LineData| {
         let estimate = identify_machine(data, &super::open::machine(), &instruments, &settings);

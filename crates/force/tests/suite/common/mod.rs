@@ -95,7 +95,7 @@ impl Mixed {
     }
 }
 
-/// A response of one degree of freedom whose acceleration nobody looks at.
+/// Returns a response of one degree of freedom whose acceleration is not used.
 pub fn response(sampling: Sampling, x: Vec<f64>, v: Vec<f64>) -> Response {
     let record = |c| Record::from_channel(sampling, c).unwrap();
     Response::new(record(x), record(v), record(vec![0.0; sampling.len()])).unwrap()

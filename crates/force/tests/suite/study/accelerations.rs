@@ -1,4 +1,4 @@
-//! Accelerations alone: what is found of a force in the band that they show.
+//! Accelerations alone: the identified force in the band that they show.
 
 use mechid_force::{Measurement, Start, Tuning, kalman, within_band};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
@@ -21,7 +21,7 @@ pub fn row(dof: usize, hz: f64) -> SecondOrderSystem {
     SecondOrderSystem::new(DMatrix::identity(dof, dof) * mass, damping, springs).unwrap()
 }
 
-/// What was found of one record.
+/// Result of one record.
 pub struct Found {
     pub band_hz: [f64; 2],
     /// RMS values of error and force within the band, in N.
@@ -61,7 +61,8 @@ pub fn found(dof: usize, hz: f64, level: f64, seed: u64) -> Found {
     }
 }
 
-/// The table of the book: machines, noise, band, error and coverage over so many records each.
+/// Returns the table of the book: machines, noise, band, error and coverage over this many records
+/// each.
 pub fn table(runs: u64, print: impl Fn(&str)) {
     print("| Masses | Natural frequency | Noise | Shown from | RMS error | in 95 % intervals |");
     print("|---|---|---|---|---|---|");

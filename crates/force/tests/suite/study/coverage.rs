@@ -45,12 +45,12 @@ impl Shape {
     }
 }
 
-/// What a record is of.
+/// Kind of record.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Extent {
     /// A period in steady state, no frequency above the last line of the force.
     Period,
-    /// The same samples, of which nobody knows that they are a period.
+    /// The same samples, but without the information that they are a period.
     Open,
     /// An open record with a force that is linear between its samples.
     Linear,
@@ -87,7 +87,7 @@ pub fn draw(bearing: bool, shape: Shape, level: f64, open: Extent, seed: u64) ->
             let walk: Vec<f64> = walk.collect();
             let last = walk[walk.len() - 1]
                 + 20.0 * noise::white(sampling, 1, 1.0, 7777 + seed).unwrap().channel(0)[0];
-            // Closed to a period by taking out the line from its start to its end.
+            // The line from its start to its end is subtracted, so that it becomes a period.
             let closing = |k: usize| {
                 if open != Extent::Period { 0.0 } else { last * k as f64 / walk.len() as f64 }
             };
@@ -148,7 +148,7 @@ fn unknown(bearing: bool, draw: &Draw, filter: Filter, open: bool) -> Option<Ide
 const TIKHONOV: Filter = Filter::Tikhonov(Rule::Likelihood);
 const TRUNCATED: Filter = Filter::TruncatedSvd(Rule::Likelihood);
 
-/// The methods whose standard error counts all there is, with whether the record is open.
+/// The methods whose standard error covers all errors, and whether the record is open.
 pub const INTERVALS: [Interval; 12] = [
     ("frequency domain, lines known", Extent::Period, |b, s, d| known(b, s, d, None)),
     ("Tikhonov, lines known", Extent::Period, |b, s, d| known(b, s, d, Some(TIKHONOV))),
@@ -179,8 +179,9 @@ pub const INTERVALS: [Interval; 12] = [
     }),
 ];
 
-/// Of so many records: share of samples within 1.96 standard errors of the truth, RMS error over
-/// that of the force, and RMS standard error over RMS error.
+/// Returns three numbers over this many records: the share of samples within 1.96 standard errors
+/// of the truth, the RMS error relative to the RMS force, and the RMS standard error relative to
+/// the RMS error.
 pub fn coverage(
     interval: &Interval,
     bearing: bool,

@@ -153,7 +153,7 @@ fn at_lines(case: &Case, m: &Measurement, lines: &[usize]) -> IdentifiedForce {
     frequency_domain(&case.system, m, &case.forced(), lines, &Noise::Unknown).unwrap()
 }
 
-/// The methods that are told which lines were excited.
+/// The methods that use the list of excited lines.
 pub const KNOWN: [Method; 3] = [
     ("frequency domain, excited lines", |c, m| at_lines(c, m, &c.lines)),
     ("Tikhonov on the excited lines, likelihood", |c, m| {
@@ -170,7 +170,7 @@ pub const KNOWN: [Method; 3] = [
     }),
 ];
 
-/// The methods that are not told.
+/// The methods that do not use it.
 pub const UNKNOWN: [Method; 13] = [
     ("continuous, differences for ẋ and ẍ", |c, m| {
         continuous(&c.system, &differenced(m.record())).unwrap()
@@ -212,14 +212,14 @@ fn parameters(case: &Case) -> Vec<f64> {
     (0..=300).map(|j| 30.0 * gain / size * 10f64.powf(-f64::from(j) / 50.0)).collect()
 }
 
-/// One way of choosing λ, over the best λ there is: mean and worst over the seeds.
+/// Result of one rule for λ relative to the best λ: mean and worst case over the seeds.
 pub struct Ratio {
     pub mean: f64,
     pub worst: f64,
 }
 
-/// What each rule loses against the best parameter: likelihood, GCV, L-curve, and the textbook
-/// corner of the whole L-curve, which is not one of the crate's rules.
+/// Returns the loss of each rule against the best parameter: likelihood, GCV, L-curve, and the
+/// textbook corner of the whole L-curve, which is not one of the crate's rules.
 pub fn rule_ratios(case: &Case, make: fn(Rule) -> Filter) -> [Ratio; 4] {
     let mut ratios: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::new());
     for seed in 1..=SEEDS {
@@ -274,7 +274,7 @@ pub fn known_table() -> String {
     table(&KNOWN, true)
 }
 
-/// The same where the lines are not known.
+/// Returns the same table for unknown lines.
 pub fn unknown_table() -> String {
     table(&UNKNOWN, false)
 }
@@ -296,7 +296,7 @@ fn table(methods: &[Method], floor: bool) -> String {
     out
 }
 
-/// A case, a filter's name and what each rule loses.
+/// A case, the name of a filter, and the loss of each rule.
 pub type RuleRow = (Case, &'static str, [Ratio; 4]);
 
 /// The comparison of the rules.

@@ -1,4 +1,5 @@
-//! Cell arrays and arrays of structs. Judge: SciPy and h5py wrote the files (`data/make_arrays.py`), the numbers stand here.
+//! Cell arrays and arrays of structs. Judge: SciPy and h5py wrote the files
+//! (`data/make_arrays.py`); the numbers are in this test.
 
 use mechid_io::{Quantity, Table, TimeAxis};
 
@@ -51,7 +52,7 @@ fn a_unit_of_a_struct_is_not_that_of_its_time() {
     assert_eq!(table.sampling(&TimeAxis::OfFile, &["one.x"]).unwrap().dt(), 0.25);
 }
 
-/// A MATLAB file of one variable with these elements behind its class, of which `class` is the code.
+/// Returns a MATLAB file of one variable with the class code `class` and these elements after it.
 fn one_variable(class: u32, elements: &[(u32, &[u8])]) -> Vec<u8> {
     let mut variable = Vec::new();
     let flags = [class.to_le_bytes(), 0_u32.to_le_bytes()].concat();
@@ -71,7 +72,7 @@ fn one_variable(class: u32, elements: &[(u32, &[u8])]) -> Vec<u8> {
 
 #[test]
 fn a_timetable_is_refused_with_the_way_to_save_it() {
-    // What the format has for objects: name, kind, class.
+    // The contents of an object in this format: name, kind, class.
     let file = one_variable(17, &[(1, b"T"), (1, b"MCOS"), (1, b"timetable")]);
     let error = Table::parse("a.mat", &file).unwrap().column("T").unwrap_err().to_string();
     assert!(error.contains("a timetable") && error.contains("struct('time'"), "{error}");
@@ -85,7 +86,7 @@ fn structs_that_are_promised_and_not_there_are_refused() {
     let file = one_variable(2, &[(5, &sizes), (1, b"s"), (5, &length), (1, b"x\0")]);
     let error = Table::parse("a.mat", &file).unwrap_err().to_string();
     assert!(error.contains("ends before its elements"), "{error}");
-    // Those without fields hold nothing, however many they are.
+    // Structs without fields have no contents, for any number of them.
     let file = one_variable(2, &[(5, &sizes), (1, b"s"), (5, &length), (1, b"")]);
     let error = Table::parse("a.mat", &file).unwrap().column("s").unwrap_err().to_string();
     assert!(error.contains("nothing"), "{error}");

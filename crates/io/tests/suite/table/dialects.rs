@@ -1,4 +1,5 @@
-//! Decimal signs, quotes, and rows beyond a block. Judge: the csv crate, and Rust's own numbers.
+//! Decimal signs, quotes, and rows longer than a block. Judge: the csv crate, and the number parser
+//! of Rust.
 
 use std::fmt::Write as _;
 
@@ -13,7 +14,7 @@ fn a_file_has_one_decimal_sign() {
         ("t\tf\n0\t999.5\n1\t1,000\n", "f", 3, DecimalSign::Point),
         ("t;f\n0;999.5\n1;1,000\n", "f", 3, DecimalSign::Point),
         ("t f\n0 1,5\n1 2.5\n2 1,5\n", "f", 3, DecimalSign::Comma),
-        // Most numbers of the first lines decide, wherever the others stand.
+        // The majority of the numbers on the first lines decides, for any positions of the others.
         ("version;f;g\n1.2;0,5;1,5\n1.3;0,5;1,5\n", "version", 2, DecimalSign::Comma),
     ] {
         let e = table(text).column(column).unwrap_err();
@@ -37,7 +38,7 @@ fn a_file_has_one_decimal_sign() {
     assert_eq!(table("t;f\n0;1.5\n").format(), "text, fields between semicolons");
 }
 
-/// A text of two million bytes, whose first sign comes late.
+/// A text of two million bytes whose first decimal sign is far from its beginning.
 #[test]
 fn the_decimal_sign_of_a_long_file_is_that_of_its_first_number_with_one() {
     let text = |first: &str, second: &str| {
@@ -65,7 +66,7 @@ fn the_decimal_sign_of_a_long_file_is_that_of_its_first_number_with_one() {
     );
 }
 
-/// Lines that end with a carriage return alone, as programs of long ago wrote them.
+/// Lines that end with a carriage return alone, as some old programs wrote them.
 #[test]
 fn old_line_ends_are_understood() {
     let table = table("t,f\r0,1\r1,2\r");
@@ -136,26 +137,26 @@ fn by_csv(text: &str, delimiter: u8) -> Vec<Vec<Vec<u8>>> {
 }
 
 proptest! {
-    /// Any text of few characters in the second and third of four fields.
+    /// Any text of a few different characters in the second and third of four fields.
     #[test]
     fn fields_are_those_of_the_csv_crate(
         fields in prop::collection::vec("[a,;\" \n#]{0,6}", 2..12),
     ) {
-        // By these the delimiter is detected.
+        // The delimiter is detected from these rows.
         let mut text = "0,0,0,0\n".repeat(9);
         for pair in fields.chunks_exact(2) {
-            // Quoted by hand, rightly or wrongly.
+            // Quoted by hand, correctly or not.
             writeln!(text, "7,{},\"{}\",9", pair[0].replace('\n', ""), pair[1]).unwrap();
         }
         let rows = by_csv(&text, b',');
-        // Others are refused, one as the next.
+        // Other rows are refused by both readers.
         if rows.iter().any(|row| row.len() != 4) {
             return Ok(());
         }
         let table = Table::parse("a.csv", text.as_bytes()).unwrap();
         prop_assert_eq!(table.len(), rows.len());
         for (column, first) in [(1, "1"), (2, "2"), (3, "3"), (4, "4")] {
-            // The first field that is no number is repeated in the error.
+            // The error repeats the first field that is not a number.
             let wrong = rows.iter().map(|row| String::from_utf8(row[column - 1].clone()).unwrap());
             let wrong = wrong.into_iter().find(|field| field.parse::<f64>().is_err());
             match (table.column(&column.to_string()), wrong) {
@@ -169,7 +170,7 @@ proptest! {
         }
     }
 
-    /// What Rust takes for a number is one, to the last bit, and nothing else is.
+    /// Numbers are exactly the texts that Rust accepts, with equal values to the last bit.
     #[test]
     fn numbers_are_those_of_rust(
         fields in prop::collection::vec(
@@ -197,7 +198,7 @@ proptest! {
     }
 }
 
-/// Every bit of every number of a file of several blocks.
+/// Compares every bit of every number of a file of several blocks.
 #[test]
 fn a_long_file_is_read_to_the_last_bit() {
     let value = |k: u64| {

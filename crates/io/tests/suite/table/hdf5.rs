@@ -1,4 +1,5 @@
-//! HDF5 and MATLAB 7.3. Judge: h5py wrote the files (`data/make_hdf5.py`), the numbers stand here.
+//! HDF5 and MATLAB 7.3. Judge: h5py wrote the files (`data/make_hdf5.py`); the numbers are in this
+//! test.
 
 use mechid_io::{IoError, Limits, Quantity, ReadOptions, Table, TimeAxis};
 use proptest::prelude::*;
@@ -40,7 +41,7 @@ fn data_sets_are_columns_with_the_units_and_rates_of_their_attributes() {
     assert_eq!(si("run 1/motion[1]", Quantity::DISPLACEMENT), 1e-3);
     assert_eq!(si("run 1/motion[2]", Quantity::DISPLACEMENT), 1e-6);
     assert!((si("run 2/acc", Quantity::ACCELERATION) - 9.80665).abs() < 1e-12);
-    // A rate beside the data sets, their own time, and a step of their own.
+    // A rate in the group of the data sets, a time column of their own, and a step of their own.
     for names in [&["run 1/force", "run 1/motion[2]"][..], &["run 2/acc"], &["counts"]] {
         let record = table.record(&TimeAxis::OfFile, names).unwrap();
         assert_eq!((record.len(), record.sampling().dt()), (8, 0.25), "{names:?}");
@@ -58,7 +59,7 @@ fn variables_of_matlab_are_columns() {
     assert_eq!(table.column("single").unwrap(), X);
     assert_eq!(table.column("rig.x").unwrap(), X);
     assert_eq!(table.scalars(), [("fs".to_owned(), 4.0)]);
-    // The time of the struct, and that beside it.
+    // The time of the struct, and the time outside it.
     assert_eq!(table.sampling(&TimeAxis::OfFile, &["rig.x"]).unwrap().dt(), 0.5);
     assert_eq!(table.sampling(&TimeAxis::OfFile, &["force"]).unwrap().dt(), 0.25);
 }

@@ -40,7 +40,7 @@ fn a_comment_above_the_table_names_its_columns() {
         );
         assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1.0, "{text}");
     }
-    // No names: another number of words, and numbers.
+    // Comments that are not names: they have another number of words, or numbers.
     for text in [format!("# rig 4\n{ROWS}"), format!("# 1,2,3\n{ROWS}")] {
         assert_eq!(three(&text).names(), ["", "", ""], "{text}");
     }
@@ -126,7 +126,7 @@ fn instants_of_dates_and_clocks_are_a_time_axis() {
     assert!(error.contains("line 3") && error.contains("is not a number"), "{error}");
 }
 
-/// Spells of time that a person reads.
+/// Durations in a form for human readers.
 #[test]
 fn units_of_time_are_read_or_named() {
     for (name, factor) in [

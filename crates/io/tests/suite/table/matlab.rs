@@ -1,4 +1,4 @@
-//! MATLAB files. Judge: SciPy wrote them (`data/make.py`), the numbers stand here.
+//! MATLAB files. Judge: SciPy wrote them (`data/make.py`); the numbers are in this test.
 
 use mechid_io::{IoError, Table, TimeAxis};
 use proptest::prelude::*;
@@ -75,7 +75,7 @@ fn uneven_time_is_refused_with_its_sample() {
     assert!(e.contains("not uniform") && e.contains("up to sample "), "{e}");
 }
 
-/// A file of one variable of doubles, put together by hand; its lengths are of type `kind`.
+/// Returns a file of one variable of doubles, composed by hand; its lengths have the type `kind`.
 fn by_hand(values: &[f64], (kind, lengths): (u32, &[u8]), big: bool) -> Vec<u8> {
     let word = |v: u32| if big { v.to_be_bytes() } else { v.to_le_bytes() };
     let double = |v: &f64| if big { v.to_be_bytes() } else { v.to_le_bytes() };
@@ -134,7 +134,7 @@ fn lengths_that_are_none_are_refused() {
     assert_eq!(table.column("v[2]").unwrap(), [5.0, 6.0, 7.0, 8.0]);
 }
 
-/// A file of vectors, of which the short ones are single numbers.
+/// Returns a file of vectors; those with one entry are single numbers.
 fn of_vectors(vectors: &[(&str, &[f64])]) -> Vec<u8> {
     let lengths = |values: &[f64]| [1, values.len() as u32].map(u32::to_le_bytes).concat();
     let variable = |(name, values): &(&str, &[f64])| {
@@ -162,11 +162,12 @@ fn a_rate_stated_by_its_name_is_the_time_axis() {
         assert_eq!(table.stated_rate(), Some(&(name.to_owned(), value)));
         let record = table.record(&TimeAxis::OfFile, &["x"]).unwrap();
         assert_eq!((record.sampling().dt(), record.len()), (0.25, 3), "{name}");
-        // Who gives another rate knows why.
+        // A rate that the user gives has priority.
         let other = table.record(&TimeAxis::RateHz(8.0), &["x"]).unwrap();
         assert_eq!(other.sampling().dt(), 0.125);
     }
-    // The same twice; a contradiction; nonsense, another number, and a column of instants.
+    // Two equal statements; a contradiction; a nonsensical value, another number, and a column of
+    // instants.
     assert!(of(&[("Fs", &[4.0]), ("dt", &[0.25]), x]).has_time_axis());
     let table = of(&[("Fs", &[5.0]), ("dt", &[0.25]), x]);
     let told = table.record(&TimeAxis::OfFile, &["x"]).unwrap_err().to_string();
@@ -192,7 +193,8 @@ fn other_versions_say_how_to_save() {
         let what = if cfg!(feature = "hdf5") { "HDF5 format error" } else { "save it with -v7" };
         assert!(e.to_string().contains(what), "{e}");
     }
-    // Level 4 has no header: a type, rows, columns, whether complex, and the length of the name.
+    // Level 4 has no header: a type, rows, columns, a flag for complex numbers, and the length of
+    // the name.
     let level_4 = b"\0\0\0\0\x01\0\0\0\x01\0\0\0\0\0\0\0\x02\0\0\0a\0\0\0\0\0\0\0\xf0\x3f";
     let e = Table::parse("a.mat", level_4).unwrap_err().to_string();
     assert!(e.contains("MATLAB level 5 (save with -v7)"), "{e}");
@@ -205,7 +207,7 @@ fn a_file_cut_short_is_refused_wherever_it_ends() {
         let mut complete = 0;
         for end in 20..bytes.len() {
             match Table::parse("a.mat", &bytes[..end]) {
-                // Between two variables nothing tells that there were more.
+                // A file that ends between two variables gives no sign that there were more.
                 Ok(table) => {
                     assert!(table.names().len() < whole, "{name} {end}");
                     complete += 1;

@@ -1,4 +1,4 @@
-//! Tables in every dialect and format, and what is said about those that are wrong.
+//! Tables in every dialect and format, and the messages about wrong ones.
 
 mod arrays;
 mod dialects;
@@ -65,7 +65,7 @@ fn a_name_that_is_a_number_wins_over_the_number() {
     assert_eq!(t.column("1").unwrap(), [6.0]);
 }
 
-/// The shape of the measured benchmark record: empty leading columns, a trailing comma.
+/// The form of the measured benchmark record: empty leading columns and a trailing comma.
 #[test]
 fn leading_columns_with_one_value() {
     let t = table("\"Ovld2\",\"Ovld1\",\"V1\",\"V2\",\n0,0,0.5,1,\n,,-0.5,2,\n");
@@ -104,7 +104,7 @@ fn a_column_is_found_by_its_name_before_the_unit() {
     for (wanted, column) in [("Fy", 2), ("Fx", 3), ("Fx [N]", 1), ("x", 4), ("a", 5), ("Time", 0)] {
         assert_eq!(t.find(wanted).unwrap(), column, "{wanted}");
     }
-    // A name wins over a number, before its unit too.
+    // A name has priority over a number, even without its unit.
     assert_eq!((t.find("2").unwrap(), t.find("3").unwrap()), (6, 2));
     let t = table("F [N],F (kN)\n0,1\n");
     assert_eq!(
@@ -128,7 +128,7 @@ fn units_have_a_factor_to_the_si() {
     );
 }
 
-/// 25.6 kHz with six decimals: steps differ by 2.6 % of one another.
+/// 25.6 kHz with six decimals: the steps differ by up to 2.6 %.
 #[test]
 fn instants_rounded_to_printed_digits_are_uniform() {
     for (decimals, unit) in [(6, ""), (5, ""), (3, "_ms"), (2, " [ms]")] {
@@ -140,7 +140,7 @@ fn instants_rounded_to_printed_digits_are_uniform() {
         let record = t.record(&TimeAxis::Column(&time), &["f"]).unwrap();
         let error = record.sampling().dt() * 25_600.0 - 1.0;
         assert!(error.abs() < 1e-5, "{decimals} {unit}: {error}");
-        // Without one of them they are not.
+        // If one instant is missing, they are not uniform.
         let (before, after) = rows.split_at(rows.match_indices('\n').nth(9_000).unwrap().0 + 1);
         let gap = after.split_once('\n').unwrap().1;
         let t = table(&format!("{time},f\n{before}{gap}"));
@@ -168,7 +168,7 @@ fn time_is_taken_in_the_unit_that_its_name_or_the_line_of_units_says() {
     assert!(
         matches!(e, IoError::NonUniformTime { step, usual, .. } if step == 5e-3 && usual == 2e-3)
     );
-    // One line of units, not two.
+    // One line of units is read, not two.
     let twice = table("t,f\ns,N\nx,y\n0,1\n");
     assert!(matches!(twice.column("f"), Err(IoError::NotANumber { line: 3, .. })));
     assert_eq!(table("speed,f\n0,1\n1,2\n").time_column(), None);
@@ -187,7 +187,7 @@ fn bad_fields_are_named_with_line_and_column() {
         let t = table(&format!("t,f\n0,1\n# a comment counts as a line\n1,{field}\n2,2\n"));
         assert_eq!(t.column("f").unwrap_err().to_string(), message);
     }
-    // Without a semicolon between fields a comma is no decimal comma.
+    // If the fields are not separated by semicolons, a comma is not a decimal comma.
     assert!(table("t;f\n0;1\n1;2,5,5\n").column("f").is_err());
 }
 
@@ -219,7 +219,7 @@ fn utf16_is_read_in_either_byte_order() {
         assert_eq!(table.column("t [µs]").unwrap(), [0.0, 1.0]);
         let e = table.column("κ").unwrap_err().to_string();
         assert_eq!(e, "a.txt, line 3, column 2 \"κ\": \"−\" is not a number");
-        // Cut within the last end of a line: what is left of it belongs to the last field.
+        // The file ends within the last line break: the remaining byte belongs to the last field.
         bytes.pop();
         let e = Table::parse("a.txt", &bytes).unwrap().column("κ").unwrap_err().to_string();
         assert!(e.starts_with("a.txt, line 3, column 2 \"κ\": \"−\\r\u{fffd}\" is not"), "{e}");
@@ -242,7 +242,7 @@ fn read_below(path: &std::path::Path, skip_lines: u64) -> Result<Table, IoError>
     Table::read_with(path, &ReadOptions { skip_lines, ..ReadOptions::default() })
 }
 
-/// What an instrument writes above its table, and below it the same three columns.
+/// Text that an instrument writes above its table, with the same three columns below it.
 const ABOVE: [&str; 3] = [
     "Analyser 7\n",
     "Device: shaker, left\nDate;2024-03-01\n\nChannel 1 2 3\n",
@@ -265,7 +265,7 @@ fn what_stands_above_the_table_is_left_out_when_told() {
             let alone = table(below);
             assert_eq!((told.names(), told.len()), (alone.names(), 3), "{text}");
             assert_eq!(told.column("3").unwrap(), [2.0, 3.0, 1.0]);
-            // Lines are those of the file.
+            // Line numbers are those of the file.
             let mut rows = text.lines().count() as u64;
             assert_eq!(told.position(2).to_string(), format!("line {rows}"));
             std::fs::write(&path, text + "3,4\n").unwrap();
@@ -274,7 +274,7 @@ fn what_stands_above_the_table_is_left_out_when_told() {
             assert!(e.contains(&format!("a.csv, line {rows}: ")), "{e}");
         }
     }
-    // Comments are no such thing, nor is a row that is wrong further down.
+    // Comments, and a wrong row further down, do not count as text above the table.
     assert!(refused("# rig\nt,f\n0,1\n1,2\n3\n").contains("line 5: 1 field where"));
     let path = folder.path().join("a.csv");
     std::fs::write(&path, "t,f\n0,1\n").unwrap();
@@ -291,19 +291,19 @@ fn uneven_time_is_refused_with_its_worst_step() {
     };
     let record = of(&[5.0, 5.1, 5.2, 5.3]).unwrap();
     assert!((record.sampling().dt() - 0.1).abs() < 1e-12, "rounding of 5.3 − 5");
-    // The mean step stays right however the printed times are rounded.
+    // The mean step stays right for any rounding of the printed times.
     assert!((of(&[0.0, 0.333, 0.667, 1.0]).unwrap().sampling().dt() - 1.0 / 3.0).abs() < 1e-12);
     let e = of(&[0.0, 1.0, 2.0, 3.5, 4.75]).unwrap_err();
     assert!(
         e.to_string().starts_with(
-            "a.csv: the time steps are not uniform: 1.5 s up to line 5, where the usual step is 1.25 s"
+            "a.csv: the time steps are not uniform: the step up to line 5 is 1.5 s, the usual step 1.25 s"
         ),
         "{e}"
     );
     assert!(e.to_string().contains("resample the record"), "{e}");
-    // A second run behind the first one, whose time starts again.
+    // A second run after the first one, whose time starts again.
     let e = of(&[0.0, 1.0, 2.0, 0.0, 1.0, 2.0]).unwrap_err().to_string();
-    assert!(e.contains("-2 s up to line 5") && e.contains("second record was appended"), "{e}");
+    assert!(e.contains("the step up to line 5 is -2 s") && e.contains("had been appended"), "{e}");
     assert!(!e.contains("resample"), "{e}");
     for times in
         [&[0.0, 1.0, 0.5, 1.5][..], &[0.0, 0.0, 0.0], &[2.0, 1.0, 0.0], &[-1.7e308, 1.7e308]]
@@ -318,7 +318,7 @@ fn uneven_time_is_refused_with_its_worst_step() {
     }
 }
 
-/// Text that looks like a table more often than random bytes do.
+/// Text that resembles a table more often than random bytes do.
 fn tables() -> impl Strategy<Value = String> {
     let field = prop_oneof![
         Just(String::new()),

@@ -83,7 +83,7 @@ fn damage_is_an_error_and_no_panic() {
     for at in (0..whole.len()).step_by(97) {
         let mut damaged = whole.clone();
         damaged[at] ^= 0x55;
-        // Read or refused: a flipped bit of a number is not found.
+        // The file is read or refused: a flipped bit of a number cannot be detected.
         let _ = Table::parse("a", &damaged);
     }
     // The name of a column in a text.
@@ -163,7 +163,7 @@ fn records_of_a_file_are_read_together_and_alone_alike() {
         let alone = file.tables(None, std::slice::from_ref(record)).unwrap().swap_remove(0);
         let rows = record.rows.clone();
         assert_eq!(alone.column("x").unwrap(), &written("x")[rows.clone()]);
-        // Instants count from the first of the record, whatever is read with it.
+        // Instants count from the first one of the record, whichever records are read together.
         let first = written("stamp")[rows.start];
         for (read, stamp) in
             table.column("stamp").unwrap().iter().zip(&written("stamp")[rows.clone()])
@@ -171,7 +171,7 @@ fn records_of_a_file_are_read_together_and_alone_alike() {
             assert!((read - (stamp - first)).abs() < 1e-12, "{read}");
         }
         assert_eq!(table.column("stamp").unwrap(), alone.column("stamp").unwrap());
-        // What is not finite in one record is in the way of that one only.
+        // A value that is not finite affects only its own record.
         match (record.id.as_str(), table.column("force")) {
             ("pump 2", force) => {
                 let error = force.unwrap_err().to_string();
@@ -194,7 +194,7 @@ fn damage_of_a_file_of_many_records_is_an_error_and_no_panic() {
         let mut damaged = whole.clone();
         damaged[at] ^= 0x55;
         fs::write(&path, &damaged).unwrap();
-        // Read or refused: a flipped bit of a number is not found.
+        // The file is read or refused: a flipped bit of a number cannot be detected.
         let read = ParquetFile::open(&path, &Limits::default()).and_then(|file| {
             let records = file.records("machine")?;
             file.tables(None, &records).map(drop)
@@ -210,7 +210,7 @@ fn with_footer(footer: &[u8]) -> Vec<u8> {
     [b"PAR1\x15\x00", footer, &len, b"PAR1"].concat()
 }
 
-/// The decoder reserves what the schema claims, and descends as deep as it is nested.
+/// The decoder allocates the memory that the schema claims, and recurses as deep as it is nested.
 #[test]
 fn a_schema_that_claims_more_than_it_has_is_refused() {
     let element = |children: &[u8]| [&[0x48, 0x01, b'r', 0x15], children, &[0x00]].concat();
@@ -226,12 +226,12 @@ fn a_schema_that_claims_more_than_it_has_is_refused() {
     // A root of 2³¹ − 1 children, which would take 17 GB.
     let root = forged(&[element(&[0xfe, 0xff, 0xff, 0xff, 0x0f])], &[0x01]);
     assert_eq!(refused(&root), "its footer contradicts its length");
-    // A hundred thousand groups in each other, which would take the whole stack.
+    // A hundred thousand nested groups, which would exhaust the stack.
     let nested = forged(&vec![element(&[0x02]); 100_000], &[0xa0, 0x8d, 0x06]);
     assert_eq!(refused(&nested), "its footer contradicts its length");
 }
 
-/// Constant columns take next to nothing in a file.
+/// Constant columns take hardly any space in a file.
 #[test]
 fn memory_has_a_limit_by_the_size_of_the_file() {
     use parquet::data_type::DoubleType;
@@ -262,7 +262,8 @@ fn memory_has_a_limit_by_the_size_of_the_file() {
     }
 }
 
-/// Sixty thousand columns were read in a time that grew with their square: 18 s.
+/// An earlier version read sixty thousand columns in a time that grew with the square of their
+/// number: 18 s.
 #[test]
 fn many_columns_are_read_in_a_time_that_grows_with_their_number() {
     let read = |count: usize| {
@@ -278,6 +279,6 @@ fn many_columns_are_read_in_a_time_that_grows_with_their_number() {
         begun.elapsed().as_secs_f64()
     };
     let (few, many) = (read(2_000), read(40_000));
-    // Twenty times as many: a square would be four hundred times.
+    // Twenty times as many columns: quadratic growth would give a factor of four hundred.
     assert!(many < 100.0 * few.max(1e-3), "{few} s, {many} s");
 }

@@ -1,4 +1,4 @@
-//! A file read again and again says what the table in memory says.
+//! A file that is read repeatedly gives the same results as the table in memory.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -9,10 +9,10 @@ use proptest::prelude::*;
 
 const TIME: TimeAxis<'_> = TimeAxis::Column("t");
 
-/// One line stands above the table.
+/// Options for a text with one line above the table.
 const BELOW: ReadOptions = ReadOptions { skip_lines: 1, limits: Limits::DEFAULT };
 
-/// A text of so many rows with a comment and an empty line now and then, in a folder.
+/// Writes a text into a folder.
 fn written(text: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.csv");
@@ -32,7 +32,7 @@ fn text(rows: usize) -> String {
     text
 }
 
-/// Both ways to read a file.
+/// Opens a file in both ways: completely in memory, and read in blocks.
 fn both(path: &PathBuf) -> [RecordFile; 2] {
     let files = [usize::MAX, 3].map(|held| RecordFile::open(path, &BELOW, held).unwrap());
     assert!(files[0].is_whole() && !files[1].is_whole());
@@ -96,7 +96,7 @@ fn surveys_and_tables_agree() {
 
 #[test]
 fn what_is_wrong_is_said_in_the_same_words() {
-    // Beyond the first rows that are taken at a time.
+    // More rows than are read at a time.
     let good = text(9001);
     let replaced = |from: &str, to: &str| {
         assert!(good.contains(from), "{from}");
@@ -146,7 +146,7 @@ fn a_block_begins_where_it_is_told_to() {
         assert_eq!(at(0..20, 8, 8), [(1.0, 8), (9.0, 8), (17.0, 4)]);
         assert_eq!(at(4..12, 4, 4), [(5.0, 4), (9.0, 4)]);
         assert_eq!(at(0..20, 50, 50), [(1.0, 20)]);
-        // Only rows that were seen are left at the end, or one that was not.
+        // The last block has only rows that were passed before, or a new one.
         assert_eq!(at(0..9, 5, 4), [(1.0, 5), (5.0, 5)]);
         assert_eq!(at(0..10, 5, 4), [(1.0, 5), (5.0, 5), (9.0, 2)]);
     }
@@ -170,13 +170,13 @@ proptest! {
     ) {
         let (_folder, path) = written(&text(9201));
         let advance = 1 + (share * (rows - 1) as f64) as usize;
-        // Short advances of long blocks take long and show nothing more.
+        // Short advances of long blocks take much time and test no more.
         prop_assume!(len / advance < 500);
         let [whole, part] = both(&path);
         let window = start..start + len;
         let expected = blocks(&whole, window.clone(), rows, advance).unwrap();
         prop_assert_eq!(&blocks(&part, window.clone(), rows, advance).unwrap(), &expected);
-        // Every sample once, where blocks follow one another.
+        // If the blocks do not overlap, every sample is passed once.
         if advance == rows {
             prop_assert_eq!(expected.iter().map(DMatrix::nrows).sum::<usize>(), len);
         }

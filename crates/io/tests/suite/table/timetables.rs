@@ -1,4 +1,5 @@
-//! Timetables of MATLAB 7.3. Judge: mat-io wrote the file (`data/make_timetable.py`), the numbers stand here.
+//! Timetables of MATLAB 7.3. Judge: mat-io wrote the file (`data/make_timetable.py`); the numbers
+//! are in this test.
 
 use mechid_io::{Quantity, Table, TimeAxis};
 use proptest::prelude::*;
@@ -16,7 +17,7 @@ fn variables_of_timetables_are_columns_with_the_times_of_their_rows() {
         assert_eq!(table.column(&x).unwrap(), X);
         let record = table.record(&TimeAxis::OfFile, &[force, x]).unwrap();
         let dt = record.sampling().dt();
-        // mat-io itself writes dates to 0.25 µs.
+        // mat-io writes dates with a resolution of 0.25 µs.
         let digits = if rows == "dates" { 1e-6 } else { 1e-12 };
         assert!(record.len() == 8 && (dt - 0.25).abs() < digits, "{rows}: {dt}");
     }

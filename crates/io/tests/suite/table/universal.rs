@@ -1,4 +1,4 @@
-//! Universal files. Judge: pyuff wrote them (`data/make.py`), the numbers stand here.
+//! Universal files. Judge: pyuff wrote them (`data/make.py`); the numbers are in this test.
 
 use mechid_io::{IoError, Table, TimeAxis};
 use proptest::prelude::*;
@@ -51,7 +51,7 @@ fn single_precision_is_read_printed_and_binary() {
 #[test]
 fn what_is_no_real_function_of_time_is_refused() {
     for table in both() {
-        // The name asks for the response; the frequency response function has another one.
+        // The name belongs to the response; the frequency response function has another one.
         let e = table.column("12+Z/1-X").unwrap_err().to_string();
         assert!(e.contains("it holds a frequency response function, a channel needs"), "{e}");
         let e = table.column("3").unwrap_err().to_string();
@@ -89,7 +89,7 @@ fn a_binary_dataset_with_a_misplaced_number_is_told() {
     }
 }
 
-/// The printed file with a text replaced by another one of its length.
+/// Returns the printed file with a text replaced by another one of the same length.
 fn with(what: &str, by: &str, nth: usize) -> Vec<u8> {
     assert_eq!(what.len(), by.len());
     let text = std::str::from_utf8(PRINTED).unwrap();
@@ -125,7 +125,7 @@ fn other_files_have_no_time_axis_of_their_own() {
     assert!(matches!(e, IoError::NoTimeAxis { .. }), "{e}");
 }
 
-/// Fortran fills its fields: numbers may touch, and double precision has a D.
+/// Fortran fills its fields: numbers may touch, and double precision uses a D.
 #[test]
 fn touching_numbers_and_fortran_exponents() {
     let rows = "  -3.00000000000e+00  -2.00000000000e+00   1.00000000000e+00  -1.00000000000e+00";
@@ -205,7 +205,7 @@ proptest! {
     }
 }
 
-/// By the standard the instants are single precision among double values; pyuff writes doubles.
+/// The standard requires single-precision instants with double values; pyuff writes doubles.
 #[test]
 fn narrow_instants_among_wide_values() {
     let pairs = |narrow: bool| -> Vec<u8> {

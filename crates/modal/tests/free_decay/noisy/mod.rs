@@ -1,5 +1,5 @@
-//! Free decays that are known exactly, and what the estimator makes of them under noise: the number of
-//! modes, the coverage of its intervals, and its scatter over the Cramér–Rao bound.
+//! Exactly known free decays under noise: number of modes, coverage of the intervals, and scatter
+//! relative to the Cramér–Rao bound.
 
 use std::f64::consts::TAU;
 
@@ -10,11 +10,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Samples of a record.
+/// Number of samples of a record.
 const LEN: usize = 1000;
 /// Time step, in s.
 const DT: f64 = 0.002;
-/// Least amplitude of a mode, all channels together, over its standard error by the bound.
+/// Minimum ratio of the amplitude of a mode, over all channels, to its standard error at the bound.
 const VISIBLE: f64 = 10.0;
 /// Coefficient of coloured noise.
 const COLOUR: f64 = 0.9;
@@ -24,15 +24,15 @@ const COLOUR: f64 = 0.9;
 pub struct Case {
     pub modes: usize,
     pub channels: usize,
-    /// Deviation of the noise over the RMS of each channel.
+    /// Ratio of the standard deviation of the noise to the RMS of each channel.
     pub noise: f64,
-    /// Whether the noise is x_k = 0.9 x_{k−1} + e_k, not white.
+    /// `true` for the noise x_k = 0.9 x_{k−1} + e_k, `false` for white noise.
     pub coloured: bool,
-    /// Whether the two modes are one to two half-power bandwidths apart.
+    /// `true` if the two modes are one to two half-power bandwidths apart.
     pub close: bool,
 }
 
-/// What came out of many experiments.
+/// Results of many experiments.
 #[derive(Debug, Clone, Default)]
 pub struct Outcome {
     pub runs: usize,
@@ -40,9 +40,11 @@ pub struct Outcome {
     pub too_many: usize,
     /// Errors over the standard deviation of the bound: of frequencies and damping ratios.
     pub errors: [Vec<f64>; 2],
-    /// Intervals that hold the truth, and all: of frequencies, damping ratios and parts of shapes.
+    /// Number of intervals that contain the truth, and of all: of frequencies, damping ratios and
+    /// parts of shapes.
     pub held: [[usize; 2]; 3],
-    /// Residuals tested; those that are not white, and those larger at the beginning, with p < 0.01.
+    /// Number of tested residuals; those that are not white, and those larger at the beginning,
+    /// with p < 0.01.
     pub tested: usize,
     pub alarms: [usize; 2],
 }
@@ -69,7 +71,7 @@ impl Case {
         format!("{modes}, {channels}, {:.1} % {noise}", 100.0 * self.noise)
     }
 
-    /// Runs seeded experiments, each with a response of its own.
+    /// Runs seeded experiments, each with a different response.
     pub fn run(&self, runs: usize) -> Outcome {
         let all: Vec<Outcome> =
             (0..runs as u64).into_par_iter().map(|seed| self.experiment(seed)).collect();
@@ -123,8 +125,8 @@ impl Case {
         outcome
     }
 
-    /// A response all of whose modes can be seen, its samples, the deviation of its noise, and the bounds
-    /// of frequency (Hz) and damping ratio of each mode.
+    /// A response whose modes are all visible, its samples, the standard deviation of its noise,
+    /// and the bounds of frequency (Hz) and damping ratio of each mode.
     fn visible(&self, rng: &mut ChaCha8Rng) -> (Truth, DMatrix<f64>, Vec<f64>, Vec<[f64; 2]>) {
         loop {
             let truth = self.draw(rng);
@@ -180,10 +182,10 @@ impl Truth {
         })
     }
 
-    /// Bounds of frequency and damping ratio of each mode; `None` if one is too weak to be seen.
+    /// Bounds of frequency and damping ratio of each mode; `None` if one is too weak to be visible.
     ///
-    /// From the information of all samples on the real parameters σ, ω of each mode and, of each channel,
-    /// real and imaginary part of each amplitude and the constant.
+    /// They follow from the information of all samples about the real parameters: σ and ω of each
+    /// mode and, for each channel, the real and imaginary part of each amplitude and the constant.
     fn bound(&self, levels: &[f64], coloured: bool) -> Option<Vec<[f64; 2]>> {
         let (modes, channels) = self.amplitude.shape();
         let (poles, own) = (2 * modes, 2 * modes + 1);
@@ -204,7 +206,7 @@ impl Truth {
                 rows[(k, poles + 2 * modes)] = 1.0;
             }
             for mut column in rows.column_iter_mut().filter(|_| coloured) {
-                // Prediction errors of noise of unit variance.
+                // Standard deviation of the prediction errors, for noise of unit variance.
                 let error = (1.0 - COLOUR * COLOUR).sqrt();
                 for k in (1..LEN).rev() {
                     column[k] = (column[k] - COLOUR * column[k - 1]) / error;
@@ -276,7 +278,7 @@ impl Truth {
     }
 }
 
-/// Half the width of a 95 % interval in standard errors, of many degrees of freedom.
+/// Half the width of a 95 % interval in standard errors, for many degrees of freedom.
 fn student(degrees_of_freedom: usize) -> f64 {
     1.96 + 2.4 / degrees_of_freedom as f64
 }
@@ -297,7 +299,7 @@ pub fn noise(rng: &mut ChaCha8Rng, coloured: bool) -> Vec<f64> {
     x
 }
 
-/// Number of records of noise alone in which modes are found.
+/// Number of records of noise alone in which modes are identified.
 pub fn found_in_noise(channels: usize, coloured: bool, runs: u64) -> usize {
     let found = |seed: &u64| {
         let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
@@ -314,12 +316,13 @@ impl Outcome {
         100.0 * (1.0 - (self.too_few + self.too_many) as f64 / self.runs as f64)
     }
 
-    /// Share of the intervals that hold the truth, in %: of frequency, damping ratio and shape.
+    /// Share of the intervals that contain the truth, in %: of frequency, damping ratio and shape.
     pub fn coverage(&self) -> [f64; 3] {
         self.held.map(|[held, all]| 100.0 * held as f64 / all as f64)
     }
 
-    /// Share of the residuals that are not white, and that are larger at the beginning, in %.
+    /// Share of the residuals that are not white, and of those that are larger at the beginning, in
+    /// %.
     pub fn alarm_rates(&self) -> [f64; 2] {
         self.alarms.map(|alarms| 100.0 * alarms as f64 / self.tested as f64)
     }

@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{Covariances, sample_cost, window};
 
-/// Covariances of lines in rising order of frequency, whose neighbours are summed.
+/// Covariances of lines in rising order of frequency, prepared for sums over neighbours.
 pub(super) struct Neighbours {
     /// Entries of each covariance, entries × lines.
     samples: DMatrix<Complex<f64>>,
@@ -23,9 +23,9 @@ impl Neighbours {
         Self { samples, channels }
     }
 
-    /// Returns the sum of `count` consecutive covariances from each line on. The sums are combined
-    /// from sums of 1, 2, 4 … lines according to the binary digits of `count`: subtraction of
-    /// running sums would lose digits.
+    /// Returns, for each line, the sum of the `count` consecutive covariances that begin with it.
+    /// The sums are combined from sums of 1, 2, 4 … lines according to the binary digits of
+    /// `count`: subtraction of running sums would lose digits.
     fn sums(&self, count: usize) -> DMatrix<Complex<f64>> {
         let lines = self.samples.ncols();
         let mut total = DMatrix::zeros(self.samples.nrows(), lines + 1 - count);
@@ -80,8 +80,8 @@ impl Neighbours {
         Some(cost)
     }
 
-    /// Returns the sums of the covariances before each line of a range, and from each line of the
-    /// range on.
+    /// Returns two sums for each line of a range: of the covariances before it within the range,
+    /// and of its covariance and those after it.
     fn ends(&self, range: Range<usize>) -> [DMatrix<Complex<f64>>; 2] {
         let (count, samples) = (range.len(), self.samples.columns_range(range));
         let [mut before, mut from] = [(); 2].map(|()| DMatrix::zeros(samples.nrows(), count + 1));

@@ -9,7 +9,7 @@ use crate::limits::{
     HEIGHT_TOLERANCE, PEAK_REACH, QUIET_DEVIATIONS, SMOOTH_FLOOR,
 };
 
-/// Shape that is added to the log powers around a line, times an unknown height.
+/// Shape that, multiplied by an unknown height, is added to the log powers around a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bump {
     shape: Shape,
@@ -21,11 +21,12 @@ pub(crate) struct Bump {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shape {
-    /// Equal on all lines.
+    /// Equal height on all lines of the bump.
     Flat,
-    /// Linear from the middle to both ends.
+    /// Height that decreases linearly from the middle to both ends.
     Tent,
-    /// ln(1 + A/(1 + x²)), with x = 1 at a distance of `half_width` lines: a resonance on a floor.
+    /// Height ln(1 + A/(1 + x²)), with x = 1 at a distance of `half_width` lines: a resonance on a
+    /// floor.
     Peak { above_floor: f64, half_width: f64 },
 }
 
@@ -104,7 +105,7 @@ impl Bump {
         }
     }
 
-    /// Returns the lines on which it has at least half its height.
+    /// Returns the lines on which the bump has at least half its height.
     pub(super) fn band(&self, lines: usize) -> Range<usize> {
         let half = match self.shape {
             Shape::Flat => self.reach - 0.5,
@@ -119,7 +120,7 @@ impl Bump {
         first.min(nearest)..(last.max(nearest) + 1).min(lines)
     }
 
-    /// Returns the lines on which it is not zero.
+    /// Returns the lines on which the bump is not zero.
     fn support(&self, lines: usize) -> Range<usize> {
         let first = (self.middle - self.reach).ceil().max(0.0) as usize;
         first..((self.middle + self.reach).floor() as usize + 1).min(lines)
@@ -170,9 +171,9 @@ pub(super) fn most_conspicuous(
     Some(best).filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
 }
 
-/// Gains of flat bumps, as reductions of Σ log p + v/p.
+/// Gains of flat bumps, as reductions of Σ log p + v/p with the fitted power p and the variance v.
 struct FlatGains {
-    /// Cumulative sums of the levels v/p, lines + 1 × channels: they give the mean of any band.
+    /// Cumulative sums of the levels v/p, (lines + 1) × channels: they give the mean of any band.
     below: DMatrix<f64>,
     nu: f64,
 }
@@ -248,8 +249,9 @@ impl Gained {
     }
 }
 
-/// Fits the height of a bump with the shape `parts` on the levels v/p `inside`, and returns the
-/// reduction of Σ log p + v/p; the levels of all other lines have the sum `outside`.
+/// Fits the height of a bump whose shape has the values `parts` on its lines with the levels v/p
+/// `inside`, and returns the reduction of Σ log p + v/p; the levels of all other lines have the sum
+/// `outside`.
 fn raised(
     parts: &[f64],
     inside: &[f64],

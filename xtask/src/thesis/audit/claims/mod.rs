@@ -70,12 +70,12 @@ impl FromIterator<bool> for Tally {
     }
 }
 
-/// The outcome of a claim's tests.
+/// Results of the tests of a claim.
 #[derive(Debug, Clone)]
 pub struct Finding {
-    /// Passed tests.
+    /// Numbers of passed tests and of all tests.
     pub tally: Tally,
-    /// The numbers behind it.
+    /// Numbers behind the verdict, in words.
     pub numbers: String,
 }
 
@@ -104,7 +104,7 @@ pub enum Support {
     Tables,
     /// Figures without numbers: the computation with every slip replayed is judged.
     Figures,
-    /// No printed evidence: likewise.
+    /// No printed evidence: the computation with every slip replayed is judged.
     Nothing,
 }
 
@@ -146,7 +146,7 @@ const GROUPS: [(&str, &[Claim]); 8] = [
     ("Appendices B and E, general conclusions (6.1)", general::CLAIMS),
 ];
 
-/// Every claim, judged twice.
+/// Returns every claim with both verdicts.
 ///
 /// # Errors
 /// The message of the first rerun that fails.
