@@ -1,7 +1,7 @@
 //! Comparison of two sets of modes: a structure before and after a change, or a test and a
 //! finite-element model.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,6 +25,15 @@ pub struct Measured {
     pub value: f64,
     /// Standard error, in the unit of the value.
     pub standard_error: f64,
+    /// Degrees of freedom of the variance behind the standard error; infinite if it is exact.
+    pub degrees_of_freedom: f64,
+}
+
+impl Measured {
+    /// Creates a value with an exact standard error.
+    pub fn new(value: f64, standard_error: f64) -> Self {
+        Self { value, standard_error, degrees_of_freedom: f64::INFINITY }
+    }
 }
 
 /// Mode to be compared.
@@ -188,11 +197,22 @@ pub fn compare(
     })
 }
 
+/// Returns the difference of two values with its two-sided test.
+///
+/// # Source
+/// Welch (1947), Biometrika 34, 28–35, with the degrees of freedom of Satterthwaite.
 fn difference(first: Measured, second: Measured) -> Difference {
     let value = second.value - first.value;
     let standard_error = first.standard_error.hypot(second.standard_error);
     let tested = standard_error > 0.0 && standard_error.is_finite();
-    let p_value = tested.then(|| 2.0 * Normal::standard().sf((value / standard_error).abs()));
+    let part =
+        |one: Measured| (one.standard_error / standard_error).powi(4) / one.degrees_of_freedom;
+    let freedom = 1.0 / (part(first) + part(second));
+    let tail = |size: f64| match StudentsT::new(0.0, 1.0, freedom) {
+        Ok(student) if freedom.is_finite() => student.sf(size),
+        _ => Normal::standard().sf(size),
+    };
+    let p_value = tested.then(|| 2.0 * tail((value / standard_error).abs()));
     Difference { value, standard_error, p_value, adjusted_p_value: p_value }
 }
 
@@ -251,7 +271,7 @@ mod tests {
 
     fn mode(f: f64, zeta: f64, shape: &[f64], error: f64) -> ComparedMode {
         let entries = DVector::from_iterator(shape.len(), shape.iter().map(|v| (*v).into()));
-        let measured = |value: f64| Measured { value, standard_error: error * value };
+        let measured = |value: f64| Measured::new(value, error * value);
         ComparedMode {
             natural_frequency_hz: measured(f),
             damping_ratio: Some(measured(zeta)),
@@ -296,9 +316,8 @@ mod tests {
             let mut mode = |f: f64, shape: &[f64; 3]| {
                 let entries = shape.map(|v| Complex::new(v + error * normal(), error * normal()));
                 let shape = DVector::from_row_slice(&entries);
-                let measured = |value: f64, noise: f64| Measured {
-                    value: value * (1.0 + error * noise),
-                    standard_error: error * value,
+                let measured = |value: f64, noise: f64| {
+                    Measured::new(value * (1.0 + error * noise), error * value)
                 };
                 ComparedMode {
                     natural_frequency_hz: measured(f, normal()),

@@ -31,9 +31,9 @@ type C = Complex<f64>;
 pub(crate) struct Covariance {
     /// Covariance of the parameters of the search.
     pub(crate) parameters: DMatrix<f64>,
-    /// Number of observations in the noise estimate of a line: real and imaginary parts in its
-    /// window.
-    pub(crate) degrees_of_freedom: usize,
+    /// Degrees of freedom of the noise estimate at each mode: real and imaginary parts in the window
+    /// of a line, or fewer with an unmeasured force.
+    pub(crate) degrees_of_freedom: Vec<usize>,
     /// A⁺ C, the change of the linear unknowns of the modes with the parameters, `2m × parameters`.
     unknowns_by_parameter: DMatrix<f64>,
     /// Covariance of the linear unknowns of the modes due to the sensor noise of each output,
@@ -92,7 +92,9 @@ impl Covariance {
         let unknowns_by_parameter = DMatrix::from_fn(2 * modes, size, |row, column| {
             unknowns_by_parameter[column * columns + row]
         });
-        let degrees_of_freedom = 2 * noise_window(lines) * outputs;
+        let of_sensors = 2 * noise_window(lines) * outputs;
+        let of_mode = |of_force: &f64| of_sensors.min((*of_force).max(1.0) as usize);
+        let degrees_of_freedom = noise.process_freedom.iter().map(of_mode).collect();
         Some(Self {
             parameters,
             degrees_of_freedom,
@@ -163,7 +165,7 @@ impl Covariance {
     ) -> ModeParameters {
         let (outputs, inputs) = (shape.len(), fit.lines.inputs());
         let (values, covariance) = self.joint(fit, &[(mode, shape)]);
-        let (gauge, degrees_of_freedom) = (fit.model.gauge[mode], self.degrees_of_freedom);
+        let (gauge, degrees_of_freedom) = (fit.model.gauge[mode], self.degrees_of_freedom[mode]);
         ModeParameters { outputs, inputs, gauge, values, covariance, degrees_of_freedom }
     }
 

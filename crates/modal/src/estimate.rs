@@ -121,6 +121,7 @@ impl ModalEstimate {
         let measured = |value: Uncertain| Measured {
             value: value.value,
             standard_error: value.standard_error,
+            degrees_of_freedom: value.degrees_of_freedom as f64,
         };
         let compared = |(mode, parameters): (&IdentifiedMode, &ModeParameters)| {
             let shape = parameters.shape_with_covariance()?;

@@ -17,6 +17,7 @@
 //! | covariance of poles, participations and shapes | `covariance.rs`, `scores.rs`, `mode_parameters.rs` |
 //! | real shapes, reciprocity | `constraint.rs` |
 //! | number of modes: candidates, likelihood, rules | `order.rs`, `rules.rs` |
+//! | agreement of two parts of the data | `parts.rs` |
 //! | frequency responses with their covariance | `modal_model.rs` |
 //! | prediction of other records | `estimate.rs`, `synthesis.rs` |
 
@@ -41,6 +42,7 @@ mod model;
 mod noise;
 mod normal;
 mod order;
+mod parts;
 pub mod plscf;
 mod projection;
 mod residues;
@@ -62,3 +64,4 @@ pub use initial_poles::{initial_mode_count, stabilisation_of};
 pub use modal_model::{ModalGroup, ModalModel, ModalTerm};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode};
 pub use model::ResidualPowers;
+pub use parts::PartsComparison;

@@ -77,7 +77,8 @@ pub const TWIN_HALF_WIDTHS: f64 = 1.0;
 /// Distance from an edge of the band, in half-widths, below which a mode is reported as near the
 /// edge.
 pub const EDGE_HALF_WIDTHS: f64 = 3.0;
-/// Significance level of the test that two shapes differ.
+/// Significance level of the tests that two modes differ: of the shapes of one record, or of the
+/// poles of two parts of it.
 pub const DIFFERENCE_PROBABILITY: f64 = 1e-3;
 /// Maximum power of a dead channel, relative to the strongest channel.
 pub const DEAD_CHANNEL: f64 = 1e-26;

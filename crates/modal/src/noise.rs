@@ -31,6 +31,8 @@ pub(crate) struct Noise {
     pub(crate) sensor: Vec<Vec<f64>>,
     /// Variance S_r of the unmeasured force of each mode.
     pub(crate) process: Vec<f64>,
+    /// Degrees of freedom of the estimate of each unmeasured force.
+    pub(crate) process_freedom: Vec<f64>,
 }
 
 impl Noise {
@@ -39,7 +41,8 @@ impl Noise {
     pub(crate) fn from_fit(fit: &Fit<'_>, process: Option<Vec<f64>>) -> Self {
         let (lines, model) = (fit.lines, &fit.model);
         let residuals = Residuals::new(fit);
-        let mut noise = Self { sensor: Vec::new(), process: vec![0.0; model.modes()] };
+        let (process_freedom, modes) = (vec![f64::INFINITY; model.modes()], model.modes());
+        let mut noise = Self { sensor: Vec::new(), process: vec![0.0; modes], process_freedom };
         noise.sensor = residuals.smooth_power(lines, residuals.power.clone());
         let Some(before) = process.filter(|_| model.modes() > 0) else { return noise };
         let shapes = shapes(&fit.projection, &fit.weights, model.modes());
@@ -52,6 +55,7 @@ impl Noise {
         for _ in 0..SCORING_STEPS {
             let (sums, power) = noise.expectation(lines, model, &shapes, &residuals);
             let step = noise.improve_process(&sums);
+            noise.process_freedom = sums.iter().map(ForceSums::degrees_of_freedom).collect();
             noise.sensor = residuals.smooth_power(lines, power);
             if step < SETTLED {
                 break;

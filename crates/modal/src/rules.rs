@@ -29,7 +29,7 @@ pub(crate) fn drop_reasons(
         let (_, damping, _) = natural_frequency_and_damping(
             model.poles[mode],
             &covariance.pole_covariance(mode),
-            covariance.degrees_of_freedom,
+            covariance.degrees_of_freedom[mode],
         );
         if damping.value < MIN_DAMPING_ERRORS * damping.standard_error {
             let standard_error = damping.standard_error;

@@ -19,6 +19,9 @@ pub(crate) struct ForceSums {
     /// Information on ln S_r, including the part shared with other forces: Σ_s Σ S_r S_s
     /// |b_rᴴV⁻¹b_s|².
     pub(crate) information: f64,
+    /// Largest share of the force in the noise of a line in the direction of its response, from 0
+    /// to 1.
+    pub(crate) largest_share: f64,
 }
 
 impl ForceSums {
@@ -26,6 +29,22 @@ impl ForceSums {
     pub(crate) fn add(&mut self, other: &Self) {
         self.score += other.score;
         self.information += other.information;
+        self.largest_share = self.largest_share.max(other.largest_share);
+    }
+
+    /// Returns the degrees of freedom of the noise estimate at the resonance.
+    ///
+    /// The variance of ln S_r is 1/information, that of the logarithm of an estimate with ν degrees
+    /// of freedom 2/ν; only the share of the force in the noise has this uncertainty.
+    ///
+    /// # Source
+    /// Satterthwaite (1946), Biometrics Bulletin 2, 110–114.
+    pub(crate) fn degrees_of_freedom(&self) -> f64 {
+        if self.largest_share > 0.0 {
+            2.0 * self.information / self.largest_share.powi(2)
+        } else {
+            f64::INFINITY
+        }
     }
 }
 
@@ -146,6 +165,7 @@ impl Posterior {
             sum.score += process * (self.projected_error[a].norm_sqr() - row[a].re);
             let shared = row.iter().zip(&self.process).map(|(i, other)| other * i.norm_sqr());
             sum.information += process * shared.sum::<f64>();
+            sum.largest_share = sum.largest_share.max(process * row[a].re);
         }
     }
 

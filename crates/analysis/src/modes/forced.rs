@@ -65,11 +65,10 @@ impl Test {
         let named = |error| named(error, &recorded.inputs, &recorded.outputs);
         let data = recorded.lines(band_hz)?;
         let engine = engine_settings(settings);
-        let mut estimate = identify_modes(&data, &engine).map_err(named)?;
-        if let Some(halves) = Halves::new(&recorded, band_hz, &estimate, &engine) {
-            estimate = estimate.with_error_scales(&halves.error_scales)?;
-            checks.push(halves.check);
-        }
+        let estimate = identify_modes(&data, &engine).map_err(named)?;
+        let halves = Halves::new(&recorded, band_hz, &estimate, &engine);
+        let estimate = estimate.with_error_scales(&halves.error_scales)?;
+        checks.extend(halves.check);
         let predicted = match settings.validate {
             0.0 => None,
             share => Some(predicted(&recorded, band_hz, share, settings)?),
@@ -83,7 +82,7 @@ impl Test {
             driving_points,
             band_hz,
             checks,
-            notes: Vec::new(),
+            notes: halves.note.into_iter().collect(),
             predicted,
             is_table: false,
             added_decay: None,
@@ -146,7 +145,7 @@ pub(super) fn modes_of_tables(
 }
 
 /// Number of channels that a message lists by their names.
-const LISTED: usize = 8;
+pub(super) const LISTED: usize = 8;
 
 /// Returns a failure that names the channels instead of their numbers.
 fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisError {

@@ -1,114 +1,101 @@
 //! Agreement of the modes in the two halves of a test.
 
-use mechid_modal::compare::{Difference, ModePair, PairingRule, pair_modes};
-use mechid_modal::{ModalEstimate, ModalSettings, refit_modes};
-use mechid_numerics::Uncertain;
+use mechid_modal::compare::ModePair;
+use mechid_modal::{IdentifiedMode, ModalEstimate, ModalSettings, PartsComparison, Uncertain};
+use mechid_signal::message;
 
+use super::forced::LISTED;
 use super::sources::Recorded;
 use super::summary::ModalCheck;
-use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Comparison of the modes of the two halves of a test.
+/// What the two halves of a test say of its modes.
 pub(super) struct Halves {
-    /// Check of the agreement.
-    pub check: ModalCheck,
-    /// Factor on the standard errors of each mode: 1 if the halves agree.
+    /// Check of their agreement; `None` if they have no common mode.
+    pub check: Option<ModalCheck>,
+    /// Note on modes that a half alone does not determine.
+    pub note: Option<String>,
+    /// Factor on the standard errors of each mode.
     pub error_scales: Vec<f64>,
 }
 
 impl Halves {
-    /// Fits the modes of an estimate to both halves and tests their differences; `None` if a half
-    /// does not determine them.
-    ///
-    /// A linear structure that does not change has the same modes in both halves. Where they differ
-    /// by more than their errors, the errors are multiplied by this excess.
-    ///
-    /// # Source
-    /// Chow (1960), Econometrica 28, 591–605 (two parts of the data); Holm (1979), Scandinavian
-    /// Journal of Statistics 6, 65–70; Birge (1932), Physical Review 40, 207–227.
+    /// Compares the modes of the first and the second half of one record or several.
     pub(super) fn new(
         recorded: &Recorded,
         band_hz: [f64; 2],
         estimate: &ModalEstimate,
         settings: &ModalSettings,
-    ) -> Option<Self> {
-        let [first, second] = recorded.halves().ok()?;
-        let fitted =
-            |half: &Recorded| refit_modes(&half.lines(band_hz).ok()?, estimate, settings).ok();
-        let (first, second) = (fitted(&first)?, fitted(&second)?);
-        let pairs = first.changes_to(&second).ok()?.pairs;
-        let of_first =
-            pair_modes(&estimate.compared_modes(), &first.compared_modes(), PairingRule::default())
-                .ok()?;
-        let mut error_scales = vec![1.0; estimate.modes().len()];
-        for pair in &pairs {
-            if let Some((mode, _)) = of_first.iter().find(|(_, at)| *at == pair.first) {
-                error_scales[*mode] = excess(pair);
-            }
-        }
-        let worst = pairs.iter().min_by(|a, b| p_value(a).total_cmp(&p_value(b)))?;
+    ) -> Self {
         let what = if recorded.parts.len() == 1 { "the record" } else { "the records" };
-        let check = ModalCheck {
-            code: "halves",
-            passed: p_value(worst) >= MODAL_SIGNIFICANCE,
-            value: p_value(worst),
-            text: match p_value(worst) {
-                p if p >= MODAL_SIGNIFICANCE => format!(
-                    "the modes of the first and the second half of {what} agree (p = {})",
-                    significant(p, 2)
-                ),
-                _ => difference(what, &first, &second, worst, &error_scales),
-            },
-        };
-        Some(Self { check, error_scales })
+        let compared = compared(recorded, band_hz, estimate, settings);
+        let unknown = || vec![None; estimate.modes().len()];
+        let scales = compared.as_ref().map_or_else(unknown, |halves| halves.error_scales.clone());
+        Self {
+            check: compared.as_ref().and_then(|compared| check(compared, what)),
+            note: undetermined(estimate, &scales, what),
+            error_scales: scales.into_iter().map(|scale| scale.unwrap_or(1.0)).collect(),
+        }
     }
 }
 
-/// Returns the differences of frequency and damping ratio.
-fn differences(pair: &ModePair) -> impl Iterator<Item = &Difference> {
-    std::iter::once(&pair.natural_frequency_hz).chain(&pair.damping_ratio)
+fn compared(
+    recorded: &Recorded,
+    band_hz: [f64; 2],
+    estimate: &ModalEstimate,
+    settings: &ModalSettings,
+) -> Option<PartsComparison> {
+    let [first, second] = recorded.halves().ok()?.map(|half| half.lines(band_hz).ok());
+    let halves = [&first?, &second?];
+    PartsComparison::new(estimate, halves, settings).ok()
 }
 
-/// Returns the smallest p-value of the differences of a mode, adjusted for the number of tests.
-fn p_value(pair: &ModePair) -> f64 {
-    let of_values = differences(pair).filter_map(|difference| difference.adjusted_p_value);
-    of_values.chain(pair.shape.map(|shape| shape.adjusted_p_value)).fold(1.0, f64::min)
+/// Returns a note on the modes that are not common to both halves.
+fn undetermined(estimate: &ModalEstimate, scales: &[Option<f64>], what: &str) -> Option<String> {
+    let all = estimate.modes().iter().zip(scales).filter(|(_, scale)| scale.is_none());
+    let hz = |(mode, _): (&IdentifiedMode, _)| significant(mode.natural_frequency_hz.value, 4);
+    let missing = message::list(all.map(hz), ", ", LISTED);
+    (!missing.is_empty()).then(|| {
+        format!(
+            "one half of {what} alone does not determine the modes at {missing} Hz, so they could \
+             not be compared between the halves"
+        )
+    })
 }
 
-/// Returns the largest significant difference of a mode in units of its standard error, or 1
-/// without any.
-fn excess(pair: &ModePair) -> f64 {
-    let is_significant = |p_value: f64| p_value < MODAL_SIGNIFICANCE;
-    let of_values = differences(pair)
-        .filter(|difference| difference.adjusted_p_value.is_some_and(is_significant))
-        .map(|difference| (difference.value / difference.standard_error).abs());
-    let of_shape = pair
-        .shape
-        .filter(|shape| is_significant(shape.adjusted_p_value))
-        .map(|shape| (shape.statistic / shape.degrees_of_freedom as f64).sqrt());
-    of_values.chain(of_shape).fold(1.0, f64::max)
+/// Returns the check of the agreement of the halves.
+fn check(compared: &PartsComparison, what: &str) -> Option<ModalCheck> {
+    let (modes, pair) = compared.largest_difference()?;
+    let (p_value, passed) = (compared.p_value(), !compared.differ());
+    let text = if passed {
+        format!(
+            "the modes of the first and the second half of {what} agree (p = {})",
+            significant(p_value, 2)
+        )
+    } else {
+        difference(modes, pair, compared, what)
+    };
+    Some(ModalCheck { code: "halves", passed, value: p_value, text })
 }
 
 /// Returns the largest difference of a mode in words.
 fn difference(
+    [one, two]: [&IdentifiedMode; 2],
+    pair: &ModePair,
+    compared: &PartsComparison,
     what: &str,
-    first: &ModalEstimate,
-    second: &ModalEstimate,
-    worst: &ModePair,
-    error_scales: &[f64],
 ) -> String {
-    let (one, two) = (&first.modes()[worst.first], &second.modes()[worst.second]);
     let uncertain = |value: Uncertain, factor: f64| {
         let [value, error] = [value.value, value.standard_error].map(|value| factor * value);
         format!("{} ± {}", significant(value, 6), significant(error, 2))
     };
-    let differing = error_scales.iter().filter(|scale| **scale > 1.0).count();
-    let scaled = match error_scales.iter().copied().fold(1.0, f64::max) {
+    let scales: Vec<f64> = compared.error_scales.iter().copied().flatten().collect();
+    let scaled = match scales.iter().copied().fold(1.0, f64::max) {
         1.0 => String::new(),
         largest => format!(
-            "; the standard errors of {differing} of {} modes are multiplied by up to {}",
-            error_scales.len(),
+            "; the standard errors of {} of {} modes are multiplied by up to {}",
+            scales.iter().filter(|scale| **scale > 1.0).count(),
+            scales.len(),
             significant(largest, 3)
         ),
     };
@@ -120,7 +107,7 @@ fn difference(
         uncertain(two.natural_frequency_hz, 1.0),
         uncertain(one.damping_ratio, 100.0),
         uncertain(two.damping_ratio, 100.0),
-        significant(worst.mac.value, 4),
-        significant(p_value(worst), 2)
+        significant(pair.mac.value, 4),
+        significant(compared.p_value(), 2)
     )
 }

@@ -90,7 +90,7 @@ struct SavedEntry {
 
 impl SavedValue {
     fn measured(self) -> Measured {
-        Measured { value: self.value, standard_error: self.standard_error.unwrap_or(0.0) }
+        Measured::new(self.value, self.standard_error.unwrap_or(0.0))
     }
 }
 
@@ -173,9 +173,8 @@ impl ModeSet {
         points: Vec<String>,
         modes: &[ShapedMode],
     ) -> Result<Self, AnalysisError> {
-        let measured = |value: &crate::identify::rows::Uncertain| Measured {
-            value: value.value,
-            standard_error: value.standard_error.unwrap_or(0.0),
+        let measured = |value: &crate::identify::rows::Uncertain| {
+            Measured::new(value.value, value.standard_error.unwrap_or(0.0))
         };
         let modes = modes.iter().filter(|mode| mode.row.oscillates).map(|mode| {
             let entry = |entry: &crate::modal::ShapeEntry| SavedEntry {
@@ -196,7 +195,7 @@ impl ModeSet {
     /// # Errors
     /// [`AnalysisError::NothingToCompare`].
     pub fn from_nodal(nodal: &NodalModes) -> Result<Self, AnalysisError> {
-        let exact = |value: f64| Measured { value, standard_error: 0.0 };
+        let exact = |value: f64| Measured::new(value, 0.0);
         let modes = nodal.modes.iter().map(|mode| {
             let entry = |z: &Complex<f64>| SavedEntry { value: [z.re, z.im], standard_error: None };
             // A file of undamped modes has a damping of zero, which is not a value to compare.

@@ -5,6 +5,7 @@ mod ambient_generator;
 mod constraints;
 mod forced;
 mod generator;
+mod parts;
 mod refusals;
 mod responses;
 mod score;
