@@ -311,7 +311,7 @@ pub enum AnalysisError {
     /// The Kalman smoother needs an open record, and a period or lines were given.
     #[error("the Kalman smoother takes an open record: leave `period` and `lines` out")]
     KalmanIsOpen,
-    /// The method has no standard error for a frequency band.
+    /// The method cannot keep the force within a frequency band.
     #[error(
         "the force from sample to sample (`discretised`) cannot be kept within the band from {low_hz} \
          to {high_hz} Hz: leave `band_hz` out, or choose another `method`"
@@ -483,8 +483,8 @@ pub enum AnalysisError {
     /// NPI (cycles of the natural frequency per period) needs a described experiment, whose
     /// sampling can be chosen.
     #[error(
-        "`npi` belongs to the description of an experiment; the rate of a record is fixed: `decimate` takes \
-         every n-th sample"
+        "`npi` applies only to a described experiment, whose sampling rate can be chosen; for a record, \
+         use `decimate`, which takes every n-th sample"
     )]
     NpiOfRecord,
     /// A decimation is a whole number.

@@ -46,7 +46,7 @@ pub struct HitRow {
     pub used: bool,
     /// Reasons for its exclusion, a sentence each.
     pub reasons: Vec<String>,
-    /// The same reasons with their numbers.
+    /// Reasons for its exclusion in machine-readable form, with the measured values.
     pub faults: Vec<HitFault>,
 }
 

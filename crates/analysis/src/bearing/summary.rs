@@ -76,7 +76,7 @@ pub struct BearingSummary {
     pub checks: Vec<CheckRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: IdentifyBearing,
 }
 
