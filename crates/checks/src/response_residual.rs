@@ -115,7 +115,7 @@ struct Series<'a> {
     each: Vec<Vec<Complex<f64>>>,
     /// Numbers of the lines, sorted, and their indices in `each`.
     lines: Vec<(usize, usize)>,
-    /// Correlation of the noise of two lines at a distance.
+    /// Correlation of the noise of two lines, by their distance in lines, from 0.
     correlation: &'a [f64],
 }
 
