@@ -96,7 +96,7 @@ pub enum EstimateError {
     },
     /// A parameter or its standard error overflows.
     #[error(
-        "{parameter} or its standard error is beyond the largest number: a known value or the force \
+        "{parameter} or its standard error exceeds the range of double precision: a known value or the force \
          is far too large, or the response far too small"
     )]
     Unbounded {
