@@ -415,9 +415,10 @@ pub enum IoError {
         what: String,
     },
     /// A covariance in the report is not known.
-    #[error("{}", Message(format_args!("{file}: the covariance of {parameters} is null: the record it was identified from leaves \
-         {parameters} undetermined; identify from one that moves the machine more, or take \
-         \"covariance\" out of the file to count the machine as exactly known")))]
+    #[error("{}", Message(format_args!("{file}: the covariance of {parameters} is not known (null), \
+         because the record of the identification did not determine {parameters}. Identify the machine \
+         again from a record with more excitation, or delete \"covariance\" from the file; the machine \
+         then counts as exactly known")))]
     Undetermined {
         /// The file.
         file: String,

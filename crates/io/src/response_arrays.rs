@@ -130,7 +130,7 @@ impl Shape {
             [points, references] => [points, references],
             _ => {
                 return Err(format!(
-                    "{} has more dimensions than frequencies, points and references",
+                    "{} has more than three dimensions; only three are known: frequency, response point and reference point",
                     sizes(array)
                 ));
             }
