@@ -200,7 +200,10 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
         let pairs = measured.data.dof().pow(2);
         let left_out = match set.len() {
             picture::DRAWN_PAIRS if pairs > picture::DRAWN_PAIRS => {
-                format!(" The first {} pairs are drawn.", picture::DRAWN_PAIRS)
+                format!(
+                    " Only the first {} pairs of response and force are drawn.",
+                    picture::DRAWN_PAIRS
+                )
             }
             _ => String::new(),
         };
