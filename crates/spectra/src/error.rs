@@ -36,7 +36,7 @@ pub enum SpectraError {
     NotFinite {
         /// Row of the line, counted from 0.
         row: usize,
-        /// The value, in its unit.
+        /// The refused frequency or amplitude, in its unit.
         value: f64,
     },
     /// The step between segments is zero, or larger than a segment.
