@@ -34,7 +34,7 @@ const RECORDS: [[&str; 4]; 6] = [
         "air-track",
         "Mass on an air track",
         "M. Schmidt and H. Lipson, Science 324, 2009, supplement; a decaying cosine by SciPy's curve_fit over the same samples",
-        "three of our standard errors, for both fit the same samples: white noise there, coloured noise here",
+        "three of our standard errors: both programs fit the same samples, but SciPy assumes white noise and mechid coloured noise",
     ],
     [
         "shake-table",
