@@ -132,8 +132,8 @@ pub fn predict(
     let mut remarks = block.unit_notes();
     if !in_motion.is_empty() {
         remarks.push(format!(
-            "the error of {} is largest at the beginning and dies away: the machine was in motion before the first \
-             sample, and not at rest; `settle` fits the state in which it begins",
+            "the error of {} is largest at the beginning and decays: the machine was not at rest at the \
+             first sample; `settle` fits its initial state",
             message::list(in_motion.iter(), ", ", 6)
         ));
     }
@@ -194,7 +194,9 @@ fn settle(
         columns.iter().any(|column| column == ABSENT)
     };
     if kinds.is_empty() || kinds.iter().any(missing) {
-        return wrong("the start is fitted to the response of every degree of freedom".into());
+        return wrong(
+            "the initial state is fitted to the response of every degree of freedom".into(),
+        );
     }
     Ok(samples)
 }
@@ -209,7 +211,9 @@ pub(crate) fn settled_samples(
     let wrong = |why: String| Err(AnalysisError::Setting { setting: "settle", why });
     let (Some(samples), len) = (how.settle, block.force.len()) else { return Ok(0) };
     if steady {
-        return wrong("whole periods are predicted as a steady state, which needs no start".into());
+        return wrong(
+            "whole periods are predicted as a steady state, which needs no initial state".into(),
+        );
     }
     if (2..len).contains(&samples) {
         Ok(samples)

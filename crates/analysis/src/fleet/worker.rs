@@ -171,7 +171,7 @@ impl Worker {
                 }
                 Ok(None) => {
                     drop(running.end());
-                    let how = "it sent something else than a row".into();
+                    let how = "it sent something other than a row of results".into();
                     return Ok(Some(AnalysisError::RecordProcess { how }));
                 }
                 Err(RecvTimeoutError::Disconnected) => {

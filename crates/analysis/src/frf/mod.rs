@@ -268,7 +268,7 @@ impl FromStr for Segmentation {
         };
         let segment = match samples.parse() {
             Ok(samples) if samples > 0 => Some(samples),
-            _ => return Err(format!("\"{samples}\" is no number of samples")),
+            _ => return Err(format!("\"{samples}\" is not a number of samples")),
         };
         match overlap {
             Ok(overlap_percent) if (0.0..100.0).contains(&overlap_percent) => {

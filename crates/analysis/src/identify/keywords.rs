@@ -240,7 +240,7 @@ impl Keywords {
         }
         let likelihood = matches!(self.method, None | Some(Method::MaximumLikelihood));
         if self.noise.is_some_and(|noise| noise != Pooling::Automatic) && !likelihood {
-            return Err(refused("noise", "it applies to `method` maximum-likelihood alone"));
+            return Err(refused("noise", "it applies only to `method` maximum-likelihood"));
         }
         Ok(())
     }
@@ -271,7 +271,7 @@ impl Keywords {
                 "it is for open records: periods show the noise of their force by their scatter",
             )),
             Some(Extent::WholePeriod) if self.hits.is_some() => {
-                Err(refused("extent", "a hit is no period"))
+                Err(refused("extent", "a hit is not a period"))
             }
             Some(Extent::WholePeriod) if !acquisition.is_default() => {
                 let setting = match acquisition.between_samples {

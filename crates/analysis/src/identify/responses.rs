@@ -155,7 +155,7 @@ fn estimated(
     match method {
         Some(Method::Instrumental) => Err(AnalysisError::InstrumentalResponses),
         Some(Method::LeastSquares) => {
-            let name = "least squares on frequency responses, all lines alike";
+            let name = "least squares on frequency responses, all lines with equal weights";
             let estimate = equation_error(&joined(responses)?, unknowns)?;
             Ok(Outcome { name, estimate, misfit: None, remark: None, settled: true })
         }
