@@ -228,7 +228,7 @@ fn one_kind_of_motion_is_enough_with_derivatives() {
         // samples.
         let found = json(folder, &format!("{common} --derivatives savitzky-golay:11:8"));
         assert!(error(&found) < 0.02, "{motion}: {found}");
-        refused(folder, &common, &["--derivatives says how", "savitzky-golay:WINDOW:ORDER"]);
+        refused(folder, &common, &["--derivatives sets how", "savitzky-golay:WINDOW:ORDER"]);
     }
     let common = "identify p.csv --force f --domain time";
     let both = "--displacement x --velocity v --derivatives spectral";
@@ -283,7 +283,7 @@ fn a_whole_period_closes() {
     let segments = format!("{common} --from-frf h1 --segment 64 --extent period");
     refused(folder, &segments, &["--extent: it belongs to", "not to --from-frf"]);
     let weights = format!("{common} --method least-squares --noise smooth");
-    refused(folder, &weights, &["--noise: it applies to --method maximum-likelihood alone"]);
+    refused(folder, &weights, &["--noise: it applies only to --method maximum-likelihood"]);
     let weights = format!("{common} --noise per-line --extent period");
     refused(folder, &weights, &["--noise: per-line is the scatter of two periods or more"]);
     let lines = "--domain time --lines odd --plot a.svg";
@@ -440,7 +440,7 @@ fn frequency_responses_are_estimated_and_fitted() {
         ("1024:100", "from 0 to below 100 %, got 100"),
         ("1024:-1", "from 0 to below 100 %, got -1"),
         ("1024:50:hanning", "is none of hann, hamming, blackman, rectangular"),
-        ("0", "is no number of samples"),
+        ("0", "is not a number of samples"),
     ] {
         refused(folder, &format!("frf r.csv {other} {segment}"), &[part]);
     }
