@@ -232,7 +232,11 @@ fn one_kind_of_motion_is_enough_with_derivatives() {
     }
     let common = "identify p.csv --force f --domain time";
     let both = "--displacement x --velocity v --derivatives spectral";
-    refused(folder, &format!("{common} {both}"), &["of the displacement alone or of the acceler"]);
+    refused(
+        folder,
+        &format!("{common} {both}"),
+        &["from the displacement alone or from the acceler"],
+    );
     let twice = "--acceleration a --derivatives savitzky-golay:11:8 --between-samples held";
     refused(folder, &format!("{common} {twice}"), &["leave --between-samples out"]);
     let even = "--acceleration a --derivatives savitzky-golay:10:4";
@@ -285,7 +289,7 @@ fn a_whole_period_closes() {
     let weights = format!("{common} --method least-squares --noise smooth");
     refused(folder, &weights, &["--noise: it applies only to --method maximum-likelihood"]);
     let weights = format!("{common} --noise per-line --extent period");
-    refused(folder, &weights, &["--noise: per-line is the scatter of two periods or more"]);
+    refused(folder, &weights, &["--noise: per-line takes the noise of each line"]);
     let lines = "--domain time --lines odd --plot a.svg";
     refused(
         folder,

@@ -135,8 +135,11 @@ fn settings_belong_to_what_is_swept() {
     record(place.path());
     let columns = "sweep r.csv --force f --displacement x";
     for (arguments, part) in [
-        (format!("{columns} --velocity v --npi 1,2"), "--npi belongs to the description"),
-        (format!("{columns} --velocity v --rate-hz 30"), "no samples at 30 Hz"),
+        (
+            format!("{columns} --velocity v --npi 1,2"),
+            "--npi applies only to a described experiment",
+        ),
+        (format!("{columns} --velocity v --rate-hz 30"), "cannot be reduced to 30 Hz"),
         (format!("{columns} --velocity v --decimate 2.5"), "got 2.5"),
         (format!("{columns} --decimate 1,2"), "needs the velocity"),
         (format!("{columns} --velocity v"), "--npi"),
