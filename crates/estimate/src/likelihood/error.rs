@@ -55,8 +55,8 @@ pub enum LikelihoodError {
     },
     /// A sample covariance has too few degrees of freedom for a weight.
     #[error(
-        "covariances of {degrees_of_freedom} degrees of freedom cannot weight {outputs} outputs: \
-         more than {} are needed",
+        "covariances with {degrees_of_freedom} statistical degrees of freedom cannot weight {outputs} \
+         outputs: more than {} are needed",
         outputs + 1
     )]
     FewDegreesOfFreedom {
@@ -81,7 +81,7 @@ pub enum LikelihoodError {
         most: usize,
     },
     /// No search converged.
-    #[error("no search ended at a minimum: {searches} searches of at most {steps} steps each")]
+    #[error("none of {searches} searches of at most {steps} steps ended at a minimum")]
     NotConverged {
         /// Number of searches.
         searches: usize,
