@@ -253,7 +253,7 @@ fn take_numbers(count: u64, bytes_each: u64, len: u64, budget: &mut Budget) -> R
     let bytes = count.saturating_mul(bytes_each.max(1));
     if bytes > len.max(MIN_BYTES).saturating_mul(MAX_EXPANSION) {
         let what =
-            format!("a data set of {bytes} bytes in a file of {len}, which cannot hold as many");
+            format!("a data set of {bytes} bytes, more than the file of {len} bytes can hold");
         return Err(Fault::new(0, what));
     }
     let (unpacked, limit) = budget.unpacked_bytes();
