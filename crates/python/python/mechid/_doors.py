@@ -1172,7 +1172,7 @@ def integrate(
     start = {"displacement": displacement, "velocity": velocity}
     given = {name: _vector(name, values) for name, values in start.items() if values is not None}
     if given and response == "periodic":
-        raise TypeError("a periodic response has no start: leave `displacement` and `velocity` out")
+        raise TypeError("a periodic response has no initial state: leave `displacement` and `velocity` out")
     known = machine_of(machine)
     forces = matrix("force", force)
     named: dict[str, Any] = {"name": scheme} if isinstance(scheme, str) else dict(scheme)
