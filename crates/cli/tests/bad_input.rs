@@ -356,7 +356,7 @@ fn a_free_decay_that_is_none() {
     fit("--velocity force", &["one kind of response: name the columns of displacement or"]);
     fit("--modes 0", &["--modes"]);
     fit("--modes 99", &["99 modes cannot be fitted: give a number from 1 to 40"]);
-    fit("--from 0 --modes 5", &["the record has 32 samples where at least 61 are needed"]);
+    fit("--from 0 --modes 5", &["the record has 32 samples, but at least 61 are needed"]);
     refused(&good(), "modes a.csv", &["name the columns of the response with --displacement"]);
     let still = record(|k| (0.004 * f64::from(k), 1.0, 2.5));
     refused(&still, "modes a.csv --displacement x --from 0", &["channel 1 is constant at 2.5"]);

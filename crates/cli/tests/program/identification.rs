@@ -242,7 +242,7 @@ fn one_kind_of_motion_is_enough_with_derivatives() {
     let even = "--acceleration a --derivatives savitzky-golay:10:4";
     refused(folder, &format!("{common} {even}"), &["an odd number of samples, not 10"]);
     let long = "--acceleration a --derivatives savitzky-golay:301:4";
-    refused(folder, &format!("{common} {long}"), &["256 samples where at least 301"]);
+    refused(folder, &format!("{common} {long}"), &["256 samples, but at least 301"]);
 }
 
 #[test]
