@@ -170,7 +170,7 @@ pub enum AnalysisError {
         force: String,
         /// The forces before it.
         others: String,
-        /// RMS of its independent part over its RMS.
+        /// Ratio of the RMS of its independent part to its RMS.
         own_share: f64,
     },
     /// A file has no modes that can be compared.
@@ -490,7 +490,7 @@ pub enum AnalysisError {
          use `decimate`, which takes every n-th sample"
     )]
     NpiOfRecord,
-    /// A decimation is a whole number.
+    /// A decimation must be a whole number.
     #[error(
         "a decimation takes every n-th sample of a record: n must be a whole number, got {value}"
     )]
@@ -498,7 +498,7 @@ pub enum AnalysisError {
         /// Number of samples asked for, a pure number.
         value: f64,
     },
-    /// A period is not a whole number of the used samples.
+    /// A period is not a whole number of decimated samples.
     #[error("a period of {} cannot be reduced to every {} sample: the ratio must be a whole number", message::count(*period, "sample"), message::ordinal(*factor))]
     DecimatedPeriod {
         /// Number of samples in a period.

@@ -60,7 +60,7 @@ pub struct PredictionSummary {
     pub channels: Vec<PredictionError>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: Predict,
 }
 
@@ -296,7 +296,7 @@ impl Predicted {
     }
 
     /// Returns displacement, velocity and acceleration of a machine (samples × degrees of freedom,
-    /// in m, m/s and m/s²); `None` of modes.
+    /// in m, m/s and m/s²); `None` for modes.
     pub fn response(&self) -> Option<&Response> {
         match &self.motion {
             PredictedMotion::Machine(response) => Some(response),
@@ -313,7 +313,7 @@ impl Predicted {
     }
 
     /// Returns the columns of a record of the prediction, with their names: every measured kind of
-    /// response, or displacements, in m, m/s or m/s²; of modes the measured responses, or all.
+    /// response, or displacements, in m, m/s or m/s²; for modes, the measured responses, or all.
     pub fn columns(&self) -> Vec<(String, &[f64])> {
         match &self.motion {
             PredictedMotion::Machine(response) => self.machine_columns(response),

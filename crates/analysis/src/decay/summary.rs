@@ -58,7 +58,7 @@ pub struct DecaySummary {
     pub channels: Vec<DecayChannelRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: DecaySettings,
 }
 

@@ -33,7 +33,7 @@ pub struct FrfSettings {
     pub estimator: Estimator,
     /// Spectral lines of a segment.
     pub lines: LineChoice,
-    /// Spectral lines to exclude from these.
+    /// Spectral lines to exclude from the chosen ones.
     pub without: LeftOut,
     /// Segments of the average.
     #[serde(deserialize_with = "words::written::one")]

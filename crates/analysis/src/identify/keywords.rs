@@ -66,7 +66,7 @@ pub struct Keywords {
     /// Known masses.
     #[serde(skip_serializing_if = "is_default", deserialize_with = "written::one")]
     pub mass: KnownMass,
-    /// Form of M, C and K.
+    /// Known form of M, C and K.
     #[serde(skip_serializing_if = "is_default", deserialize_with = "written::one")]
     pub structure: Structure,
     /// Rule for dividing the records of a hammer test into hits.
@@ -75,7 +75,7 @@ pub struct Keywords {
     /// Estimator of the frequency responses that are fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_frf: Option<Estimator>,
-    /// Segments over which these are averaged.
+    /// Segments over which the frequency responses are averaged.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "written::optional")]
     pub segment: Option<Segmentation>,
     /// Nonlinear springs and dampers.

@@ -115,7 +115,7 @@ pub struct TermRow {
     pub estimate: Uncertain,
 }
 
-/// Levels of distortion, and the kind of term whose absence costs a linear model most.
+/// Levels of distortion, and the kind of term that explains most of the residual of a linear model.
 #[derive(Debug, Serialize)]
 pub struct DistortionRow {
     /// Level on even lines; `None` unless only odd lines are driven.

@@ -167,7 +167,7 @@ pub enum TermEstimator {
 pub struct SpectralLines {
     /// Lines to use.
     pub choice: LineChoice,
-    /// Lines to exclude from these.
+    /// Lines to exclude from the chosen ones.
     pub without: LeftOut,
 }
 

@@ -275,7 +275,7 @@ pub struct ResponseSummary {
     /// than 2,000 parameters: use [`IdentifiedResponses::covariance`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<ParameterCovariance>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: IdentifyResponses,
 }
 

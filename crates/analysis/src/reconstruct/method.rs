@@ -55,8 +55,8 @@ pub struct How {
     pub chosen: Vec<(String, f64, &'static str)>,
     /// Unexplained part of each measured channel; `None` without surplus channels.
     pub unexplained: Option<Vec<Unexplained>>,
-    /// Frequency, in Hz, below which noise exceeds the part of the force in the responses; `None`
-    /// if the method cannot decide, or if noise prevails at all frequencies.
+    /// Frequency, in Hz, below which the noise exceeds the response to the force; `None` if the
+    /// method cannot decide, or if noise prevails at all frequencies.
     pub seen_from_hz: Option<f64>,
     /// Frequency band, in Hz, in which force and standard error are valid; `None`: all.
     pub band_hz: Option<[f64; 2]>,

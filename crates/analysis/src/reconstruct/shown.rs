@@ -7,8 +7,7 @@ use super::method::{How, Request};
 use crate::reconstruct::options::Method;
 use crate::text::significant;
 
-/// Returns a remark on the frequencies at which the responses contain less of a force than of
-/// noise.
+/// Returns a remark on the frequencies at which the response to a force is smaller than the noise.
 ///
 /// A displacement shows even a constant force, so with one there is no remark. Dynamic stiffness
 /// cannot decide where noise prevails. If lines or a band are requested, the user has already

@@ -41,7 +41,7 @@ pub struct ForceSummary {
     pub forces: Vec<ForceRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: Reconstruct,
 }
 
