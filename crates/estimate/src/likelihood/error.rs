@@ -46,8 +46,8 @@ pub enum LikelihoodError {
         /// Number of unknowns, including transient loads.
         unknowns: usize,
     },
-    /// The noise covariance of the outputs is singular: an output has no noise, or two have the
-    /// same.
+    /// The noise covariance of the outputs is singular: an output has no noise, or two outputs have
+    /// the same noise.
     #[error("the covariance of the outputs at {frequency_hz} Hz cannot be inverted")]
     SingularNoise {
         /// Frequency of the line.

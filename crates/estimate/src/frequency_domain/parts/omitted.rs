@@ -1,4 +1,4 @@
-//! Score tests for terms that a model leaves out, and what they would change.
+//! Score tests for terms that a model leaves out, and their effect on the parameters.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
