@@ -96,7 +96,7 @@ pub enum AnalysisError {
         name: String,
         /// Samples and columns of the array.
         got: [usize; 2],
-        /// Samples and columns of the others.
+        /// Samples and columns of the other arrays.
         expected: [usize; 2],
     },
     /// No record was given.

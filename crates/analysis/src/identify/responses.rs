@@ -54,7 +54,7 @@ pub fn fit(
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
-    // An undetermined parameter ends the fit here with its name, before other steps fail for it.
+    // An undetermined parameter ends the fit here with its name, before it makes a later step fail.
     estimate.system()?;
     let periodic = segments.are_periods();
     let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));

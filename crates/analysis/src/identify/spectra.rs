@@ -81,7 +81,7 @@ pub(super) fn fit(
         noise_through,
         remark,
     } = estimated(&spectra, &data, unknowns, estimator)?;
-    // An undetermined parameter ends the fit here with its name, before other steps fail for it.
+    // An undetermined parameter ends the fit here with its name, before it makes a later step fail.
     estimate.system()?;
     let RecordFindings { before, after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
