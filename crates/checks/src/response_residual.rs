@@ -132,7 +132,7 @@ impl<'a> Series<'a> {
         Self { each: pairs.map(one).collect(), lines, correlation: frf.line_correlation() }
     }
 
-    /// Returns the indices of the pairs of lines at a distance.
+    /// Returns the indices of the pairs of lines with this distance.
     fn pairs(&self, distance: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.lines.iter().filter_map(move |(number, at)| {
             let partner =
