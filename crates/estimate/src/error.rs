@@ -108,7 +108,7 @@ pub enum EstimateError {
     Step {
         /// Step of the first record, in seconds.
         expected: f64,
-        /// Step of the other, in seconds.
+        /// Step of the other record, in seconds.
         got: f64,
     },
     /// A sliding polynomial cannot be fitted, or has no such derivative.

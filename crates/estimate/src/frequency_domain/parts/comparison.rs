@@ -94,7 +94,7 @@ struct ScoreComparison {
     largest: Option<PartDifference>,
 }
 
-/// Difference of one part from the others about one parameter, in its unit.
+/// Difference between one part and the other parts in one parameter, in the unit of the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PartDifference {
     part: usize,

@@ -92,7 +92,7 @@ impl PartsOfFit<'_> {
         })
     }
 
-    /// Returns what a term with these columns explains.
+    /// Returns the explained part of the residual for a term with these columns.
     fn explained(&self, term: OmittedTerm, mut columns: DMatrix<f64>) -> Option<Explained> {
         remove(&self.linear.transients, &mut columns);
         let by_parameters = self.linear.basis.tr_mul(&columns);
