@@ -185,9 +185,9 @@ pub enum IoError {
         file: String,
         /// Number of the column.
         column: usize,
-        /// First request for it.
+        /// Name by which the column is requested first.
         first: String,
-        /// Second request for it.
+        /// Name by which the column is requested the second time.
         second: String,
         /// Numbers and names of the columns of the file.
         available: String,

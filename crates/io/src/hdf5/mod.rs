@@ -38,7 +38,7 @@ const MIN_BYTES: u64 = 4096;
 pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Contents, IoError> {
     let is_matlab = bytes.starts_with(b"MATLAB");
     let budget = Budget::new(limits, bytes.len());
-    // The decoder crate is young: a panic in it is reported as a damaged file.
+    // The decoder crate is young, so its panics are reported as a damaged file.
     let read = catch_unwind(AssertUnwindSafe(|| Reader::read(bytes, is_matlab, budget)));
     let read = read.unwrap_or_else(|_| Err(Fault::new(0, "its structure is damaged")));
     let contents = read.map_err(|fault| fault.error(file, Place::Byte(1)))?;

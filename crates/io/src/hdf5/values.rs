@@ -81,7 +81,7 @@ pub(super) fn read(
     Ok(Content::Numbers(array(dataset, len, budget)?))
 }
 
-/// Returns what a data set of MATLAB contains instead of numbers; `None` for numbers.
+/// Returns the content of a data set of MATLAB that is not numbers, in words; `None` for numbers.
 fn unusable_class(attributes: &Attributes) -> Option<&'static str> {
     if attributes.has("MATLAB_empty") {
         return Some("an empty array");
