@@ -185,9 +185,9 @@ pub enum IoError {
         file: String,
         /// Number of the column.
         column: usize,
-        /// Name by which the column is requested first.
+        /// Name of the column in the first request.
         first: String,
-        /// Name by which the column is requested the second time.
+        /// Name of the column in the second request.
         second: String,
         /// Numbers and names of the columns of the file.
         available: String,
