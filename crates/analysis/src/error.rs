@@ -96,16 +96,16 @@ pub enum AnalysisError {
         name: String,
         /// Samples and columns of the array.
         got: [usize; 2],
-        /// Samples and columns of the others.
+        /// Samples and columns of the other arrays.
         expected: [usize; 2],
     },
     /// No record was given.
-    #[error("no record: an identification needs one at least")]
+    #[error("no record: an identification needs at least one")]
     NoRecord,
     /// A table of frequency responses does not contain all responses for its forces and points.
     #[error(
-        "{file} has no response at {response} to a force at {force}: every point needs one to every \
-         force, and every force one at its own point (choose `points`){advice}"
+        "{file} has no response at {response} to a force at {force}: every point needs a response to \
+         every force, and every force a response at its own point (choose `points`){advice}"
     )]
     NoResponse {
         /// The table.
@@ -120,7 +120,8 @@ pub enum AnalysisError {
     /// A file is neither a record with named columns nor a table of frequency responses.
     #[error(
         "{file}: name the columns of the response with `displacement`, `velocity` or `acceleration`; without \
-         any, the file is taken for a table of frequency responses, and it has none such as h_1_1_real; its \
+         such a name, the file is read as a table of frequency responses, but it has no column such as \
+         h_1_1_real; its \
          columns are {available}"
     )]
     NeitherRecordNorTable {
@@ -131,8 +132,8 @@ pub enum AnalysisError {
     },
     /// A table does not have the responses of all points to a force.
     #[error(
-        "{file} has no response at {response} to the force at {force}, which other forces have: a shape \
-         needs the responses of all points to every force"
+        "{file} has no response at {response} to the force at {force}, only to other forces: a mode \
+         shape needs the responses of all points to every force"
     )]
     MissingResponse {
         /// The table.
@@ -169,11 +170,13 @@ pub enum AnalysisError {
         force: String,
         /// The forces before it.
         others: String,
-        /// RMS of its independent part over its RMS.
+        /// Ratio of the RMS of its independent part to its RMS.
         own_share: f64,
     },
     /// A file has no modes that can be compared.
-    #[error("{file} has no mode with a frequency and a shape of one length: nothing to compare")]
+    #[error(
+        "{file} has no modes to compare: each needs a frequency, and shapes of the same length"
+    )]
     NothingToCompare {
         /// The file.
         file: String,
@@ -306,12 +309,12 @@ pub enum AnalysisError {
         with_acceleration: bool,
     },
     /// The frequency domain needs whole periods, and no period was given.
-    #[error("the frequency domain needs whole periods: say how long one is with `period`")]
+    #[error("the frequency domain needs whole periods: give the length of a period (`period`)")]
     ForceNeedsPeriods,
     /// The Kalman smoother needs an open record, and a period or lines were given.
-    #[error("the Kalman smoother takes an open record: leave `period` and `lines` out")]
+    #[error("the Kalman smoother is for open records: leave `period` and `lines` out")]
     KalmanIsOpen,
-    /// The method has no standard error for a frequency band.
+    /// The method cannot keep the force within a frequency band.
     #[error(
         "the force from sample to sample (`discretised`) cannot be kept within the band from {low_hz} \
          to {high_hz} Hz: leave `band_hz` out, or choose another `method`"
@@ -406,14 +409,14 @@ pub enum AnalysisError {
     /// The time domain needs both displacement and velocity.
     #[error(
         "in the time domain `displacement` and `velocity` are both needed (in the frequency domain \
-         one kind of response is enough); with displacement or acceleration alone, `derivatives` says \
-         how to find the others: spectral for whole periods, savitzky-golay:WINDOW:ORDER for any record"
+         one kind of response is enough); with displacement or acceleration alone, `derivatives` sets \
+         how the others are computed: spectral for whole periods, savitzky-golay:WINDOW:ORDER for any record"
     )]
     TimeDomainMotions,
     /// Derivatives are computed from one measured kind of response only.
     #[error(
-        "`derivatives` completes a record of the displacement alone or of the acceleration alone: name \
-         one of them, or leave `derivatives` out"
+        "`derivatives` computes the other motions from the displacement alone or from the acceleration \
+         alone: name only one of these, or leave `derivatives` out"
     )]
     NothingToDerive,
     /// Second derivatives are only for the fit of the equation of motion.
@@ -471,8 +474,8 @@ pub enum AnalysisError {
     },
     /// The record cannot be decimated to the requested sampling rate.
     #[error(
-        "a record of {own_hz} Hz has no samples at {rate_hz} Hz: its rates are {own_hz} Hz divided by \
-         whole numbers"
+        "a record sampled at {own_hz} Hz cannot be reduced to {rate_hz} Hz: possible rates are {own_hz} \
+         Hz divided by whole numbers"
     )]
     SweepRate {
         /// Requested rate, in Hz.
@@ -483,18 +486,20 @@ pub enum AnalysisError {
     /// NPI (cycles of the natural frequency per period) needs a described experiment, whose
     /// sampling can be chosen.
     #[error(
-        "`npi` belongs to the description of an experiment; the rate of a record is fixed: `decimate` takes \
-         every n-th sample"
+        "`npi` applies only to a described experiment, whose sampling rate can be chosen; for a record, \
+         use `decimate`, which takes every n-th sample"
     )]
     NpiOfRecord,
-    /// A decimation is a whole number.
-    #[error("every n-th sample of a record: n is a whole number, got {value}")]
+    /// A decimation must be a whole number.
+    #[error(
+        "a decimation takes every n-th sample of a record: n must be a whole number, got {value}"
+    )]
     Decimation {
         /// Number of samples asked for, a pure number.
         value: f64,
     },
-    /// A period is not a whole number of the used samples.
-    #[error("a period of {} cannot be divided into steps of every {} sample", message::count(*period, "sample"), message::ordinal(*factor))]
+    /// A period is not a whole number of decimated samples.
+    #[error("a period of {} cannot be reduced to every {} sample: the ratio must be a whole number", message::count(*period, "sample"), message::ordinal(*factor))]
     DecimatedPeriod {
         /// Number of samples in a period.
         period: usize,
@@ -508,7 +513,7 @@ pub enum AnalysisError {
         wanted: ResponseQuantity,
     },
     /// A sweep was requested without a setting.
-    #[error("a sweep needs one setting at least")]
+    #[error("a sweep needs at least one setting")]
     NoSetting,
     /// No setting of a sweep gave an estimate.
     #[error(
@@ -540,7 +545,7 @@ pub enum AnalysisError {
     /// The computation needs more memory than the limit for a file of this size.
     #[error(
         "{file}: the work on {numbers} numbers takes about {} GB of memory, and {} GB is the limit for a file of this size; \
-         if the record is right and the memory is there, set `memory_gb`: {}",
+         if the record is correct and the memory is available, set `memory_gb`: {}",
         message::number(two_digits(*needed_gb)),
         message::number(two_digits(*allowed_gb)),
         message::number(needed_gb.ceil())

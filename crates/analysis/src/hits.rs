@@ -46,7 +46,7 @@ pub struct HitRow {
     pub used: bool,
     /// Reasons for its exclusion, a sentence each.
     pub reasons: Vec<String>,
-    /// The same reasons with their numbers.
+    /// Reasons for its exclusion in machine-readable form, with the measured values.
     pub faults: Vec<HitFault>,
 }
 
@@ -167,8 +167,8 @@ impl Struck {
                 Ok(Self { dof, found, idle })
             }
             _ => Err(wrong(format!(
-                "a hammer strikes one degree of freedom, and {} forces act in {}: name one column, and 0 \
-                 for the others",
+                "a hammer strikes one degree of freedom, but {} forces act in {}: name the column of the \
+                 struck one, and 0 for the others",
                 held.driven.len(),
                 held.file
             ))),
@@ -215,7 +215,7 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
         let force = buffered.force.channel(dof);
         cut.remarks.extend(idle.iter().map(|dof| {
             format!(
-                "{}: force {} taken as zero: its channel shows noise alone, also during the hits",
+                "{}: force {} was assumed zero: its channel contains only noise, also during the hits",
                 buffered.file,
                 dof + 1
             )

@@ -30,12 +30,12 @@ pub const PAIR_BYTES: usize = 128;
 /// channel: the number of lines is half the number of samples.
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
-/// Logarithm of the decay of the slowest mode in the zeros that follow the forces of a prediction:
-/// the response that wraps around from the end is below 0.1 %.
+/// Decay of the slowest mode, as a natural logarithm, during the zeros that are appended to the
+/// forces of a prediction: the response that wraps around from the end is below 0.1 %.
 pub const REST_DECAY: f64 = 7.0;
 
-/// Largest number of records of zeros that follow the forces of a prediction by modes; it limits
-/// their memory.
+/// Largest number of zeros that are appended to the forces of a prediction by modes, in lengths of
+/// the record; it limits the memory.
 pub const REST_RECORDS: usize = 8;
 
 /// Minimum relative uncertainty of the standard errors for a remark: that of 12 degrees of freedom.

@@ -60,7 +60,7 @@ pub struct PredictionSummary {
     pub channels: Vec<PredictionError>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: Predict,
 }
 
@@ -132,8 +132,8 @@ pub fn predict(
     let mut remarks = block.unit_notes();
     if !in_motion.is_empty() {
         remarks.push(format!(
-            "the error of {} is largest at the beginning and dies away: the machine was in motion before the first \
-             sample, and not at rest; `settle` fits the state in which it begins",
+            "the error of {} is largest at the beginning and decays: the machine was not at rest at the \
+             first sample; `settle` fits its initial state",
             message::list(in_motion.iter(), ", ", 6)
         ));
     }
@@ -194,7 +194,9 @@ fn settle(
         columns.iter().any(|column| column == ABSENT)
     };
     if kinds.is_empty() || kinds.iter().any(missing) {
-        return wrong("the start is fitted to the response of every degree of freedom".into());
+        return wrong(
+            "the initial state is fitted to the response of every degree of freedom".into(),
+        );
     }
     Ok(samples)
 }
@@ -209,7 +211,9 @@ pub(crate) fn settled_samples(
     let wrong = |why: String| Err(AnalysisError::Setting { setting: "settle", why });
     let (Some(samples), len) = (how.settle, block.force.len()) else { return Ok(0) };
     if steady {
-        return wrong("whole periods are predicted as a steady state, which needs no start".into());
+        return wrong(
+            "whole periods are predicted as a steady state, which needs no initial state".into(),
+        );
     }
     if (2..len).contains(&samples) {
         Ok(samples)
@@ -292,7 +296,7 @@ impl Predicted {
     }
 
     /// Returns displacement, velocity and acceleration of a machine (samples × degrees of freedom,
-    /// in m, m/s and m/s²); `None` of modes.
+    /// in m, m/s and m/s²); `None` for modes.
     pub fn response(&self) -> Option<&Response> {
         match &self.motion {
             PredictedMotion::Machine(response) => Some(response),
@@ -309,7 +313,7 @@ impl Predicted {
     }
 
     /// Returns the columns of a record of the prediction, with their names: every measured kind of
-    /// response, or displacements, in m, m/s or m/s²; of modes the measured responses, or all.
+    /// response, or displacements, in m, m/s or m/s²; for modes, the measured responses, or all.
     pub fn columns(&self) -> Vec<(String, &[f64])> {
         match &self.motion {
             PredictedMotion::Machine(response) => self.machine_columns(response),

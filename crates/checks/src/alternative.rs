@@ -124,10 +124,10 @@ impl Check for Alternative {
             Cause::Quantity { .. } => "State what was measured (`quantity`)",
             Cause::Decibels => "State the unit in the header, as in magnitude [dB]",
             Cause::BetweenSamples { .. } => {
-                "Records from a simulation are like that: state it with `between_samples`"
+                "In records of a simulation this is usual: state it with `between_samples`"
             }
             Cause::AcCoupling { .. } => {
-                "State it with `ac_coupling`, or couple all channels alike"
+                "State it with `ac_coupling`, or measure all channels with the same coupling"
             }
         })
     }

@@ -63,8 +63,8 @@ impl Check for Bias {
         if self.verdict() == Verdict::Good {
             write!(
                 f,
-                "the estimate agrees with {reference} ({p_value}): {parameter} is {other} \
-                 there, {value} here, {errors:.1} standard errors away"
+                "the estimate agrees with {reference} ({p_value}): {parameter} is {value}, and {other} \
+                 by {reference}; they differ by {errors:.1} standard errors"
             )
         } else {
             write!(

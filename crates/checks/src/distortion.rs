@@ -54,7 +54,8 @@ pub struct Distortion {
     /// Level of the response on even lines relative to the driven lines, in dB, if only odd lines
     /// are driven; `None` otherwise, or if there is only noise.
     pub even_db: Option<f64>,
-    /// Level on odd lines without force, in dB, under the same condition.
+    /// Level of the response on odd lines without force relative to the driven lines, in dB, if
+    /// only odd lines are driven; `None` otherwise, or if there is only noise.
     pub odd_db: Option<f64>,
     /// Probability that one of the terms explains as much by noise alone.
     #[cfg_attr(feature = "serde", serde(flatten))]

@@ -56,8 +56,8 @@ fn longest_run(x: &[f64]) -> Option<(usize, usize)> {
     runs.max_by_key(|(first, len)| (*len, std::cmp::Reverse(*first)))
 }
 
-/// Returns the probability that the channel has such a run by chance; `None` unless the channel
-/// moves on both sides.
+/// Returns the probability that the channel has a run of equal samples of this length by chance;
+/// `None` unless the channel moves on both sides.
 fn p_value(x: &[f64], sample: usize, samples: usize) -> Option<f64> {
     let (before, after) = (&x[..sample], &x[sample + samples..]);
     let changes = x.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);

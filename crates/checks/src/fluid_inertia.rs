@@ -50,13 +50,13 @@ impl Check for FluidInertia {
         if self.verdict() == Verdict::Good {
             return write!(
                 f,
-                "no inertia of the fluid shows: a likelihood ratio of {statistic} ({p_value})"
+                "no inertia of the fluid was found: the likelihood ratio is {statistic} ({p_value})"
             );
         }
         write!(
             f,
-            "the fluid has inertia (a likelihood ratio of {statistic}, {p_value}), and eight coefficients leave it out, \
-             which biases them: identify twelve (`coefficients`)"
+            "the fluid has inertia (likelihood ratio {statistic}, {p_value}), which eight coefficients \
+             ignore, so they are biased: identify twelve (`coefficients`)"
         )
     }
 }

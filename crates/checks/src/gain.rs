@@ -100,8 +100,8 @@ impl Check for Gain {
         write!(
             f,
             "C and K are symmetric except for one factor: c{i}{j} over c{j}{i} and k{i}{j} over k{j}{i} are both \
-             {ratio}, as if response {i} or force {i} were read {ratio} times too large compared with number {j}: \
-             check their units and gains"
+             {ratio}, as if response {i} or force {i} were measured {ratio} times too large compared \
+             with response {j} or force {j}: check their units and gains"
         )
     }
 }

@@ -236,7 +236,7 @@ pub(crate) const MAX_DISTANCES: usize = 12;
 /// fewer pairs of lines have products that are not normally distributed.
 pub(crate) const LINES_PER_DISTANCE: usize = 8;
 
-/// Minimum number of pairs of lines at a distance.
+/// Minimum number of pairs of lines with a given distance.
 pub(crate) const RESPONSE_PAIRS: usize = 8;
 
 /// Minimum number of lines per distance of the correlation from line to line, and per lag of the
@@ -284,7 +284,7 @@ pub const DROP_OUT_NEIGHBOURS: usize = 64;
 pub const DROP_OUT_MOTION: f64 = 10.0;
 
 /// Maximum probability of a run of equal samples that counts as a drop-out; real drop-outs have far
-/// smaller ones.
+/// smaller probabilities.
 pub const DROP_OUT_LEVEL: f64 = 1e-4;
 
 /// Maximum number of rounds in which the corner frequency of an AC-coupled channel is refined.

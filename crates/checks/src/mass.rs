@@ -95,7 +95,7 @@ impl Check for NegativeMass {
             f,
             "m{i}{i} is {mass} kg, {errors} standard errors below zero ({p_value}): no machine has a \
              negative mass. Possible causes: a force or a response of the wrong sign, channels in the \
-             wrong order, a quantity taken for another one (acceleration for displacement)"
+             wrong order, a wrong quantity (acceleration read as displacement)"
         )
     }
 }

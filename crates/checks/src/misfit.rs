@@ -120,8 +120,8 @@ impl Misfit {
         match verdict {
             Verdict::Good => "consistent with noise",
             _ if self.ratio < 1.0 && self.source == NoiseSource::Force => {
-                "the noise of the force is less than assumed, which biases the estimate; state it with \
-                 `force_noise`"
+                "the noise of the force is less than assumed, and the wrong value biases the estimate; \
+                 state the noise with `force_noise`"
             }
             _ if self.ratio < 1.0 => {
                 "the periods differ by more than noise (hits of unequal strength, a drift, a transient), and \

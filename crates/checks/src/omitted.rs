@@ -79,7 +79,9 @@ impl TermLeftOut {
         let name = |dof| names.response(ResponseQuantity::Displacement, dof);
         f.write_str(match self.term {
             OmittedTerm::ResidualFlexibility => "a residual flexibility of modes above the band",
-            OmittedTerm::HiddenMass => "a mass on a spring of its own, with a mode above the band,",
+            OmittedTerm::HiddenMass => {
+                "an additional mass on a spring, with its mode above the band,"
+            }
             OmittedTerm::ResidualMass => "a residual mass of modes below the band",
             OmittedTerm::StructuralDamping => {
                 "structural damping, a force that does not grow with the frequency,"

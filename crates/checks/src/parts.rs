@@ -151,13 +151,14 @@ impl Check for PartsAgreement {
         match self.verdict() {
             Verdict::Good => write!(
                 f,
-                "parts of the data agree ({p_value}): the largest difference is that of {parameter}, {value} by {part} \
-                 and {others} by the rest, {errors} standard errors"
+                "parts of the data agree ({p_value}): the largest difference is that of {parameter}, \
+                 {value} for {part} and {others} for the rest, {errors} standard errors"
             ),
             _ => write!(
                 f,
-                "parts of the data disagree beyond their errors ({p_value}): {parameter} is {value} by {part} and \
-                 {others} by the rest, {errors} standard errors apart; the model is wrong or the machine changes"
+                "parts of the data disagree beyond their errors ({p_value}): {parameter} is {value} for \
+                 {part} and {others} for the rest, a difference of {errors} standard errors; the model \
+                 is wrong or the machine changes"
             ),
         }
     }

@@ -191,8 +191,8 @@ pub enum PeriodFault {
     Neighbour {
         /// Number of samples after which it repeats best.
         period: usize,
-        /// RMS difference from one such period to the next, over the RMS of the force (pure
-        /// number).
+        /// Ratio of the RMS difference from one of these periods to the next to the RMS of the
+        /// force (pure number).
         mismatch: f64,
         /// RMS difference after the claimed period, relative to the RMS of the force (pure number).
         claimed_mismatch: f64,
@@ -211,8 +211,8 @@ pub enum PeriodFault {
     Other {
         /// Number of samples after which it repeats.
         period: usize,
-        /// RMS difference from one such period to the next, over the RMS of the force (pure
-        /// number).
+        /// Ratio of the RMS difference from one of these periods to the next to the RMS of the
+        /// force (pure number).
         mismatch: f64,
         /// Number of samples of the force.
         samples: usize,

@@ -82,7 +82,7 @@ impl Check for PowerFlow {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the forces take power out of the machine ({:.1} % of the apparent power): force and \
+            "the forces extract power from the machine ({:.1} % of the apparent power): force and \
              response are interchanged, one of them has the wrong sign or a delay, or something \
              else drives the machine",
             -100.0 * self.fraction

@@ -48,7 +48,7 @@ impl Check for PriorAgreement {
         let away = (self.estimate - self.mean).abs() / self.standard_deviation;
         write!(
             f,
-            "{}: the estimate is {} standard deviations of its prior from the mean of the prior ({}): ",
+            "{}: the distance of the estimate from the mean of its prior is {} standard deviations of the prior ({}): ",
             self.parameter,
             three_digits(away),
             self.p_value

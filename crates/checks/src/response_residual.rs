@@ -115,7 +115,7 @@ struct Series<'a> {
     each: Vec<Vec<Complex<f64>>>,
     /// Numbers of the lines, sorted, and their indices in `each`.
     lines: Vec<(usize, usize)>,
-    /// Correlation of the noise of two lines at a distance.
+    /// Correlation of the noise of two lines, by their distance in lines, from 0.
     correlation: &'a [f64],
 }
 
@@ -132,7 +132,7 @@ impl<'a> Series<'a> {
         Self { each: pairs.map(one).collect(), lines, correlation: frf.line_correlation() }
     }
 
-    /// Returns the indices of the pairs of lines at a distance.
+    /// Returns the indices of the pairs of lines with this distance.
     fn pairs(&self, distance: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.lines.iter().filter_map(move |(number, at)| {
             let partner =

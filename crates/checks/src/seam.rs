@@ -65,7 +65,7 @@ impl Check for Seam {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "from the last sample back to the first the response bends {:.1} times as much as elsewhere: ",
+            "from the last sample to the first the curvature of the response is {:.1} times that elsewhere: ",
             self.ratio
         )?;
         f.write_str(match self.verdict() {

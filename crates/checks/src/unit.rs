@@ -49,12 +49,12 @@ impl Check for Unit {
             ),
             (Some(factor), false) => write!(
                 f,
-                "may be a unit with the factor {factor}, and the numbers are taken as {si} without it: \
-                 state the unit (`unit`) or the factor (`scale`)"
+                "may be a unit with the factor {factor}, which was not applied; the numbers are read as \
+                 {si}: state the unit (`unit`) or the factor (`scale`)"
             ),
             (None, _) => write!(
                 f,
-                "is not understood, and the numbers are taken as {si}: state the unit (`unit`) or the \
+                "is not understood, and the numbers are read as {si}: state the unit (`unit`) or the \
                  factor (`scale`)"
             ),
         }

@@ -34,7 +34,7 @@ impl Check for UnmeasuredForce {
         f.write_str(match self.verdict() {
             Verdict::Good => "",
             _ => {
-                ": a nonlinearity under a random force has the same effect, and so has a missing degree of freedom; repeat the test at another level of the force, or with periods that repeat"
+                ": a nonlinearity under a random force or a missing degree of freedom has the same effect; repeat the test at another level of the force, or with a periodic force"
             }
         })
     }

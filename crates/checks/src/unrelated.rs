@@ -60,8 +60,8 @@ impl Check for Unrelated {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the response does not follow the force: the fit explains {} % of its power, no more than of noise; the \
-             parameters mean nothing. Check columns, cables and units",
+            "the response does not follow the force: the fit explains {} % of its power, no more than it \
+             would of noise; the parameters are meaningless. Check columns, cables and units",
             three_digits(100.0 * self.explained)
         )
     }

@@ -126,8 +126,8 @@ impl Residual {
                 "uncorrelated from line to line"
             }
             (Residual::Lines { .. }, true) => {
-                "correlated from line to line: a transient or leakage, as of an unmeasured force, or an \
-                 error of the model; use later periods"
+                "correlated from line to line: a transient, leakage (for example from an unmeasured \
+                 force), or an error of the model; use later periods"
             }
             (Residual::FrequencyResponse { .. }, true) => {
                 "correlated from line to line: a missing mode, another error of the model, or segments too \

@@ -67,9 +67,9 @@ pub enum CliError {
     },
     /// Two results for standard output.
     #[error(
-        "standard output takes one thing, not {}{}",
+        "only one output can go to standard output, not {}{}",
         message::count(*files, "file"),
-        if *json { " and the report: name files, or leave --json out" } else { ": name the others" }
+        if *json { " and the report: write to named files, or leave --json out" } else { ": name the others" }
     )]
     SharedOutput {
         /// Number of files for standard output.
@@ -111,10 +111,10 @@ impl CliError {
             | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { file, at, limit })) => {
                 match (raises, limit.is_memory()) {
                     (true, true) => {
-                        format!("{error}; if the record is really so large, use --memory-gb")
+                        format!("{error}; if the record is really this large, use --memory-gb")
                     }
                     (true, false) => {
-                        format!("{error}; if the record is really so large, use --raise-limits")
+                        format!("{error}; if the record is really this large, use --raise-limits")
                     }
                     (false, _) => format!("{file}, {at}: {limit}, which this command cannot raise"),
                 }

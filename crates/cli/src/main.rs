@@ -4,7 +4,7 @@ use std::io::Write as _;
 
 fn main() -> std::process::ExitCode {
     // The message has no backtrace: a backtrace needs memory, and a program that fails for lack of
-    // memory would wait for it for ever.
+    // memory would wait for this memory for ever.
     std::panic::set_hook(Box::new(|panic| {
         let _ = writeln!(std::io::stderr(), "{panic}");
     }));

@@ -167,7 +167,7 @@ fn lines_above_the_table() {
 
 #[test]
 fn json_for_a_record() {
-    let parts = ["a.csv is JSON, no table of samples", "simulate", "force --system"];
+    let parts = ["a.csv is JSON, not a table of samples", "simulate", "force --system"];
     identify("{ \"system\": { \"mass\": 1 } }", "", &parts);
 }
 
@@ -220,7 +220,7 @@ fn no_excited_line() {
     identify(&good(), "--band-hz 1e300:2e300", &["between 1e300 and 2e300 Hz"]);
     identify(&good(), "--lines even", &["no excited line among even"]);
     identify(&good(), "--lines 1:20", &["line 20 is not between 1 and 15"]);
-    identify(&good(), "--lines 5:1", &["\"5:1\" is no choice of lines", "first:step:last"]);
+    identify(&good(), "--lines 5:1", &["\"5:1\" is not a choice of lines", "first:step:last"]);
     identify(&good(), "--band-hz 60:30", &["low:high"]);
     identify(&good(), "--period 2", &["2 equations do not determine 3 unknowns"]);
 }
@@ -356,7 +356,7 @@ fn a_free_decay_that_is_none() {
     fit("--velocity force", &["one kind of response: name the columns of displacement or"]);
     fit("--modes 0", &["--modes"]);
     fit("--modes 99", &["99 modes cannot be fitted: give a number from 1 to 40"]);
-    fit("--from 0 --modes 5", &["the record has 32 samples where at least 61 are needed"]);
+    fit("--from 0 --modes 5", &["the record has 32 samples, but at least 61 are needed"]);
     refused(&good(), "modes a.csv", &["name the columns of the response with --displacement"]);
     let still = record(|k| (0.004 * f64::from(k), 1.0, 2.5));
     refused(&still, "modes a.csv --displacement x --from 0", &["channel 1 is constant at 2.5"]);

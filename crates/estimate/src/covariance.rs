@@ -24,7 +24,7 @@ pub struct Product {
     pub rows: DMatrix<f64>,
     /// Indices of the equation and of the row h of every parameter.
     pub places: Vec<(usize, usize)>,
-    /// Flag of each parameter that the data do not determine.
+    /// Flags of the parameters: `true` if the data do not determine the parameter.
     pub open: Vec<bool>,
 }
 

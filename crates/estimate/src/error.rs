@@ -57,7 +57,7 @@ pub enum EstimateError {
     },
     /// Two entries of a symmetric matrix are known, and differ.
     #[error(
-        "{lower} is known as {} and {upper} as {}: the matrix cannot be symmetric",
+        "{lower} is given as {} and {upper} as {}: the matrix cannot be symmetric",
         message::number(*lower_value), message::number(*upper_value)
     )]
     Asymmetric {
@@ -96,7 +96,7 @@ pub enum EstimateError {
     },
     /// A parameter or its standard error overflows.
     #[error(
-        "{parameter} or its standard error is beyond the largest number: a known value or the force \
+        "{parameter} or its standard error exceeds the range of double precision: a known value or the force \
          is far too large, or the response far too small"
     )]
     Unbounded {
@@ -108,12 +108,12 @@ pub enum EstimateError {
     Step {
         /// Step of the first record, in seconds.
         expected: f64,
-        /// Step of the other, in seconds.
+        /// Step of the other record, in seconds.
         got: f64,
     },
     /// A sliding polynomial cannot be fitted, or has no such derivative.
     #[error(
-        "a polynomial of order {order} through {}: the window must have more samples \
+        "a polynomial of order {order} through {} is not possible: the window must have more samples \
          than the order, and the order must be at least that of the derivative", message::count(*samples, "sample")
     )]
     Window {
@@ -124,8 +124,8 @@ pub enum EstimateError {
     },
     /// A sliding polynomial over too many samples, or of too high an order.
     #[error(
-        "a sliding polynomial of order {order} with {half_width} samples to either side: at most \
-         order {} and {} samples",
+        "a sliding polynomial of order {order} with {half_width} samples on either side is not possible: \
+         the order can be at most {}, the number of samples on either side at most {}",
         crate::derivatives::SavitzkyGolay::MOST_ORDER,
         crate::derivatives::SavitzkyGolay::MOST_HALF_WIDTH
     )]
@@ -145,8 +145,8 @@ pub enum EstimateError {
     },
     /// A mode is too fast for a step from sample to sample.
     #[error(
-        "the fastest mode has {rate:.3e} rad/s, too fast for samples {dt:.3e} s apart: leave out \
-         degrees of freedom without mass of their own, or sample faster"
+        "the fastest mode has {rate:.3e} rad/s, too fast for a sampling interval of {dt:.3e} s: leave \
+         out degrees of freedom without a mass, or sample faster"
     )]
     TooStiff {
         /// Modulus of the eigenvalue of the mode, in rad/s.
@@ -156,8 +156,8 @@ pub enum EstimateError {
     },
     /// A computed response diverges.
     #[error(
-        "the response of the nonlinear system grows beyond all bounds within {}: its spring or damper \
-         turns negative at that amplitude",
+        "the response of the nonlinear system grows without limit within {}: a spring or damper has a \
+         negative force coefficient at this amplitude",
         message::count(*len, "sample")
     )]
     Diverged {
@@ -166,8 +166,8 @@ pub enum EstimateError {
     },
     /// The noise covariance of a line cannot be inverted.
     #[error(
-        "the noise covariance at {frequency_hz} Hz is singular: a displacement without noise, or no \
-         more periods than degrees of freedom; pool it over more lines"
+        "the noise covariance at {frequency_hz} Hz is singular: a displacement has no noise, or there \
+         are no more periods than degrees of freedom; pool the covariance over more lines"
     )]
     SingularNoise {
         /// Frequency, in Hz.

@@ -55,7 +55,7 @@ pub enum ForceError {
         dof: usize,
     },
     /// No degree of freedom is forced, so there is no unknown.
-    #[error("no forced degree of freedom was named")]
+    #[error("no degree of freedom with an unknown force was named")]
     NoForcedDof,
     /// More unknown forces than measured channels.
     #[error(
@@ -69,7 +69,7 @@ pub enum ForceError {
         measurements: usize,
     },
     /// A Taylor order outside 1 … 8.
-    #[error("Taylor order {order}: choose 1 (Euler) to 8, or the exact form")]
+    #[error("the Taylor order {order} is not possible: choose 1 (Euler) to 8, or the exact form")]
     TaylorOrder {
         /// Order given.
         order: usize,
@@ -104,7 +104,7 @@ pub enum ForceError {
     #[error("no spectral line was chosen")]
     NoLines,
     /// A line outside the spectrum.
-    #[error("line {line} was asked for, the spectrum ends at line {last}")]
+    #[error("line {line} was requested, but the spectrum ends at line {last}")]
     NoSuchLine {
         /// Line requested.
         line: usize,
@@ -144,8 +144,8 @@ pub enum ForceError {
     },
     /// Too few lines remain to measure the noise on.
     #[error(
-        "the noise level is to be measured outside the chosen lines, but only {outside} are left \
-         of the {needed} needed: choose fewer lines, give a longer period, or state the level"
+        "the noise level is estimated from the lines outside the chosen ones, but only {outside} of the \
+         {needed} needed remain: choose fewer lines, give a longer period, or state the level"
     )]
     TooFewOutsideLines {
         /// Lines not chosen.
@@ -155,8 +155,8 @@ pub enum ForceError {
     },
     /// A channel without noise on the lines that measure it.
     #[error(
-        "channel {channel} (counted from 1) is zero outside the chosen lines, or not finite, where \
-         its noise is to be measured: the sensor may be dead; leave it out, or state the noise level"
+        "channel {channel} (counted from 1) is zero or not finite outside the chosen lines, from which \
+         its noise is estimated: the sensor may be dead; leave it out, or state the noise level"
     )]
     NoNoise {
         /// The channel, counted from 1.
@@ -183,7 +183,7 @@ pub enum ForceError {
     },
     /// The measured channels cannot show a force, at any frequency.
     #[error(
-        "no frequency shows the force on degree of freedom {} (counted from 1) apart from the \
+        "at no frequency can the force on degree of freedom {} (counted from 1) be separated from the \
          others in the measured channels: measure elsewhere, or name fewer forces",
         dof + 1
     )]
@@ -200,7 +200,9 @@ pub enum ForceError {
         forces: usize,
     },
     /// A model of forces of an impossible order.
-    #[error("a force model of order {order}: choose 1 (reverts to zero) to {most} (a sharp band)")]
+    #[error(
+        "a force model of order {order} is not possible: choose 1 (first-order low-pass) to {most} (a sharp band)"
+    )]
     ModelOrder {
         /// The order given.
         order: usize,
@@ -246,7 +248,7 @@ pub enum ForceError {
     #[error("no force reaches the measured channels, or all of them are zero: measure elsewhere")]
     Silent,
     /// Two force records have different numbers of channels.
-    #[error("the forces compared have {estimate} and {truth} channels")]
+    #[error("the two forces to compare have {estimate} and {truth} channels")]
     Compared {
         /// Channels of the estimate.
         estimate: usize,
@@ -254,13 +256,13 @@ pub enum ForceError {
         truth: usize,
     },
     /// A ratio to a force that is zero at the line.
-    #[error("the force compared with is zero at line {line}: leave the line out")]
+    #[error("the reference force is zero at line {line}: leave the line out")]
     NoForceAtLine {
         /// The line.
         line: usize,
     },
     /// A ratio to a force that is zero.
-    #[error("the force compared with is zero on every channel")]
+    #[error("the reference force is zero on every channel")]
     NoForce,
     /// The model is not usable.
     #[error(transparent)]

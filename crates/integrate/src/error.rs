@@ -95,8 +95,9 @@ pub enum IntegrateError {
     },
     /// M is singular, and the scheme solves the equation of motion for the acceleration.
     #[error(
-        "{scheme}: the mass matrix is singular (pivot {smallest:.1e} of its terms), so that forces determine \
-         no acceleration: every motion needs a mass, and rigid connections fewer degrees of freedom"
+        "{scheme}: the mass matrix is singular (pivot {smallest:.1e} of its terms), so the acceleration \
+         is not determined: every degree of freedom needs a mass; model rigid connections with fewer \
+         degrees of freedom"
     )]
     SingularMass {
         /// Name of the scheme.
@@ -119,8 +120,8 @@ pub enum IntegrateError {
     },
     /// The factors of a matrix need more memory than the limit.
     #[error(
-        "the LU factors of the {} need at least {:.2} GB, more than the limit of {:.2} GB: a body in three \
-         dimensions fills in. Use a coarser model, a scheme or a search that factors a diagonal matrix \
+        "the LU factors of the {} need at least {:.2} GB, more than the limit of {:.2} GB: the factors \
+         of a three-dimensional body have many additional entries. Use a coarser model, a scheme or a search that factors a diagonal matrix \
          (central-difference with lumped masses), or raise the limit (`factor_memory_gb` of the system, \
          `SparseSystem::with_factor_limit`); the time grows faster than the memory",
         message::count(*dof, "degree of freedom"), 1e-9 * *bytes as f64, 1e-9 * *limit as f64
@@ -208,7 +209,7 @@ pub enum IntegrateError {
     },
     /// No response repeats with the period of the force, or rounding hides it.
     #[error(
-        "no unique response repeats every {period} s: the free motion repeats too \
+        "no response that repeats every {period} s is unique, because a free motion has this period, too \
          (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})",
         period = message::number(*period)
     )]
@@ -222,9 +223,9 @@ pub enum IntegrateError {
     },
     /// The periodic response of a large linear system was not found in the Krylov space.
     #[error(
-        "the response that repeats every {period} s is not found to rounding: after {products} passes over the \
-         period the best still changes by {missed:.1e} of its size in a period; much of the free motion \
-         lasts longer than that: take a longer period",
+        "the response that repeats every {period} s was not found to rounding accuracy: after {products} \
+         passes over the period the best response still changes by {missed:.1e} of its size in a period, \
+         because much of the free motion lasts longer; choose a longer period",
         period = message::number(*period)
     )]
     PeriodNotClosed {
@@ -237,8 +238,9 @@ pub enum IntegrateError {
     },
     /// Newton's method found no periodic response of a nonlinear system.
     #[error(
-        "no response that repeats every {period} s was found from this start: the best still changes by \
-         {missed:.1e} of its size in a period; start nearer, or let the motion settle for longer",
+        "no response that repeats every {period} s was found from this initial motion: the best one \
+         still changes by {missed:.1e} of its size in a period; choose an initial motion nearer to it, \
+         or a longer settling time",
         period = message::number(*period)
     )]
     NoOrbit {
@@ -249,8 +251,8 @@ pub enum IntegrateError {
     },
     /// The nonlinear equation of a step has no solution that Newton's method finds.
     #[error(
-        "the nonlinear forces cannot be balanced at t = {time} s: Newton's method ends with \
-         accelerations that miss their equation by {residual:.1e} m/s²; take smaller steps",
+        "the nonlinear forces cannot be balanced at t = {time} s: Newton's method leaves an error of \
+         {residual:.1e} m/s² in the accelerations; choose smaller steps",
         time = message::number(*time)
     )]
     NotSolved {

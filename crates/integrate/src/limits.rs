@@ -234,8 +234,8 @@ pub(crate) const SHIFT_OFFSET: f64 = 1e-6;
 /// eigenvalue.
 pub(crate) const SAME_EIGENVALUE: f64 = 3e-8;
 
-/// Largest residual of a mode that is preferred for the next shift; a larger residual may belong
-/// to no mode.
+/// Largest residual of a mode that is preferred for the next shift; a vector with a larger residual
+/// may not be a mode.
 pub(crate) const SHIFT_RESIDUAL: f64 = 1e-2;
 
 /// Number of start vectors: multiple eigenvalues, such as those of a symmetric rotor in its two

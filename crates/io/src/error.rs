@@ -46,21 +46,22 @@ pub enum IoError {
         source: std::io::Error,
     },
     /// The file is HDF5, but the feature `hdf5`, which reads it, is not enabled.
-    #[error("{}", Message(format_args!("{file} is HDF5, like MATLAB files of version 7.3, and this program was compiled without HDF5: save it \
-        with -v7")))]
+    #[error("{}", Message(format_args!("{file} is an HDF5 file, as MATLAB files of version 7.3 are, but \
+        this program was compiled without HDF5: in MATLAB, save it with -v7")))]
     Hdf5 {
         /// The file.
         file: String,
     },
     /// The file is binary and of an unknown format.
-    #[error("{}", Message(format_args!("{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7) or 7.3, \
-         HDF5, universal file with datasets 58, Parquet, or gzip around a record")))]
+    #[error("{}", Message(format_args!("{file} is neither text nor in a known format: MATLAB level 5 \
+         (save with -v7) or 7.3, HDF5, universal file with datasets 58, Parquet, or one of these \
+         compressed with gzip")))]
     UnknownFormat {
         /// The file.
         file: String,
     },
     /// The Parquet file is damaged or uses a part of the format that is not supported.
-    #[error("{}", Message(format_args!("{file} is damaged, or no Parquet file that can be read here: {what}")))]
+    #[error("{}", Message(format_args!("{file} is damaged, or a Parquet file of a kind that cannot be read: {what}")))]
     Parquet {
         /// The file.
         file: String,
@@ -102,7 +103,7 @@ pub enum IoError {
         what: String,
     },
     /// The file is larger than a limit that guards against damaged and forged files.
-    #[error("{}", Message(format_args!("{file}, {at}: {limit}; if the record is right, raise the limit")))]
+    #[error("{}", Message(format_args!("{file}, {at}: {limit}; if the record is correct, raise the limit")))]
     TooLarge {
         /// The file.
         file: String,
@@ -112,7 +113,7 @@ pub enum IoError {
         limit: Limit,
     },
     /// The file is JSON, which contains descriptions and reports but no record.
-    #[error("{}", Message(format_args!("{file} is JSON, no table of samples: simulate, sweep and stability read the description of \
+    #[error("{}", Message(format_args!("{file} is JSON, not a table of samples: simulate, sweep and stability read the description of \
          an experiment, force --system and modal read a machine or a report of identify")))]
     JsonRecord {
         /// The file.
@@ -132,7 +133,7 @@ pub enum IoError {
         fields: usize,
     },
     /// Header lines are to be skipped in a file that is not text.
-    #[error("{}", Message(format_args!("{file} is no text: it has no lines to skip")))]
+    #[error("{}", Message(format_args!("{file} is not text, so it has no lines to skip")))]
     NothingToSkip {
         /// The file.
         file: String,
@@ -184,9 +185,9 @@ pub enum IoError {
         file: String,
         /// Number of the column.
         column: usize,
-        /// First request for it.
+        /// Name of the column in the first request.
         first: String,
-        /// Second request for it.
+        /// Name of the column in the second request.
         second: String,
         /// Numbers and names of the columns of the file.
         available: String,
@@ -214,8 +215,9 @@ pub enum IoError {
         column: String,
     },
     /// A number has another decimal sign than the numbers before it.
-    #[error("{}", Message(format_args!("{file}, line {line}, column {column}: \"{text}\" does not have the decimal {sign} of the \
-         other numbers of the file: use one decimal sign, and no sign between thousands")))]
+    #[error("{}", Message(format_args!("{file}, line {line}, column {column}: \"{text}\" does not have \
+         the decimal {sign} that the other numbers of the file have: use one decimal sign, and no separator \
+         between thousands")))]
     MixedDecimalSigns {
         /// The file.
         file: String,
@@ -229,7 +231,7 @@ pub enum IoError {
         sign: DecimalSign,
     },
     /// The contents of a column are not real numbers.
-    #[error("{}", Message(format_args!("{file}, column {column}: it holds {what}, a channel needs real numbers in time")))]
+    #[error("{}", Message(format_args!("{file}, column {column}: it holds {what}, but a channel needs real numbers over time")))]
     NoNumbers {
         /// The file.
         file: String,
@@ -255,7 +257,7 @@ pub enum IoError {
         wanted: Quantity,
     },
     /// A text that should be a unit is not one.
-    #[error("{}", Message(format_args!("\"{text}\" is no unit of a force, a response or a time that is known: examples are kN, lbf, \
+    #[error("{}", Message(format_args!("\"{text}\" is not a known unit of force, response or time: examples of units are kN, lbf, \
         mm, in, m/s^2, g, ms")))]
     NoUnit {
         /// The text.
@@ -297,7 +299,7 @@ pub enum IoError {
         usual: f64,
     },
     /// A record of one sample has no time step.
-    #[error("{}", Message(format_args!("{file} holds a single sample: a time column needs two to tell the time step")))]
+    #[error("{}", Message(format_args!("{file} holds a single sample: the time step of a time column needs at least two")))]
     SingleSample {
         /// The file.
         file: String,
@@ -415,9 +417,10 @@ pub enum IoError {
         what: String,
     },
     /// A covariance in the report is not known.
-    #[error("{}", Message(format_args!("{file}: the covariance of {parameters} is null: the record it was identified from leaves \
-         {parameters} undetermined; identify from one that moves the machine more, or take \
-         \"covariance\" out of the file to count the machine as exactly known")))]
+    #[error("{}", Message(format_args!("{file}: the covariance of {parameters} is not known (null), \
+         because the record of the identification did not determine {parameters}. Identify the machine \
+         again from a record with more excitation, or delete \"covariance\" from the file; the machine \
+         then counts as exactly known")))]
     Undetermined {
         /// The file.
         file: String,
@@ -433,7 +436,7 @@ pub enum IoError {
         source: ModelError,
     },
     /// A text is not a valid choice of spectral lines.
-    #[error("{}", Message(format_args!("\"{lines}\" is no choice of lines: write all, odd, even, or numbers and ranges such as \
+    #[error("{}", Message(format_args!("\"{lines}\" is not a choice of lines: write all, odd, even, or numbers and ranges such as \
          1:2:335 (first:step:last) separated by commas")))]
     LineSpec {
         /// Text of the choice.
@@ -449,7 +452,7 @@ pub enum IoError {
         available: String,
     },
     /// A point does not have the form of node and direction that universal files use.
-    #[error("{}", Message(format_args!("\"{point}\" is no point of a universal file: write a node and a direction such as 12+Z \
+    #[error("{}", Message(format_args!("\"{point}\" is not a point of a universal file: write a node and a direction such as 12+Z \
          (X, Y, Z, RX, RY or RZ)")))]
     Point {
         /// The point.

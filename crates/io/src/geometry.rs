@@ -187,7 +187,7 @@ impl Geometry {
             |name: &&str| self.index(name).ok_or_else(|| format!("there is no point {name}"));
         let chain: Vec<usize> = names.iter().map(index).collect::<Result<_, _>>()?;
         if chain.len() < 2 {
-            return Err("a line joins two points or more".into());
+            return Err("a line needs at least two points".into());
         }
         self.lines.extend(chain.windows(2).map(|pair| [pair[0], pair[1]]));
         Ok(())

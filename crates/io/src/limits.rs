@@ -205,8 +205,9 @@ impl Budget {
         Self { limits: *limits, columns, numbers, memory, memory_left: memory }
     }
 
-    /// Returns how many bytes may be unpacked at once, and the limit that decides it. A growing
-    /// buffer needs twice its size.
+    /// Returns the maximum number of bytes to unpack at once, and the limit that determines it.
+    /// Only half of the remaining memory may be used: a growing buffer is copied and then needs
+    /// twice its size.
     pub fn unpacked_bytes(&self) -> (usize, Limit) {
         let (unpacked, memory) = (self.limits.unpacked_bytes, self.memory_left / 2);
         if unpacked <= memory {

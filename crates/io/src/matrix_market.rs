@@ -73,7 +73,9 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
     let mut source = source.bounded(limits);
     let mut lines = Lines { file: source.file.clone(), at: 0, text: Vec::new(), limits: *limits };
     if !lines.next(&mut source)? {
-        return Err(lines.malformed("it is empty, a Matrix Market file begins with %%MatrixMarket"));
+        return Err(
+            lines.malformed("it is empty, but a Matrix Market file begins with %%MatrixMarket")
+        );
     }
     let header = Header::parse(&lines)?;
     if !lines.next_of_data(&mut source)? {

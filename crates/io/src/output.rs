@@ -258,7 +258,7 @@ fn resolved(path: &Path) -> io::Result<PathBuf> {
             _ => path,
         });
     }
-    Err(io::Error::other("it is a symbolic link in a ring of links"))
+    Err(io::Error::other("it is a symbolic link that leads back to itself"))
 }
 
 /// Creates the temporary file for `destination`.

@@ -35,7 +35,7 @@ pub(crate) fn add_functions(
         let sizes: Vec<String> = arrays.iter().map(sizes).collect();
         let sizes = sizes.join(", ");
         return Err(wrong(format!(
-            "no dimension of {sizes} has as many entries as there are frequencies, {count}"
+            "none of the dimensions {sizes} equals the number of frequencies, {count}"
         )));
     }
     for array in over_frequency {
@@ -130,7 +130,7 @@ impl Shape {
             [points, references] => [points, references],
             _ => {
                 return Err(format!(
-                    "{} has more dimensions than frequencies, points and references",
+                    "{} has more than three dimensions; only three are known: frequency, response point and reference point",
                     sizes(array)
                 ));
             }

@@ -43,7 +43,7 @@ pub(crate) fn frequencies(
             return Err(IoError::Description {
                 file: table.file().into(),
                 what: format!(
-                    "it has responses, and no vector of their frequencies: save this vector as {}",
+                    "it has responses, but no vector of their frequencies: save this vector as {}",
                     FREQUENCY[..4].join(" or ")
                 ),
             });

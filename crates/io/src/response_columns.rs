@@ -232,7 +232,7 @@ fn function<'a>(
     let missing = |what: &str| IoError::Description {
         file: table.file().into(),
         what: format!(
-            "column {} has no {what} beside it: a frequency response has a real and an imaginary part, or a \
+            "column {} has no matching {what}: a frequency response has a real and an imaginary part, or a \
              magnitude and a phase",
             table.label(first.column)
         ),
@@ -276,7 +276,7 @@ fn function<'a>(
         invert(&mut values, standard_error.as_deref_mut()).map_err(|row| IoError::Description {
             file: table.file().into(),
             what: format!(
-                "value {row} of column {} is 0, and has no inverse",
+                "value {row} of column {} is 0, so it has no inverse",
                 table.label(first.column)
             ),
         })?;

@@ -208,7 +208,7 @@ pub struct InputMeasures {
     pub persistent_excitation_order: usize,
     /// Lower end of the band whose lines are at most 20 dB below the strongest line, in Hz.
     pub effective_band_low_hz: f64,
-    /// Upper end of this band, in Hz.
+    /// Upper end of the band whose lines are at most 20 dB below the strongest line, in Hz.
     pub effective_band_high_hz: f64,
     /// Largest circular autocorrelation of the samples at a lag other than zero, as a ratio to the
     /// value at zero.

@@ -23,7 +23,7 @@ pub struct SelectedModes {
     pub modes: Vec<SelectedMode>,
 }
 
-/// One of these modes.
+/// One computed mode of a large machine.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SelectedMode {
     /// `true` if the mode is underdamped.

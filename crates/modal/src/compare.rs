@@ -69,7 +69,8 @@ pub struct Difference {
     pub value: f64,
     /// Standard error of the difference, in the same unit.
     pub standard_error: f64,
-    /// Probability of a difference as large by the errors alone; `None` without errors.
+    /// Probability that the errors alone cause a difference at least as large; `None` without
+    /// errors.
     pub p_value: Option<f64>,
     /// P-value after Holm's adjustment for the number of tests of the comparison.
     pub adjusted_p_value: Option<f64>,
@@ -82,7 +83,7 @@ pub struct ShapeTest {
     pub statistic: f64,
     /// Degrees of freedom of the statistic.
     pub degrees_of_freedom: usize,
-    /// Probability of a statistic as large by the errors alone.
+    /// Probability that the errors alone cause a statistic at least as large.
     pub p_value: f64,
     /// P-value after Holm's adjustment for the number of tests of the comparison.
     pub adjusted_p_value: f64,

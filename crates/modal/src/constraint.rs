@@ -31,10 +31,11 @@ pub struct DrivingPoint {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ModalConstraint {
-    /// Proportional damping: the residues of a mode are real multiples of λᵈ/(2jω_d) for outputs
-    /// that are the d-th time derivative of displacements and inputs that are forces.
+    /// Proportional damping: if the inputs are forces and the outputs are the n-th time derivatives
+    /// of displacements, the residues of a mode are real multiples of λⁿ/(2jω_d), with its pole λ
+    /// and its damped natural frequency ω_d.
     RealShapes {
-        /// d: 0 for displacements, 1 for velocities, 2 for accelerations.
+        /// The order n: 0 for displacements, 1 for velocities, 2 for accelerations.
         derivative: i32,
     },
     /// Reciprocity: the response between any two of the points is the same in both directions.

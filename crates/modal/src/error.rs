@@ -7,13 +7,15 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ModalError {
     /// There is no output.
-    #[error("no output is given: modes need at least one response")]
+    #[error("no output was given: modes need at least one response")]
     NoOutput,
     /// There is neither an input nor an open record.
-    #[error("no input and no open record: nothing excites the modes of this data")]
+    #[error(
+        "there is neither an input nor an open record, so the modes of these data are not excited"
+    )]
     NoExcitation,
     /// The lines are fewer than the unknowns of one mode.
-    #[error("the band has {lines} lines; one mode of this data needs at least {required}")]
+    #[error("the band has {lines} lines; one mode of these data needs at least {required}")]
     TooFewLines {
         /// Number of lines.
         lines: usize,
@@ -36,7 +38,7 @@ pub enum ModalError {
     },
     /// Inputs that are multiples of one another on every line.
     #[error(
-        "input {input} follows the other inputs (independent share {own_share:.1e}): their responses \
+        "input {input} is a multiple of the other inputs (independent share {own_share:.1e}): their responses \
          cannot be separated; record a test in which it differs, or leave it out"
     )]
     DependentInputs {
@@ -78,7 +80,7 @@ pub enum ModalError {
     },
     /// The numbers of channels of line data and estimate differ.
     #[error(
-        "the data has {inputs} inputs and {outputs} outputs, the modes {model_inputs} and \
+        "the data have {inputs} inputs and {outputs} outputs, but the modes have {model_inputs} and \
          {model_outputs}"
     )]
     Size {

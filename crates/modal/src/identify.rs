@@ -54,10 +54,11 @@ impl Default for ModalSettings {
     }
 }
 
-/// Identifies the modes in the band of the data.
+/// Identifies the modes in the band of the data by maximum likelihood, without a window.
 ///
-/// Maximum likelihood without a window: poles and participations are searched, shapes and residual
-/// terms are linear; the transient of each open record is one more load, common to all outputs.
+/// The search varies the poles and participation factors; the shapes and residual terms then follow
+/// from linear least squares. The transient of each open record (one that is not whole periods) is
+/// estimated as one more force, common to all outputs.
 ///
 /// # Errors
 /// [`ModalError`] if the data do not suffice for a mode, or if no mode is significant.

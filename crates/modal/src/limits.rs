@@ -97,9 +97,9 @@ pub const HIDDEN_HALF_WIDTHS: f64 = 1.0;
 /// Largest ratio of the widths of a mode and of another that it hides; the tails of a wider mode
 /// are visible beside the other.
 pub const HIDDEN_WIDTHS: f64 = 3.0;
-/// Minimum share of the residual around a mode that the measured forces must explain before a
-/// hidden mode is tried; the likelihood then decides. Of noise alone, they explain the ratio of the
-/// number of forces to the number of lines.
+/// Minimum share of the residual around a mode that the measured forces explain; below it no hidden
+/// mode is tried, above it the likelihood decides. If the residual is only noise, the expected
+/// share is the number of forces divided by the number of lines.
 pub const LEAST_HIDDEN_SHARE: f64 = 0.5;
 /// Minimum noise of a sensor, relative to the root-mean-square of its output: lower noise is
 /// rounding, and in data without noise ever more modes would be significant.

@@ -102,7 +102,7 @@ pub enum DropReason {
     OutsideBand,
     /// Another mode within a half-width has the same shape and participations.
     Twin {
-        /// Natural frequency of the other, in Hz.
+        /// Natural frequency of the other mode, in Hz.
         other_hz: f64,
     },
     /// Unmeasured forces drive the mode more than the measured ones.

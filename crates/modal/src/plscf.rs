@@ -33,7 +33,7 @@ const MAX_COMPANION: usize = 400;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PlscfError {
-    /// Two things that belong together have different sizes.
+    /// Two sizes that must agree differ.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
         /// Name of the items counted.
@@ -50,7 +50,7 @@ pub enum PlscfError {
         what: &'static str,
         /// Line, counted from 0.
         line: usize,
-        /// The value.
+        /// The unusable value, in its unit.
         value: f64,
     },
     /// There are too few lines for the highest order.

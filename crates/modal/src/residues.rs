@@ -6,9 +6,10 @@ use crate::lines::{Block, Lines};
 use crate::model::{Model, ResidualPowers, growth, kernels, level_near, select_kernel, write_pair};
 use crate::projection::{Design, Projection, Weights};
 
-/// Linear model with a free residue for every mode and load, and the residual powers.
+/// Linear model with an unconstrained residue for every mode and load, and with the residual terms
+/// of the modes outside the band.
 struct FreeResidues<'a> {
-    /// Poles and residual powers; the participations are not used.
+    /// Poles and powers of jω in the residual terms; the participations are not used.
     model: &'a Model,
 }
 

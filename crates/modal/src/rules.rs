@@ -1,4 +1,4 @@
-//! Rules for modes that are significant in the likelihood but no resonances of the structure.
+//! Rules for modes that are significant in the likelihood but are not resonances of the structure.
 
 use std::f64::consts::TAU;
 

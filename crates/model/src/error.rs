@@ -117,7 +117,9 @@ pub enum ModelError {
         reciprocal_condition: f64,
     },
     /// The entries of M⁻¹K or M⁻¹C are too large for the computation of eigenvalues.
-    #[error("M⁻¹K or M⁻¹C has an entry of size {largest:.1e}: too large for eigenvalues")]
+    #[error(
+        "M⁻¹K or M⁻¹C has an entry of size {largest:.1e}, too large for the computation of eigenvalues"
+    )]
     StateMatrixOverflow {
         /// Largest modulus of an entry, in 1/s or its square.
         largest: f64,
@@ -194,7 +196,7 @@ pub enum ModelError {
         parameter: String,
     },
     /// A text is not a nonlinear term, or the term does not fit the system.
-    #[error("`{text}` is not usable as a nonlinear term: {reason}")]
+    #[error("`{text}` is not a valid nonlinear term: {reason}")]
     Term {
         /// The text of the term.
         text: String,

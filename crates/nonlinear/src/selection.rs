@@ -182,13 +182,14 @@ impl Selection {
     }
 }
 
-/// Weighted squared residuals for some of the columns.
+/// Weighted sums of squared residuals for some of the columns.
 struct Misfit {
-    /// Sum of all experiments, fitted together.
+    /// Sum of squares of all experiments, fitted together.
     fitted: f64,
-    /// Sum of all experiments without any model.
+    /// Sum of squares of all experiments without a model.
     all: f64,
-    /// Sum of each experiment for the fit to the others; empty if the criterion does not hold out.
+    /// Sum of squares of each experiment, for the coefficients fitted to all other experiments;
+    /// empty unless the criterion is [`Criterion::HeldOut`].
     held_out: Vec<f64>,
 }
 

@@ -66,8 +66,9 @@ pub enum NumericsError {
     /// a continuous system.
     #[error(
         "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \
-         has no logarithm and no continuous machine moves like that: either a mode oscillates near or \
-         above half the sampling rate (sample faster), or one dies out within a sample, or noise drowns it"
+         has no logarithm, and no machine that is continuous in time has this motion: either a mode \
+         oscillates near or above half the sampling rate (sample faster), or a mode decays within one \
+         sample, or noise hides a mode"
     )]
     NoLogarithm {
         /// The eigenvalue of the matrix, a pure number, zero or negative.

@@ -98,7 +98,7 @@ pub enum PlotError {
     },
     /// The requested bitmap is empty or has more than 16,384 pixels per side.
     #[error(
-        "a bitmap of {width} × {height} pixels cannot be made: choose a scale that gives 1 to {limit} pixels a side"
+        "a bitmap of {width} × {height} pixels is not possible: choose a scale that gives 1 to {limit} pixels per side"
     )]
     BitmapSize {
         /// Requested width, pixels.

@@ -207,7 +207,7 @@ def test_a_bearing_comes_from_frequency_responses(tmp_path: Path) -> None:
     for matrix, exact in zip((found.stiffness, found.damping, found.mass), film, strict=True):
         np.testing.assert_allclose(matrix, exact, atol=1e-8 * np.abs(exact).max())
     assert found.settings["points"] == [] and "neither standard errors" in found.remarks[0]
-    with pytest.raises(mechid.MechidError, match="a test has two tables"):
+    with pytest.raises(mechid.MechidError, match="a test needs two tables"):
         mechid.bearing(wet[0], stator_mass=20)
     with pytest.raises(TypeError, match="`period` belongs to records"):
         mechid.bearing(*wet, stator_mass=20, period=256)

@@ -301,7 +301,7 @@ def test_axes_and_panels_are_those_that_were_asked_for(results: Pages) -> None:
     for wrong in ({"show": "x"}, {"scale": "x"}, {"phase": "x"}, {"quantity": "x"}):
         with pytest.raises(ValueError, match="is one of"):
             found.plot(**wrong)
-    with pytest.raises(ValueError, match="which this figure has not"):
+    with pytest.raises(ValueError, match="this figure has none"):
         found.plot("fit", quantity="mobility")
 
 

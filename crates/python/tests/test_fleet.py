@@ -253,7 +253,7 @@ def test_a_study_that_is_none_is_refused(tmp_path: Path) -> None:
         ({"noise.seed": [1.5]}, "noise.seed"),
         ({"system.mass": [25.0, np.nan]}, "system.mass"),
         ({"system.mass": [25.0], "noise.seed": [1, 2]}, "system.mass"),
-        (0, "one run at least"),
+        (0, "at least one run"),
     ]:
         with pytest.raises(mechid.MechidError, match=why):
             fleet.simulate(RIG, tmp_path / "runs.parquet", runs)

@@ -43,7 +43,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A record is too short for what is asked of it.
-    #[error("the record has {} where at least {needed} are needed", message::count(*samples, "sample"))]
+    #[error("the record has {}, but at least {needed} are needed", message::count(*samples, "sample"))]
     TooShort {
         /// Number of samples of the record.
         samples: usize,
@@ -67,7 +67,7 @@ pub enum SignalError {
         channels: usize,
     },
     /// Channel that the record does not have.
-    #[error("channel {} was asked for, there {} {channels}", channel.saturating_add(1), if *channels == 1 { "is" } else { "are" })]
+    #[error("channel {} was requested, but there {} {channels}", channel.saturating_add(1), if *channels == 1 { "is" } else { "are" })]
     NoSuchChannel {
         /// Channel, counted from 0.
         channel: usize,
@@ -102,7 +102,7 @@ pub enum SignalError {
     },
     /// Two records have different time axes.
     #[error(
-        "time axes differ: {} at {left_dt} s against {right_len} at {right_dt} s", message::count(*left_len, "sample"),
+        "time axes differ: {} with steps of {left_dt} s against {right_len} with steps of {right_dt} s", message::count(*left_len, "sample"),
         left_dt = message::number(*left_dt), right_dt = message::number(*right_dt)
     )]
     SamplingMismatch {
@@ -127,7 +127,7 @@ pub enum SignalError {
         highest: usize,
     },
     /// Lines are not in ascending order, or repeated.
-    #[error("line {line} follows line {previous}: lines must rise, each given once")]
+    #[error("line {line} follows line {previous}: lines must be in rising order, each given once")]
     LineOrder {
         /// The line before.
         previous: usize,

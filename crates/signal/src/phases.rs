@@ -154,7 +154,7 @@ mod tests {
         for (k, phase) in (1..).zip(schroeder(&n, &[2.0; 31])) {
             assert!(same_angle(phase, -PI * (k * (k - 1)) as f64 / 31.0), "line {k}");
         }
-        // Odd lines: the same law, counted in steps of two.
+        // On odd lines only, the k-th line has the same phase as the k-th of consecutive lines.
         let odd: Vec<usize> = (0..31).map(|k| 2 * k + 1).collect();
         assert_eq!(schroeder(&odd, &[2.0; 31]), schroeder(&n, &[2.0; 31]));
     }

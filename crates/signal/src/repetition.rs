@@ -14,17 +14,18 @@ pub struct Repetition {
     pub mismatch: f64,
 }
 
-/// Returns the smallest number of samples after which a signal, in any unit, repeats, if it does so
-/// at least once in full and to better than an eighth of its RMS value.
+/// Returns the period of a signal (any unit) in samples: the smallest lag after which it repeats.
+/// The record must contain at least two periods, and the mismatch ([`Repetition::mismatch`]) must
+/// be at most 1/8.
 ///
-/// The whole record must repeat: samples two, three and more periods apart, as long as every sample
-/// has such a partner, also agree to √2 eighths of the RMS value. A decay does not count. A free
-/// vibration resembles itself after each of its cycles with a smaller amplitude, a modulated one
-/// with an alternating amplitude. There d, the difference of samples one period apart, is
-/// proportional to their sum s, while noise leaves a difference that is independent of the sum. So
-/// in every period d is fitted by the terms κs (the same shape, larger or smaller) and τs′ (the
-/// same shape a fraction of a sample later, for a fractional period). If κs explains more than half
-/// of the part of d that τs′ does not explain, the record does not repeat.
+/// The mismatch after two, three and more periods must be at most √2/8, for all multiples of the
+/// period up to half the record.
+///
+/// A decaying or modulated vibration does not count: after one cycle it has the same shape, but
+/// another amplitude. The difference d of two samples one period apart is then proportional to
+/// their sum s; for noise, d does not depend on s. So d is fitted by κs (growth or decay) and τs′
+/// (a shift in time by a fraction of a sample). If κs explains more than half of the part of d that
+/// τs′ does not explain, the record does not repeat.
 ///
 /// A slow signal also resembles itself a few samples later; the search begins at the first lag at
 /// which it does not. A period of a fractional number of samples is not found, but an almost

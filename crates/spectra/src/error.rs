@@ -36,11 +36,11 @@ pub enum SpectraError {
     NotFinite {
         /// Row of the line, counted from 0.
         row: usize,
-        /// The value, in its unit.
+        /// The refused frequency or amplitude, in its unit.
         value: f64,
     },
     /// The step between segments is zero, or larger than a segment.
-    #[error("segments of {} cannot start {} apart: the step must be from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
+    #[error("segments of {} cannot start at intervals of {}: the interval must be from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
     Hop {
         /// Number of samples in a segment.
         len: usize,
@@ -48,11 +48,11 @@ pub enum SpectraError {
         hop: usize,
     },
     /// No spectral line was chosen, or none of them has force.
-    #[error("no spectral line carries force: choose lines the excitation drives")]
+    #[error("no spectral line has force: choose lines that the excitation drives")]
     NoExcitedLine,
     /// A chosen line does not exist or carries no phase.
     #[error(
-        "line {line} cannot be used: lines 1 to {last} of this record have amplitude and phase"
+        "line {line} cannot be used: only lines 1 to {last} of this record have an amplitude and a phase"
     )]
     LineOutOfRange {
         /// Chosen line.
@@ -75,7 +75,9 @@ pub enum SpectraError {
         right: mechid_model::ResponseQuantity,
     },
     /// Two sets of frequencies that must be equal differ.
-    #[error("row {row}: {left} rad/s against {right} rad/s; both must hold the same frequencies")]
+    #[error(
+        "row {row}: {left} rad/s against {right} rad/s; both data sets must have the same frequencies"
+    )]
     FrequencyMismatch {
         /// First row that differs, counted from 0.
         row: usize,

@@ -25,7 +25,7 @@ pub(super) fn lund_thomsen(root: &Path) -> Result<Judge, String> {
     Ok(Judge {
         name: "Finite journal bearings",
         source: "J. W. Lund and K. K. Thomsen, A calculation method and data for the dynamic coefficients of oil-lubricated journal bearings, ASME, 1978",
-        tolerance: "eccentricity 0.0015 and attitude 0.15°, for S is printed to three digits; coefficients 0.5 % (elliptical) or 1 % (two grooves) of the largest of their kind",
+        tolerance: "eccentricity 0.0015 and attitude 0.15°, because S is printed to three digits; coefficients 0.5 % (elliptical) or 1 % (two grooves) of the largest of their kind",
         test: "crates/bearing/tests/suite/published.rs",
         rows,
     })

@@ -16,25 +16,25 @@ const RECORDS: [[&str; 4]; 6] = [
         "subframe",
         "Steel subframe, two shakers",
         "DaISy 96-013 through SLICOT; a subspace model of all 5,000 samples (N4SID of nfoursid 1.0.2, 12 block rows, order 40)",
-        "0.1 Hz, half the distance of two lines of the record, and a tenth of the damping ratio, for a subspace model states no error",
+        "0.1 Hz, half the line spacing of the record, and a tenth of the damping ratio, because a subspace model states no error",
     ],
     [
         "beam-frf",
         "Cantilever, one frequency response",
         "J. C. Slater, Vibration Toolbox, example of sdof_cf",
-        "a tenth of the distance of two lines, 0.03125 Hz, for the printed fit states no error",
+        "0.03125 Hz, a tenth of the line spacing, because the printed fit states no error",
     ],
     [
         "cd-arm",
         "CD player's arm",
-        "DaISy through SLICOT; shares explained by a subspace model of order 12 as known of the record; shares predicted by one of order 12 (N4SID of nfoursid 1.0.2, 15 block rows) of the first 60 %",
+        "DaISy through SLICOT; shares that a subspace model of order 12 explains; shares that such a model, fitted to the first 60 % (N4SID of nfoursid 1.0.2, 15 block rows), predicts",
         "no lower than the other model",
     ],
     [
         "air-track",
         "Mass on an air track",
         "M. Schmidt and H. Lipson, Science 324, 2009, supplement; a decaying cosine by SciPy's curve_fit over the same samples",
-        "three of our standard errors, for both fit the same samples: white noise there, coloured noise here",
+        "three of our standard errors: both programs fit the same samples, but SciPy assumes white noise and mechid coloured noise",
     ],
     [
         "shake-table",
@@ -45,8 +45,8 @@ const RECORDS: [[&str; 4]; 6] = [
     [
         "silverbox",
         "Silverbox",
-        "least squares over 335 lines by NumPy; J. Schoukens and L. Ljung, IEEE Control Systems 39(6), 2019: simulation errors of physical models and of the best black box, on the part of the record that is not here; noise of the record from the lines without force",
-        "0.2 Hz and 0.001, for the two weigh lines differently of which a spring that hardens moves the resonance by 4 Hz; errors: no higher than published on another part of the record, no lower than the noise",
+        "least squares over 335 lines by NumPy; J. Schoukens and L. Ljung, IEEE Control Systems 39(6), 2019: simulation errors of physical models and of the best black box, on a part of the record that is not used here; noise of the record from the lines without force",
+        "0.2 Hz and 0.001, because the two fits weight the lines differently and the hardening spring moves the resonance by 4 Hz; errors: not above those published for another part of the record, and not below the noise",
     ],
 ];
 

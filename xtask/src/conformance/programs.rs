@@ -81,8 +81,8 @@ fn displacements(values: &[Value], name: &str, step: &str) -> Vec<f64> {
     values.iter().filter(of).map(|value| value.value).collect()
 }
 
-/// Returns the scheme with a name of OpenSees. Houbolt's scheme of OpenSees always starts at rest,
-/// so its first two steps are given to ours.
+/// Returns our scheme for an integrator with the name `name` in OpenSees. Houbolt's scheme in
+/// OpenSees always starts at rest; ours therefore takes its first two displacements from OpenSees.
 fn scheme(name: &str, values: &[Value]) -> Result<Box<dyn Scheme>, String> {
     Ok(match name {
         "Newmark 1/2 1/4" => Box::new(Newmark::AVERAGE_ACCELERATION),
@@ -257,7 +257,7 @@ pub(super) fn scipy(root: &Path) -> Result<Judge, String> {
     Ok(Judge {
         name: "SciPy: modes, responses, quantiles, spectra",
         source: "SciPy 1.17.1 (Virtanen et al., Nature Methods 17, 2020) and NumPy 2.4.6: linalg.eigvals, linalg.inv, signal.lsim, stats.t.ppf, linalg.logm, signal.csd and coherence (Hann, 256 samples, half overlapping)",
-        tolerance: "10⁻¹¹ of the absolute value, for vectors and matrices of the largest entry: rounding in two programs",
+        tolerance: "10⁻¹¹ of the absolute value, or of the largest entry of a vector or matrix: the rounding of two programs",
         test: "xtask/tests/conformance.rs",
         rows,
     })

@@ -44,7 +44,7 @@ pub struct ResultRow {
     pub nrmse: Option<f64>,
     /// Part of the response that the model does not explain, a ratio of RMS values.
     pub unexplained_motion: Option<f64>,
-    /// Power of the residual over the power that the noise explains, a ratio.
+    /// Ratio of the residual power to the noise power.
     pub misfit_ratio: Option<f64>,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: Option<f64>,

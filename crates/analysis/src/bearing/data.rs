@@ -98,7 +98,7 @@ impl BearingData {
         let tests = tables.chunks(2).map(|test| match test {
             [displacement, acceleration] => Self::from_tables(displacement, acceleration, how),
             _ => Err(apart(&format!(
-                "a test has two tables, of displacement and of acceleration: there are {}",
+                "a test needs two tables, one of displacement and one of acceleration; the number of tables is {}",
                 tables.len()
             ))),
         });
@@ -121,14 +121,16 @@ impl BearingData {
         let (keep, rotating): (Vec<usize>, Vec<usize>) =
             (0..d.len()).partition(|row| is_kept(d.omega()[*row]));
         if keep.is_empty() {
-            return Err(apart("every frequency is a multiple of the rotation, or left out"));
+            return Err(apart(
+                "every frequency is a multiple of the frequency of rotation or was left out",
+            ));
         }
         let data = film_data(&d, &a, &keep, how.stator_mass, noise.is_some())?;
         let names = vec![displacement.file.clone(), acceleration.file.clone()];
         let mut remarks = [&displacement.remarks[..], &acceleration.remarks[..]].concat();
         remarks.extend(noise.is_none().then(|| {
             format!(
-                "{}: neither standard errors nor coherence in both tables; the noise was estimated from the residual, for the displacement alone",
+                "{}: at least one of the tables has neither standard errors nor coherences; the noise was estimated from the residual, as noise on the displacement only",
                 names.join(", ")
             )
         }));
@@ -173,7 +175,7 @@ impl BearingData {
         let mut remarks = block.unit_notes();
         if noise.is_none() {
             remarks.push(format!(
-                "{}: the periods show no noise ({} of them); it was estimated from the residual, for the displacement alone",
+                "{}: the periods ({}) show no noise; the noise was estimated from the residual, as noise on the displacement only",
                 block.file,
                 periods.count()
             ));

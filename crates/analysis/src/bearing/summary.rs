@@ -76,7 +76,7 @@ pub struct BearingSummary {
     pub checks: Vec<CheckRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: IdentifyBearing,
 }
 
@@ -234,16 +234,17 @@ impl BearingSummary {
         };
         if self.error_scale.is_some() && (0..film.values().len()).any(is_moved) {
             remarks.push(
-                "the intervals allow for the choice of twelve coefficients by the test, which favours large masses; with \
-                 `coefficients` twelve, given before the test, they are narrower"
+                "twelve coefficients were chosen by a significance test, which favours large masses; the \
+                 intervals allow for this. They are narrower if `coefficients` twelve is set beforehand"
                     .into(),
             );
         }
         let speed = if self.error_scale.is_none() { speed_of_misfit(tests) } else { None };
         if let Some([low, high]) = speed {
             remarks.push(format!(
-                "without the lines at multiples of a frequency from {} to {} Hz the tests agree: if the shaft rotates at \
-                 that speed, its run-out disturbs them (`rotation_hz`)",
+                "the tests agree if the lines at multiples of a frequency from {} to {} Hz are left out: \
+                 if the shaft rotates at this frequency, its run-out disturbs these lines \
+                 (`rotation_hz`)",
                 compact(low, 3),
                 compact(high, 3)
             ));

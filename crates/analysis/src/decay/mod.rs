@@ -103,7 +103,7 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     summary.remarks.extend(last.map(|last| {
         let (column, unit) = (&summary.channels[last.channel].column, summary.unit);
         format!(
-            "the first {} s of the decay are used: then {column} falls to a few steps of {} {unit}, its resolution, and rounding distorts the response (`to` sets another end)",
+            "only the first {} s of the decay are used: afterwards {column} moves by only a few steps of its resolution, {} {unit}, and rounding distorts it (`to` sets another end)",
             significant(last.samples as f64 * record.sampling().dt(), 4),
             significant(last.step, 3)
         )

@@ -106,14 +106,14 @@ impl DecaySummary {
             let numbers: Vec<String> = backbone.modes.iter().map(usize::to_string).collect();
             let stand = match &numbers[..] {
                 [one] => format!(
-                    "mode {one} is not linear, and its one frequency and damping are a mean"
+                    "Mode {one} is not linear, and its frequency and damping ratio are only mean values"
                 ),
-                all => format!("modes {} represent one mode together", all.join(", ")),
+                all => format!("Modes {} together represent one mode", all.join(", ")),
             };
             remarks.push(format!(
-                "the amplitude does not fall exponentially: frequency and damping that change with it describe the \
-                 response better (the Bayesian information criterion falls by {}). {stand}; use the values over \
-                 amplitude",
+                "the amplitude does not fall exponentially: a frequency and damping that depend on the \
+                 amplitude describe the response better (the Bayesian information criterion falls by \
+                 {}). {stand}; use the values given over the amplitude",
                 significant(backbone.gain, 3)
             ));
         }
@@ -133,8 +133,8 @@ impl DecaySummary {
         for (number, row) in (1..).zip(&self.modes) {
             if let Some(Harmonic { of_mode, order }) = row.harmonic {
                 remarks.push(format!(
-                    "mode {number} lies at {order} × the frequency of mode {of_mode} within its error: a harmonic of a \
-                     response that is not linear, unless the structure has a mode there"
+                    "mode {number} lies at {order} × the frequency of mode {of_mode} within its error: a \
+                     harmonic of a nonlinear response, unless the structure has a mode there"
                 ));
             }
         }

@@ -58,7 +58,7 @@ pub struct DecaySummary {
     pub channels: Vec<DecayChannelRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: DecaySettings,
 }
 
@@ -171,16 +171,16 @@ impl DecaySummary {
             }
             if channel.onset_p_value < SIGNIFICANCE {
                 remarks.push(format!(
-                    "the first samples of {column} leave a residual of {} × the power of the others (p = \
-                     {}): a force may still act there; begin later with `from`",
+                    "the residual of the first samples of {column} has {} × the power of the other \
+                     samples (p = {}): a force may still act there; begin later with `from`",
                     significant(channel.onset_ratio, 3),
                     significant(channel.onset_p_value, 2)
                 ));
             }
             if channel.explained < EXPLAINED {
                 remarks.push(format!(
-                    "the modes explain {} % of the variance of {column}; the rest is noise, or a response \
-                     that is no decaying oscillation",
+                    "the modes explain {} % of the variance of {column}; the rest is noise, or a motion \
+                     that is not a decaying oscillation",
                     significant(100.0 * channel.explained, 3)
                 ));
             }
@@ -189,8 +189,8 @@ impl DecaySummary {
         let names = message::list(coloured.map(|c| &c.column), ", ", 6);
         if !names.is_empty() {
             remarks.push(format!(
-                "the noise of {names} is coloured; the fit and the standard errors take it as an \
-                 autoregression"
+                "the noise of {names} is coloured; the fit and the standard errors model it as an \
+                 autoregressive process"
             ));
         }
         remarks
@@ -226,7 +226,7 @@ impl DecaySummary {
         let zeta = mode.mode.damping_ratio.value;
         if zeta > HEAVY {
             remarks.push(format!(
-                "{name} has a damping ratio of {}: hardly an oscillation, it may stand for an overdamped \
+                "{name} has a damping ratio of {}: hardly an oscillation, it may represent an overdamped \
                  mode, which is not part of the model",
                 significant(zeta, 2)
             ));
@@ -258,7 +258,7 @@ impl DecaySummary {
 
     fn channel_table(&self) -> String {
         let header =
-            ["channel", "explained (%)", &format!("noise ({})", self.unit), "order of its colour"];
+            ["channel", "explained (%)", &format!("noise ({})", self.unit), "noise model (order)"];
         let mut rows = vec![header.map(String::from).to_vec()];
         rows.extend(self.channels.iter().map(|channel| {
             let order = match channel.noise_order {

@@ -77,7 +77,7 @@ impl fmt::Display for ElementNote {
                 "more than {most} entries of M, C and K are uncertain: their covariance is left out"
             ),
             Self::BoundInSystem => f.write_str(
-                "the covariance of M, C and K takes parameters at their bounds as known",
+                "the covariance of M, C and K treats parameters at their bounds as known",
             ),
             Self::Read { text } => f.write_str(text),
         }

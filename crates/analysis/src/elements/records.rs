@@ -196,7 +196,7 @@ impl Signals {
         let is_of_periods = matches!(how.noise, Pooling::Neighbours(_) | Pooling::PerLine);
         if is_of_periods {
             let why = format!(
-                "{} is for whole periods (`period`): an open record has no scatter at a line",
+                "{} is for whole periods (`period`): an open record has only one value at each line, so its scatter is not known",
                 how.noise
             );
             return Err(AnalysisError::Setting { setting: "noise", why });
@@ -223,7 +223,7 @@ fn with_noise(
     let count = periods.count();
     if count < 2 {
         if noise == Pooling::PerLine {
-            let why = "per-line is the scatter of two periods or more, and there is one".into();
+            let why = "per-line takes the noise of each line from the scatter of two or more periods, but there is only one period".into();
             return Err(AnalysisError::Setting { setting: "noise", why });
         }
         return Ok((periods.mean()?, None));

@@ -85,7 +85,7 @@ fn from_table(
         let lines = ElementData::kept(lines, spacing_hz(table), how)?;
         let test = TestRow { file: table.file.clone(), kind: TestKind::Responses, window: None };
         let noise = match source {
-            Some(_) => "that of the standard errors of the table",
+            Some(_) => "from the standard errors of the table",
             None => "taken from the residual",
         };
         let data = ElementData::from_test(lines, test, Channels::default());
@@ -214,7 +214,8 @@ fn rows_at(part: &FrequencyResponses, omega: &[f64]) -> Result<Vec<usize>, Analy
         let hz = omega / TAU;
         let is_same = |of: &f64| (of - hz).abs() <= SAME_FREQUENCY * hz;
         part.frequency_hz.iter().position(is_same).ok_or_else(|| {
-            let why = format!("{} has no response at {hz} Hz, which the data have", part.file);
+            let why =
+                format!("{} has no response at {hz} Hz, a frequency of the other data", part.file);
             refused("part", why)
         })
     };

@@ -90,8 +90,8 @@ impl IdentifyElements {
                 }
                 Input::Unbalance { name, .. } => {
                     let why = format!(
-                        "input {name:?} is an unbalance, which is no column of a record: give a table over \
-                         the speed (`speed_table`)"
+                        "input {name:?} is an unbalance, and a record has no column for it: give a table \
+                         over the speed (`speed_table`)"
                     );
                     return Err(AnalysisError::Setting { setting: "machine", why });
                 }

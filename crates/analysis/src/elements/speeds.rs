@@ -94,7 +94,7 @@ fn from_table(table: &Table, how: &IdentifyElements) -> Result<ElementData, Anal
     let lines = ElementData::kept(lines, 0.0, how)?;
     let test = TestRow { file: table.file().to_owned(), kind: TestKind::Speeds, window: None };
     let noise = match source {
-        Some(_) => "that of the standard errors of the table",
+        Some(_) => "from the standard errors of the table",
         None => "taken from the residual",
     };
     let data = ElementData::from_test(lines, test, Channels::default());

@@ -40,7 +40,7 @@ pub struct ElementSummary {
     pub lines: usize,
     /// Lowest and highest frequency, in Hz.
     pub band_hz: [f64; 2],
-    /// Number of real numbers that were fitted.
+    /// Number of fitted real numbers: real and imaginary parts.
     pub equations: usize,
     /// Noise of the weights of the lines, in words.
     pub noise: String,
@@ -81,7 +81,7 @@ pub struct ElementSummary {
     pub system: Option<SystemMatrices>,
     /// Covariance of the entries of these matrices that depend on unknowns.
     pub covariance: Option<ParameterCovariance>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: IdentifyElements,
 }
 
@@ -111,7 +111,7 @@ pub struct SensorRow {
 pub struct CombinationRow {
     /// The combinations, in a sentence.
     pub text: String,
-    /// Numbers of the combinations.
+    /// The combinations in machine-readable form.
     #[serde(flatten)]
     pub combination: Combination,
 }
@@ -126,8 +126,8 @@ pub struct CandidateRow {
     pub information_gain: Option<f64>,
     /// Number of parameters or combinations that become determined.
     pub newly_determined: usize,
-    /// Standard errors with it, one for each parameter, in its SI unit; `None` if the parameter is
-    /// still not determined.
+    /// Standard errors with the additional measurement, one for each parameter, in its SI unit;
+    /// `None` if the parameter is still not determined.
     pub standard_errors: Vec<Option<f64>>,
 }
 

@@ -159,7 +159,7 @@ impl ElementSummary {
 }
 
 impl TestRow {
-    /// Returns in words what was used of the file.
+    /// Returns the used part of the file, in words.
     pub fn words(&self) -> String {
         let samples = self.window.as_ref().map(|window| {
             let rate = compact(window.sample_rate_hz, 6);

@@ -13,7 +13,7 @@ pub struct FailureCount {
     pub code: String,
     /// Number of records.
     pub records: usize,
-    /// The first record, by name.
+    /// Name of the first of these records.
     pub record: String,
     /// Failure of that record, in a sentence.
     pub message: String,

@@ -13,15 +13,15 @@ use crate::{AnalysisError, ResultRow};
 /// Rows of results, one for each record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Results {
-    /// Rows by rising record.
+    /// Rows, in the order of the names of the records.
     pub rows: Vec<ResultRow>,
     /// Number of older rows of the same records, from parts before a change of a record or the
     /// analysis.
     pub superseded: usize,
 }
 
-/// Reads the rows of all parts in a folder of results, by rising record. If a record has several
-/// rows, the row in the part written last counts.
+/// Reads the rows of all parts in a folder of results, in the order of the names of the records. If
+/// a record has several rows, the row in the part written last counts.
 ///
 /// # Errors
 /// [`AnalysisError::Io`] if the folder or a part cannot be read, [`AnalysisError::NoRecord`] if
@@ -70,7 +70,7 @@ impl Cells {
         Self(cells.into_iter().collect())
     }
 
-    /// Returns the row.
+    /// Returns the row of results that the cells contain.
     pub fn row(mut self) -> ResultRow {
         let error = self
             .text("error_code")

@@ -89,12 +89,12 @@ impl fmt::Display for FleetSummary {
             writeln!(f, "  left out: {path}")?;
         }
         match self.computed_parts {
-            0 => writeln!(f, "all parts were there, nothing was computed")?,
+            0 => writeln!(f, "all parts had been computed before; nothing was computed")?,
             computed => {
                 let rate = self.computed_records as f64 / self.elapsed_s;
                 writeln!(
                     f,
-                    "computed {} in {} s ({} records/s); {} there before",
+                    "computed {} in {} s ({} records/s); {} computed before",
                     message::count(self.computed_records, "record"),
                     compact(self.elapsed_s, 3),
                     compact(rate, 3),
@@ -105,7 +105,7 @@ impl fmt::Display for FleetSummary {
         if self.other_parts > 0 {
             writeln!(
                 f,
-                "note: the folder holds {} more, of other records or another analysis: a reader of the whole folder includes them",
+                "note: the folder contains another {}, of other records or another analysis: programs that read the whole folder include them",
                 message::count(self.other_parts, "part")
             )?;
         }

@@ -171,7 +171,7 @@ impl Worker {
                 }
                 Ok(None) => {
                     drop(running.end());
-                    let how = "it sent something else than a row".into();
+                    let how = "it sent something other than a row of results".into();
                     return Ok(Some(AnalysisError::RecordProcess { how }));
                 }
                 Err(RecvTimeoutError::Disconnected) => {
@@ -192,8 +192,8 @@ impl Worker {
         command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         // Every arena of the allocator would reserve addresses, which count as memory.
         command.env("MALLOC_ARENA_MAX", "2");
-        // A backtrace needs memory; a process that fails for lack of memory would wait for it for
-        // ever.
+        // A backtrace needs memory; a process that fails for lack of memory would wait for this
+        // memory for ever.
         command.env("RUST_BACKTRACE", "0");
         #[cfg(unix)]
         {
@@ -249,7 +249,7 @@ impl Drop for Worker {
 }
 
 impl Running {
-    /// Ends the process; returns how it ended, and what it said.
+    /// Ends the process; returns its exit status, and the text of its error stream.
     fn end(mut self) -> (io::Result<ExitStatus>, String) {
         let _ = self.child.kill();
         let status = self.child.wait();

@@ -33,7 +33,7 @@ pub struct FrfSettings {
     pub estimator: Estimator,
     /// Spectral lines of a segment.
     pub lines: LineChoice,
-    /// Spectral lines to exclude from these.
+    /// Spectral lines to exclude from the chosen ones.
     pub without: LeftOut,
     /// Segments of the average.
     #[serde(deserialize_with = "words::written::one")]
@@ -268,7 +268,7 @@ impl FromStr for Segmentation {
         };
         let segment = match samples.parse() {
             Ok(samples) if samples > 0 => Some(samples),
-            _ => return Err(format!("\"{samples}\" is no number of samples")),
+            _ => return Err(format!("\"{samples}\" is not a number of samples")),
         };
         match overlap {
             Ok(overlap_percent) if (0.0..100.0).contains(&overlap_percent) => {

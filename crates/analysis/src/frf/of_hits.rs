@@ -76,7 +76,9 @@ pub(crate) fn average_of_hits(
         }
         Some(percent) => {
             let given = mechid_signal::message::number(percent);
-            let why = format!("a window ends above 0 and below 100 %, got {given}");
+            let why = format!(
+                "the value of the window at its end must be above 0 and below 100 %, got {given}"
+            );
             return Err(AnalysisError::Setting { setting: "exponential_percent", why });
         }
     };
@@ -130,8 +132,8 @@ pub(super) fn responses_of_hits(
     }
     if let Some(rate) = added_decay {
         remarks.push(format!(
-            "the exponential window adds {} 1/s to the decay of every mode: a damping ratio read from these \
-             responses is too large by {} Hz over the natural frequency",
+            "the exponential window adds {} 1/s to the decay rate of every mode: a damping ratio read \
+             from these responses is too large by {} Hz divided by the natural frequency",
             significant(rate, 4),
             significant(rate / std::f64::consts::TAU, 4)
         ));

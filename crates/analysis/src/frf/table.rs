@@ -61,7 +61,7 @@ pub struct FrfTable {
     pub coherence: Vec<Coherence>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: FrfSettings,
 }
 

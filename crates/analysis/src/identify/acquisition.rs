@@ -69,7 +69,8 @@ impl Acquisition {
         held: &Block,
     ) -> Result<FrequencyData, AnalysisError> {
         if self.between_samples == Some(Discretisation::Euler) {
-            let why = "euler belongs to `domain` time; spectra take held or linear".to_owned();
+            let why =
+                "euler belongs to `domain` time; for spectra choose held or linear".to_owned();
             return Err(AnalysisError::Setting { setting: "between_samples", why });
         }
         let (names, kind) = (&held.names, held.response().1);

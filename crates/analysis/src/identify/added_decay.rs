@@ -19,7 +19,7 @@ pub(crate) fn common_rate(tables: &[FrequencyResponses]) -> Result<Option<f64>, 
         None => Ok(first.added_decay),
         Some(other) => {
             let why = format!(
-                "the windows of {} and {} add different decays: identify from each by itself",
+                "the windows of {} and {} add different decay rates: identify from each of them separately",
                 first.file, other.file
             );
             Err(AnalysisError::Setting { setting: "exponential_percent", why })

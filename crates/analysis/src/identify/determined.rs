@@ -57,7 +57,7 @@ pub(super) fn check(
     let frequencies = determined(modes);
     if is_open(estimate) && (estimate.dof() == 1 || frequencies.is_empty()) {
         let modes = if frequencies.is_empty() {
-            "and so do those of all natural frequencies".to_owned()
+            "and so do the intervals of all natural frequencies".to_owned()
         } else {
             format!("so that {} may be only a peak of the noise", frequencies.join(", "))
         };

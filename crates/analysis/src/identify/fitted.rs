@@ -50,7 +50,8 @@ pub struct Fitted {
     /// The same spectra with the noise from the scatter of the periods of every record; `None` if a
     /// record has one period, and for other fits.
     pub scattered: Option<FrequencyData>,
-    /// Coherence of the frequency responses of the first record, if such were fitted.
+    /// Coherence of the frequency responses of the first record; `None` if no frequency responses
+    /// were fitted.
     pub coherence: Option<ResponseCoherence>,
     /// Findings before the fit on all records together.
     pub before_all: Vec<Finding>,
@@ -68,7 +69,7 @@ pub struct Fitted {
     pub misfit: Option<Misfit>,
     /// Estimated noise spectra: one of each record, or one from the residual.
     pub noise: Vec<NoiseModel>,
-    /// Noise of the forces of each record, if it is not part of those spectra.
+    /// Noise of the forces of each record, if it is not part of the spectra in `noise`.
     pub force_noise: Vec<ForceNoise>,
     /// Sinusoids that were subtracted from open records.
     pub sinusoids: Vec<SinusoidRow>,
@@ -93,7 +94,8 @@ pub struct WithTerms {
     pub selection: Option<SelectionSummary>,
 }
 
-/// Power of a residual over what the noise explains: 1 if the model is right.
+/// Ratio of the residual power to the noise power, near 1 if the model is right, and the source of
+/// the noise.
 #[derive(Debug, Clone, Copy)]
 pub struct Misfit {
     /// Ratio of residual power to noise power.

@@ -66,7 +66,7 @@ pub struct Keywords {
     /// Known masses.
     #[serde(skip_serializing_if = "is_default", deserialize_with = "written::one")]
     pub mass: KnownMass,
-    /// Form of M, C and K.
+    /// Known form of M, C and K.
     #[serde(skip_serializing_if = "is_default", deserialize_with = "written::one")]
     pub structure: Structure,
     /// Rule for dividing the records of a hammer test into hits.
@@ -75,7 +75,7 @@ pub struct Keywords {
     /// Estimator of the frequency responses that are fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_frf: Option<Estimator>,
-    /// Segments over which these are averaged.
+    /// Segments over which the frequency responses are averaged.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "written::optional")]
     pub segment: Option<Segmentation>,
     /// Nonlinear springs and dampers.
@@ -240,7 +240,7 @@ impl Keywords {
         }
         let likelihood = matches!(self.method, None | Some(Method::MaximumLikelihood));
         if self.noise.is_some_and(|noise| noise != Pooling::Automatic) && !likelihood {
-            return Err(refused("noise", "it applies to `method` maximum-likelihood alone"));
+            return Err(refused("noise", "it applies only to `method` maximum-likelihood"));
         }
         Ok(())
     }
@@ -271,7 +271,7 @@ impl Keywords {
                 "it is for open records: periods show the noise of their force by their scatter",
             )),
             Some(Extent::WholePeriod) if self.hits.is_some() => {
-                Err(refused("extent", "a hit is no period"))
+                Err(refused("extent", "a hit is not a period"))
             }
             Some(Extent::WholePeriod) if !acquisition.is_default() => {
                 let setting = match acquisition.between_samples {

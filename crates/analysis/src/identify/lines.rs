@@ -105,8 +105,8 @@ pub(super) fn few(records: &[Windowed], choice: &LineChoice) -> Option<String> {
     }
     (driven < all).then(|| {
         format!(
-            "the forces drive {driven} of {}, as a single sine or a step does: drive more of them (a multisine, \
-             a sweep, noise), or take all (`lines` all)",
+            "the forces excite only {driven} of {}: excite more lines (multisine, sweep or noise), or \
+             use all lines (`lines` all)",
             count(all, "line")
         )
     })

@@ -253,9 +253,10 @@ impl Identify {
         };
         let (setting, why) = match (period_given, noise.response) {
             (true, _) => (setting, of_period),
-            (false, Pooling::PerLine) => {
-                ("noise", "per-line is for periods: an open record has no scatter at a line")
-            }
+            (false, Pooling::PerLine) => (
+                "noise",
+                "per-line is for whole periods: an open record has only one value at each line, so its scatter is not known",
+            ),
             (false, _) => return Ok(()),
         };
         Err(AnalysisError::Setting { setting, why: why.into() })
@@ -410,7 +411,7 @@ impl Identified {
         let refused =
             |why: &str| Err(AnalysisError::Setting { setting: "fitted_lines", why: why.into() });
         let Some((_, data)) = &self.fitted.frequency else {
-            return refused("a fit in the time domain has none");
+            return refused("a fit in the time domain has no lines");
         };
         if self.fitted.nonlinear.is_some() {
             return refused(

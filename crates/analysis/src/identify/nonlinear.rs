@@ -92,8 +92,9 @@ impl ExtrapolationRow {
         self.poor.then(|| {
             format!(
                 "{term} extrapolates badly: its force grows with the power {order}, from {near} of the \
-                 restoring force at the edge of the data to {far} at {REACH} times as far, where the \
-                 standard error of that force is {error}. Do not predict beyond the amplitudes measured"
+                 restoring force at the edge of the data to {far} at {REACH} times the amplitude, where \
+                 the standard error of the restoring force is {error}. Do not predict beyond the \
+                 amplitudes measured"
             )
         })
     }
@@ -114,7 +115,7 @@ pub struct TermRow {
     pub estimate: Uncertain,
 }
 
-/// Levels of distortion, and the kind of term whose absence costs a linear model most.
+/// Levels of distortion, and the kind of term that explains most of the residual of a linear model.
 #[derive(Debug, Serialize)]
 pub struct DistortionRow {
     /// Level on even lines; `None` unless only odd lines are driven.
@@ -264,7 +265,7 @@ fn select(
     if how.criterion == Criterion::HeldOut && data.count() < HELD_OUT_RECORDS {
         let got = data.count();
         let why = format!(
-            "held-out needs {HELD_OUT_RECORDS} records or windows or more, each left out once, got {got}"
+            "held-out needs at least {HELD_OUT_RECORDS} records or windows, each of which is left out once; got {got}"
         );
         return Err(AnalysisError::Setting { setting: "criterion", why });
     }
@@ -391,7 +392,10 @@ impl NonlinearSummary {
         for row in &self.parameters {
             if let Some([x, v]) = row.largest {
                 let (x, v) = (significant(x, 3), significant(v, 3));
-                text += &format!("{}: data up to {x} m, {v} m/s; beyond extrapolated\n", row.name);
+                text += &format!(
+                    "{}: data up to {x} m, {v} m/s; beyond this range, extrapolated\n",
+                    row.name
+                );
             }
         }
         text

@@ -116,8 +116,8 @@ pub(super) fn no_period(records: &[Windowed]) -> Result<Option<AnalysisError>, A
         let looked = steady_periods(&held.force, held.response().0, held.period)?;
         if looked.iter().any(|finding| finding.verdict() > Verdict::Good) {
             let why = format!(
-                "nonlinear terms are fitted to whole periods unless `extent` is open, and {} is none: its end does \
-                 not meet its beginning",
+                "nonlinear terms are fitted to whole periods unless `extent` is open, but {} is not \
+                 whole periods: its end does not meet its beginning",
                 held.file
             );
             return Ok(Some(AnalysisError::Setting { setting: "nonlinear", why }));

@@ -167,7 +167,7 @@ pub enum TermEstimator {
 pub struct SpectralLines {
     /// Lines to use.
     pub choice: LineChoice,
-    /// Lines to exclude from these.
+    /// Lines to exclude from the chosen ones.
     pub without: LeftOut,
 }
 
@@ -322,7 +322,7 @@ impl Derivatives {
         let wrong = |why: String| AnalysisError::Setting { setting: "derivatives", why };
         if window % 2 == 0 {
             return Err(wrong(format!(
-                "the window has a middle: an odd number of samples, not {window}"
+                "the window must have an odd number of samples, not {window}"
             )));
         }
         if order < 2 {

@@ -54,7 +54,7 @@ pub fn fit(
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
-    // An undetermined parameter ends the fit here with its name, before other steps fail for it.
+    // An undetermined parameter ends the fit here with its name, before it makes a later step fail.
     estimate.system()?;
     let periodic = segments.are_periods();
     let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));
@@ -155,7 +155,7 @@ fn estimated(
     match method {
         Some(Method::Instrumental) => Err(AnalysisError::InstrumentalResponses),
         Some(Method::LeastSquares) => {
-            let name = "least squares on frequency responses, all lines alike";
+            let name = "least squares on frequency responses, all lines with equal weights";
             let estimate = equation_error(&joined(responses)?, unknowns)?;
             Ok(Outcome { name, estimate, misfit: None, remark: None, settled: true })
         }

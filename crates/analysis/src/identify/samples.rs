@@ -268,7 +268,7 @@ impl SampleFit {
             remarks.push(format!(
                 "{} in every interval; the standard errors count measured samples only{}",
                 message::count(factor, "step"),
-                if open { ", and the interpolation takes the window as open" } else { "" }
+                if open { ", and the interpolation treats the window as open" } else { "" }
             ));
         }
         if prepared.iter().any(|p| p.twice_differentiated) {
@@ -282,7 +282,7 @@ impl SampleFit {
         let residual = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
         if self.derivatives == Some(Derivatives::Spectral) && residual > CONSPICUOUS {
             remarks.push(
-                "spectral derivatives contain the noise of every line, excited or not, and most of the low lines if the acceleration was measured: without `domain` time and `derivatives` the same whole periods are fitted on the excited lines alone"
+                "spectral derivatives contain the noise of every line, excited or not, and with a measured acceleration mainly that of the low lines: leave `domain` time and `derivatives` out to fit the same whole periods on the excited lines only"
                     .into(),
             );
         }

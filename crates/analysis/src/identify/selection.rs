@@ -28,7 +28,7 @@ pub struct SelectionSummary {
 pub struct SelectionRow {
     /// Name of the term added; `None` for the first step.
     pub added: Option<String>,
-    /// Value of the criterion with it, a pure number; smaller is better.
+    /// Value of the criterion with this term, a pure number; smaller is better.
     pub score: f64,
     /// Part of the weighted force that the fit does not explain, a ratio.
     pub unexplained: f64,

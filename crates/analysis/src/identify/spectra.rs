@@ -81,7 +81,7 @@ pub(super) fn fit(
         noise_through,
         remark,
     } = estimated(&spectra, &data, unknowns, estimator)?;
-    // An undetermined parameter ends the fit here with its name, before other steps fail for it.
+    // An undetermined parameter ends the fit here with its name, before it makes a later step fail.
     estimate.system()?;
     let RecordFindings { before, after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
@@ -233,8 +233,8 @@ fn read(
         spectra.push((periods(recorded, &lines)?, lines));
     }
     if noise == Pooling::PerLine && spectra.iter().any(|(periods, _)| periods.count() < 2) {
-        let why = "per-line is the scatter of two periods or more at a line, and there is one: give `period`, or \
-                   another noise";
+        let why = "per-line takes the noise of each line from the scatter of two or more periods, but \
+                   there is only one period: give `period`, or choose another noise";
         return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
     }
     Ok(spectra)
@@ -333,7 +333,7 @@ fn estimated(
             let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
             let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
             Ok(SpectralEstimate {
-                estimator: "instrumental variables, half of the periods against the other",
+                estimator: "instrumental variables: each half of the periods is the instrument of the other",
                 estimate: instrumental_variables(&first, &second, unknowns)?,
                 misfit: None,
                 noise: Vec::new(),
@@ -372,15 +372,17 @@ fn suitable(
     }
     if parameters > LIKELIHOOD_PARAMETERS {
         let remark = format!(
-            "least squares was used, for {parameters} parameters: noise on the response biases it. \
-             Maximum likelihood takes minutes; `method` maximum-likelihood chooses it"
+            "least squares was used, because maximum likelihood would take minutes for {parameters} \
+             parameters: noise on the response biases the estimate; `method` maximum-likelihood avoids \
+             this bias"
         );
         return least_squares(data, unknowns, Some(remark));
     }
     match likelihood(spectra, &noisy, unknowns, noise) {
         Err(error @ EstimateError::NotConverged { .. }) => {
-            let remark =
-                format!("least squares was used, which noise on the response biases: {error}");
+            let remark = format!(
+                "least squares was used, because maximum likelihood failed: {error}. Noise on the response biases least squares"
+            );
             least_squares(data, unknowns, Some(remark))
         }
         other => Ok(other?),

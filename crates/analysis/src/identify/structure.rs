@@ -148,7 +148,7 @@ impl Structure {
                 let before = unknowns.fixed(p.matrix(), p.row(), p.column());
                 if let Some(before) = before.filter(|before| before != value) {
                     let why = format!(
-                        "{name}={value}: it is {before} already, as stated or by another form"
+                        "{name}={value}: this entry is already fixed at {before}, by a known value or another structure"
                     );
                     return Err(AnalysisError::Setting { setting: "structure", why });
                 }

@@ -92,7 +92,7 @@ pub struct IdentificationSummary {
     /// [`Identified::covariance`](super::Identified::covariance) returns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<ParameterCovariance>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: Identify,
 }
 
@@ -120,8 +120,8 @@ pub struct FitRow {
     /// Estimated noise spectra that weighted maximum likelihood: one of each record from its
     /// periods, or one from the residual.
     pub noise: Vec<NoiseModel>,
-    /// Noise of the forces of each record if these spectra are of the response alone, as for open
-    /// records.
+    /// Noise of the forces of each record if the spectra in `noise` are those of the response only,
+    /// as for open records.
     pub force_noise: Vec<ForceNoise>,
     /// Sinusoids in open records that are not a response to the forces and were subtracted.
     #[serde(skip_serializing_if = "Vec::is_empty")]

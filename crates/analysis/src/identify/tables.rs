@@ -211,7 +211,7 @@ fn remarks(
             .chain(measured.iter().flat_map(|measured| measured.remarks.iter().cloned()))
             .chain(added_decay.map(|rate| {
                 format!(
-                    "an exponential window adds {} 1/s to the decay of every mode of the table: this was subtracted from damping and stiffness",
+                    "an exponential window adds {} 1/s to the decay rate of every mode of the table: this was subtracted from damping and stiffness",
                     significant(rate, 4)
                 )
             }))
@@ -275,7 +275,7 @@ pub struct ResponseSummary {
     /// than 2,000 parameters: use [`IdentifiedResponses::covariance`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<ParameterCovariance>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: IdentifyResponses,
 }
 
@@ -457,7 +457,7 @@ impl Fit {
             return Err(AnalysisError::InstrumentalResponses);
         }
         if method == Some(Method::LeastSquares) {
-            let name = "least squares on frequency responses, all alike";
+            let name = "least squares on frequency responses, all with equal weights";
             let estimate = equation_error(data, unknowns)?;
             return Ok(Self { name, estimate, misfit: None, noise: Vec::new(), averaged: None });
         }

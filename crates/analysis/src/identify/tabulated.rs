@@ -93,7 +93,7 @@ fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
     if table.functions.iter().any(|f| f.response == force) {
         return "";
     }
-    "; by reciprocity a row of responses is a column: `structure` symmetric"
+    "; for a reciprocal machine (`structure` symmetric) a row of responses also serves as a column"
 }
 
 /// Returns a table with missing responses replaced by their reciprocal ones, with a remark. Returns
@@ -135,7 +135,7 @@ fn with_reciprocal<'a>(
     }
     completed.retain(|f| whole.contains(&f.reference));
     let remark = format!(
-        "{}: by reciprocity the responses at {} to forces at other points are used as those at these points to a force there",
+        "{}: by reciprocity the responses at {} to forces at other points are used as the responses at these points to a force there",
         table.file,
         whole.join(", ")
     );
@@ -286,12 +286,12 @@ fn noise_remarks(
 ) -> Vec<String> {
     let mut remarks = Vec::new();
     if table.segments.is_some() && !is_averaged {
-        let why = "its frequencies are not those of the segments that it states";
+        let why = "its frequencies are not those of the stated segments";
         remarks.push(uncorrected(table, why));
     }
     if is_averaged && how.averages.is_some() {
         remarks.push(format!(
-            "{}: it states its segments, from which the number of averages follows; `averages` was not used",
+            "{}: the table states its segments, which determine the number of averages; `averages` was not used",
             table.file
         ));
     }
@@ -386,7 +386,10 @@ pub(crate) fn response_data(
     how: &IdentifyResponses,
 ) -> Result<(FrequencyData, Option<&'static str>), AnalysisError> {
     if table.added_decay.is_some() {
-        let why = format!("{} is of an exponential window, which is for `identify`", table.file);
+        let why = format!(
+            "{} was measured with an exponential window: use it with `identify`",
+            table.file
+        );
         return Err(AnalysisError::Setting { setting: "exponential_percent", why });
     }
     let tabulated = Tabulated::new(table, how)?;

@@ -24,8 +24,8 @@ pub struct Unscaled {
 }
 
 impl Unscaled {
-    /// Fits the modes of such equations if `fit` refuses them; the forces act on the degrees of
-    /// freedom `driven`, counted from 0.
+    /// Fits the modes of equations without scale if `fit` refuses these equations; the forces act
+    /// on the degrees of freedom `driven`, counted from 0.
     ///
     /// # Errors
     /// The errors of `fit`.

@@ -34,7 +34,7 @@ pub struct RecordSummary {
     pub remarks: Vec<String>,
     /// Columns not shown, each with the reason.
     pub left_out: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: InspectSettings,
 }
 

@@ -223,8 +223,8 @@ pub(crate) fn coarse_time(
     let error = rounding / sampling.len() as f64;
     (rounding < EVEN && error > RATE_ERROR).then(|| {
         format!(
-            "{}: the instants of {} are rounded to {} s, which leaves the sampling rate, {} Hz, uncertain by up to {} % \
-             and all frequencies with it: give `sample_rate`",
+            "{}: the times of {} are rounded to {} s, so the sampling rate of {} Hz, and all frequencies \
+             with it, is uncertain by up to {} %: give `sample_rate`",
             table.file(),
             table.label(table.find(name).unwrap_or_default()),
             significant(rounding * sampling.dt(), 2),

@@ -38,7 +38,7 @@ impl Window {
     /// period without samples.
     pub fn span(&self, file: &str, samples: usize) -> Result<(usize, usize), AnalysisError> {
         if self.period == Some(0) {
-            let why = "a period has one sample or more, not 0".into();
+            let why = "a period needs at least one sample".into();
             return Err(AnalysisError::Setting { setting: "period", why });
         }
         let start = self.start.saturating_sub(1);

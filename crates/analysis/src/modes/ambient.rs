@@ -31,8 +31,10 @@ pub(super) fn modes(
     without_harmonics: bool,
 ) -> Result<Modes, AnalysisError> {
     let [measurement] = measurements else {
-        let why =
-            format!("{} records: an ambient record is analysed by itself", measurements.len());
+        let why = format!(
+            "{} records were given: ambient records are analysed one at a time",
+            measurements.len()
+        );
         return Err(settings.refused("ambient", why));
     };
     let outputs = outputs_of(measurement.channels());
@@ -135,7 +137,7 @@ fn uncertain(value: &ModalValue) -> Uncertain {
 fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
     let reason = match candidate.reason {
         DropReason::SmallGain { gain, needed } => format!(
-            "it improves the fit by {} (2 log L) where {} is needed",
+            "it improves the fit by {} (2 log L), but {} is needed",
             significant(gain, 3),
             significant(needed, 3)
         ),
@@ -145,8 +147,10 @@ fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
         ),
         DropReason::OutsideBand => "it is outside of the band".into(),
         DropReason::OverDamped { .. } => "it is too damped for a mode".into(),
-        DropReason::NumberReached { number } => format!("{number} modes were found before it"),
-        _ => "the likelihood has no maximum with it".into(),
+        DropReason::NumberReached { number } => {
+            format!("the maximum number of modes, {number}, was found before it")
+        }
+        _ => "with it, the likelihood has no maximum".into(),
     };
     let DroppedCandidate { natural_frequency_hz, damping_ratio, .. } = *candidate;
     DroppedRow { frequency_hz: natural_frequency_hz, damping_ratio, reason }
@@ -165,8 +169,8 @@ fn notes(estimate: &AmbientEstimate) -> Vec<String> {
         }
         if mode.harmonic.is_some() {
             notes.push(format!(
-                "mode {number} ({hz} Hz) stands where the record has a sinusoid: it may be a harmonic of a \
-                 machine (`without_harmonics` leaves these out)"
+                "mode {number} ({hz} Hz) has the frequency of a sinusoid in the record: it may be a \
+                 harmonic of a machine (`without_harmonics` excludes its lines)"
             ));
         }
     }

@@ -284,7 +284,7 @@ impl ModeComparison {
             }));
         }
         if self.points.len() == 1 {
-            let why = "note: at one point shapes cannot be compared: pairs are by frequency alone";
+            let why = "note: with a single common point shapes cannot be compared; the modes are paired by frequency alone";
             remarks.push(why.into());
         }
         remarks

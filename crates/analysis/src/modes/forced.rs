@@ -115,7 +115,7 @@ pub(super) fn modes_of_tables(
     let mut notes = Vec::new();
     if tables.added_decay.is_some() {
         notes.push(format!(
-            "an exponential window adds {} 1/s to the decay of every mode of the tables: it was \
+            "an exponential window adds {} 1/s to the decay rate of every mode of the tables: it was \
              subtracted",
             significant(decay, 4)
         ));

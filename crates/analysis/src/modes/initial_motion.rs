@@ -1,4 +1,4 @@
-//! Free motion of modes that a record begins with.
+//! Free motion of the modes at the beginning of a record.
 
 use mechid_numerics::least_squares::{LeastSquares, Solution};
 use mechid_signal::{Record, measures};

@@ -157,7 +157,8 @@ impl Response {
         settle: usize,
     ) -> Result<(), AnalysisError> {
         if columns.is_empty() {
-            let why = "the start is fitted to measured responses, and there are none".into();
+            let why =
+                "the initial state is fitted to measured responses, but there are none".into();
             return Err(AnalysisError::Setting { setting: "settle", why });
         }
         let free = FreeMotion::fit(system, block, columns, &self.record, settle)?;

@@ -89,7 +89,7 @@ fn vector(shape: &[Complex<f64>]) -> DVector<Complex<f64>> {
 pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
     let reason = match candidate.reason {
         DropReason::Insignificant { gain, required } => format!(
-            "it improves the fit by {} (−2 log L) where {} is needed",
+            "it improves the fit by {} (−2 log L), but {} is needed",
             significant(gain, 3),
             significant(required, 3)
         ),
@@ -100,7 +100,7 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
         DropReason::TooDamped => {
             "it is too damped for a mode: the response of modes outside of the band".into()
         }
-        DropReason::OutsideBand => "it left the band".into(),
+        DropReason::OutsideBand => "its frequency left the band".into(),
         DropReason::Twin { other_hz } => format!(
             "its shape is that of the mode at {} Hz, within whose width it lies",
             significant(other_hz, 5)
@@ -110,7 +110,7 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(ratio, 2)
         ),
         DropReason::BeyondNumber { .. } => "`modes` asks for fewer, and others explain more".into(),
-        _ => "it is no mode of the record".into(),
+        _ => "it is not a mode of the record".into(),
     };
     let DroppedCandidate { frequency_hz, damping_ratio, .. } = *candidate;
     DroppedRow { frequency_hz, damping_ratio, reason }
@@ -128,8 +128,8 @@ pub(super) fn notes(estimate: &ModalEstimate) -> Vec<String> {
         }
         if let Some(share) = mode.driven_share.filter(|share| 1.0 - share > NOTED_UNMEASURED) {
             notes.push(format!(
-                "{} % of the motion of mode {number} ({hz} Hz) answers forces that were not measured; its \
-                 intervals allow for that",
+                "{} % of the motion of mode {number} ({hz} Hz) is caused by forces that were not \
+                 measured; its intervals allow for that",
                 compact(100.0 * (1.0 - share), 2)
             ));
         }

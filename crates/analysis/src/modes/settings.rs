@@ -93,10 +93,13 @@ impl ModesSettings {
         if let Some([low, high]) = self.band_hz
             && !(low >= 0.0 && low < high && high.is_finite())
         {
-            return Err(self.refused("band_hz", format!("{low} to {high} Hz is no band")));
+            return Err(self.refused("band_hz", format!("{low} to {high} Hz is not a band")));
         }
         if !(0.0..MOST_VALIDATED).contains(&self.validate) {
-            let why = format!("{} % of a record leaves too little to fit", 100.0 * self.validate);
+            let why = format!(
+                "with {} % of each record excluded, too little remains for the fit",
+                100.0 * self.validate
+            );
             return Err(self.refused("validate_percent", why));
         }
         Ok(())

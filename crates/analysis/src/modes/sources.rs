@@ -214,8 +214,8 @@ impl Columns {
         }
         if !stated.is_empty() && stated.len() != count {
             let why = format!(
-                "{} places for {} in {}: name one for each column, or, of \
-                 a hammer that roves, one for each record",
+                "{} places for {} in {}: name one for each column, or, for a roving hammer, one for each \
+                 record",
                 stated.len(),
                 message::count(count, "force column"),
                 message::count(measurements.len(), "record"),

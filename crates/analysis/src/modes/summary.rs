@@ -69,7 +69,7 @@ pub struct ModesSummary {
     pub model: Option<ModalModel>,
     /// Notes to read before using the numbers.
     pub notes: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: ModesSettings,
 }
 

@@ -24,8 +24,8 @@ pub struct KinematicConsistency(Vec<Pair>);
 /// Minimum correlation for a comparison of magnitudes; below it noise may explain a difference.
 const ALIKE: f64 = 0.7;
 
-/// Minimum ratio of magnitudes for a remark; the trapezoidal rule has such an error only below 2.4
-/// samples per period.
+/// Ratio of the integrated rate to the measured change, or its inverse, above which a remark is
+/// made; the error of the trapezoidal rule is so large only below 2.4 samples per period.
 const ANOTHER_UNIT: f64 = 3.0;
 
 impl KinematicConsistency {

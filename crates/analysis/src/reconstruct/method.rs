@@ -55,8 +55,8 @@ pub struct How {
     pub chosen: Vec<(String, f64, &'static str)>,
     /// Unexplained part of each measured channel; `None` without surplus channels.
     pub unexplained: Option<Vec<Unexplained>>,
-    /// Frequency, in Hz, below which noise exceeds the part of the force in the responses; `None`
-    /// if the method cannot decide, or if noise prevails at all frequencies.
+    /// Frequency, in Hz, below which the noise exceeds the response to the force; `None` if the
+    /// method cannot decide, or if noise prevails at all frequencies.
     pub seen_from_hz: Option<f64>,
     /// Frequency band, in Hz, in which force and standard error are valid; `None`: all.
     pub band_hz: Option<[f64; 2]>,
@@ -90,7 +90,7 @@ pub fn choose(
     } else if complete(channels, dofs, true) && request.forced.len() == dofs {
         (
             Method::Continuous,
-            "displacement, velocity and acceleration of every degree of freedom are there".into(),
+            "displacement, velocity and acceleration of every degree of freedom are given".into(),
         )
     } else if request.periodic {
         (Method::Shrinkage, "whole periods, the lines with force not given".into())
@@ -365,7 +365,7 @@ fn little_power_remark(motion: &Measurement, request: &Request) -> Option<String
     let (channel, share) = shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < FEW)?;
     let (samples, step) = (motion.sampling().len(), motion.sampling().omega0() / TAU);
     Some(format!(
-        "the lines given hold {} % of the power of channel {} about its mean, and no force is sought on other lines; lines are counted in the period of {samples} samples, {} Hz apart",
+        "the given lines contain only {} % of the power of channel {} (without its mean), and on other lines no force is computed; the lines are those of a period of {samples} samples, {} Hz apart",
         significant(100.0 * share, 3),
         channel + 1,
         significant(step, 5)

@@ -7,8 +7,7 @@ use super::method::{How, Request};
 use crate::reconstruct::options::Method;
 use crate::text::significant;
 
-/// Returns a remark on the frequencies at which the responses contain less of a force than of
-/// noise.
+/// Returns a remark on the frequencies at which the response to a force is smaller than the noise.
 ///
 /// A displacement shows even a constant force, so with one there is no remark. Dynamic stiffness
 /// cannot decide where noise prevails. If lines or a band are requested, the user has already
@@ -31,14 +30,15 @@ pub fn remark(channels: &[Channel], request: &Request, how: &How) -> Option<Stri
     let hz = |value| significant(value, 4);
     match (how.seen_from_hz?, how.band_hz?, request.band_hz) {
         (seen, [low, high], None) if seen > 0.0 => Some(format!(
-            "the {responses} are insensitive to slow forces, and below {} Hz their noise exceeds the part of a force in them: force and standard error are those of {} to {} Hz; for the slower part measure a \
-             displacement as well",
+            "the {responses} are insensitive to slow forces, and below {} Hz their noise exceeds the \
+             response to the force: force and standard error cover only {} to {} Hz; for the slower part \
+             of the force measure a displacement as well",
             hz(seen),
             hz(low),
             hz(high)
         )),
         (seen, [low, _], Some(_)) if low < seen => Some(format!(
-            "below {0} Hz the noise of the {responses} exceeds the part of a force in them, and the requested band begins at {1} Hz: the standard error includes that part as unknown; begin the band at {0} \
+            "below {0} Hz the noise of the {responses} exceeds the response to the force, but the requested band begins at {1} Hz: the standard error treats the force below {0} Hz as unknown; begin the band at {0} \
              Hz, or measure a displacement as well",
             hz(seen),
             hz(low)

@@ -41,7 +41,7 @@ pub struct ForceSummary {
     pub forces: Vec<ForceRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: Reconstruct,
 }
 
@@ -88,7 +88,7 @@ impl ForceRow {
         (self.sought && share > UNSURE).then(|| {
             format!(
                 "the record hardly determines the force on degree of freedom {}: its standard error is {} % of its \
-                 RMS value. Possible causes: noise, sensors that are insensitive to the force, or another machine",
+                 RMS value. Possible causes: noise, sensors that are insensitive to the force, or a model of another machine",
                 self.dof,
                 significant(100.0 * share, 2)
             )

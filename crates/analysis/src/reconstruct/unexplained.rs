@@ -114,7 +114,9 @@ fn causes(request: &Request, dofs: usize) -> Vec<String> {
         let forced: Vec<String> = request.forced.iter().map(|dof| (dof + 1).to_string()).collect();
         let degrees = if forced.len() == 1 { "degree" } else { "degrees" };
         let forced = listed(&forced);
-        causes.push(format!("another force acts than on {degrees} of freedom {forced} (`forced`)"));
+        causes.push(format!(
+            "a force acts elsewhere than on {degrees} of freedom {forced} (`forced`)"
+        ));
     }
     if matches!(request.rule, Rule::Given(_)) {
         causes.push("`parameter` suppresses too much of the force".into());

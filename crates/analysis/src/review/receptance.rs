@@ -140,9 +140,9 @@ fn measured(
         "measured on the lines of whole periods that carry force".into()
     } else {
         format!(
-            "by H1 from segments of {} samples, half overlapped and weighted by a Hann window, \
-                 where the force explains at least half of the motion (a resonance narrower than \
-                 the lines appears wider than it is)",
+            "by H1 from segments of {} samples (Hann window, 50 % overlap), on the lines where the force \
+                 explains at least half of the response (a resonance narrower than the line spacing \
+                 appears too wide)",
             segment(first)
         )
     };

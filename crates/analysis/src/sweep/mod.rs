@@ -168,8 +168,8 @@ fn spectra_note(measured: &Block) -> Option<String> {
     let seam = periodicity(measured.response().0);
     (seam.verdict() > Verdict::Good).then(|| {
         format!(
-            "the spectra are those of whole periods, and {} samples of {} are none: {seam}; give `period`, or sweep \
-             an estimator in time",
+            "the spectra need whole periods, but the {} samples of {} are not whole periods: {seam}; \
+             give `period`, or choose an estimator of the time domain",
             measured.period, measured.file
         )
     })

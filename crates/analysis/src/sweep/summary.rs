@@ -37,7 +37,7 @@ pub struct SweepSummary {
     pub best_npi: Option<f64>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// The settings, which repeat the analysis.
+    /// Settings of the analysis; with them it can be repeated.
     pub analysis: SweepSettings,
 }
 

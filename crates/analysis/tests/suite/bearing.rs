@@ -179,14 +179,14 @@ fn tables_of_frequency_responses_give_the_same() {
     refused(
         &tables[..1],
         &how,
-        "a test has two tables, of displacement and of acceleration: there are 1",
+        "a test needs two tables, one of displacement and one of acceleration; the number of tables is 1",
     );
     refused(&[], &how, "no record");
     let numbered =
         IdentifyBearing { lines: "3:9".parse().map(LineChoice::Lines).unwrap(), ..how.clone() };
     refused(&tables, &numbered, "`lines`: frequency responses have no numbered lines");
     let still = IdentifyBearing { rotation_hz: Some(4.0), ..how };
-    refused(&tables, &still, "every frequency is a multiple of the rotation");
+    refused(&tables, &still, "every frequency is a multiple of the frequency of rotation");
 }
 
 /// Results from records of `count` periods in x and as many in y, and results from the tables of

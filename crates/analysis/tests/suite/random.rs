@@ -457,7 +457,7 @@ fn a_record_that_begins_in_motion_is_told_by_its_prediction() {
     };
     let told = |test: &Measurement, stiffer: f64| {
         let found = predict(test, &machine(stiffer), &Predict::default()).unwrap();
-        found.summary().remarks.iter().any(|remark| remark.contains("in motion"))
+        found.summary().remarks.iter().any(|remark| remark.contains("not at rest"))
     };
     assert!((0..8).all(|seed| told(&random_test(seed), 1.0)));
     let settled = predict(&random_test(0), &machine(1.0), &Predict { settle: Some(500) }).unwrap();

@@ -281,8 +281,8 @@ fn what_a_table_lacks_is_told() {
     gap.functions.remove(2);
     assert_eq!(
         refused(&gap, &usual),
-        "table has no response at 2 to a force at 1: every point needs one to every force, and every \
-         force one at its own point (choose `points`)"
+        "table has no response at 2 to a force at 1: every point needs a response to every force, and \
+         every force a response at its own point (choose `points`)"
     );
     // With a single point the table is complete, although the machine is another one.
     let alone = IdentifyResponses { points: vec!["2".into()], ..usual.clone() };

@@ -32,9 +32,10 @@ impl Banded {
         &self.entries[start + from..start + to]
     }
 
-    /// Solves the equations of some unknowns, with zeros for the others: overwrites their part of
-    /// the matrix by its Cholesky factor and their rows of `right`, of `sides` entries each, by the
-    /// solution. `None` if the matrix is not positive definite.
+    /// Solves the equations for a range of unknowns; all other unknowns are zero. The part of the
+    /// matrix for this range is overwritten by its Cholesky factor, and the rows of `right` for
+    /// this range (`sides` entries per row) by the solution. `None` if the matrix is not positive
+    /// definite.
     pub(super) fn solve(
         &mut self,
         unknowns: Range<usize>,

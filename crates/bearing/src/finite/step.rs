@@ -7,7 +7,8 @@ use super::film::Film;
 use crate::error::BearingError;
 use crate::limits;
 
-/// Linearisation of a film: its load, and the changes of pressure and fronts with the journal.
+/// Linearisation of a film: its load, and the derivatives of the pressure and of the film
+/// boundaries (fronts) with respect to displacement and velocity of the journal.
 pub(super) struct Step {
     /// Load of the film once it satisfies its equations, to first order.
     pub(super) load: Vector2<f64>,

@@ -135,7 +135,7 @@ impl SimulateArgs {
     fn many(&self, option: &'static str, runs: &StudyRuns) -> Result<Outcome, CliError> {
         let ending = self.output.extension().and_then(|ending| ending.to_str());
         if !ending.is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
-            let why = "writes a Parquet file: let the name of --output end in .parquet";
+            let why = "writes a Parquet file: the name of --output must end in .parquet";
             return Err(CliError::MisplacedOption { option, why });
         }
         let study = ExperimentStudy::read(&self.experiment, runs)?;

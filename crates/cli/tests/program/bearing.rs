@@ -170,7 +170,7 @@ fn tables_of_frequency_responses_are_a_bearing_test() {
     assert_eq!(report["rows"][0]["coefficients"], found["coefficients"]);
 
     let told = refused(folder, &format!("bearing {x} displacement-y.csv --frf-table {how}"));
-    assert!(told.contains("--frf-table: a test has two tables"), "{told}");
+    assert!(told.contains("--frf-table: a test needs two tables"), "{told}");
     let told = refused(
         folder,
         &format!("bearing displacement-x.csv acceleration-y.csv --frf-table {how}"),

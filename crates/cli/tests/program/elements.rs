@@ -233,7 +233,7 @@ fn bad_descriptions_are_told_by_name() {
     let told = message(&|m| drop(m["elements"].as_array_mut().unwrap().remove(2)));
     assert!(told.contains("degree of freedom \"x3\" has no mass (it belongs to \"s3\")"), "{told}");
     let told = message(&|m| m["dofs"] = json!(["x1", "x2", "x3", "x4"]));
-    assert!(told.contains("no element holds degree of freedom \"x4\""), "{told}");
+    assert!(told.contains("no element is connected to degree of freedom \"x4\""), "{told}");
     let told = message(&|m| m["elements"][3]["k"] = json!({"begin": 2}));
     assert!(told.contains("elements[3].k.begin: unknown field `begin`"), "{told}");
     let told = message(&|m| {

@@ -284,7 +284,7 @@ fn lines_of_another_period_are_told() {
     let notes = |window: &str| {
         let call = "force x.csv --sample-rate 64 --system machine.json --displacement x --lines 3";
         let told = mechid(folder.path(), &format!("{call} {window}"));
-        told.lines().filter(|line| line.contains("the lines given hold")).count()
+        told.lines().filter(|line| line.contains("the given lines contain only")).count()
     };
     assert_eq!(notes(""), 1);
     assert_eq!(notes("--method shrinkage"), 1);

@@ -228,17 +228,21 @@ fn one_kind_of_motion_is_enough_with_derivatives() {
         // samples.
         let found = json(folder, &format!("{common} --derivatives savitzky-golay:11:8"));
         assert!(error(&found) < 0.02, "{motion}: {found}");
-        refused(folder, &common, &["--derivatives says how", "savitzky-golay:WINDOW:ORDER"]);
+        refused(folder, &common, &["--derivatives sets how", "savitzky-golay:WINDOW:ORDER"]);
     }
     let common = "identify p.csv --force f --domain time";
     let both = "--displacement x --velocity v --derivatives spectral";
-    refused(folder, &format!("{common} {both}"), &["of the displacement alone or of the acceler"]);
+    refused(
+        folder,
+        &format!("{common} {both}"),
+        &["from the displacement alone or from the acceler"],
+    );
     let twice = "--acceleration a --derivatives savitzky-golay:11:8 --between-samples held";
     refused(folder, &format!("{common} {twice}"), &["leave --between-samples out"]);
     let even = "--acceleration a --derivatives savitzky-golay:10:4";
     refused(folder, &format!("{common} {even}"), &["an odd number of samples, not 10"]);
     let long = "--acceleration a --derivatives savitzky-golay:301:4";
-    refused(folder, &format!("{common} {long}"), &["256 samples where at least 301"]);
+    refused(folder, &format!("{common} {long}"), &["256 samples, but at least 301"]);
 }
 
 #[test]
@@ -283,9 +287,9 @@ fn a_whole_period_closes() {
     let segments = format!("{common} --from-frf h1 --segment 64 --extent period");
     refused(folder, &segments, &["--extent: it belongs to", "not to --from-frf"]);
     let weights = format!("{common} --method least-squares --noise smooth");
-    refused(folder, &weights, &["--noise: it applies to --method maximum-likelihood alone"]);
+    refused(folder, &weights, &["--noise: it applies only to --method maximum-likelihood"]);
     let weights = format!("{common} --noise per-line --extent period");
-    refused(folder, &weights, &["--noise: per-line is the scatter of two periods or more"]);
+    refused(folder, &weights, &["--noise: per-line takes the noise of each line"]);
     let lines = "--domain time --lines odd --plot a.svg";
     refused(
         folder,
@@ -329,7 +333,7 @@ fn masses_may_be_known_in_part() {
     assert_eq!(known, [true, true, true, false]);
     assert!((parameter(&found, "m22", "value") / 14.8 - 1.0).abs() < 1e-9);
     refused(folder, &format!("{common} 14.8,heavy"), &["\"heavy\" is not a number, nor unknown"]);
-    refused(folder, &format!("{common} 1e300,1e300"), &["beyond the largest number"]);
+    refused(folder, &format!("{common} 1e300,1e300"), &["exceeds the range of double precision"]);
     refused(folder, &format!("{common} unknown,-1"), &["got -1 kg"]);
 }
 
@@ -440,7 +444,7 @@ fn frequency_responses_are_estimated_and_fitted() {
         ("1024:100", "from 0 to below 100 %, got 100"),
         ("1024:-1", "from 0 to below 100 %, got -1"),
         ("1024:50:hanning", "is none of hann, hamming, blackman, rectangular"),
-        ("0", "is no number of samples"),
+        ("0", "is not a number of samples"),
     ] {
         refused(folder, &format!("frf r.csv {other} {segment}"), &[part]);
     }

@@ -159,7 +159,7 @@ fn what_a_large_machine_does_not_have_is_refused() {
         refused(home.path(), "simulate chain/chain.json --output x.csv")
     };
     for (rest, expected) in [
-        (r#", "outputs": []"#, "outputs names no degree of freedom"),
+        (r#", "outputs": []"#, "`outputs` is an empty list of degrees of freedom"),
         (r#", "outputs": [101]"#, "outputs names degree of freedom 101, the system has 100"),
         (r#", "outputs": [3, 3]"#, "outputs names degree of freedom 3 twice"),
         (

@@ -198,7 +198,9 @@ fn a_force_that_drives_few_lines_is_named() {
     let line = "identify sine.csv --force f --displacement x --period 100";
     let message = refused(home, line);
     assert!(message.contains("2 equations do not determine 3 unknowns"), "{message}");
-    assert!(message.contains("the forces drive 1 of 49 lines") && message.contains("--lines all"));
+    assert!(
+        message.contains("the forces excite only 1 of 49 lines") && message.contains("--lines all")
+    );
     let output = json(home, "identify step.csv --force f --displacement x --lines all");
     let [mass, _] = parameter(&output, 0);
     assert!((mass / 3.0 - 1.0).abs() < 0.01, "{mass}");

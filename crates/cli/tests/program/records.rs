@@ -160,8 +160,7 @@ fn a_machine_with_an_undetermined_parameter_is_refused_by_its_name() {
     fs::write(folder.path().join("machine.json"), machine.to_string()).unwrap();
     let arguments = "force rec.csv --system machine.json --displacement displacement --period 256";
     let message = refused(folder.path(), arguments);
-    let part =
-        "error: machine.json: the covariance of c is null: the record it was identified from";
+    let part = "error: machine.json: the covariance of c is not known (null), because the record";
     assert!(message.starts_with(part), "{message}");
 }
 

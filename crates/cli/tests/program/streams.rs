@@ -93,8 +93,8 @@ fn standard_output_takes_one_thing() {
         let message = refused(folder.path(), &format!("{design} {name} --json"));
         assert_eq!(
             message,
-            "error: standard output takes one thing, not 1 file and the report: name files, or leave \
-             --json out\n"
+            "error: only one output can go to standard output, not 1 file and the report: write to named \
+             files, or leave --json out\n"
         );
     }
     let both = shell(folder.path(), &format!("{FORCE} --output - --spectrum /dev/stdout"));

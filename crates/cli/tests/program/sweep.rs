@@ -123,7 +123,7 @@ fn a_record_is_swept_by_taking_fewer_samples() {
     // If a period is no multiple of the factor, the point of this setting says so.
     let uneven = report(&format!("{spectra} --decimate 1,7"));
     let reason = uneven["points"][1]["failure"].as_str().unwrap();
-    assert_eq!(reason, "a period of 240 samples cannot be divided into steps of every 7th sample");
+    assert_eq!(reason, "a period of 240 samples cannot be reduced to every 7th sample");
     // Without a reference the report gives standard errors and says that they do not include bias.
     let own = told(&format!("{columns} --decimate 1,2"));
     assert!(own.contains("it does not include bias"), "{own}");
@@ -135,8 +135,11 @@ fn settings_belong_to_what_is_swept() {
     record(place.path());
     let columns = "sweep r.csv --force f --displacement x";
     for (arguments, part) in [
-        (format!("{columns} --velocity v --npi 1,2"), "--npi belongs to the description"),
-        (format!("{columns} --velocity v --rate-hz 30"), "no samples at 30 Hz"),
+        (
+            format!("{columns} --velocity v --npi 1,2"),
+            "--npi applies only to a described experiment",
+        ),
+        (format!("{columns} --velocity v --rate-hz 30"), "cannot be reduced to 30 Hz"),
         (format!("{columns} --velocity v --decimate 2.5"), "got 2.5"),
         (format!("{columns} --decimate 1,2"), "needs the velocity"),
         (format!("{columns} --velocity v"), "--npi"),

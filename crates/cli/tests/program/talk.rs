@@ -94,10 +94,7 @@ fn one_thing_is_told_as_one() {
             folder.path(),
             &format!("sweep {record} --velocity v --estimator least-squares --decimate {factor}"),
         );
-        assert!(
-            told.contains(&format!("cannot be divided into steps of every {ordinal} sample")),
-            "{told}"
-        );
+        assert!(told.contains(&format!("cannot be reduced to every {ordinal} sample")), "{told}");
     }
     let told = refused(folder.path(), "identify a.csv --force f,0 --displacement x,v --mass 1");
     assert!(told.contains("--mass gives 1 value, the record has 2 degrees of freedom"), "{told}");

@@ -82,7 +82,7 @@ fn a_force_sought_in_too_few_places_is_told() {
         let found = report(folder.path(), &way);
         let told = remarks(&found);
         for words in [
-            "another force acts than on degree of freedom 1 (`forced`)",
+            "a force acts elsewhere than on degree of freedom 1 (`forced`)",
             "its standard error is not reliable",
         ] {
             assert!(told.contains(words), "{way}: {told}");

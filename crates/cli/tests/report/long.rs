@@ -151,7 +151,7 @@ fn numbers_and_pictures_are_those_of_all_samples() {
         let (re, im) = line(&motion, n);
         found += 0.5 * stiffness * stiffness * (re * re + im * im);
     }
-    let cells = row(&document, "Force found and force measured", "F");
+    let cells = row(&document, "Computed and measured force", "F");
     // The peak of the force adds 2 N to the mean period, but is not in the part kept in memory.
     near(&cells[1], measured.sqrt(), 4);
     near(&cells[2], found.sqrt(), 4);

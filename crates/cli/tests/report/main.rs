@@ -203,7 +203,7 @@ fn the_page_says_what_is_in_the_record() {
     assert_eq!(excitation[3..], ["77", "1 to 20", "1.00", "154"]);
     assert_eq!(row(&document, "Residual of the response", "x")[3..], ["0", "0 %"]);
     assert!(checks(&document).contains("residual 1: rounding"), "{}", checks(&document));
-    let force = row(&document, "Force found and force measured", "F");
+    let force = row(&document, "Computed and measured force", "F");
     assert_eq!((&force[1], &force[2]), (&"31.02".to_owned(), &"31.02".to_owned()));
     let [(heading, _)] = &remarks(&document)[..] else { panic!("nothing speaks against it") };
     assert_eq!(heading, "What speaks for the numbers");
@@ -325,7 +325,7 @@ fn an_open_record_has_its_page_too() {
         figures.iter().find(|figure| figure.attribute("id") == Some("figure-receptance"));
     assert!(text(*receptance.unwrap()).contains("by H1 from segments of 64 samples"));
     assert_eq!(figures.len(), 7);
-    let force = row(&document, "Force found and force measured", "force");
+    let force = row(&document, "Computed and measured force", "force");
     let difference: f64 = force[4].strip_suffix(" %").unwrap().parse().unwrap();
     // Noise of 1 % on the motion gives an error of about 1 % of the force, which is mostly inertia.
     assert!(difference > 0.5 && difference < 5.0, "{difference}");
@@ -408,7 +408,7 @@ fn a_record_in_segments_has_its_page_too() {
     let percent = |cell: &str| cell.strip_suffix(" %").unwrap().parse::<f64>().unwrap();
     let left = row(&document, "Residual of the response", "x");
     assert!(percent(&left[4]) < 5.0, "{left:?}");
-    let force = row(&document, "Force found and force measured", "F");
+    let force = row(&document, "Computed and measured force", "F");
     assert!(percent(&force[4]) < 20.0, "{force:?}");
     assert_eq!(tagged(&document, "figure").len(), 6);
 }

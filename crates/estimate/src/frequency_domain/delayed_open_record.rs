@@ -26,7 +26,7 @@ pub struct DelayedOpenRecord<'a> {
 }
 
 impl<'a> DelayedOpenRecord<'a> {
-    /// Starts at the result of a `fit` to the same data; `None` if that has no transient.
+    /// Starts at the result of a `fit` to the same data; `None` if the fit has no transient.
     pub fn from_fit(
         data: &'a FrequencyData,
         unknowns: &'a Unknowns,

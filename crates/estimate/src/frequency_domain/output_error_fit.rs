@@ -23,10 +23,11 @@ use crate::{Estimate, EstimateError, Unknowns};
 pub struct OutputErrorFit {
     /// M̂, Ĉ, K̂ with the covariance from the Fisher information.
     pub estimate: Estimate,
-    /// Ratio of the weighted residual power to its expectation: 1 within a few √(2/degrees of
-    /// freedom) if model and noise are correct; much more if the model is wrong (a nonlinearity,
-    /// missing degrees of freedom). It is 1 by definition if the noise is estimated from the
-    /// residual.
+    /// Ratio of the weighted residual power to its expectation. If model and noise are correct, it
+    /// is 1 with a standard deviation of about √(2/ν) (more if the noise is estimated from few
+    /// periods), where ν is the number of residuals minus the number of parameters. It is much
+    /// larger if the model is wrong (a nonlinearity, missing degrees of freedom), and 1 by
+    /// definition if the noise is estimated from the residual.
     pub misfit_ratio: f64,
     /// Twice the negative log-likelihood, up to a constant and corrected for sampled weights, a
     /// pure number; `None` if the noise is estimated from the residual. The difference between two

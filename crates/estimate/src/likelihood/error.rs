@@ -46,8 +46,8 @@ pub enum LikelihoodError {
         /// Number of unknowns, including transient loads.
         unknowns: usize,
     },
-    /// The noise covariance of the outputs is singular: an output has no noise, or two have the
-    /// same.
+    /// The noise covariance of the outputs is singular: an output has no noise, or two outputs have
+    /// the same noise.
     #[error("the covariance of the outputs at {frequency_hz} Hz cannot be inverted")]
     SingularNoise {
         /// Frequency of the line.
@@ -55,8 +55,8 @@ pub enum LikelihoodError {
     },
     /// A sample covariance has too few degrees of freedom for a weight.
     #[error(
-        "covariances of {degrees_of_freedom} degrees of freedom cannot weight {outputs} outputs: \
-         more than {} are needed",
+        "covariances with {degrees_of_freedom} statistical degrees of freedom cannot weight {outputs} \
+         outputs: more than {} are needed",
         outputs + 1
     )]
     FewDegreesOfFreedom {
@@ -81,7 +81,7 @@ pub enum LikelihoodError {
         most: usize,
     },
     /// No search converged.
-    #[error("no search ended at a minimum: {searches} searches of at most {steps} steps each")]
+    #[error("none of {searches} searches of at most {steps} steps ended at a minimum")]
     NotConverged {
         /// Number of searches.
         searches: usize,

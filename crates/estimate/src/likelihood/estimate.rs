@@ -66,8 +66,8 @@ pub struct ParameterEstimate {
 pub struct Combination {
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// Values, one for each parameter, in its unit: one of all sets of values with the same
-    /// combinations.
+    /// One possible set of values, one for each parameter in its unit. The data determine only the
+    /// combinations; other values with the same combinations fit equally well.
     pub values: Vec<f64>,
     /// Coefficients of the parameters in the differential of each determined combination; the
     /// largest one is 1. Units: that of the parameter with the largest coefficient per unit of each

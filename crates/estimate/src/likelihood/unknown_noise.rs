@@ -82,7 +82,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok(WeightedMinimum { minimum, weights, is_white: true, bases: Vec::new() })
     }
 
-    /// Returns the ratio of the number of real numbers to the degrees of freedom of the residual.
+    /// Returns the number of residuals (real and imaginary parts) divided by their degrees of
+    /// freedom.
     fn freedom_ratio(&self, minimum: &Minimum, residual: &Residual<'_, M>) -> f64 {
         let free = minimum.at_bound.iter().filter(|at_bound| !**at_bound).count();
         let unknowns = (free + residual.transient_unknowns()).saturating_sub(self.priors.len());

@@ -160,7 +160,11 @@ fn by_products(
             shooting.free(state, end)
         })?;
         products += solution.products;
-        log::debug!("{} products leave {:.1e} of the gap", solution.products, solution.residual);
+        log::debug!(
+            "after {} products {:.1e} of the gap remains",
+            solution.products,
+            solution.residual
+        );
         if solution.reciprocal_condition <= rounding {
             return Err(IntegrateError::NoPeriodicState {
                 period: shooting.period(),

@@ -271,7 +271,7 @@ fn by_products(
                 shooting.derivative(&state, direction, derivative)
             })?;
         log::debug!(
-            "a gap of {missed:.1e}: {} products leave {:.1e}",
+            "a gap of {missed:.1e}: after {} products {:.1e} remains",
             step.products,
             step.residual
         );

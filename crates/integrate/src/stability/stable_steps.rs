@@ -3,10 +3,10 @@
 /// The steps Δt at which a scheme is stable on every passive system: M symmetric and positive
 /// definite, C and K symmetric and positive semidefinite.
 ///
-/// If x is an eigenvector of the amplification and m, c, k are the (real) products x*Mx, x*Cx,
-/// x*Kx, its eigenvalue is also that of the single degree of freedom m, c, k, whose ω² = k/m and
-/// c/m do not exceed the largest eigenvalues of M⁻¹K and M⁻¹C. So a limit for one degree of freedom
-/// is a limit for any number.
+/// Let x be an eigenvector of the amplification matrix, and m = x*Mx, c = x*Cx and k = x*Kx, which
+/// are real. The eigenvalue of x is then also an eigenvalue for the system of one degree of freedom
+/// with m, c and k. Its k/m and c/m do not exceed the largest eigenvalues of M⁻¹K and M⁻¹C. So a
+/// limit for one degree of freedom is a limit for any number.
 ///
 /// # Source
 /// Hughes (1987), sections 9.1 and 9.2.

@@ -202,7 +202,7 @@ impl Experiment {
         let Some(outputs) = &self.outputs else { return self.forced() };
         let dof = self.dof()?;
         if outputs.is_empty() {
-            return Err(self.wrong("outputs names no degree of freedom".into()));
+            return Err(self.wrong("`outputs` is an empty list of degrees of freedom".into()));
         }
         for (place, output) in outputs.iter().enumerate() {
             if !(1..=dof).contains(output) {

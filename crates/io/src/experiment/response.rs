@@ -46,7 +46,8 @@ impl PerDof {
         *self == Self::Zero
     }
 
-    /// Returns the numbers for `dof` degrees of freedom, or as an error their number if it differs.
+    /// Returns one value for each of `dof` degrees of freedom; if another number of values was
+    /// given, the error is that number.
     pub(super) fn values(&self, dof: usize) -> Result<Vec<f64>, usize> {
         match self {
             Self::Zero => Ok(vec![0.0; dof]),

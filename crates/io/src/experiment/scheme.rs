@@ -197,9 +197,9 @@ pub enum FirstSteps {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoadBeyond {
-    /// Force on the line through both ends of the step.
+    /// Linear extrapolation of the force from the start and the end of the step.
     #[default]
     Projected,
-    /// Force between the samples around it.
+    /// Linear interpolation of the force between the two neighbouring samples.
     Interpolated,
 }

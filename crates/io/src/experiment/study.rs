@@ -114,7 +114,7 @@ impl ExperimentStudy {
         };
         let runs = fields.first().map_or(0, |field| field.values.len());
         if runs == 0 {
-            return Err(refused("a study needs one run at least".into()));
+            return Err(refused("a study needs at least one run".into()));
         }
         let study = Self { file, folder: folder.into(), description, fields, runs };
         // A wrong name is wrong in every run, so the first run is read at once.
@@ -262,7 +262,7 @@ mod tests {
             let refused = refusal(&table(&format!("{columns},periods\n{value},1\n")));
             assert!(refused.contains(expected), "{columns} = {value}: {refused}");
         }
-        assert!(refusal(&StudyRuns::Seeds(0)).contains("one run at least"));
+        assert!(refusal(&StudyRuns::Seeds(0)).contains("at least one run"));
         let silent = EXPERIMENT.replace("\"noise\"", "\"nois\"");
         let refused = ExperimentStudy::parse("rig.json", &silent, &StudyRuns::Seeds(2));
         assert!(matches!(refused, Err(IoError::Json { .. })), "{refused:?}");

@@ -38,7 +38,7 @@ const MIN_BYTES: u64 = 4096;
 pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Contents, IoError> {
     let is_matlab = bytes.starts_with(b"MATLAB");
     let budget = Budget::new(limits, bytes.len());
-    // The decoder crate is young: a panic in it is reported as a damaged file.
+    // The decoder crate is young, so its panics are reported as a damaged file.
     let read = catch_unwind(AssertUnwindSafe(|| Reader::read(bytes, is_matlab, budget)));
     let read = read.unwrap_or_else(|_| Err(Fault::new(0, "its structure is damaged")));
     let contents = read.map_err(|fault| fault.error(file, Place::Byte(1)))?;
@@ -253,7 +253,7 @@ fn take_numbers(count: u64, bytes_each: u64, len: u64, budget: &mut Budget) -> R
     let bytes = count.saturating_mul(bytes_each.max(1));
     if bytes > len.max(MIN_BYTES).saturating_mul(MAX_EXPANSION) {
         let what =
-            format!("a data set of {bytes} bytes in a file of {len}, which cannot hold as many");
+            format!("a data set of {bytes} bytes, more than the file of {len} bytes can hold");
         return Err(Fault::new(0, what));
     }
     let (unpacked, limit) = budget.unpacked_bytes();

@@ -32,7 +32,7 @@ const PROPERTY_WORDS: usize = 3;
 /// Kind of a property whose value is in a cell.
 const IN_CELL: u32 = 1;
 
-/// Cells before those of the values.
+/// Number of cells before the cells of the values.
 const FIRST_VALUE: usize = 2;
 
 /// Start of the names in the table, in bytes, behind its version, their number and eight offsets.

@@ -81,7 +81,7 @@ pub(super) fn read(
     Ok(Content::Numbers(array(dataset, len, budget)?))
 }
 
-/// Returns what a data set of MATLAB contains instead of numbers; `None` for numbers.
+/// Returns the content of a data set of MATLAB that is not numbers, in words; `None` for numbers.
 fn unusable_class(attributes: &Attributes) -> Option<&'static str> {
     if attributes.has("MATLAB_empty") {
         return Some("an empty array");
@@ -104,7 +104,7 @@ fn array(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Array, Trou
     let dimensions = dataset.shape().map_err(cannot_be_read)?;
     let count = dimensions.iter().try_fold(1_u64, |product, len| product.checked_mul(*len));
     let element_bytes = dataset.element_size().map_err(cannot_be_read)?;
-    let Some(count) = count else { return unusable("more numbers than can be counted") };
+    let Some(count) = count else { return unusable("an array with too many numbers") };
     if count == 0 {
         return unusable("an empty array");
     }

@@ -106,7 +106,10 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
         // An f64 represents every u32 exactly, and no file can have a longer dimension.
         let whole = (0.0..=f64::from(u32::MAX)).contains(value) && value.fract() == 0.0;
         whole.then_some(*value as usize).ok_or_else(|| {
-            Fault::new(size.at, format!("a dimension of {} is no length", message::number(*value)))
+            Fault::new(
+                size.at,
+                format!("{} is not a possible size of a dimension", message::number(*value)),
+            )
         })
     };
     lengths.iter().map(length).collect()
@@ -131,7 +134,7 @@ fn object(elements: &mut Elements<'_>) -> &'static str {
 /// Returns the number of elements of a full matrix; messages name the position of its data.
 fn count_of(part: &Element<'_>, lengths: &[usize]) -> Result<usize, Fault> {
     let Some(count) = part.count() else {
-        let what = format!("a variable holds data of type {}, no numbers", part.kind);
+        let what = format!("a variable holds data of type {}, not numbers", part.kind);
         return Err(Fault::new(part.at, what));
     };
     let product = lengths.iter().try_fold(1_usize, |product, len| product.checked_mul(*len));
@@ -211,7 +214,7 @@ fn inner(
 ) -> Result<Array, Fault> {
     let element = elements.required("elements")?;
     if element.kind != MATRIX {
-        return Err(Fault::new(element.at, "an element of an array is no variable"));
+        return Err(Fault::new(element.at, "an element of an array is not a variable"));
     }
     if depth == MOST_NESTED {
         let what = format!("arrays are nested more than {MOST_NESTED} deep");

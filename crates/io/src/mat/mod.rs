@@ -66,7 +66,7 @@ fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
                 let mut elements = Elements::new(&inflated, at, endian);
                 let inner = elements.next().map_err(inside)?;
                 let Some(inner) = inner.filter(|e| e.kind == MATRIX) else {
-                    return Err(Fault::new(at, "the compressed data are no variable"));
+                    return Err(Fault::new(at, "the compressed data are not a variable"));
                 };
                 let variable = Array::read(inner.data, at, endian, 0, &mut budget);
                 budget.give_bytes(inflated.len());

@@ -377,7 +377,7 @@ impl Kind {
         match column.physical_type() {
             Type::INT32 | Type::INT64 | Type::FLOAT | Type::DOUBLE => Ok(kind),
             Type::BOOLEAN => Err("truth values"),
-            Type::INT96 => Err("instants of an old kind (write them as timestamps)"),
+            Type::INT96 => Err("times in an old format (write them as timestamps)"),
             Type::BYTE_ARRAY => Err("text"),
             Type::FIXED_LEN_BYTE_ARRAY => Err("bytes"),
         }
@@ -411,7 +411,9 @@ impl Kind {
             ColumnReader::Int64ColumnReader(column) => {
                 append(column, rows, |v| integer(*v, v.cast_unsigned() as f64), into)
             }
-            _ => Err(Trouble::Damaged("a column is of another type than the file says".into())),
+            _ => Err(Trouble::Damaged(
+                "the type of a column is not the one that the file states".into(),
+            )),
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::standard::input_name;
 /// Cell of a table that [`write_parquet`](super::write_parquet) writes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParquetCell {
-    /// Null, or a value of another kind.
+    /// Null, or a value that is not text, a whole number, a number or a list.
     Null,
     /// Text.
     Text(String),

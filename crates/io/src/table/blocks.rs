@@ -222,7 +222,7 @@ impl<'a> Blocks<'a> {
         Err(IoError::Malformed {
             file: self.file.clone(),
             at: Place::Line(line),
-            what: "there are zero bytes within the text: the file is damaged, or no text".into(),
+            what: "there are zero bytes within the text: the file is damaged, or not text".into(),
         })
     }
 

@@ -158,7 +158,7 @@ fn real(line: &Line<'_>, from: usize) -> Result<f64, Fault> {
 
 fn wrong(line: &Line<'_>, from: usize, width: usize, kind: &str) -> Fault {
     let text = String::from_utf8_lossy(field(line, from, width)).into_owned();
-    line.fault(format!("\"{text}\" in columns {} to {} is no {kind}", from + 1, from + width))
+    line.fault(format!("\"{text}\" in columns {} to {} is not a {kind}", from + 1, from + width))
 }
 
 /// Returns a label, empty if it is NONE.

@@ -113,7 +113,7 @@ fn units(lines: &mut Lines<'_>) -> Result<Units, Fault> {
     let factor = |field: usize| -> Result<f64, Fault> {
         let part = factors.text.get(25 * field..).unwrap_or_default();
         number(part.get(..25).unwrap_or(part))
-            .ok_or_else(|| factors.fault("the factor of a unit is no number"))
+            .ok_or_else(|| factors.fault("the factor of a unit is not a number"))
     };
     Ok(Units { code, name: name.trim().into(), length: factor(0)?, force: factor(1)? })
 }

@@ -107,7 +107,7 @@ fn mode(lines: &mut Lines<'_>) -> Result<Option<Nodal>, Fault> {
     }
     if !(1..=MOST_VALUES).contains(&width) || ![2, 5].contains(&data) {
         return Err(
-            kind.fault(format!("{width} values of type {data} at a node are not values of a mode"))
+            kind.fault(format!("{width} values of type {data} at a node cannot be a mode shape"))
         );
     }
     let about = lines.required(SHORT)?;

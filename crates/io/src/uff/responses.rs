@@ -99,7 +99,7 @@ fn add(
     if header.abscissa != FREQUENCY {
         let abscissa = header.abscissa;
         return Err(id.fault(format!(
-            "{} over an abscissa of type {abscissa}, not over a frequency (18)",
+            "{} with an abscissa of type {abscissa}, not frequency (18)",
             header.kind()
         )));
     }

@@ -52,8 +52,7 @@ fn an_undetermined_parameter_is_named() {
              \"degrees_of_freedom\": 3}}}}"
         );
         let e = read_covariance(file(&text).path()).unwrap_err();
-        let what =
-            format!(": the covariance of {named} is null: the record it was identified from");
+        let what = format!(": the covariance of {named} is not known (null), because the record");
         assert!(matches!(e, IoError::Undetermined { .. }) && e.to_string().contains(&what), "{e}");
     }
 }

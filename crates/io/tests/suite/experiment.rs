@@ -136,7 +136,7 @@ fn wrong_descriptions_say_what_is_wrong() {
         ),
         (
             description(SDOF, r#"{ "lines": "some", "amplitude": 1 }"#, ""),
-            "\"some\" is no choice of lines",
+            "\"some\" is not a choice of lines",
         ),
         ("{".into(), "EOF while parsing"),
     ] {

@@ -69,7 +69,7 @@ fn rows_have_a_limit() {
     assert_eq!(
         e,
         "a, line 3: the row is longer than 65536 bytes (is a quote not closed?); if the record is \
-         right, raise the limit"
+         correct, raise the limit"
     );
     // A row of the maximum length.
     let padded = format!("t,f\n0,{}1\n", " ".repeat(LIMITS.row_bytes - 3));
@@ -108,7 +108,7 @@ fn what_is_packed_has_a_limit() {
     // The limit holds for the sum of two variables.
     let twice = compressed(&file[128..]);
     let e = Table::parse_with("a", &twice, &OPTIONS).unwrap_err().to_string();
-    assert!(e.contains("the compressed data are no variable"), "{e}");
+    assert!(e.contains("the compressed data are not a variable"), "{e}");
 }
 
 #[test]

@@ -165,10 +165,10 @@ fn broken_tables_are_refused() {
     let mut nameless = two_by_one(vec![1.0]);
     nameless.functions[0].response = "drive end".into();
     let e = nameless.to_universal_file().unwrap_err().to_string();
-    assert!(e.starts_with("\"drive end\" is no point of a universal file"), "{e}");
+    assert!(e.starts_with("\"drive end\" is not a point of a universal file"), "{e}");
     let text = two_by_one(vec![1.0, 2.0, 3.0]).to_universal_file().unwrap();
     for (what, by, message) in [
-        ("        18    0", "        17    0", "not over a frequency"),
+        ("        18    0", "        17    0", "not frequency"),
         ("        13    0", "        12    0", "not per excitation force"),
     ] {
         assert!(text.contains(what));

@@ -114,14 +114,14 @@ fn what_is_missing_or_does_not_go_together_is_said() {
     let text = refused(&file(&[h]));
     assert!(text.contains("no vector of their frequencies"), "{text}");
     let text = refused(&file(&[("f", &[4, 1], four, &[]), h]));
-    assert!(text.contains("H (3 × 1) has as many entries as there are frequencies, 4"), "{text}");
+    assert!(text.contains("H (3 × 1) equals the number of frequencies, 4"), "{text}");
     let f: (&str, &[u32], &[f64], &[f64]) = ("f", &[3, 1], three, &[]);
     let text = refused(&file(&[f, h, ("G", &[3, 1], three, three)]));
     assert!(text.contains("G and another array have the response at 1"), "{text}");
     let text = refused(&file(&[f, ("H", &[3, 1], &[1.0, f64::NAN, 1.0], three)]));
     assert!(text.contains("entry 2 of H is not finite"), "{text}");
     let text = refused(&file(&[f, ("H", &[3, 1, 1, 1], three, three)]));
-    assert!(text.contains("more dimensions"), "{text}");
+    assert!(text.contains("more than three dimensions"), "{text}");
     // An array that is not a response is left out.
     let analytic: (&str, &[u32], &[f64], &[f64]) = ("z", &[4, 1], four, four);
     let responses = FrequencyResponses::parse("a.mat", &file(&[f, h, analytic])).unwrap();

@@ -35,12 +35,12 @@ pub enum SimulateError {
     /// The exact scheme is only for linear machines.
     #[error(
         "the scheme \"exact\" is for linear machines: choose another one for nonlinear terms, such as \
-         newmark or runge-kutta-4, and steps that are short against the fastest motion"
+         newmark or runge-kutta-4, and steps that are much shorter than the period of the fastest motion"
     )]
     ExactNonlinear,
     /// A periodic response has no initial conditions.
     #[error(
-        "a periodic response has no start: give displacements for Houbolt's first steps only with a \
+        "a periodic response has no initial state: give displacements for Houbolt's first steps only with a \
          response from rest or from a given motion"
     )]
     GivenStartPeriodic,
@@ -56,8 +56,8 @@ pub enum SimulateError {
     /// The periodic response of a nonlinear or large machine is unstable, so that a run leaves it.
     #[error(
         "the periodic response is unstable: each period multiplies a disturbance by {} (the largest \
-         Floquet multiplier), so that no machine keeps it; choose \"response\": \"from-rest\" to see \
-         where the response goes, or another amplitude or frequency",
+         Floquet multiplier), so the machine leaves it; choose \"response\": \"from-rest\" to see how \
+         the response develops, or another amplitude or frequency",
         multiplier_text(*.multiplier)
     )]
     UnstableOrbit {
@@ -67,9 +67,9 @@ pub enum SimulateError {
     /// The search for the periodic response of a nonlinear machine fails.
     #[error(
         "no response that repeats every {period} s was found from rest and {SETTLING} periods: the best \
-         changes by {missed:.1e} of its size in a period. Choose \"response\": \"from-rest\" to see where \
-         the response goes; where it repeats after several periods of the force only, describe these as \
-         one (`samples`, `lines`)",
+         one changes by {missed:.1e} of its size in a period. Choose \"response\": \"from-rest\" to see \
+         how the response develops; if it repeats only after several periods of the force, describe \
+         these as one period (`samples`, `lines`)",
         period = message::number(*period)
     )]
     NoPeriodicOrbit {

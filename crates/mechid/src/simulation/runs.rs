@@ -65,7 +65,7 @@ pub fn simulate_runs(
         channels = names;
         progress(run);
     }
-    let file = file.expect("a study has one run at least").finish()?;
+    let file = file.expect("a study needs at least one run").finish()?;
     let runs = study.runs();
     Ok((file, RunsSummary { runs, samples, record_column: RUN, channels, fields }))
 }

@@ -265,7 +265,7 @@ impl SimulatedTerms {
 impl fmt::Display for SimulationSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kind = match self.response {
-            ResponseKind::Periodic => "the response that repeats",
+            ResponseKind::Periodic => "periodic response",
             ResponseKind::FromRest => "from rest",
             ResponseKind::From(_) => "from a given motion",
         };

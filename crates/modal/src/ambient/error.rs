@@ -51,8 +51,8 @@ pub enum AmbientError {
     },
     /// The band has too few lines.
     #[error(
-        "{lines} spectral lines lie between {from_hz} and {to_hz} Hz; one mode at {outputs} \
-         outputs needs {needed}: record longer or widen `band_hz`"
+        "{lines} spectral lines lie between {from_hz} and {to_hz} Hz; one mode with {outputs} outputs \
+         needs {needed}: record for longer, or widen `band_hz`"
     )]
     TooFewLines {
         /// Number of lines in the band.
@@ -78,7 +78,7 @@ pub enum AmbientError {
     },
     /// The band is empty or not finite.
     #[error(
-        "`band_hz` {from_hz} to {to_hz} Hz must rise within 0 to {nyquist_hz} Hz, half the sampling rate"
+        "`band_hz` is {from_hz} to {to_hz} Hz, but its lower end must be at least 0 and below its upper end, which must be at most {nyquist_hz} Hz, half the sampling rate"
     )]
     Band {
         /// Lower end given, in Hz.

@@ -1,5 +1,5 @@
-//! Number of modes: decided by the likelihood, with rules for poles that are significant but no
-//! modes.
+//! Number of modes: decided by the likelihood, with rules for poles that are significant but are
+//! not modes.
 
 use std::f64::consts::TAU;
 

@@ -118,7 +118,7 @@ pub enum DropReason {
     /// The damping ratio does not differ from zero significantly, as for a harmonic or a chance
     /// peak.
     DampingUndetermined {
-        /// Damping ratio over its standard error.
+        /// Ratio of the damping ratio to its standard error.
         ratio: f64,
     },
     /// The frequency is outside the band.

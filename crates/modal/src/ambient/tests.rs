@@ -1,4 +1,5 @@
-//! Derivatives and the expected periodogram, against differences and direct sums.
+//! Tests of ambient analysis: derivatives are compared with finite differences, and the expected
+//! periodogram with a direct sum.
 
 use nalgebra::{Complex, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};

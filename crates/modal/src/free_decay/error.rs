@@ -8,7 +8,7 @@ use mechid_signal::message;
 pub enum FreeDecayError {
     /// A record is longer than can be fitted.
     #[error(
-        "the record has {samples} samples where at most {most} can be fitted: use a part of it, or every n-th sample"
+        "the record has {samples} samples, but at most {most} can be fitted: use a part of it, or every n-th sample"
     )]
     TooLong {
         /// Samples of the record.
@@ -37,8 +37,8 @@ pub enum FreeDecayError {
     },
     /// No oscillation was found in a free response.
     #[error(
-        "no oscillation exceeds the noise in {}: the best one raises twice the log likelihood by {gained:.1}, \
-         noise alone by up to {needed:.1}. Use the part of the record in which the response decays",
+        "no oscillation exceeds the noise in {}: the best one increases twice the log likelihood by \
+         {gained:.1}, but noise alone can increase it by {needed:.1}. Use the part of the record in which the response decays",
         message::count(*samples, "sample")
     )]
     NoDecay {

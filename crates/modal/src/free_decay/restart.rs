@@ -45,7 +45,7 @@ fn best(data: &Data, fit: &Fit, candidates: Vec<usize>) -> Option<(f64, usize)> 
     candidates.iter().enumerate().filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Returns BᵀB and BᵀX of the rows before each sample, and last of all rows.
+/// Returns BᵀB and BᵀX for the rows before each candidate; the last entry is for all rows.
 fn sums(data: &Data, fit: &Fit, candidates: &[usize]) -> Vec<(DMatrix<f64>, DMatrix<f64>)> {
     let linear = linear_columns(&fit.poles, data.constant);
     let mut gram = DMatrix::zeros(linear, linear);

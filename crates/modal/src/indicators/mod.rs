@@ -18,7 +18,7 @@ use propagation::propagate;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IndicatorError {
-    /// Two things that belong together have different sizes.
+    /// Two sizes that must agree differ.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
         /// Name of the items counted.

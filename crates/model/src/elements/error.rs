@@ -137,7 +137,7 @@ pub enum MachineError {
         elements: String,
     },
     /// A degree of freedom has no element.
-    #[error("no element holds degree of freedom {dof:?}")]
+    #[error("no element is connected to degree of freedom {dof:?}")]
     Detached {
         /// Degree of freedom.
         dof: String,

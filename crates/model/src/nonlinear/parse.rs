@@ -176,7 +176,7 @@ impl Parser {
             ('x', false) => &mut product.displacement,
             ('v', false) => &mut product.velocity,
             (_, true) if letter == 'v' => &mut product.absolute,
-            _ => return Err("|x| is not among the laws".to_owned()),
+            _ => return Err("|x| is not one of the known laws".to_owned()),
         };
         *total = total.saturating_add(exponent);
         self.take('*');
@@ -196,7 +196,7 @@ impl Parser {
         if letter == other {
             Ok((letter, Coordinate::Difference(first, second)))
         } else {
-            Err("a difference is of two displacements or of two velocities".to_owned())
+            Err("a difference must be of two displacements or of two velocities".to_owned())
         }
     }
 
@@ -217,7 +217,7 @@ impl Parser {
 
     /// Returns b of `(1+(v1/b)^2)`.
     fn saturation(&mut self, coordinate: Coordinate) -> Result<f64, String> {
-        let form = || "only (1 + (v/b)^2), with the v of v^3, can follow /".to_owned();
+        let form = || "only (1 + (v/b)^2), with the same v as in v^3, can follow /".to_owned();
         for c in ['(', '1', '+', '('] {
             self.expect(c).map_err(|_| form())?;
         }
@@ -319,7 +319,7 @@ mod tests {
             ("k3: (x1-x1)^2", "two different degrees of freedom"),
             ("k3: x1^99", "at most 9"),
             ("k3: x1^", "expected a whole number, found the end"),
-            ("c: |x| x", "|x| is not among the laws"),
+            ("c: |x| x", "|x| is not one of the known laws"),
             ("c: |v|", "allowed only in |v| v"),
             ("c: v^2/(1+(v/2)^2)", "only v^3 can be divided"),
             ("c: v^3/(1+(v/a)^2)", "a is not a number"),

@@ -104,7 +104,7 @@ impl Term {
         if let Coordinate::Difference(i, j) = coordinate
             && i == j
         {
-            return refused("a difference is of two different degrees of freedom");
+            return refused("a difference must be of two different degrees of freedom");
         }
         Ok(Self { name, coordinate, law })
     }

@@ -12,7 +12,7 @@ const EXACT: usize = 100;
 /// Maximum deviation of an evenly spaced list from its step, in steps.
 const EVEN: f64 = 1e-9;
 
-/// Lists, identified by their text.
+/// Lists of numbers for a page, encoded as text; equal lists are stored once.
 #[derive(Debug, Default)]
 pub(super) struct Arrays {
     texts: Vec<String>,

@@ -913,7 +913,7 @@ def reconstruct(
     """
     found = one(sources, "reconstruct", record)
     if lines is not None and band_hz is not None:
-        raise TypeError("either `lines` or `band_hz`")
+        raise TypeError("give either `lines` or `band_hz`, not both")
     if settings is None:
         band = None
         if band_hz is not None:
@@ -1032,7 +1032,7 @@ def sweep(
             raise TypeError("one of `npi`, `rate_hz` and `decimate` is needed")
         ((kind, values),) = kinds.items()
         if unknown_mass and mass is not None:
-            raise TypeError("either `unknown_mass` or `mass`")
+            raise TypeError("give either `unknown_mass` or `mass`, not both")
         settings = {
             "kind": kind,
             "settings": [float(value) for value in values],
@@ -1172,7 +1172,7 @@ def integrate(
     start = {"displacement": displacement, "velocity": velocity}
     given = {name: _vector(name, values) for name, values in start.items() if values is not None}
     if given and response == "periodic":
-        raise TypeError("a periodic response has no start: leave `displacement` and `velocity` out")
+        raise TypeError("a periodic response has no initial state: leave `displacement` and `velocity` out")
     known = machine_of(machine)
     forces = matrix("force", force)
     named: dict[str, Any] = {"name": scheme} if isinstance(scheme, str) else dict(scheme)
@@ -1293,7 +1293,7 @@ def multisine(
     levels = {"amplitude": amplitude, "rms": rms, "peak": peak}
     given = [(name, float(level)) for name, level in levels.items() if level is not None]
     if len(given) > 1:
-        raise TypeError(f"either `{given[0][0]}` or `{given[1][0]}`")
+        raise TypeError(f"give either `{given[0][0]}` or `{given[1][0]}`, not both")
     laws = ("schroeder", "schroeder-binary", "random", "zero", "low-crest")
     if phases not in laws:
         raise ValueError(f"`phases` is one of {', '.join(laws)}, got {phases!r}")
@@ -1334,7 +1334,7 @@ def _without(lines: str | None, hz: Sequence[float | Mapping[str, Any]]) -> str:
 
 def _lines(lines: str | None, band_hz: tuple[float, float] | None) -> Any:
     if lines is not None and band_hz is not None:
-        raise TypeError("either `lines` or `band_hz`")
+        raise TypeError("give either `lines` or `band_hz`, not both")
     if lines is not None:
         return {"lines": lines}
     if band_hz is not None:

@@ -78,7 +78,7 @@ def careful(door: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]:
             message = f"a number is negative, or too large for what it counts: {error}"
             raise MechidError(message, "Settings") from None
         except UnicodeError as error:
-            raise MechidError(f"a text has no UTF-8 form: {error}", "Settings") from None
+            raise MechidError(f"a text cannot be encoded in UTF-8: {error}", "Settings") from None
         except RecursionError as error:
             raise MechidError(f"settings are nested too deep: {error}", "Settings") from None
 

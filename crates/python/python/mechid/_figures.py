@@ -483,7 +483,7 @@ class _View:
         magnitude = next((p for p, part in zip(drawn.panels, drawn.parts, strict=True) if part == "m"), None)
         if magnitude is None:
             if show != "bode" or quantity is not None or scale is not None:
-                raise ValueError("`show`, `quantity` and `scale` are for responses per unit force, which this figure has not")
+                raise ValueError("`show`, `quantity` and `scale` are for responses per unit force, and this figure has none")
             return
         self._drawn_scale: Scale = "decibel" if magnitude.y.unit.startswith("dB") else "log"
         self._scale = scale or self._drawn_scale

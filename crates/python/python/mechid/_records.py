@@ -297,7 +297,7 @@ class Measurement:
                     label, factor = source.label(column, kind)
                     found = _columns(column, source[column])
                     if len(found) != 1:
-                        raise ValueError(f"column {column!r} has {len(found)} columns of its own")
+                        raise ValueError(f"column {column!r} consists of {len(found)} columns")
                     columns.append((label, found[0] * factor if factor != 1.0 else found[0]))
                 channels[kind].append(label)
         rate = source.fs(given, time) if fs is None else fs
@@ -799,7 +799,7 @@ class ResponseTable:
         if std_error is not None:
             errors = _finite("std_error", np.asarray(std_error, dtype=np.float64))
             if errors.size != values.size or len(errors) != len(hz):
-                raise ValueError(f"`std_error` of shape {errors.shape} has not that of `response`")
+                raise ValueError(f"`std_error` has the shape {errors.shape}, not that of `response`")
             errors = errors.reshape(values.shape)
         coherent = None
         if coherence is not None:

@@ -245,7 +245,7 @@ def force(found: Reconstructed, dof: int = 1, *, ax: Axes | None = None) -> Axes
     for member in range(1, len(figure.members) + 1):
         if isinstance(figure, Chart) and label in (panel.y.label for panel in figure.panels(member)):
             return figure.plot(member, panel=label, ax=ax)[0]
-    raise KeyError(f"no force was sought at degree of freedom {dof}")
+    raise KeyError(f"no force was reconstructed on degree of freedom {dof}")
 
 
 def sweep(found: Sweep, *, ax: Axes | None = None) -> Axes:

@@ -291,7 +291,7 @@ fn coherence_of(measured: &ResponseCoherence, motion: usize, style: FigureStyle)
 }
 
 /// Note on a figure that shows responses instead of receptances.
-pub const WHY: &str = "one record does not separate forces that act at once";
+pub const WHY: &str = "a single record does not separate forces that act at the same time";
 
 /// Returns the frequencies of a fitted curve, fewer of them if there are many curves.
 fn fine_grid(omega: &[f64], curves: usize) -> Vec<f64> {

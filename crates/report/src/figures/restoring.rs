@@ -118,7 +118,8 @@ fn side(
         .collect::<Result<_, ReportError>>()?;
     let name = format!("{} % interval", compact(100.0 * CONFIDENCE, 3));
     Ok(vec![
-        Curve::points("measured, less the rest of the model", values, &measured).color(Color::GREY),
+        Curve::points("measured, minus the rest of the model", values, &measured)
+            .color(Color::GREY),
         Curve::band(name, &grid, &bound(0), &bound(1)),
         Curve::line("identified", &grid, &curve).color(Color::VERMILION),
     ])

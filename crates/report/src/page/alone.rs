@@ -9,7 +9,7 @@ use crate::ReportError;
 use crate::figures::shapes::ModeShapes;
 
 /// Caption of the mode shapes.
-pub(super) const SHAPES: &str = "Mode shapes: lines at the largest deflection, over the lines at rest. In a complex mode \
+pub(super) const SHAPES: &str = "Mode shapes: the structure at its largest deflection, drawn over the structure at rest. In a complex mode \
                                  the points reach their largest deflections at different times.";
 
 /// Caption of the modal assurance criterion.

@@ -127,9 +127,10 @@ fn candidates(found: &ElementSummary) -> Markup {
 }
 
 fn response(identified: &IdentifiedElements) -> Result<Markup, ReportError> {
-    let caption = "Amplitude of every sensor over frequency: measured, of the identified machine, and of their \
-                   difference; lines of the first test."
-        .to_owned();
+    let caption =
+        "Amplitude of every sensor over frequency, on the lines of the first test: measured, \
+                   computed with the identified machine, and their difference."
+            .to_owned();
     let drawn = figures::drawn_set("sensors".into(), sensors::set(identified), caption)?;
     Ok(html! { div.figures { (figure(&drawn)) } })
 }
@@ -143,7 +144,7 @@ fn residual(found: &ElementSummary) -> Markup {
     html! {
         (Table { caption: "Residual of the response", header: &["sensor", "residual, of RMS"], numbers_from: 1, rows }.html())
         @if let Some(ratio) = misfit {
-            p { "Power of the residual over what the noise explains: " strong { (ratio) } "; 1 is expected." }
+            p { "Power of the residual divided by that expected from the noise: " strong { (ratio) } "; 1 is expected." }
         }
         (checks::list(&found.checks, When::After))
     }

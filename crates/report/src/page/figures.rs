@@ -200,13 +200,15 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
         let pairs = measured.data.dof().pow(2);
         let left_out = match set.len() {
             picture::DRAWN_PAIRS if pairs > picture::DRAWN_PAIRS => {
-                format!(" The first {} pairs are drawn.", picture::DRAWN_PAIRS)
+                format!(
+                    " Only the first {} pairs of response and force are drawn.",
+                    picture::DRAWN_PAIRS
+                )
             }
             _ => String::new(),
         };
         let caption = format!(
-            "Response per unit force: that of the identified machine, and that of the record, \
-             {origin}.{below}{left_out}"
+            "Response per unit force of the identified machine, and that of the record, {origin}.{below}{left_out}"
         );
         return drawn_set("receptance".into(), set, caption);
     }
@@ -321,7 +323,7 @@ pub fn residual_spectrum(
         part.id("residual-spectrum"),
         (0..motion.channels()).map(of_channel).collect(),
         format!(
-            "{}: noise is flat, an effect that the model lacks has the shape of a resonance or of the force.",
+            "{}: a residual of noise is flat; an effect missing in the model has the shape of a resonance or of the force.",
             part.period_caption(&format!(
                 "Spectra of the measured {} and of the residual",
                 compared.kind
@@ -407,10 +409,12 @@ pub fn correlations(
     };
     let spanned = match widest {
         0 => String::new(),
-        span => format!(" Noise on the response alone correlates it over {span} lags."),
+        span => {
+            format!(" If only the response has noise, the residual is correlated over {span} lags.")
+        }
     };
     let caption =
-        format!("{what}; 95 % of the stems of pure noise are between the dashed lines.{spanned}");
+        format!("{what}; for pure noise, 95 % of the stems are between the dashed lines.{spanned}");
     drawn_set(part.id("correlations"), members, caption)
 }
 
@@ -428,8 +432,9 @@ pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<
 /// Draws the restoring force of a system with nonlinear terms, for the first record.
 pub fn restoring(identified: &Identified) -> Result<Option<Drawn>, ReportError> {
     let Some((fitted, points)) = surface::whole_periods(identified) else { return Ok(None) };
-    let caption = "Restoring force of the first record: points of its surface, springs and dampers with their \
-                   confidence intervals, drawn to 1.2 times the amplitudes measured, and the residual.";
+    let caption = "Restoring force of the first record: points of its surface, springs and dampers with \
+                   their confidence intervals (up to 1.2 times the measured amplitudes), and the \
+                   residual.";
     let figure = surface::figure("first record", fitted, points)?;
     drawn("restoring-force".into(), figure, caption.into()).map(Some)
 }
@@ -446,7 +451,7 @@ pub fn force(
         let name = part.held().names.force_name(c);
         let time = || Axis::linear("Time in the window", "s");
         let both = Panel::new(time(), Axis::linear(&name, "N"))
-            .curves(overlay(&t, truth, "found from the motion", reconstructed))
+            .curves(overlay(&t, truth, "computed from the motion", reconstructed))
             .legend(Legend::Above);
         let apart: Vec<f64> = reconstructed.iter().zip(truth).map(|(f, m)| f - m).collect();
         let mut below = Panel::new(time(), Axis::linear(format!("Difference of {name}"), "N"));
@@ -463,6 +468,6 @@ pub fn force(
     drawn_set(
         part.id("reconstructed-force"),
         reconstruction.forced.iter().map(of_force).collect(),
-        part.period_caption("Force found from the motion with the identified machine, and the measured one; below, their difference") + ".",
+        part.period_caption("Force computed from the motion with the identified machine, and the measured force; below, their difference") + ".",
     )
 }

@@ -134,9 +134,10 @@ pub fn bearing_words(found: &BearingSummary) -> Words {
     let mut tables = coefficients_of_bearing(found);
     let rows = fit_of_bearing(found);
     tables.push(Table { caption: "The fit", header: &[], numbers_from: 9, rows }.html());
-    let caption = "Dynamic stiffness of the film, line by line and fitted: real part over ω², imaginary part over ω, \
-                   direct and cross-coupled."
-        .to_owned();
+    let caption =
+        "Dynamic stiffness of the film, line by line and fitted, direct and cross-coupled: \
+                   real part against ω², imaginary part against ω."
+            .to_owned();
     Words {
         what: "Bearing coefficients",
         files: found.tests.clone(),
@@ -188,7 +189,7 @@ fn coefficients_of_bearing(found: &BearingSummary) -> Vec<Markup> {
 
 fn fit_of_bearing(found: &BearingSummary) -> Vec<Vec<String>> {
     let mut rows = vec![
-        pair("Power of the residual over that of the noise", significant(found.misfit_ratio, 3)),
+        pair("Power of the residual / power of the noise", significant(found.misfit_ratio, 3)),
         pair("Condition number", significant(found.condition_number, 3)),
     ];
     if let Some(test) = &found.inertia_test {

@@ -74,7 +74,7 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     })?;
     Ok(html! {
         (records)
-        p.note { "Crest factor: peak over RMS. Not repeated: RMS of what differs from period to period over RMS of what repeats." }
+        p.note { "Crest factor: peak divided by RMS. Not repeated: RMS of the part that differs from period to period, divided by the RMS of the part that repeats." }
     })
 }
 
@@ -83,8 +83,8 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
 fn part_held(part: &RecordReview<'_>) -> Option<String> {
     let (first, last) = (part.held().first_sample, part.held().held_to()?);
     Some(format!(
-        "The record is long: levels, time histories and what is averaged over periods or segments are those of all \
-         samples used. Results for single samples (the residual in time, its correlations and its checks) \
+        "The record is long: levels, time histories and averages over periods or segments are those of \
+         all samples used. Results for single samples (the residual in time, its correlations and its checks) \
          are those of samples {first} to {last}; captions of other figures name these samples, too."
     ))
 }
@@ -150,8 +150,8 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         (records)
         p.note {
             "Peak factor: half the range over √2 times the RMS, 1 for a sine. Excited lines are those within "
-            (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of persistent \
-             excitation is the number of parameters that they can distinguish."
+            (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of \
+             persistent excitation is the number of parameters that these lines can determine."
         }
         (checks::list(&contents.review.identified.summary().checks, When::Before))
     })
@@ -288,7 +288,7 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
         rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
     }
     if let Some(misfit) = &contents.review.identified.fitted().misfit {
-        let what = format!("Power of the residual over that of the noise ({})", misfit.noise);
+        let what = format!("Power of the residual / power of the noise ({})", misfit.noise);
         rows.push(pair(&what, significant(misfit.ratio, 4)));
     }
     rows.push(pair("Condition number", significant(fit.condition_number, 3)));
@@ -431,8 +431,8 @@ fn reconstruction_of(
         ["force", "measured, RMS (N)", "found, RMS (N)", "standard error (N)", "difference"];
     let lines = if part.lines.is_some() { ", on the lines of the fit" } else { "" };
     Ok(html! {
-        p { "Found from the measured motion with the identified machine: " (reconstruction.method) (lines) "." }
-        (Table { caption: &part.period_caption("Force found and force measured"), header: &header, numbers_from: 1, rows }.html())
+        p { "Computed from the measured motion with the identified machine: " (reconstruction.method) (lines) "." }
+        (Table { caption: &part.period_caption("Computed and measured force"), header: &header, numbers_from: 1, rows }.html())
         div.figures { (figure(&drawn)) }
     })
 }

@@ -112,7 +112,8 @@ mod tests {
         let m = Multisine::flat(1..=24, 1.0, Phases::Random { seed: 5 }).unwrap();
         let norm = PNorm::new(&m, 8);
         let derivatives = norm.derivatives(m.phases(), &norm.signal(m.phases()), 16);
-        // The damping makes the matrix positive definite, so that both methods have a step.
+        // With this damping the matrix is positive definite, so conjugate gradients converge to a
+        // step.
         let added = 2.0 * derivatives.mean_curvature();
         let lower = derivatives.hessian();
         let full = DMatrix::from_fn(24, 24, |i, j| lower[(i.max(j), i.min(j))]);

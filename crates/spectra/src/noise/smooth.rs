@@ -25,7 +25,7 @@ pub(crate) struct Form {
 }
 
 impl Form {
-    /// Returns the same form for `times` as many lines.
+    /// Returns this form with its bumps converted to a line spacing finer by the factor `times`.
     fn finer(&self, times: f64) -> Self {
         Self { order: self.order, bumps: self.bumps.iter().map(|bump| bump.finer(times)).collect() }
     }

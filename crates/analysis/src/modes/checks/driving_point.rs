@@ -38,7 +38,7 @@ pub(super) fn tests(
             p_value,
             text: format!(
                 "mode {number} ({hz:.4} Hz) has a negative modal mass at {} under force {}: one of the \
-                 two channels has the wrong sign, or they are not at one place",
+                 two channels has the wrong sign, or the two are not at the same point",
                 outputs[output].name, inputs[input]
             ),
         })

@@ -53,8 +53,8 @@ pub(super) fn output_checks(explained: &[f64], names: &[String]) -> Vec<ModalChe
 pub(super) fn prediction_checks(predicted: &[f64], names: &[String]) -> Vec<ModalCheck> {
     let text = |percent: f64, name: &str| {
         format!(
-            "the modes predict {percent:.1} % of the variance of {name} where it was not fitted: \
-             what the fit explains is not the structure's response to these forces"
+            "the modes predict {percent:.1} % of the variance of {name} in the part that was not fitted: \
+             what was fitted is not only the response of the structure to these forces"
         )
     };
     share_checks("predicted", predicted, names, text)

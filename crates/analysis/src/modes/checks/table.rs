@@ -93,7 +93,7 @@ fn leakage(
              are not reliable; use longer segments, or fit the record itself"
         }
         None => {
-            "the table wide, which does not state its segments: if they are averages under a window, the \
+            "the table wide, and the table does not state its segments: if the responses are averages under a window, the \
              damping is that of the window; fit the record itself"
         }
     };

@@ -137,8 +137,9 @@ impl<'a> Misfit<'a> {
         DMatrix::from_rows(&rows)
     }
 
-    /// Returns the derivative of entries and transient loads with respect to the independent
-    /// unknowns last accepted, for related entries.
+    /// Returns the derivatives of the matrix entries and transient loads with respect to the
+    /// independent unknowns, at the values last accepted; `None` if no relations between entries
+    /// are given.
     fn tangent(&self) -> Option<DMatrix<f64>> {
         let relations = self.relations.as_ref()?;
         let ends = transient::len(self.data);

@@ -30,16 +30,16 @@ pub struct PartsComparison {
     pub largest: Option<Difference>,
 }
 
-/// Difference of a part of the data from the others about one parameter.
+/// Difference between a part of the data and the other parts in one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
     /// The part.
     pub part: Part,
     /// The parameter.
     pub parameter: Parameter,
-    /// Value by the part, in the unit of the parameter.
+    /// Value from the part, in the unit of the parameter.
     pub by_part: f64,
-    /// Value by the others, in the unit of the parameter.
+    /// Value from the other parts, in the unit of the parameter.
     pub by_others: f64,
     /// Standard error of the difference, in the unit of the parameter.
     pub standard_error: f64,
@@ -94,7 +94,7 @@ struct ScoreComparison {
     largest: Option<PartDifference>,
 }
 
-/// Difference of one part from the others about one parameter, in its unit.
+/// Difference between one part and the other parts in one parameter, in the unit of the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PartDifference {
     part: usize,

@@ -1,4 +1,4 @@
-//! Score tests for terms that a model leaves out, and what they would change.
+//! Score tests for terms that a model leaves out, and their effect on the parameters.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -92,7 +92,7 @@ impl PartsOfFit<'_> {
         })
     }
 
-    /// Returns what a term with these columns explains.
+    /// Returns the explained part of the residual for a term with these columns.
     fn explained(&self, term: OmittedTerm, mut columns: DMatrix<f64>) -> Option<Explained> {
         remove(&self.linear.transients, &mut columns);
         let by_parameters = self.linear.basis.tr_mul(&columns);

@@ -12,8 +12,8 @@ use crate::likelihood::{LikelihoodError, LineResponse, ResponseModel};
 pub enum Candidate {
     /// An additional sensor in the same test, as noisy as the sensors of its quantity.
     Sensor(Sensor),
-    /// A second test with this force instead of the others, as large as they are, and the same
-    /// sensors.
+    /// A second test with the same sensors, in which this force acts instead of the others and has
+    /// their size.
     Force(Input),
 }
 

@@ -29,8 +29,8 @@ fn a_file_has_one_decimal_sign() {
     let mixed = table("t\tf\n0\t999.5\n1\t1,000\n").column("f").unwrap_err().to_string();
     assert_eq!(
         mixed,
-        "a.csv, line 3, column 2 \"f\": \"1,000\" does not have the decimal point of the other \
-         numbers of the file: use one decimal sign, and no sign between thousands"
+        "a.csv, line 3, column 2 \"f\": \"1,000\" does not have the decimal point that the other numbers \
+         of the file have: use one decimal sign, and no separator between thousands"
     );
     let comma = table("t;f\n0;1,5\n1;2\n");
     assert_eq!(comma.format(), "text, fields between semicolons, decimal comma");

@@ -117,10 +117,10 @@ fn lengths_that_are_none_are_refused() {
         |lengths: &[i32]| -> Vec<u8> { lengths.iter().flat_map(|v| v.to_le_bytes()).collect() };
     let values = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
     for (kind, lengths, part) in [
-        (5, words(&[-2, -4]), "a dimension of -2 is no length"),
-        (9, doubles(&[0.5, 16.0]), "a dimension of 0.5 is no length"),
-        (9, doubles(&[f64::NAN, 8.0]), "is no length"),
-        (9, doubles(&[f64::INFINITY, 0.0]), "is no length"),
+        (5, words(&[-2, -4]), "-2 is not a possible size of a dimension"),
+        (9, doubles(&[0.5, 16.0]), "0.5 is not a possible size of a dimension"),
+        (9, doubles(&[f64::NAN, 8.0]), "is not a possible size"),
+        (9, doubles(&[f64::INFINITY, 0.0]), "is not a possible size"),
         (5, words(&[0, 8]), "a variable of 0 × 8 numbers holds 8"),
         (5, words(&[1 << 30, 1 << 30, 1 << 30]), "numbers holds 8"),
         (5, words(&[8]), "a variable has no size"),

@@ -231,7 +231,10 @@ fn json_is_no_record() {
     for text in ["{}", "{", "\u{feff}{\n  \"system\": 3 }", "[ { \"a\": 1 } ]"] {
         let e = Table::parse("a.json", text.as_bytes()).unwrap_err();
         assert!(matches!(e, IoError::JsonRecord { .. }), "{text}: {e}");
-        assert!(e.to_string().starts_with("a.json is JSON, no table of samples: simulate"), "{e}");
+        assert!(
+            e.to_string().starts_with("a.json is JSON, not a table of samples: simulate"),
+            "{e}"
+        );
     }
     assert_eq!(table("{a},[b]\n1,2\n").names(), ["{a}", "[b]"]);
     assert_eq!(table("[a],[b]\n1,2\n").names(), ["[a]", "[b]"]);

@@ -53,7 +53,7 @@ fn what_is_no_real_function_of_time_is_refused() {
     for table in both() {
         // The name belongs to the response; the frequency response function has another one.
         let e = table.column("12+Z/1-X").unwrap_err().to_string();
-        assert!(e.contains("it holds a frequency response function, a channel needs"), "{e}");
+        assert!(e.contains("it holds a frequency response function, but a channel needs"), "{e}");
         let e = table.column("3").unwrap_err().to_string();
         assert!(e.contains("6 \"3\": it holds complex numbers"), "{e}");
     }

@@ -45,7 +45,7 @@ impl Bump {
         Self { shape: Shape::Peak { above_floor, half_width }, middle, reach }
     }
 
-    /// Returns the same bump for `times` as many lines.
+    /// Returns this bump converted to a line spacing finer by the factor `times`.
     pub(super) fn finer(&self, times: f64) -> Self {
         let shape = match self.shape {
             Shape::Peak { above_floor, half_width } => {
