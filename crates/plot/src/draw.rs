@@ -13,8 +13,8 @@ use crate::trace;
 /// Height of the middle of a digit above the baseline, as a fraction of the font size.
 const MIDDLE: f64 = 0.36;
 
-const GRID: Stroke = Stroke::solid(Color("#e0e0e0"), 0.8);
-const FINE_GRID: Stroke = Stroke::solid(Color("#f1f1f1"), 0.7);
+const GRID: Stroke = Stroke::solid(Color::GRID, 0.8);
+const FINE_GRID: Stroke = Stroke::solid(Color::FINE_GRID, 0.7);
 const FRAME: Stroke = Stroke::solid(Color::DARK, 0.9);
 
 pub(crate) fn figure(figure: &Figure, layout: &Layout, sheet: &mut Canvas) {

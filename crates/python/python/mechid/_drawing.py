@@ -56,15 +56,17 @@ def draw_shape(
     lines: Sequence[tuple[int, int]],
     names: Sequence[str],
     title: str,
+    colors: tuple[str, str, str],
     ax: Axes | None,
 ) -> Axes:
-    """Draw the lines of a structure at rest and deflected, whose points are projected."""
+    """Draw the lines of a structure at rest and deflected, whose points are projected, in the colors given."""
     axes = new_axes(ax)
     rest, moved = projected
+    at_rest, deflected, spots = colors
     for first, second in lines:
-        axes.plot(*rest[[first, second]].T, color="0.5", linestyle="--", linewidth=0.8)
-        axes.plot(*moved[[first, second]].T, color="#0072b2")
-    axes.plot(*moved.T, "o", color="#d55e00", markersize=4)
+        axes.plot(*rest[[first, second]].T, color=at_rest, linestyle="--", linewidth=0.8)
+        axes.plot(*moved[[first, second]].T, color=deflected)
+    axes.plot(*moved.T, "o", color=spots, markersize=4)
     for name, point in zip(names, moved, strict=True):
         axes.annotate(name, point, xytext=(5, 4), textcoords="offset points", fontsize="small")
     axes.set_title(title)

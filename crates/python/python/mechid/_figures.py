@@ -253,6 +253,7 @@ class ShapeFigure:
     lines: tuple[tuple[int, int], ...]
     displacements: tuple[NDArray[np.complex128], ...]
     _view: tuple[float, float] = field(repr=False)
+    _colors: tuple[str, str, str] = field(repr=False)
 
     def plot(
         self,
@@ -290,7 +291,7 @@ class ShapeFigure:
         turned = np.real(self.displacements[at] * np.exp(1j * np.radians(phase_deg)))
         moved = self.positions + _DEFLECTION * size * amplitude * turned
         ends = self._projected(self.positions), self._projected(moved)
-        return [draw_shape(ends, self.lines, self.points, self.members[at], ax)]
+        return [draw_shape(ends, self.lines, self.points, self.members[at], self._colors, ax)]
 
     def _projected(self, positions: Values) -> Values:
         turn, tilt = self._view
@@ -470,6 +471,7 @@ def _shapes(name: str, caption: str, data: dict[str, Any]) -> ShapeFigure:
         lines=tuple((first, second) for first, second in data["lines"]),
         displacements=tuple(part[..., 0] + 1j * part[..., 1] for part in parts),
         _view=(data["turn"], data["tilt"]),
+        _colors=tuple(data["colors"]),
     )
 
 

@@ -13,7 +13,7 @@ mod trends;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mechid_io::Geometry;
-use mechid_plot::{FIGURE_STYLE, content_policy, script};
+use mechid_plot::{content_policy, figure_style, script};
 
 use mechid_analysis::identify::Identified;
 use mechid_analysis::identify::rows::ModeRow;
@@ -45,7 +45,7 @@ fn head(title: &str) -> Markup {
             meta name="color-scheme" content="light dark";
             meta name="generator" content={ "mechid " (env!("CARGO_PKG_VERSION")) };
             title { (title) }
-            style { (PreEscaped(FIGURE_STYLE)) (PreEscaped(STYLE)) }
+            style { (PreEscaped(figure_style())) (PreEscaped(STYLE)) }
         }
     }
 }
