@@ -263,6 +263,16 @@ class Tests:
         page.run("document.querySelectorAll('svg.shape ~ .map button')[2].click()")
         page.settle()
         self.check("55.5 Hz" in page.run("document.querySelector('svg.shape ~ .values').textContent"), "third mode")
+        # The legend shows the markers of the diagram, also of many poles.
+        marks = page.run(
+            "[...document.querySelectorAll('figure')].flatMap(figure => [...figure.querySelectorAll('.keys button')].map(key => {"
+            " const curve = [...figure.querySelectorAll('.curve')].find(c => c.dataset.name === key.textContent);"
+            " const mark = root => [...root.querySelectorAll('path')].map(p => /M[\\d. ]+([a-z][^M]*)/i.exec(p.getAttribute('d'))?.[1]"
+            ".replace(/[-\\d. ]/g, '')).at(-1);"
+            " return [key.textContent, mark(key), mark(curve)]; }))"
+        )
+        poles = [row for row in marks if "pole" in row[0]]
+        self.check(len(poles) == 2 and all(key == drawn for _, key, drawn in poles), f"legend of poles: {marks}")
         # The cursor names the poles in words.
         left, top, right, bottom = box(page, "figure")
         spots = page.run(

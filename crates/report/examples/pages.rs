@@ -117,7 +117,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sum: Vec<f64> =
         hz.iter().map(|f| resonance(*f, 12.4, 0.011) + 0.3 * resonance(*f, 38.0, 0.008)).collect();
     let mut poles = StabilisationRows::default();
-    for order in (2..=20).step_by(2) {
+    for order in (2..=320).step_by(2) {
         let wander = 50.0 * (TAU * order as f64 / 7.3).sin().abs() + 5.0;
         for (hz, is_stable) in [(12.4, order > 2), (38.0, order > 6), (wander, false)] {
             poles.order.push(order);

@@ -81,9 +81,9 @@ const at = (curve, x, Y = curve.Y) => {
 };
 const SHAPES = {s: "m-3-3h6v6h-6z", t: "m0-4l4 7h-8z", v: "m0 4l4-7h-8z", d: "m0-4l4 4-4 4-4-4z", x: "m-3-3l6 6m0-6l-6 6", p: "m-4 0h8m-4-4v8"};
 const markers = (parent, points, {m, o}) => {
-    const size = within(500 / points.length, 2.8, 6), shape = size > 4 && SHAPES[m], filled = shape && !"xp".includes(m);
+    const size = within(500 / points.length, 2.8, 6), shape = SHAPES[m]?.replace(/\d/g, v => px(v * size / 6)), filled = shape && !"xp".includes(m);
     draw(parent, "path", {d: points.map(([x, y]) => `M${px(x)} ${px(y)}${shape || "h0"}`).join(""), fill: filled ? o : "none",
-        stroke: filled ? "none" : o, "stroke-width": shape ? 1.5 : size, "stroke-linecap": "round"});
+        stroke: filled ? "none" : o, "stroke-width": shape ? size / 4 : size, "stroke-linecap": "round"});
 };
 const stroke = ({o, w, d}, width = w) => ({fill: "none", stroke: o, "stroke-width": width, "stroke-dasharray": d?.join(" ") ?? "none", "stroke-linejoin": "round"});
 const choice = (parent, label, options, value, change) => {
