@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use mechid_plot::Figure;
 use mechid_plot::charts::{FrequencyResponse, Quantity, bode};
 use mechid_plot::{Figure, NEPER};
 use nalgebra::Complex;
@@ -71,8 +70,7 @@ impl Trace {
     }
 
     /// Returns the curve with standard errors of its magnitudes, one for each drawn point, in the
-    /// unit of the magnitudes; magnitudes in decibels get none, nor does a curve with an undefined
-    /// error.
+    /// unit of the response; a curve with an undefined error gets none.
     pub fn standard_error(mut self, style: FigureStyle, errors: Vec<f64>) -> Self {
         let is_whole = errors.len() == self.magnitude.len();
         if is_whole && errors.iter().all(|error| error.is_finite()) {
@@ -127,6 +125,15 @@ impl Trace {
     pub fn suffixed(mut self, more: &str) -> Self {
         self.name += more;
         self
+    }
+
+    /// Returns the largest magnitude, in the unit of the response; 0 without points.
+    pub fn largest(&self, style: FigureStyle) -> f64 {
+        let magnitude = |value: &f64| match style.magnitude {
+            MagnitudeScale::Logarithmic => *value,
+            MagnitudeScale::Decibel => 10f64.powf(value / 20.0),
+        };
+        self.magnitude.iter().map(magnitude).fold(0.0, f64::max)
     }
 
     /// Returns whether there are no points.
