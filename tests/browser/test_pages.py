@@ -49,6 +49,15 @@ LONELY = """
 [...document.querySelectorAll('figure > svg g.panel')].filter(g => g.querySelectorAll('text[text-anchor=end]').length < 2).length
 """
 
+# Panels whose abscissa has only one number, and figures none of whose abscissae has two.
+ONE_NUMBER = """
+[...document.querySelectorAll('figure > svg')].filter(svg => {
+    const counts = [...svg.querySelectorAll('g.panel')].map(g => [...g.querySelectorAll('text[text-anchor=middle][font-size="11.5"]')]
+        .filter(t => /^[−0-9.×⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+$/.test(t.textContent)).length);
+    return counts.length && (counts.includes(1) || counts.at(-1) === 0);
+}).map(svg => svg.closest('figure').id)
+"""
+
 # Texts whose contrast is below the limit of WCAG AA: 4.5, or 3 for large text.
 FAINT = """
 (() => {
@@ -450,6 +459,8 @@ class Tests:
                     self.check(not overlaps, f"{what}: texts overlap: {overlaps[:4]}")
                     lonely = page.run(LONELY)
                     self.check(lonely == 0, f"{what}: {lonely} ordinates with fewer than two numbers")
+                    single = page.run(ONE_NUMBER)
+                    self.check(not single, f"{what}: abscissae with fewer than two numbers: {single}")
                     faint = page.run(FAINT)
                     self.check(not faint, f"{what}: faint: {faint[:4]}")
                     if self.pictures:
