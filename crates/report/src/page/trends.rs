@@ -120,7 +120,7 @@ fn changes(trends: &Trends) -> Table<'static> {
             change.record.clone(),
             significant(change.size, 3),
             series.unit.clone(),
-            significant(change.p_value, 2),
+            change.p().trim_start_matches("= ").to_owned(),
         ]
     });
     Table {
