@@ -101,9 +101,9 @@ impl PageArgs {
         let settings = PageSettings {
             title: self.about.title.clone(),
             reconstruct_force: self.reconstruct_force,
-            command: Some(repeat::command(words)),
             about: self.about.details(self.fit.record())?,
             geometry: self.geometry.as_ref().map(Geometry::read).transpose()?,
+            ..repeat::settings(words)
         };
         if let Some(saved) = self.fit.saved_result() {
             return self.saved_page(saved, &settings);

@@ -75,7 +75,8 @@ pub trait ToFigure {
     ) -> Result<String, ReportError> {
         let figure = self.styled_figure(style)?;
         let title = settings.title.clone().unwrap_or_else(|| figure.name().to_owned());
-        figure_page(&title, vec![(String::new(), figure)], None)
+        let settings = PageSettings { title: Some(title), ..settings.clone() };
+        figure_page(vec![(String::new(), figure)], None, &settings)
     }
 }
 
