@@ -238,7 +238,7 @@ pub fn force_words(found: &ForceSummary) -> Words {
         "standard error, N"
     };
     let row = |force: &ForceRow| {
-        let number = force.dof.to_string();
+        let name = force.name.clone();
         if !force.sought {
             return vec![
                 number,
@@ -252,7 +252,7 @@ pub fn force_words(found: &ForceSummary) -> Words {
         let (amplitude, hz) =
             (significant(force.strongest_amplitude, 4), compact(force.strongest_hz, 5));
         let [rms, peak] = [force.rms, force.peak].map(|value| significant(value, 4));
-        vec![number, rms, error, peak, format!("{amplitude} N at {hz} Hz")]
+        vec![name, rms, error, peak, format!("{amplitude} N at {hz} Hz")]
     };
     let header = ["force", "RMS, N", error, "peak, N", "strongest line"];
     let rows = found.forces.iter().map(row).collect();
