@@ -66,7 +66,7 @@ pub fn result_page(
         sections.push(("numbers", "Numbers", tables));
     }
     sections.push(("drawn", "Figure", html! { div.figures { (figure(&drawn)) } }));
-    Ok(document(&title, &heading, &sections, settings.command.as_deref()))
+    Ok(document(&title, &heading, &sections, settings.command.as_deref(), &words.files))
 }
 
 /// Returns warnings (conspicuous checks, then remarks) and merits.
@@ -108,7 +108,7 @@ pub fn comparison_page(found: &ModeComparison, settings: &PageSettings) -> Strin
         ("numbers", "Numbers", as_text(&found.to_string())),
         ("shapes", "Mode shapes", html! { div.figures { (figure(&drawn)) } }),
     ];
-    document(&title, &heading, &sections, settings.command.as_deref())
+    document(&title, &heading, &sections, settings.command.as_deref(), &found.sets)
 }
 
 /// Returns a text with aligned columns, as a program prints it.
@@ -259,7 +259,7 @@ pub fn force_words(found: &ForceSummary) -> Words {
     let facts = facts_of_force(found);
     Words {
         what: "Force in the record",
-        files: vec![found.file.clone()],
+        files: vec![found.file.clone(), found.machine.clone()],
         subtitle: vec![format!("{samples} at {} Hz", compact(found.sample_rate_hz, 8)), extent],
         warnings: found.remarks.clone(),
         merits: Vec::new(),
