@@ -322,10 +322,11 @@ fn quantities(row: &ResultRow) -> Vec<(String, String, Uncertain)> {
     });
     let of_modes = (1..).zip(&row.modes).flat_map(|(number, mode)| {
         let hz = uncertain(mode.natural_frequency_hz, mode.natural_frequency_standard_error_hz);
-        let ratio = uncertain(mode.damping_ratio, mode.damping_ratio_standard_error);
+        let error = mode.damping_ratio_standard_error.map(|error| 100.0 * error);
+        let ratio = uncertain(100.0 * mode.damping_ratio, error);
         [
             (format!("frequency {number}"), "Hz".to_owned(), hz),
-            (format!("damping ratio {number}"), String::new(), ratio),
+            (format!("damping ratio {number}"), "%".into(), ratio),
         ]
     });
     let quantities = of_parameters.chain(of_modes);

@@ -189,7 +189,7 @@ impl ModeRow {
                 if damped && mode.oscillates {
                     add("damped frequency", mode.damped_frequency_hz, "Hz");
                 }
-                add("damping ratio", mode.damping_ratio, "–");
+                add("damping ratio", mode.damping_ratio.percent(), "%");
             }
         }
         quantities

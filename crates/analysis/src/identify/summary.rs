@@ -298,7 +298,7 @@ impl IdentificationSummary {
                 if mode.is_rigid_body {
                     "rigid-body mode".into()
                 } else {
-                    format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3))
+                    format!("{} Hz, ζ = {} %", significant(hz, 4), significant(100.0 * ratio, 3))
                 }
             })
             .collect();
