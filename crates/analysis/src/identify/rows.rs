@@ -356,7 +356,7 @@ impl ProportionalDamping {
     }
 
     /// Returns name, value, standard error, interval and unit of both factors.
-    pub(super) fn rows(&self) -> [Vec<String>; 2] {
+    pub fn rows(&self) -> [Vec<String>; 2] {
         [("alpha", &self.alpha, "1/s"), ("beta", &self.beta, "s")].map(|(name, factor, unit)| {
             let mut row = vec![name.to_owned()];
             row.extend(factor.cells());

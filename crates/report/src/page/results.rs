@@ -4,17 +4,20 @@ use maud::{Markup, html};
 use mechid_analysis::bearing::{BearingSummary, BearingTable, CoefficientRow};
 use mechid_analysis::frf::table::{AveragedRecord, Response};
 use mechid_analysis::identify::checks::CheckRow;
-use mechid_analysis::identify::rows::Uncertain;
+use mechid_analysis::identify::nonlinear::NonlinearSummary;
+use mechid_analysis::identify::rows::{ProportionalDamping, Uncertain};
+use mechid_analysis::identify::summary::{FitRow, RecordRow};
 use mechid_analysis::inspect::channel::{Channel, Cut};
 use mechid_analysis::modes::ModeComparison;
 use mechid_analysis::reconstruct::summary::{ForceRow, ForceSummary};
 use mechid_analysis::text::{compact, significant};
 use mechid_analysis::{FrfTable, Identified, IdentifiedResponses, Inspected};
+use mechid_model::ResponseQuantity;
 use mechid_plot::{Figure, matrix_of_squares};
 use mechid_signal::message;
 
 use super::figures::{Drawn, drawn_large};
-use super::sections::{pair, percent};
+use super::sections::{identified_tables, machine_tables, pair, percent, predicted, shapes};
 use super::tables::Table;
 use super::{
     PageSettings, about, base_name, checks, document, figure, names_of, remarks, short_names,
@@ -240,13 +243,7 @@ pub fn force_words(found: &ForceSummary) -> Words {
     let row = |force: &ForceRow| {
         let name = force.name.clone();
         if !force.sought {
-            return vec![
-                number,
-                "taken as zero".into(),
-                String::new(),
-                String::new(),
-                String::new(),
-            ];
+            return vec![name, "taken as zero".into(), String::new(), String::new(), String::new()];
         }
         let error = force.standard_error.map_or("not known".into(), |error| significant(error, 2));
         let (amplitude, hz) =
@@ -437,17 +434,41 @@ fn tables_of_record(inspected: &Inspected) -> Vec<Markup> {
     tables
 }
 
+/// Returns the quality of a fit.
+fn fit_table(fit: &FitRow, model: &str) -> Markup {
+    Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit.rows(model) }.html()
+}
+
 /// Returns the words on an identified machine.
 pub fn identified_words(identified: &Identified) -> Words {
     let summary = identified.summary();
     let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);
+    let mut tables = identified_tables(summary);
+    let model = if summary.nonlinear.is_some() { "model" } else { "linear model" };
+    tables.push(fit_table(&summary.fit, model));
+    let record = |RecordRow { file, window }: &RecordRow| {
+        let (first, last) = (window.first_sample, window.last_sample);
+        pair(file, format!("samples {first} to {last}, {} Hz", compact(window.sample_rate_hz, 8)))
+    };
+    let rows = summary.records.iter().map(record).collect();
+    let header = ["file", "what was used"];
+    tables.push(Table { caption: "Records", header: &header, numbers_from: 9, rows }.html());
+    tables.extend(summary.validation.as_ref().map(predicted));
+    if summary.unscaled.is_some() {
+        let kind = summary.channels.first_response().unwrap_or(ResponseQuantity::Displacement);
+        tables.push(shapes(&summary.modes, |dof| summary.channels.response_name(kind, dof)));
+    }
+    let nonlinear = summary.nonlinear.as_ref().map(NonlinearSummary::text).unwrap_or_default();
+    if !nonlinear.is_empty() {
+        tables.push(as_text(&nonlinear));
+    }
     Words {
         what: "Identification",
         files: summary.records.iter().map(|record| record.file.clone()).collect(),
         subtitle: vec![summary.estimator.to_owned()],
         warnings,
         merits,
-        tables: vec![as_text(&summary.to_string())],
+        tables,
         caption: "Measured, and computed with the identified machine.".into(),
     }
 }
@@ -456,13 +477,29 @@ pub fn identified_words(identified: &Identified) -> Words {
 pub fn table_words(identified: &IdentifiedResponses) -> Words {
     let summary = identified.summary();
     let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);
+    let factors = summary.proportional_damping.iter().flat_map(ProportionalDamping::rows);
+    let modes = ("Modes", summary.modes.as_slice());
+    let mut tables =
+        machine_tables(&summary.parameters, factors.collect(), modes, summary.confidence);
+    tables.push(fit_table(&summary.fit, "linear model"));
+    if summary.unscaled.is_some() {
+        tables.push(shapes(&summary.modes, |at| summary.points[at].clone()));
+    }
+    let [low, high] =
+        [summary.frequencies.first_hz, summary.frequencies.last_hz].map(|hz| compact(hz, 5));
+    let (points, forces) = (summary.points.join(", "), summary.forces.join(", "));
+    let frequencies = message::count(summary.frequencies.count, "frequency");
     Words {
         what: "Identification",
         files: summary.files.clone(),
-        subtitle: vec![summary.estimator.to_owned()],
+        subtitle: vec![
+            format!("{} at {points} per force at {forces}", summary.quantity),
+            summary.estimator.to_owned(),
+            format!("{frequencies}, {low} to {high} Hz"),
+        ],
         warnings,
         merits,
-        tables: vec![as_text(&identified.to_string())],
+        tables,
         caption: "Measured response per unit force, and that of the identified machine.".into(),
     }
 }
