@@ -49,6 +49,15 @@ LONELY = """
 [...document.querySelectorAll('figure > svg g.panel')].filter(g => g.querySelectorAll('text[text-anchor=end]').length < 2).length
 """
 
+# Panels whose abscissa has only one number, and figures none of whose abscissae has two.
+ONE_NUMBER = """
+[...document.querySelectorAll('figure > svg')].filter(svg => {
+    const counts = [...svg.querySelectorAll('g.panel')].map(g => [...g.querySelectorAll('text[text-anchor=middle][font-size="11.5"]')]
+        .filter(t => /^[−0-9.×⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+$/.test(t.textContent)).length);
+    return counts.length && (counts.includes(1) || counts.at(-1) === 0);
+}).map(svg => svg.closest('figure').id)
+"""
+
 # Texts whose contrast is below the limit of WCAG AA: 4.5, or 3 for large text.
 FAINT = """
 (() => {
@@ -263,6 +272,16 @@ class Tests:
         page.run("document.querySelectorAll('svg.shape ~ .map button')[2].click()")
         page.settle()
         self.check("55.5 Hz" in page.run("document.querySelector('svg.shape ~ .values').textContent"), "third mode")
+        # The legend shows the markers of the diagram, also of many poles.
+        marks = page.run(
+            "[...document.querySelectorAll('figure')].flatMap(figure => [...figure.querySelectorAll('.keys button')].map(key => {"
+            " const curve = [...figure.querySelectorAll('.curve')].find(c => c.dataset.name === key.textContent);"
+            " const mark = root => [...root.querySelectorAll('path')].map(p => /M[\\d. ]+([a-z][^M]*)/i.exec(p.getAttribute('d'))?.[1]"
+            ".replace(/[-\\d. ]/g, '')).at(-1);"
+            " return [key.textContent, mark(key), mark(curve)]; }))"
+        )
+        poles = [row for row in marks if "pole" in row[0]]
+        self.check(len(poles) == 2 and all(key == drawn for _, key, drawn in poles), f"legend of poles: {marks}")
         # The cursor names the poles in words.
         left, top, right, bottom = box(page, "figure")
         spots = page.run(
@@ -440,6 +459,8 @@ class Tests:
                     self.check(not overlaps, f"{what}: texts overlap: {overlaps[:4]}")
                     lonely = page.run(LONELY)
                     self.check(lonely == 0, f"{what}: {lonely} ordinates with fewer than two numbers")
+                    single = page.run(ONE_NUMBER)
+                    self.check(not single, f"{what}: abscissae with fewer than two numbers: {single}")
                     faint = page.run(FAINT)
                     self.check(not faint, f"{what}: faint: {faint[:4]}")
                     if self.pictures:

@@ -52,6 +52,9 @@ pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     pages.iter().map(|page| part(page)).collect::<Vec<_>>().join("\n")
 }
 
+/// Exponent of ten from which a number is written in scientific notation.
+const PLAIN: i32 = 6;
+
 /// Formats a number, in any unit, with a number of significant digits; in scientific notation if
 /// plain notation would be long.
 pub fn significant(value: f64, digits: usize) -> String {
@@ -64,7 +67,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     // The exponent after rounding, which may exceed the exponent of the value by one.
     let scientific = format!("{value:.*e}", digits - 1);
     let exponent: i32 = scientific.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
-    if !(-4..6.max(digits as i32)).contains(&exponent) {
+    if !(-4..PLAIN).contains(&exponent) {
         return scientific;
     }
     let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
@@ -74,6 +77,9 @@ pub fn significant(value: f64, digits: usize) -> String {
 /// Formats a number like [`significant`], without trailing zeros: for given numbers, not measured
 /// ones, in any unit.
 pub fn compact(value: f64, digits: usize) -> String {
+    if value.fract() == 0.0 && value.abs() < 10f64.powi(digits as i32) {
+        return format!("{value}");
+    }
     let text = significant(value, digits);
     if text.contains('.') && !text.contains('e') {
         text.trim_end_matches('0').trim_end_matches('.').into()
@@ -134,13 +140,15 @@ mod tests {
             (1.5e-9, 2, "1.5e-9"),
             (2.5e12, 3, "2.50e12"),
             (0.0, 3, "0"),
+            (4e7, 12, "4.00000000000e7"),
+            (610_351.562_5, 9, "610351.562"),
             (f64::NAN, 3, "NaN"),
         ] {
             assert_eq!(significant(value, digits), expected);
         }
         assert_eq!(
-            (compact(128.0, 8), compact(610.3515625, 8)),
-            ("128".into(), "610.35156".into())
+            [compact(128.0, 8), compact(610.3515625, 8), compact(1_024_000.0, 8)],
+            ["128", "610.35156", "1024000"]
         );
     }
 }

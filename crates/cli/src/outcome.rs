@@ -1,5 +1,6 @@
 //! Result of a subcommand, and its output.
 
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,20 +9,21 @@ use mechid::io::{
     BegunFile, OutputFile, escaped, is_standard_output, refuse_replaced_inputs, write_all,
 };
 use mechid::plot::{Figure, svg_to_png};
-use mechid::report::{FigureStyle, ToFigure, figure_page};
+use mechid::report::{FigureStyle, PageSettings, ToFigure, figure_page};
 use serde::Serialize;
 
 use crate::args::{FigureArgs, PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::options;
+use crate::{options, repeat};
 
 /// Number of pixels of a PNG file per px of the drawing.
 const PNG_SCALE: f64 = 2.0;
 
-/// Returns a page with one figure.
-fn page(figure: Figure) -> Result<String, CliError> {
-    let title = figure.name().to_owned();
-    Ok(figure_page(&title, vec![(String::new(), figure)], None)?)
+/// Returns a page with one figure and the command of these arguments.
+fn page(figure: Figure, words: &[OsString]) -> Result<String, CliError> {
+    let title = Some(figure.name().to_owned());
+    let settings = PageSettings { title, ..repeat::settings(words) };
+    Ok(figure_page(vec![(String::new(), figure)], None, &settings)?)
 }
 
 /// Files that a subcommand reads and writes, as far as its arguments name them.
@@ -115,15 +117,17 @@ impl Outcome {
         self
     }
 
-    /// Adds the figure for `--plot`, drawn only if requested.
+    /// Adds the figure for `--plot`, drawn only if requested; `words` are the arguments of the
+    /// program.
     pub fn with_plot(
         self,
         plot: &PlotArgs,
+        words: &[OsString],
         figure: impl FnOnce() -> Result<Figure, CliError>,
     ) -> Result<Self, CliError> {
         let Some(path) = &plot.plot else { return Ok(self) };
         let figure = figure()?;
-        self.with_drawing(path, &figure.to_svg()?, || page(figure))
+        self.with_drawing(path, &figure.to_svg()?, || page(figure, words))
     }
 
     /// Adds a drawing in the format that the ending of the file names, or its page.
@@ -146,16 +150,16 @@ impl Outcome {
     pub fn with_result_page(
         self,
         page: &FigureArgs,
-        record: &Path,
+        (record, words): (&Path, &[OsString]),
         result: &impl ToFigure,
         style: FigureStyle,
     ) -> Result<Self, CliError> {
-        match (&page.plot.plot, page.settings(record)?) {
+        match (&page.plot.plot, page.settings(record, words)?) {
             (Some(path), Some(settings)) => {
                 let page = result.page_with(style, &settings)?;
                 Ok(self.with_file(path, options::spelled(&page)))
             }
-            _ => self.with_plot(&page.plot, || Ok(result.styled_figure(style)?)),
+            _ => self.with_plot(&page.plot, words, || Ok(result.styled_figure(style)?)),
         }
     }
 
@@ -163,12 +167,16 @@ impl Outcome {
     pub fn with_result_plot(
         self,
         plot: &PlotArgs,
+        words: &[OsString],
         result: &impl ToFigure,
         style: FigureStyle,
     ) -> Result<Self, CliError> {
         match &plot.plot {
-            Some(path) if plot.is_page() => Ok(self.with_file(path, result.styled_page(style)?)),
-            _ => self.with_plot(plot, || Ok(result.styled_figure(style)?)),
+            Some(path) if plot.is_page() => {
+                let page = result.page_with(style, &repeat::settings(words))?;
+                Ok(self.with_file(path, options::spelled(&page)))
+            }
+            _ => self.with_plot(plot, words, || Ok(result.styled_figure(style)?)),
         }
     }
 

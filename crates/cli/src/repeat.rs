@@ -2,10 +2,11 @@
 
 use std::ffi::OsString;
 
+use mechid::report::PageSettings;
 use shlex::Quoter;
 
 /// Returns `mechid` with these arguments, quoted for a POSIX shell.
-pub fn command(arguments: &[OsString]) -> String {
+fn command(arguments: &[OsString]) -> String {
     let quoter = Quoter::new().allow_nul(true);
     let mut command = String::from("mechid");
     for argument in arguments {
@@ -14,6 +15,11 @@ pub fn command(arguments: &[OsString]) -> String {
         command += &quoter.quote(&argument).expect("only a NUL is refused, and NULs are allowed");
     }
     command
+}
+
+/// Returns the settings of a page that names the command with these arguments.
+pub fn settings(arguments: &[OsString]) -> PageSettings {
+    PageSettings { command: Some(command(arguments)), ..PageSettings::default() }
 }
 
 #[cfg(test)]

@@ -107,7 +107,7 @@ impl SelectedMode {
             (true, _) => ["rigid body".into(), "–".into(), "0".into()],
             (false, true) => [
                 significant(self.natural_frequency_hz, 7),
-                significant(self.damping_ratio, 5),
+                significant(100.0 * self.damping_ratio, 5),
                 format!("{} ± {}i", significant(re, 5), significant(im, 7)),
             ],
             (false, false) => ["–".into(), "–".into(), significant(re, 7)],
@@ -130,7 +130,7 @@ impl fmt::Display for SelectedModes {
         let header = [
             "mode",
             "natural frequency, Hz",
-            "damping ratio",
+            "damping ratio, %",
             "eigenvalue, rad/s",
             "moves most",
             "residual",

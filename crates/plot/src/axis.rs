@@ -1,5 +1,9 @@
 //! Axes: quantity, unit, scale and range.
 
+/// Number of decibels for a relative change of e, the base of natural logarithms: a relative error
+/// times this number is one in decibels.
+pub const NEPER: f64 = 20.0 * std::f64::consts::LOG10_E;
+
 /// Division of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
@@ -65,6 +69,11 @@ impl Axis {
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
         self
+    }
+
+    /// Returns whether the axis has levels in decibels.
+    pub(crate) fn is_decibel(&self) -> bool {
+        self.unit.starts_with("dB")
     }
 
     /// Returns `label (unit)`, or the label alone for a pure number.

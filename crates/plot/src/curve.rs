@@ -125,7 +125,7 @@ impl Curve {
     }
 
     /// Shades ± 2 standard errors around the curve; `error` has one standard error for each point,
-    /// in the unit of the ordinate.
+    /// in the unit of the ordinate. Of levels in decibels the band is that of the magnitude.
     #[must_use]
     pub fn standard_error(mut self, error: &[f64]) -> Self {
         self.error = error.to_vec();

@@ -1,5 +1,6 @@
 //! Drawing of a figure whose layout is known.
 
+use crate::axis::NEPER;
 use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 use crate::curve::{Curve, Kind};
 use crate::figure::Figure;
@@ -13,8 +14,8 @@ use crate::trace;
 /// Height of the middle of a digit above the baseline, as a fraction of the font size.
 const MIDDLE: f64 = 0.36;
 
-const GRID: Stroke = Stroke::solid(Color("#e0e0e0"), 0.8);
-const FINE_GRID: Stroke = Stroke::solid(Color("#f1f1f1"), 0.7);
+const GRID: Stroke = Stroke::solid(Color::GRID, 0.8);
+const FINE_GRID: Stroke = Stroke::solid(Color::FINE_GRID, 0.7);
 const FRAME: Stroke = Stroke::solid(Color::DARK, 0.9);
 
 pub(crate) fn figure(figure: &Figure, layout: &Layout, sheet: &mut Canvas) {
@@ -111,7 +112,7 @@ fn draw_curve(
         return;
     }
     if !curve.error.is_empty() {
-        error_band(layout, curve, style.color, sheet);
+        error_band(panel, layout, curve, style.color, sheet);
     }
     let radius = marker_radius(layout.size.0, points.len());
     if curve.kind == Kind::Stems {
@@ -143,11 +144,20 @@ const MANY: usize = 400;
 /// Half-width of an error band, in standard errors.
 const ERRORS: f64 = 2.0;
 
-/// Shades ± 2 standard errors; on a logarithmic axis, an edge that is not positive is at the
-/// bottom.
-fn error_band(layout: &PanelLayout, curve: &Curve, color: Color, sheet: &mut Canvas) {
+/// Shades ± 2 standard errors, of levels in decibels those of the magnitude; an edge without a
+/// logarithm is at the bottom.
+fn error_band(
+    panel: &Panel,
+    layout: &PanelLayout,
+    curve: &Curve,
+    color: Color,
+    sheet: &mut Canvas,
+) {
+    let by = |error: f64| {
+        if panel.y.is_decibel() { NEPER * (error / NEPER).ln_1p() } else { error }
+    };
     let edge = |sign: f64| {
-        let edge = curve.y.iter().zip(&curve.error).map(|(y, error)| y + sign * ERRORS * error);
+        let edge = curve.y.iter().zip(&curve.error).map(|(y, error)| y + by(sign * ERRORS * error));
         let lowest = layout.y_range.0;
         edge.map(|y| if y.is_finite() { y.max(lowest) } else { lowest }).collect::<Vec<f64>>()
     };

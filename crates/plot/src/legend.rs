@@ -151,7 +151,7 @@ pub(crate) fn free_place(
 
 /// Draws a legend inside a panel.
 pub(crate) fn draw_box(sheet: &mut Canvas, entries: &[Entry], (x, y): Point) {
-    let edge = Stroke::solid(Color("#c8c8c8"), 0.7);
+    let edge = Stroke::solid(Color::LIGHT, 0.7);
     sheet.rect((x, y), box_size(entries), Some(Color::WHITE), Some(edge));
     for (row, entry) in entries.iter().enumerate() {
         entry.draw(

@@ -57,14 +57,14 @@ mod text;
 mod ticks;
 mod trace;
 
-pub use axis::{Axis, Scale};
+pub use axis::{Axis, NEPER, Scale};
 pub use bitmap::svg_to_png;
 pub use canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 pub use curve::{Curve, Reference};
 pub use error::PlotError;
 pub use figure::Figure;
 pub use interactive::{
-    DrawnSet, FIGURE_STYLE, FigureSet, content_policy, page_of, script, with_metadata,
+    DrawnSet, FigureSet, content_policy, figure_style, page_of, script, with_metadata,
 };
 pub use panel::{Legend, Panel, ResponsePart};
 pub use save::save_svg;

@@ -5,6 +5,10 @@ use crate::curve::{Curve, Kind, Reference};
 use crate::error::PlotError;
 use crate::style::Resolved;
 
+/// Maximum ratio of a value to the largest on the same logarithmic axis that is a rounding error;
+/// the axis ends there.
+const ROUNDING: f64 = 1e-12;
+
 /// Position of the legend of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Legend {
@@ -271,6 +275,8 @@ impl Panel {
             let rising = !self.curves.iter().flat_map(Curve::ordinates).any(|value| value < 0.0);
             return (if rising { 0.0 } else { low }, high);
         }
+        // Values that are rounding errors of the largest would spread a logarithmic axis.
+        let low = if self.y.scale == Scale::Log10 { low.max(ROUNDING * high) } else { low };
         padded(self.y.scale, low, high, 0.06)
     }
 }

@@ -37,6 +37,9 @@ const SMALL: (f64, f64) = (120.0, 64.0);
 /// Rotation about the vertical axis, and tilt towards the viewer, of the first view, in radians.
 const VIEW: (f64, f64) = (-0.5, 0.42);
 
+/// Colours of the lines at rest, of the deflected lines and of the points.
+const COLORS: [Color; 3] = [Color::GREY, Color::BLUE, Color::VERMILION];
+
 /// Largest displacement in the drawing, relative to the size of the structure; the script uses the
 /// same value.
 const DEFLECTION: f64 = 0.16;
@@ -58,6 +61,7 @@ struct ShapeData<'a> {
     names: Vec<&'a str>,
     lines: &'a [[usize; 2]],
     modes: Vec<ModeData<'a>>,
+    colors: [&'static str; 3],
 }
 
 #[derive(Serialize)]
@@ -117,6 +121,7 @@ impl ShapeDrawing {
             names: self.points.iter().map(|(name, _)| name.as_str()).collect(),
             lines: &self.lines,
             modes: self.modes.iter().map(DrawnMode::data).collect(),
+            colors: COLORS.map(|color| color.0),
         };
         // Numbers and texts can always be serialised.
         let json = serde_json::to_string(&data).unwrap_or_default();
@@ -133,6 +138,7 @@ impl ShapeDrawing {
     fn sheet(&self, mode: &DrawnMode, size: (f64, f64), has_words: bool) -> Canvas {
         let mut sheet = Canvas::new(size.0, size.1);
         let view = View::new(&self.points, size);
+        let [rest, deflected, points] = COLORS;
         let factor = DEFLECTION * view.size / mode.largest();
         let undeformed: Vec<[f64; 3]> = self.points.iter().map(|(_, position)| *position).collect();
         let moved: Vec<[f64; 3]> = undeformed
@@ -147,10 +153,10 @@ impl ShapeDrawing {
             };
             sheet.segments(self.lines.iter().map(ends), stroke);
         };
-        lines(&undeformed, Stroke::solid(Color::GREY, if has_words { 1.0 } else { 0.6 }));
-        lines(&moved, Stroke::solid(Color::BLUE, if has_words { 2.0 } else { 1.2 }));
+        lines(&undeformed, Stroke::solid(rest, if has_words { 1.0 } else { 0.6 }));
+        lines(&moved, Stroke::solid(deflected, if has_words { 2.0 } else { 1.2 }));
         let spots: Vec<(f64, f64)> = moved.iter().map(|at| view.project(*at)).collect();
-        sheet.discs(&spots, if has_words { 3.0 } else { 1.6 }, Color::VERMILION);
+        sheet.discs(&spots, if has_words { 3.0 } else { 1.6 }, points);
         if has_words && spots.len() <= NAMED {
             let style = TextStyle::new(11.5).anchored(Anchor::Start);
             for ((x, y), (name, _)) in spots.iter().zip(&self.points) {

@@ -23,9 +23,10 @@ pub(crate) fn ticks(scale: Scale, low: f64, high: f64, wanted: f64, step: Option
 }
 
 fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
-    // A step with more than forty labels is ignored.
+    // A step with more than forty labels, or with one, is ignored.
     let step = step
         .filter(|step| *step > 0.0 && step.is_finite() && (high - low) / step <= 40.0)
+        .filter(|step| multiples(low, high, *step).1 > 1)
         .unwrap_or_else(|| {
             let usual = step_of_two_ticks(low, high, nice_step((high - low) / wanted));
             step_to_the_ends(low, high, wanted, usual)
@@ -255,6 +256,23 @@ mod tests {
             (labels(&large), large.factor.as_deref()),
             (vec!["0.0", "0.5", "1.0", "1.5", "2.0"], Some("×10^{6}"))
         );
+    }
+
+    #[test]
+    fn every_axis_has_two_labels() {
+        for low in [0.0, 0.03, 0.1, 0.99, 7.0, 63.0] {
+            for length in [1e-4, 0.013, 0.37, 1.0, 1.9, 4.0, 11.0, 300.0] {
+                for wanted in [2.0, 3.0, 6.0, 12.0] {
+                    for step in [None, Some(45.0)] {
+                        let count = linear(low, low + length, wanted, step).major.len();
+                        assert!(count > 1, "{low} to {}, {wanted}, {step:?}", low + length);
+                    }
+                    let (low, high) = (1e-9 + low, 1e-9 + low + length);
+                    let count = logarithmic(low, high, wanted).major.len();
+                    assert!(count > 1, "logarithmic, {low} to {high}, {wanted}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -348,3 +348,50 @@ fn figures_of_one_document_share_no_id() {
     let svg = document.root_element().first_element_child().unwrap();
     assert_eq!(svg.first_element_child().unwrap().text(), Some("One & two"));
 }
+
+/// Ordinates of the corners of the only faded area, px.
+fn band(svg: &str) -> Vec<f64> {
+    let document = roxmltree::Document::parse(svg).expect("the figure is XML");
+    let faded = document.descendants().find(|node| node.attribute("opacity") == Some("0.22"));
+    let area = faded
+        .expect("a band")
+        .descendants()
+        .find_map(|node| node.attribute("points").or(node.attribute("d")).map(str::to_owned));
+    let numbers = area.expect("its outline");
+    let numbers = numbers.split(|c: char| !c.is_ascii_digit() && c != '.' && c != '-');
+    let numbers: Vec<f64> = numbers.filter_map(|text| text.parse().ok()).collect();
+    numbers.chunks(2).map(|point| point[1]).collect()
+}
+
+/// Judge: the band of levels in decibels is that of the magnitude on a logarithmic axis.
+#[test]
+fn an_error_has_the_same_band_on_every_scale() {
+    let x: Vec<f64> = (1..=50).map(f64::from).collect();
+    let y: Vec<f64> = x.iter().map(|x| 1e-6 * (2.0 + (0.3 * x).sin())).collect();
+    let error: Vec<f64> = y.iter().map(|y| 0.08 * y).collect();
+    let level: Vec<f64> = y.iter().map(|y| 20.0 * y.log10()).collect();
+    let of_level = vec![mechid_plot::NEPER * 0.08; 50];
+    let ends = [1e-7, 1e-5];
+    let draw = |axis: Axis, [low, high]: [f64; 2], y: &[f64], error: &[f64]| {
+        let panel = Panel::new(Axis::linear("Frequency", "Hz"), axis.range(low, high));
+        let curve = Curve::line("", &x, y).standard_error(error);
+        Figure::new("").panel(panel.curve(curve).legend(Legend::Hidden)).to_svg().unwrap()
+    };
+    let levels = ends.map(|end| 20.0 * f64::log10(end));
+    let logarithmic = band(&draw(Axis::log10("Receptance", "m/N"), ends, &y, &error));
+    let decibel = Axis::linear("Receptance", "dB re 1 m/N");
+    let decibel = band(&draw(decibel, levels, &level, &of_level));
+    assert!(logarithmic.len() >= 100 && logarithmic.len() == decibel.len());
+    for (a, b) in logarithmic.iter().zip(&decibel) {
+        assert!((a - b).abs() < 0.02, "{a} {b}");
+    }
+}
+
+#[test]
+fn rounding_does_not_spread_a_logarithmic_axis() {
+    let panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::log10("Receptance", "m/N"))
+        .curve(Curve::line("a", &[1.0, 2.0], &[1e-4, 1e-6]))
+        .curve(Curve::line("b", &[1.0, 2.0], &[3e-22, 1e-21]));
+    let svg = Figure::new("").panel(panel).to_svg().unwrap();
+    assert!(svg.contains("−16") && !svg.contains("−20"), "{svg}");
+}

@@ -7,7 +7,7 @@ use mechid::report::{FigureStyle, PageSettings, ReportError, ToFigure};
 use pyo3::prelude::*;
 use serde::Serialize;
 
-use crate::page::{self, PageTexts};
+use crate::page::PageTexts;
 use crate::{failure, work};
 
 /// Result as JSON, as text and as a figure.
@@ -24,7 +24,7 @@ pub trait ResultOutput: Send + Sync {
     /// Returns the figure as an interactive HTML page.
     fn html(&self) -> Result<String, ReportError>;
 
-    /// Returns the page of a result with modes.
+    /// Returns the page with the heading and the details of the settings.
     fn page(&self, settings: &PageSettings) -> Result<String, ReportError>;
 }
 
@@ -46,7 +46,7 @@ impl<T: Serialize + Display + ToFigure + Send + Sync> ResultOutput for T {
     }
 
     fn page(&self, settings: &PageSettings) -> Result<String, ReportError> {
-        page::of_modes(self, Some(self.figure()?), settings)
+        self.page_with(FigureStyle::default(), settings)
     }
 }
 
@@ -58,6 +58,16 @@ pub fn svg(py: Python<'_>, result: Arc<impl ResultOutput + ?Sized + 'static>) ->
 /// Creates the HTML page of a result without the interpreter's lock.
 pub fn html(py: Python<'_>, result: Arc<impl ResultOutput + ?Sized + 'static>) -> PyResult<String> {
     work::watched(py, None, || Ok(()), move || result.html())
+}
+
+/// Creates the HTML page of a result with these texts without the interpreter's lock.
+pub fn page(
+    py: Python<'_>,
+    result: Arc<impl ResultOutput + ?Sized + 'static>,
+    texts: PageTexts,
+) -> PyResult<String> {
+    let settings = texts.settings(py)?;
+    work::watched(py, None, || Ok(()), move || result.page(&settings))
 }
 
 /// Result with JSON, text and figure.
@@ -93,10 +103,8 @@ impl Answer {
         html(py, Arc::clone(&self.0))
     }
 
-    /// Returns the report of a result with modes, as an HTML page.
+    /// Returns the figure as a page with these texts.
     fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
-        let settings = texts.settings(py)?;
-        let result = Arc::clone(&self.0);
-        work::watched(py, None, || Ok(()), move || result.page(&settings))
+        page(py, Arc::clone(&self.0), texts)
     }
 }

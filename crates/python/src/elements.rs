@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use mechid::analysis::AnalysisError;
 use mechid::io::parse_machine;
-use mechid::report::elements_page;
 use mechid::{ElementData, IdentifyElements};
 use pyo3::prelude::*;
 
@@ -100,9 +99,7 @@ impl IdentifiedElements {
 
     /// Returns the report of the program, as an HTML page.
     fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
-        let settings = texts.settings(py)?;
-        let identified = Arc::clone(&self.0);
-        work::watched(py, None, || Ok(()), move || elements_page(&identified, &settings))
+        answer::page(py, Arc::clone(&self.0), texts)
     }
 
     /// Returns the names of the unknowns, and their covariance.

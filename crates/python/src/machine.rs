@@ -13,7 +13,7 @@ use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::page::{PageTexts, of_modes};
+use crate::page::PageTexts;
 use crate::{arrays, failure, work};
 
 /// System with the covariance of its parameters, if it was identified.
@@ -141,13 +141,7 @@ impl Machine {
     fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
         let settings = texts.settings(py)?;
         let machine = self.0.clone();
-        let write = move || {
-            let figure = match machine.figure() {
-                Err(ReportError::NothingResonates { .. }) => None,
-                figure => Some(figure?),
-            };
-            of_modes(&ModalSummary::from_machine(&machine)?, figure, &settings)
-        };
+        let write = move || machine.page_with(FigureStyle::default(), &settings);
         work::watched(py, None, || Ok(()), write)
     }
 

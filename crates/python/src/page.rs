@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 use mechid::analysis::modes::SavedModes;
 use mechid::io::{Geometry, record_details};
-use mechid::plot::Figure;
-use mechid::report::{ModeShapes, PageSettings, ReportError, modes_page};
+use mechid::report::{ModeShapes, PageSettings};
 use pyo3::prelude::*;
-use serde::Serialize;
 
 use crate::{failure, work};
 
@@ -43,20 +41,6 @@ impl PageTexts {
     }
 }
 
-/// Returns the page of a result with modes.
-///
-/// # Errors
-/// [`ReportError::Analysis`] without modes, [`ReportError::Plot`].
-pub fn of_modes(
-    result: &impl Serialize,
-    figure: Option<Figure>,
-    settings: &PageSettings,
-) -> Result<String, ReportError> {
-    let modes = SavedModes::from_result(result)?;
-    let shapes = shapes(&modes, settings.geometry.as_ref());
-    modes_page(&modes, figure, shapes.as_ref(), settings)
-}
-
 /// Returns geometry and shapes of a result with modes (its JSON) as a universal file; `None` if no
 /// mode oscillates, there are fewer than two channels, or a channel has no point.
 #[pyfunction]
@@ -69,13 +53,6 @@ pub fn shapes_file(
     let result: serde_json::Value = failure::settings(py, result)?;
     let modes = work::brief(py, || SavedModes::from_json("the result", result))?;
     let geometry = geometry.map(|path| work::brief(py, || Geometry::read(path))).transpose()?;
-    let shapes = shapes(&modes, geometry.as_ref());
+    let shapes = ModeShapes::from_saved(&modes, geometry.as_ref());
     Ok(shapes.map(|shapes| shapes.geometry.universal_file(&shapes.modes)))
-}
-
-/// Returns the shapes at the places of the responses, or at their columns if these have the points.
-fn shapes(modes: &SavedModes, geometry: Option<&Geometry>) -> Option<ModeShapes> {
-    let (shaped, places) = modes.shapes();
-    let at = |names: &[String]| ModeShapes::from_modes(&shaped, names, geometry);
-    at(&places).or_else(|| at(&modes.columns()))
 }

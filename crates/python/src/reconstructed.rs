@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use crate::answer::{self, ResultOutput as _};
 use crate::machine::Answering;
 use crate::measurement::Measurement;
+use crate::page::PageTexts;
 use crate::{arrays, failure, work};
 
 /// Reconstructed force, with the method and its settings.
@@ -68,6 +69,11 @@ impl Reconstructed {
     /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         answer::html(py, Arc::clone(&self.0))
+    }
+
+    /// Returns the figure as a page with these texts.
+    fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
+        answer::page(py, Arc::clone(&self.0), texts)
     }
 
     #[getter]

@@ -11,6 +11,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use crate::machine::Machine;
+use crate::page::PageTexts;
 use crate::{answer, arrays, failure, work};
 
 /// Table of frequency responses.
@@ -139,6 +140,11 @@ impl IdentifiedResponses {
     /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         answer::html(py, Arc::clone(&self.0))
+    }
+
+    /// Returns the figure as a page with these texts.
+    fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
+        answer::page(py, Arc::clone(&self.0), texts)
     }
 
     /// Returns the confidence interval of a parameter.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use mechid::analysis::fleet::{TrendAxis, Trends};
 use mechid::io::{ExperimentStudy, StudyRuns, Table, write_all};
-use mechid::report::trends_page;
+use mechid::report::{PageSettings, trends_page};
 use mechid::{SimulateError, simulate_runs};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -52,6 +52,7 @@ pub fn fleet_trends(
 ) -> PyResult<(String, String, String)> {
     let over = if over_number { TrendAxis::Number } else { TrendAxis::Order };
     let trends = work::watched(py, None, || Ok(()), move || Trends::read(folder, over))?;
-    let page = work::brief(py, || trends_page(&trends, title))?;
+    let settings = PageSettings { title: Some(title.to_owned()), ..PageSettings::default() };
+    let page = work::brief(py, || trends_page(&trends, &settings))?;
     Ok((trends.to_string(), failure::json(py, &trends)?, page))
 }

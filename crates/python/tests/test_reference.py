@@ -11,7 +11,7 @@ from typing import Any
 
 import mechid
 from mechid import fleet, plotting
-from mechid._results import Drawn, Plotted, Reported, Result, Shaped
+from mechid._results import Drawn, Plotted, Result, Shaped
 
 from .conftest import ROOT
 
@@ -68,7 +68,7 @@ def page() -> str:
     things = {name: getattr(mechid, name) for name in mechid.__all__ if name != "__version__"}
     functions = [section(n, t) for n, t in things.items() if not isinstance(t, type)]
     kinds = [section(n, t) for n, t in things.items() if isinstance(t, type)]
-    shared = [section(kind.__name__, kind) for kind in (Result, Plotted, Drawn, Reported, Shaped)]
+    shared = [section(kind.__name__, kind) for kind in (Result, Plotted, Drawn, Shaped)]
     drawn = [section(f"plotting.{name}", getattr(plotting, name)) for name in plotting.__all__]
     many = [section(f"fleet.{name}", getattr(fleet, name)) for name in fleet.__all__]
     parts = [HEAD, "## Functions\n", *functions, "## Records and results\n", *kinds,

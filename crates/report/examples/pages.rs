@@ -9,7 +9,7 @@ use mechid_analysis::modes::StabilisationRows;
 use mechid_io::{Geometry, PointShape};
 use mechid_plot::charts::{FrequencyResponse, bode};
 use mechid_plot::{Axis, Curve, Figure, Panel};
-use mechid_report::{ModeShapes, figure_page, stabilisation};
+use mechid_report::{ModeShapes, PageSettings, figure_page, stabilisation};
 use nalgebra::Complex;
 
 const LINES: usize = 4096;
@@ -103,12 +103,13 @@ fn frame() -> Result<ModeShapes, Box<dyn std::error::Error>> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("."), PathBuf::from);
-    fs::write(
-        folder.join("response.html"),
-        figure_page("One response", vec![response(0, 0)], None)?,
-    )?;
+    let page = |title: &str, figures, shapes: Option<&ModeShapes>| {
+        let title = Some(title.to_owned());
+        figure_page(figures, shapes, &PageSettings { title, ..PageSettings::default() })
+    };
+    fs::write(folder.join("response.html"), page("One response", vec![response(0, 0)], None)?)?;
     let all = (0..FORCES).flat_map(|j| (0..RESPONSES).map(move |i| response(i, j)));
-    fs::write(folder.join("matrix.html"), figure_page("28 × 2 responses", all.collect(), None)?)?;
+    fs::write(folder.join("matrix.html"), page("28 × 2 responses", all.collect(), None)?)?;
     let hz: Vec<f64> = (1..=600).map(|k| 0.1 * f64::from(k)).collect();
     let resonance = |f: f64, natural: f64, damping: f64| {
         let r = f / natural;
@@ -117,7 +118,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sum: Vec<f64> =
         hz.iter().map(|f| resonance(*f, 12.4, 0.011) + 0.3 * resonance(*f, 38.0, 0.008)).collect();
     let mut poles = StabilisationRows::default();
-    for order in (2..=20).step_by(2) {
+    for order in (2..=320).step_by(2) {
         let wander = 50.0 * (TAU * order as f64 / 7.3).sin().abs() + 5.0;
         for (hz, is_stable) in [(12.4, order > 2), (38.0, order > 6), (wander, false)] {
             poles.order.push(order);
@@ -128,7 +129,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let panel = stabilisation(&poles, (&hz, &sum)).ok_or("there are poles")?;
     let diagram = ("Stabilisation".to_owned(), Figure::new("").panel(panel));
-    fs::write(folder.join("shapes.html"), figure_page("Frame", vec![diagram], Some(&frame()?))?)?;
+    fs::write(folder.join("shapes.html"), page("Frame", vec![diagram], Some(&frame()?))?)?;
     let expected = [known(1599), known(127)];
     fs::write(folder.join("expected.json"), serde_json::to_string(&expected)?)?;
     Ok(())

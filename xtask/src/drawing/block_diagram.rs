@@ -33,7 +33,7 @@ impl Role {
             Role::Data => (Color("#f6f6f6"), Color::GREY),
             Role::Process => (Color("#e6f1f8"), Color::BLUE),
             Role::Result => (Color("#e4f4ee"), Color::GREEN),
-            Role::Comparison => (Color("#fdf3e0"), Color::ORANGE),
+            Role::Comparison => (Color("#fdf3e0"), Color::BROWN),
         }
     }
 }

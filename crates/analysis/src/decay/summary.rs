@@ -226,9 +226,9 @@ impl DecaySummary {
         let zeta = mode.mode.damping_ratio.value;
         if zeta > HEAVY {
             remarks.push(format!(
-                "{name} has a damping ratio of {}: hardly an oscillation, it may represent an overdamped \
+                "{name} has a damping ratio of {} %: hardly an oscillation, it may represent an overdamped \
                  mode, which is not part of the model",
-                significant(zeta, 2)
+                significant(100.0 * zeta, 2)
             ));
         }
         remarks

@@ -93,6 +93,8 @@ pub struct TrendChange {
     /// Probability of at least this change for a random order of the records, adjusted for the
     /// number of series.
     pub p_value: f64,
+    /// `true` if the p-value is an upper bound: no order that was tried has as large a change.
+    pub is_bound: bool,
 }
 
 /// Value of one record.
@@ -216,6 +218,7 @@ impl TrendSeries {
             at: point.at,
             size: change.size,
             p_value: change.p_value,
+            is_bound: change.is_bound,
         }
     }
 
@@ -236,6 +239,14 @@ impl TrendSeries {
     }
 }
 
+impl TrendChange {
+    /// Returns the p-value as text: `= 0.0012` or, for an upper bound, `≤ 0.0001`.
+    pub fn p(&self) -> String {
+        let sign = if self.is_bound { '≤' } else { '=' };
+        format!("{sign} {}", significant(self.p_value, 2))
+    }
+}
+
 impl TrendSeries {
     /// Returns a change in words.
     pub fn sentence(&self, change: &TrendChange) -> String {
@@ -244,9 +255,14 @@ impl TrendSeries {
             ChangeKind::Step => "at",
             ChangeKind::Drift => "from",
         };
-        let p = significant(change.p_value, 2);
         let unit = format!("{size} {}", self.unit);
-        format!("{}: {kind} of {} {from} {}, p = {p}", self.name, unit.trim_end(), change.record)
+        format!(
+            "{}: {kind} of {} {from} {}, p {}",
+            self.name,
+            unit.trim_end(),
+            change.record,
+            change.p()
+        )
     }
 }
 
@@ -306,10 +322,11 @@ fn quantities(row: &ResultRow) -> Vec<(String, String, Uncertain)> {
     });
     let of_modes = (1..).zip(&row.modes).flat_map(|(number, mode)| {
         let hz = uncertain(mode.natural_frequency_hz, mode.natural_frequency_standard_error_hz);
-        let ratio = uncertain(mode.damping_ratio, mode.damping_ratio_standard_error);
+        let error = mode.damping_ratio_standard_error.map(|error| 100.0 * error);
+        let ratio = uncertain(100.0 * mode.damping_ratio, error);
         [
             (format!("frequency {number}"), "Hz".to_owned(), hz),
-            (format!("damping ratio {number}"), String::new(), ratio),
+            (format!("damping ratio {number}"), "%".into(), ratio),
         ]
     });
     let quantities = of_parameters.chain(of_modes);
@@ -420,6 +437,19 @@ impl fmt::Display for Trends {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bound_of_a_p_value_is_told_as_one() {
+        let change = |is_bound| TrendChange {
+            kind: ChangeKind::Step,
+            record: "run-25".into(),
+            at: 25.0,
+            size: 2.0,
+            p_value: 0.0012,
+            is_bound,
+        };
+        assert_eq!([true, false].map(|is_bound| change(is_bound).p()), ["≤ 0.0012", "= 0.0012"]);
+    }
 
     #[test]
     fn numbers_are_found_in_names() {

@@ -384,7 +384,7 @@ impl NonlinearSummary {
 
     /// Returns the findings before the fit and the amplitudes of the data within which the terms
     /// are valid, a sentence each.
-    pub(super) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let before = self.distortion.as_ref();
         let mut text =
             before.map(|row| format!("before the fit: {}\n", row.text)).unwrap_or_default();

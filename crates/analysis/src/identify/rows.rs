@@ -189,7 +189,7 @@ impl ModeRow {
                 if damped && mode.oscillates {
                     add("damped frequency", mode.damped_frequency_hz, "Hz");
                 }
-                add("damping ratio", mode.damping_ratio, "–");
+                add("damping ratio", mode.damping_ratio.percent(), "%");
             }
         }
         quantities
@@ -356,7 +356,7 @@ impl ProportionalDamping {
     }
 
     /// Returns name, value, standard error, interval and unit of both factors.
-    pub(super) fn rows(&self) -> [Vec<String>; 2] {
+    pub fn rows(&self) -> [Vec<String>; 2] {
         [("alpha", &self.alpha, "1/s"), ("beta", &self.beta, "s")].map(|(name, factor, unit)| {
             let mut row = vec![name.to_owned()];
             row.extend(factor.cells());

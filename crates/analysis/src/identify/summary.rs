@@ -298,7 +298,7 @@ impl IdentificationSummary {
                 if mode.is_rigid_body {
                     "rigid-body mode".into()
                 } else {
-                    format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3))
+                    format!("{} Hz, ζ = {} %", significant(hz, 4), significant(100.0 * ratio, 3))
                 }
             })
             .collect();
@@ -389,6 +389,12 @@ impl FitRow {
 
     /// Returns the quality of the fit as a table; `model` is the name of the model in it.
     pub(super) fn lines(&self, model: &str) -> String {
+        text_table(&self.rows(model))
+    }
+
+    /// Returns names and values of the quality of the fit; `model` is the name of the model in
+    /// them.
+    pub fn rows(&self, model: &str) -> Vec<Vec<String>> {
         let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
         let mut rows = Vec::new();
         rows.extend(self.residual_name().map(|name| vec![name.into(), percent(self.nrmse)]));
@@ -400,7 +406,7 @@ impl FitRow {
             vec!["condition number".into(), significant(self.condition_number, 3)],
             vec!["equations / unknowns".into(), format!("{} / {}", self.equations, self.unknowns)],
         ]);
-        text_table(&rows)
+        rows
     }
 
     /// Returns the name of the residual [`nrmse`](Self::nrmse); `None` if it is the unexplained

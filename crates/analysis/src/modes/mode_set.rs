@@ -8,6 +8,7 @@ use mechid_modal::indicators::ShapeWithCovariance;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::Deserialize;
 
+use super::SavedModes;
 use super::summary::ModesSummary;
 use crate::modal::{ModalSummary, ShapedMode};
 use crate::{AnalysisError, Machine};
@@ -23,72 +24,42 @@ pub struct ModeSet {
     pub modes: Vec<ComparedMode>,
 }
 
-/// A saved result with modes, as far as a comparison needs it.
+/// Frequencies and shapes alone, such as those of a finite-element model. A misspelt field is
+/// refused, whereas a result of mechid has many fields that do not concern a comparison.
 #[derive(Debug, Deserialize)]
-struct Saved {
-    modes: Vec<SavedMode>,
-    #[serde(default)]
-    inputs: Vec<String>,
-    /// Responses of a test with forces or of an ambient record.
-    #[serde(default)]
-    outputs: Vec<Column>,
-    /// Responses of a free decay.
-    #[serde(default)]
-    channels: Vec<Column>,
-    /// Responses of a machine.
+#[serde(deny_unknown_fields)]
+struct PlainModes {
+    modes: Vec<PlainMode>,
     #[serde(default)]
     response_names: Vec<String>,
-    #[serde(default)]
-    analysis: SavedAnalysis,
 }
 
 #[derive(Debug, Deserialize)]
-struct Column {
-    column: String,
-}
-
-#[derive(Debug, Default, Deserialize)]
-struct SavedAnalysis {
+#[serde(deny_unknown_fields)]
+struct PlainMode {
+    natural_frequency_hz: PlainValue,
     #[serde(default)]
-    places: Option<SavedPlaces>,
-}
-
-#[derive(Debug, Deserialize)]
-struct SavedPlaces {
-    responses: Vec<String>,
-}
-
-#[derive(Debug, Deserialize)]
-struct SavedMode {
-    #[serde(default = "oscillates")]
-    oscillates: bool,
-    natural_frequency_hz: SavedValue,
-    #[serde(default)]
-    damping_ratio: Option<SavedValue>,
-    shape: Vec<SavedEntry>,
-    #[serde(default)]
-    participation: Vec<SavedEntry>,
-}
-
-fn oscillates() -> bool {
-    true
+    damping_ratio: Option<PlainValue>,
+    shape: Vec<PlainEntry>,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
-struct SavedValue {
+#[serde(deny_unknown_fields)]
+struct PlainValue {
     value: f64,
     #[serde(default)]
     standard_error: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
-struct SavedEntry {
+#[serde(deny_unknown_fields)]
+struct PlainEntry {
     value: [f64; 2],
     #[serde(default)]
     standard_error: Option<[f64; 2]>,
 }
 
-impl SavedValue {
+impl PlainValue {
     fn measured(self) -> Measured {
         Measured::new(self.value, self.standard_error.unwrap_or(0.0))
     }
@@ -112,34 +83,25 @@ impl ModeSet {
         }
     }
 
-    /// Takes modes from the JSON of a result.
+    /// Takes modes from the JSON of a result, or of frequencies and shapes alone.
     ///
     /// # Errors
-    /// [`AnalysisError::SavedModes`] if it has none, [`AnalysisError::NothingToCompare`].
+    /// [`AnalysisError::SavedModes`] if it has none or an unknown field beside frequencies and
+    /// shapes, [`AnalysisError::NothingToCompare`].
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
-        let saved: Saved = serde_json::from_value(json).map_err(|error| {
+        // Every mode of a result has an eigenvalue.
+        if json["modes"].get(0).is_none_or(|mode| mode.get("eigenvalue").is_some()) {
+            let (modes, points) = SavedModes::from_json(name, json)?.shapes();
+            return Self::from_shaped(name, points, &modes);
+        }
+        let plain: PlainModes = serde_json::from_value(json).map_err(|error| {
             AnalysisError::SavedModes { file: name.into(), why: error.to_string() }
         })?;
-        let at_forces = !saved.outputs.is_empty() && saved.inputs.len() > saved.outputs.len();
-        let stated = saved.analysis.places.map(|places| places.responses).unwrap_or_default();
-        let columns = |columns: Vec<Column>| columns.into_iter().map(|c| c.column).collect();
-        let points: Vec<String> = if at_forces {
-            saved.inputs
-        } else if !stated.is_empty() {
-            stated
-        } else if !saved.outputs.is_empty() {
-            columns(saved.outputs)
-        } else if !saved.channels.is_empty() {
-            columns(saved.channels)
-        } else {
-            saved.response_names
-        };
-        let modes = saved.modes.into_iter().filter(|mode| mode.oscillates).map(|mode| {
-            let shape = if at_forces { mode.participation } else { mode.shape };
-            let damping_ratio = mode.damping_ratio.map(SavedValue::measured);
-            (mode.natural_frequency_hz.measured(), damping_ratio, shape)
+        let modes = plain.modes.into_iter().map(|mode| {
+            let damping_ratio = mode.damping_ratio.map(PlainValue::measured);
+            (mode.natural_frequency_hz.measured(), damping_ratio, mode.shape)
         });
-        Self::new(name, points, modes)
+        Self::new(name, plain.response_names, modes)
     }
 
     /// Takes the modes of a test; its points are the stated ones, or the columns.
@@ -177,7 +139,7 @@ impl ModeSet {
             Measured::new(value.value, value.standard_error.unwrap_or(0.0))
         };
         let modes = modes.iter().filter(|mode| mode.row.oscillates).map(|mode| {
-            let entry = |entry: &crate::modal::ShapeEntry| SavedEntry {
+            let entry = |entry: &crate::modal::ShapeEntry| PlainEntry {
                 value: entry.value,
                 standard_error: entry.standard_error,
             };
@@ -197,7 +159,7 @@ impl ModeSet {
     pub fn from_nodal(nodal: &NodalModes) -> Result<Self, AnalysisError> {
         let exact = |value: f64| Measured::new(value, 0.0);
         let modes = nodal.modes.iter().map(|mode| {
-            let entry = |z: &Complex<f64>| SavedEntry { value: [z.re, z.im], standard_error: None };
+            let entry = |z: &Complex<f64>| PlainEntry { value: [z.re, z.im], standard_error: None };
             // A file of undamped modes has a damping of zero, which is not a value to compare.
             let damping_ratio = Some(mode.damping_ratio).filter(|ratio| *ratio != 0.0).map(exact);
             (exact(mode.frequency_hz), damping_ratio, mode.shape.iter().map(entry).collect())
@@ -208,7 +170,7 @@ impl ModeSet {
     fn new(
         name: &str,
         points: Vec<String>,
-        modes: impl Iterator<Item = (Measured, Option<Measured>, Vec<SavedEntry>)>,
+        modes: impl Iterator<Item = (Measured, Option<Measured>, Vec<PlainEntry>)>,
     ) -> Result<Self, AnalysisError> {
         let nothing = || AnalysisError::NothingToCompare { file: name.into() };
         let mut compared = Vec::new();
@@ -220,10 +182,13 @@ impl ModeSet {
             compared.push(ComparedMode { natural_frequency_hz, damping_ratio, shape });
         }
         let entries = compared.first().ok_or_else(nothing)?.shape.shape().len();
-        let points = if points.len() == entries {
-            points
-        } else {
-            (1..=entries).map(|number| number.to_string()).collect()
+        let points = match points.len() {
+            0 => (1..=entries).map(|number| number.to_string()).collect(),
+            len if len == entries => points,
+            len => {
+                let why = format!("{len} names of points for {entries} entries of a shape");
+                return Err(AnalysisError::SavedModes { file: name.into(), why });
+            }
         };
         if compared.iter().any(|mode| mode.shape.shape().len() != entries) {
             return Err(nothing());
@@ -256,7 +221,7 @@ impl ModeSet {
 }
 
 /// Returns a shape with independent errors of real and imaginary parts.
-fn with_covariance(shape: &[SavedEntry]) -> Result<ShapeWithCovariance, AnalysisError> {
+fn with_covariance(shape: &[PlainEntry]) -> Result<ShapeWithCovariance, AnalysisError> {
     let values = shape.iter().map(|entry| Complex::new(entry.value[0], entry.value[1]));
     let errors = shape.iter().map(|entry| entry.standard_error.unwrap_or_default());
     let (re, im): (Vec<f64>, Vec<f64>) = errors.map(|[re, im]| (re * re, im * im)).unzip();

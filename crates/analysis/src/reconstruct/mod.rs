@@ -182,8 +182,8 @@ impl Serialize for Reconstructed {
 /// Part of a summary that concerns the system.
 struct System<'a> {
     name: &'a str,
-    /// Number of places where forces may act.
-    dofs: usize,
+    /// Names of the forces, one for each place where they may act.
+    forces: Vec<String>,
     /// `true` if its uncertainty is known.
     uncertain: bool,
 }
@@ -236,7 +236,8 @@ impl Task {
         };
         how.remarks.extend(shown::remark(&recorded.channels, request, &how));
         how.remarks.extend(rates.remarks(recorded.columns()));
-        let system = System { name: &machine.name, dofs, uncertain: !machine.is_exact() };
+        let forces = (0..dofs).map(|dof| machine.names.force_name(dof)).collect();
+        let system = System { name: &machine.name, forces, uncertain: !machine.is_exact() };
         Ok((self.summary(&system, settings, &how, &tally), force))
     }
 
@@ -253,30 +254,30 @@ impl Task {
         remarks.extend(how.remarks.iter().cloned());
         let unexplained = how.unexplained.as_deref();
         let channels = Measured::all(recorded, unexplained);
-        let System { name, dofs, uncertain } = *system;
-        remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
-        let forces = tally.forces(&request.forced);
+        let System { name, forces, uncertain } = system;
+        remarks.extend(unexplained::remark(&channels, unexplained, request, forces.len()));
+        let forces = tally.forces(forces, &request.forced);
         remarks.extend(forces.iter().filter_map(ForceRow::doubt));
-        if uncertain && !how.counts_noise {
+        if *uncertain && !how.counts_noise {
             remarks.push(
                 "the standard error includes the uncertainty of the machine, not the noise of the record: state this noise with `noise`"
                     .to_owned(),
             );
         }
-        if !uncertain {
+        if !*uncertain {
             remarks.push(
                 "the machine is treated as exactly known: its file has no covariance".to_owned(),
             );
         }
         ForceSummary {
             file: recorded.file().to_owned(),
-            machine: name.to_owned(),
+            machine: (*name).to_owned(),
             method: how.method,
             why: how.why.clone(),
             samples: recorded.sampling.len(),
             periods: request.periodic.then_some(recorded.periods),
             sample_rate_hz: recorded.sampling.rate_hz(),
-            machine_uncertainty: uncertain,
+            machine_uncertainty: *uncertain,
             noise_uncertainty: how.counts_noise,
             chosen: how
                 .chosen

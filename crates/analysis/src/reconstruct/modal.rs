@@ -47,12 +47,7 @@ pub fn reconstruct_with_modes(
         levels => Noise::PerChannel(levels.to_vec()),
     };
     let force = frequency_domain(system, &motion, &request.forced, &lines, &noise)?;
-    let mut remarks = vec![format!(
-        "the numbers of the forces are those of {}: {}",
-        system.name,
-        system.inputs.join(", ")
-    )];
-    remarks.extend(periods::remark(&recorded, &window));
+    let mut remarks: Vec<String> = periods::remark(&recorded, &window).into_iter().collect();
     if run.window_settings().period.is_none() && how.at_rest {
         remarks.push(
             "the record is assumed to begin and end at rest: motion at its ends is attributed to the forces, and the standard errors do not include this"
@@ -73,7 +68,7 @@ pub fn reconstruct_with_modes(
     let task = Task { recorded, request };
     let mut tally = Tally::new(task.recorded.sampling, places, true, take)?;
     tally.push_all(&force, how_found.counts_noise)?;
-    let of_modes = System { name: &system.name, dofs: places, uncertain: true };
+    let of_modes = System { name: &system.name, forces: system.inputs.clone(), uncertain: true };
     let summary = task.summary(&of_modes, how, &how_found, &tally);
     let Request { forced, lines, .. } = task.request;
     Ok(Reconstructed { summary, force, forced, lines })

@@ -61,6 +61,9 @@ pub struct Chosen {
 pub struct ForceRow {
     /// Degree of freedom, counted from 1.
     pub dof: usize,
+    /// Name of the force in the test that identified the system, or `force 1` of the first degree
+    /// of freedom.
+    pub name: String,
     /// `true` if a force was to be reconstructed here.
     pub sought: bool,
     /// RMS value, in the unit of the channel.
@@ -87,9 +90,9 @@ impl ForceRow {
         let share = self.standard_error? / self.rms;
         (self.sought && share > UNSURE).then(|| {
             format!(
-                "the record hardly determines the force on degree of freedom {}: its standard error is {} % of its \
-                 RMS value. Possible causes: noise, sensors that are insensitive to the force, or a model of another machine",
-                self.dof,
+                "the record hardly determines the force {}: its standard error is {} % of its RMS value. \
+                 Possible causes: noise, sensors that are insensitive to the force, or a model of another machine",
+                self.name,
                 significant(100.0 * share, 2)
             )
         })
@@ -145,9 +148,9 @@ impl ForceSummary {
             );
             rows.push(if force.sought {
                 let [rms, peak] = [force.rms, force.peak].map(|value| significant(value, 4));
-                vec![format!("{}", force.dof), rms, error, peak, strongest]
+                vec![force.name.clone(), rms, error, peak, strongest]
             } else {
-                vec![format!("{}", force.dof), "taken as zero".into()]
+                vec![force.name.clone(), "taken as zero".into()]
             });
         }
         let _ = write!(text, "\n{}", text_table(&rows));

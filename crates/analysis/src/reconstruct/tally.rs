@@ -87,15 +87,18 @@ impl<'a> Tally<'a> {
         (self.take)(&ForceChunk { sampling: self.sampling, force, samples: kept, counts_noise })
     }
 
-    /// Returns the levels on each degree of freedom; `forced` are those with a requested force.
-    pub fn forces(&self, forced: &[usize]) -> Vec<ForceRow> {
+    /// Returns the level of each force by its name; `forced` are the degrees of freedom with a
+    /// requested force.
+    pub fn forces(&self, names: &[String], forced: &[usize]) -> Vec<ForceRow> {
         self.levels
             .iter()
+            .zip(names)
             .enumerate()
-            .map(|(dof, level)| {
+            .map(|(dof, (level, name))| {
                 let (strongest_hz, strongest_amplitude) = self.strongest.line(dof);
                 ForceRow {
                     dof: dof + 1,
+                    name: name.clone(),
                     // The equations of motion give a force on every degree of freedom, whether
                     // requested or not.
                     sought: level.force.peak() > 0.0 || forced.contains(&dof),

@@ -252,6 +252,26 @@ fn a_comparison_names_the_mode_that_changed() {
     assert_eq!(error.code(), "analysis.no-common-point");
 }
 
+/// A field that is misspelt, and names that are not those of the entries, are refused.
+#[test]
+fn frequencies_and_shapes_alone_are_read_strictly() {
+    let set = |text: &str| ModeSet::from_json("model", serde_json::from_str(text).unwrap());
+    let shape = r#""shape": [{"value": [1, 0]}, {"value": [0.5, 0]}]"#;
+    let mode = format!(r#"{{"natural_frequency_hz": {{"value": 12}}, {shape}}}"#);
+    let right = set(&format!(r#"{{"modes": [{mode}], "response_names": ["a", "b"]}}"#)).unwrap();
+    assert_eq!(right.points, ["a", "b"]);
+    assert_eq!(set(&format!(r#"{{"modes": [{mode}]}}"#)).unwrap().points, ["1", "2"]);
+    for (wrong, word) in [
+        (format!(r#"{{"modes": [{mode}], "points": ["a", "b"]}}"#), "`points`"),
+        (format!(r#"{{"modes": [{mode}], "response_names": ["a"]}}"#), "1 names"),
+        (r#"{"modes": [{"frequency_hz": {"value": 12}, "shape": []}]}"#.into(), "`frequency_hz`"),
+    ] {
+        let error = set(&wrong).unwrap_err();
+        assert_eq!(error.code(), "analysis.saved-modes");
+        assert!(error.to_string().contains(word), "{error}");
+    }
+}
+
 /// Reference: the exact shapes of a model with more nodes and directions than the test; one sensor
 /// of the test points against its direction.
 #[test]

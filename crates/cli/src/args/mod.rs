@@ -7,6 +7,7 @@ pub mod hits;
 mod style;
 pub mod word;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,6 +21,7 @@ pub use self::style::StyleArgs;
 use self::word::word;
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
+use crate::repeat;
 
 /// Format of the printed result.
 #[derive(Debug, Default, Args)]
@@ -167,14 +169,19 @@ impl FigureArgs {
         files.reads(&self.about.about).writes(&self.plot.plot)
     }
 
-    /// Returns heading and details of the page of a record; `None` without a page.
+    /// Returns heading, details and command of the page of a record; `None` without a page. `words`
+    /// are the arguments of the program.
     ///
     /// # Errors
     /// [`CliError::MisplacedOption`] if they are given without a page.
-    pub fn settings(&self, record: &Path) -> Result<Option<PageSettings>, CliError> {
+    pub fn settings(
+        &self,
+        record: &Path,
+        words: &[OsString],
+    ) -> Result<Option<PageSettings>, CliError> {
         if self.plot.is_page() {
             let (title, about) = (self.about.title.clone(), self.about.details(record)?);
-            return Ok(Some(PageSettings { title, about, ..PageSettings::default() }));
+            return Ok(Some(PageSettings { title, about, ..repeat::settings(words) }));
         }
         match self.about.given() {
             Some(option) => {

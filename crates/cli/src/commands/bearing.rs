@@ -1,5 +1,6 @@
 //! `mechid bearing`: the coefficients of a journal bearing on a test rig.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -135,13 +136,13 @@ impl BearingArgs {
     }
 
     /// Reads, identifies, and reports.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         if self.campaign {
             let plan: BearingPlan = mechid::io::read_json(&self.input.record)?;
             let speeds = plan.run()?;
             let outcome = Outcome::new(speeds.to_string(), &speeds)?.with_result_page(
                 &self.page,
-                &self.input.record,
+                (&self.input.record, words),
                 &speeds,
                 FigureStyle::default(),
             )?;
@@ -167,7 +168,7 @@ impl BearingArgs {
         let identified = identify_bearing(&tests, baseline.as_ref(), &how)?;
         let outcome = Outcome::new(identified.to_string(), &identified)?.with_result_page(
             &self.page,
-            &self.input.record,
+            (&self.input.record, words),
             &identified,
             FigureStyle::default(),
         )?;

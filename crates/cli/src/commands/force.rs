@@ -1,5 +1,6 @@
 //! `mechid force`: the force that drove a known machine.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -105,7 +106,7 @@ impl ForceArgs {
     }
 
     /// Reads, reconstructs, and reports.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let modes = ModalSystem::read(&self.system)?;
         let how = self.settings();
         let mut rows = ForceRows { path: self.output.as_deref(), rows: None };
@@ -113,7 +114,7 @@ impl ForceArgs {
         if let Some(modes) = &modes {
             let run = self.input.open(&self.responses.channels())?;
             let reconstructed = reconstruct_with_modes(&run, modes, &how, &mut take)?;
-            return self.delivered(rows, &reconstructed);
+            return self.delivered(rows, &reconstructed, words);
         }
         let machine = Machine::read(&self.system)?;
         let run = self.input.open(&self.responses.channels())?;
@@ -122,7 +123,7 @@ impl ForceArgs {
             return rows.deliver(Outcome::new(summary.to_string(), &summary)?);
         }
         let reconstructed = reconstruct_with(&run, &machine, &how, &mut take)?;
-        self.delivered(rows, &reconstructed)
+        self.delivered(rows, &reconstructed, words)
     }
 
     /// Reports a force, and adds the requested files.
@@ -130,6 +131,7 @@ impl ForceArgs {
         &self,
         rows: ForceRows<'_>,
         reconstructed: &Reconstructed,
+        words: &[OsString],
     ) -> Result<Outcome, CliError> {
         let mut outcome = rows.deliver(Outcome::new(reconstructed.to_string(), reconstructed)?)?;
         if let Some(path) = &self.spectrum {
@@ -141,7 +143,7 @@ impl ForceArgs {
         }
         outcome.with_result_page(
             &self.page,
-            &self.input.record,
+            (&self.input.record, words),
             reconstructed,
             FigureStyle::default(),
         )

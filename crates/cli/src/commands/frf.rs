@@ -1,5 +1,6 @@
 //! `mechid frf`: response per unit force, frequency by frequency.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -86,7 +87,7 @@ impl FrfArgs {
     }
 
     /// Reads, averages, and reports.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let mut channels = self.channels.channels();
         if !self.hits.is_struck() {
             channels = channels.with_a_force_each();
@@ -107,7 +108,7 @@ impl FrfArgs {
         let table = mechid::frf_of_records(&records, &how)?;
         let mut outcome = Outcome::new(table.to_string(), &table)?.with_result_page(
             &self.page,
-            &self.input.record,
+            (&self.input.record, words),
             &table,
             self.style.style(),
         )?;

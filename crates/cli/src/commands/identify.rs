@@ -1,5 +1,7 @@
 //! `mechid identify`: the machine behind a record.
 
+use std::ffi::OsString;
+
 use clap::Args;
 
 use crate::args::elements::ElementArgs;
@@ -66,12 +68,12 @@ impl IdentifyArgs {
     }
 
     /// Reads, identifies, and reports.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         if let Some(identified) = self.fit.identify_elements(&self.table, &self.elements)? {
             let text = self.fit.text_of_elements(&identified);
             return Outcome::new(text, &identified)?.with_result_page(
                 &self.page,
-                self.fit.record(),
+                (self.fit.record(), words),
                 &identified,
                 self.style.style(),
             );
@@ -79,7 +81,7 @@ impl IdentifyArgs {
         if let Some(identified) = self.fit.identify_tables(&self.table)? {
             return Outcome::new(identified.to_string(), &identified)?.with_result_page(
                 &self.page,
-                self.fit.record(),
+                (self.fit.record(), words),
                 &identified,
                 self.style.style(),
             );
@@ -87,7 +89,7 @@ impl IdentifyArgs {
         let identified = self.fit.identify()?;
         Outcome::new(self.fit.text(&identified), &identified)?.with_result_page(
             &self.page,
-            self.fit.record(),
+            (self.fit.record(), words),
             &identified,
             self.style.style(),
         )

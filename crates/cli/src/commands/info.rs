@@ -1,5 +1,7 @@
 //! `mechid info`: what is in a record.
 
+use std::ffi::OsString;
+
 use clap::Args;
 use mechid::analysis::InspectSettings;
 use mechid::report::FigureStyle;
@@ -43,7 +45,7 @@ impl InfoArgs {
     }
 
     /// Reads the record and measures each of its columns.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let how = InspectSettings {
             columns: self.columns.clone(),
             curves: self.page.plot.plot.is_some(),
@@ -52,7 +54,7 @@ impl InfoArgs {
         let inspected = mechid::inspect(&self.input.record, &reading, &window, &how)?;
         Outcome::new(inspected.to_string(), &inspected)?.with_result_page(
             &self.page,
-            &self.input.record,
+            (&self.input.record, words),
             &inspected,
             FigureStyle::default(),
         )

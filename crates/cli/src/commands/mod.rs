@@ -72,21 +72,21 @@ impl Command {
     /// the arguments of the program, for a report that names the command to reproduce it.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         match self {
-            Command::Bearing(args) => args.run(),
+            Command::Bearing(args) => args.run(words),
             Command::Completions(args) => args.run(),
             Command::Fleet(args) => args.run(),
-            Command::Force(args) => args.run(),
-            Command::Frf(args) => args.run(),
-            Command::Identify(args) => args.run(),
-            Command::Info(args) => args.run(),
+            Command::Force(args) => args.run(words),
+            Command::Frf(args) => args.run(words),
+            Command::Identify(args) => args.run(words),
+            Command::Info(args) => args.run(words),
             Command::Modes(args) => args.run(words),
-            Command::Multisine(args) => args.run(),
+            Command::Multisine(args) => args.run(words),
             Command::Predict(args) => args.run(),
             Command::Report(args) => args.run(words),
-            Command::Simulate(args) => args.run(),
-            Command::Stability(args) => args.run(),
-            Command::Sweep(args) => args.run(),
-            Command::Trends(args) => args.run(),
+            Command::Simulate(args) => args.run(words),
+            Command::Stability(args) => args.run(words),
+            Command::Sweep(args) => args.run(words),
+            Command::Trends(args) => args.run(words),
         }
     }
 

@@ -267,9 +267,8 @@ impl ModesArgs {
     fn page_settings(&self, words: &[OsString]) -> Result<PageSettings, CliError> {
         Ok(PageSettings {
             title: self.about.title.clone(),
-            command: Some(repeat::command(words)),
             about: self.about.details(&self.input.record)?,
-            ..PageSettings::default()
+            ..repeat::settings(words)
         })
     }
 
@@ -290,7 +289,7 @@ impl ModesArgs {
         let outcome = self.shapes.with_shapes(outcome, shapes.as_ref());
         let style = self.style.style();
         let Some(path) = self.plot.plot.as_ref().filter(|_| self.plot.is_page()) else {
-            return outcome.with_plot(&self.plot, || Ok(result.styled_figure(style)?));
+            return outcome.with_plot(&self.plot, words, || Ok(result.styled_figure(style)?));
         };
         let settings = self.page_settings(words)?;
         let figure = result.styled_figure(style)?;

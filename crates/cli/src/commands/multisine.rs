@@ -1,5 +1,6 @@
 //! `mechid multisine`: design of an excitation for a test, with its quality.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -132,7 +133,7 @@ impl MultisineArgs {
     }
 
     /// Designs the excitation, samples it and measures it.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let columns = match self.uncorrelated {
             Uncorrelated::Interleaved => self.inputs,
             Uncorrelated::Dft | Uncorrelated::Hadamard => self.inputs.saturating_mul(self.inputs),
@@ -149,7 +150,7 @@ impl MultisineArgs {
         if let Some(path) = &self.output {
             outcome = outcome.with_begun(self.record(path, &inputs)?);
         }
-        outcome.with_plot(&self.plot, || Ok(excitation_figure(&inputs)?))
+        outcome.with_plot(&self.plot, words, || Ok(excitation_figure(&inputs)?))
     }
 
     fn design(&self, sampling: Sampling) -> Result<ExcitationDesign, CliError> {

@@ -101,9 +101,9 @@ impl PageArgs {
         let settings = PageSettings {
             title: self.about.title.clone(),
             reconstruct_force: self.reconstruct_force,
-            command: Some(repeat::command(words)),
             about: self.about.details(self.fit.record())?,
             geometry: self.geometry.as_ref().map(Geometry::read).transpose()?,
+            ..repeat::settings(words)
         };
         if let Some(saved) = self.fit.saved_result() {
             return self.saved_page(saved, &settings);
@@ -123,12 +123,9 @@ impl PageArgs {
     /// Writes the page of a saved result with modes, or of a described machine.
     fn saved_page(&self, file: &Path, settings: &PageSettings) -> Result<Outcome, CliError> {
         let modes = SavedModes::read(file)?;
-        let (shaped, points) = modes.shapes();
-        let geometry = settings.geometry.as_ref();
-        let shapes = ModeShapes::from_modes(&shaped, &points, geometry)
-            .or_else(|| ModeShapes::from_modes(&shaped, &modes.columns(), geometry));
+        let shapes = ModeShapes::from_saved(&modes, settings.geometry.as_ref());
         if shapes.is_none() && settings.geometry.is_some() {
-            return Err(CliError::NoShapes { names: points.join(", ") });
+            return Err(CliError::NoShapes { names: modes.shapes().1.join(", ") });
         }
         let figure = match modes.has_system().then(|| Machine::read(file)?.figure()) {
             Some(Ok(figure)) => Some(figure),

@@ -1,5 +1,6 @@
 //! `mechid simulate`: the record an experiment would give.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -110,9 +111,9 @@ impl SimulateArgs {
     }
 
     /// Simulates one record, or the records of all runs.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         match (self.runs, &self.study) {
-            (None, None) => self.one(),
+            (None, None) => self.one(words),
             (Some(runs), _) => self.many("--runs", &StudyRuns::Seeds(runs)),
             (None, Some(table)) => {
                 self.many("--study", &StudyRuns::Table(Box::new(Table::read(table)?)))
@@ -120,7 +121,7 @@ impl SimulateArgs {
         }
     }
 
-    fn one(&self) -> Result<Outcome, CliError> {
+    fn one(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let simulation = mechid::simulate(&Experiment::read(&self.experiment)?)?;
         let (names, columns): (Vec<String>, Vec<&[f64]>) = simulation.columns().into_iter().unzip();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -129,7 +130,7 @@ impl SimulateArgs {
         let report: Report<SimulationSummary> = self.report(simulation.summary()?);
         Outcome::new(format!("{}: {}", report.record, report.summary), &report)?
             .with_begun(file.finish()?)
-            .with_plot(&self.plot, || Ok(simulation.figure(&report.record)))
+            .with_plot(&self.plot, words, || Ok(simulation.figure(&report.record)))
     }
 
     fn many(&self, option: &'static str, runs: &StudyRuns) -> Result<Outcome, CliError> {

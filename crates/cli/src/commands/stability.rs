@@ -1,5 +1,6 @@
 //! `mechid stability`: effect of the time step on a free motion, scheme by scheme.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -75,7 +76,7 @@ impl StabilityArgs {
     }
 
     /// Compares the schemes.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let mut schemes = self.schemes()?;
         let machine = match &self.experiment {
             None => None,
@@ -98,7 +99,7 @@ impl StabilityArgs {
         }
         let compared = compare_schemes(&schemes, self.damping, &self.step, machine)?;
         Outcome::new(compared.to_string(), &compared)?
-            .with_plot(&self.plot, || Ok(stability_figure(&schemes, self.damping)?))
+            .with_plot(&self.plot, words, || Ok(stability_figure(&schemes, self.damping)?))
     }
 
     fn schemes(&self) -> Result<Vec<NamedScheme>, CliError> {

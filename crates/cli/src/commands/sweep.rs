@@ -1,5 +1,6 @@
 //! `mechid sweep`: errors of an estimator over a range of sampling steps.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -106,7 +107,7 @@ impl SweepArgs {
     }
 
     /// Runs all settings and reports which was best.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let described = |ending: &std::ffi::OsStr| ending.eq_ignore_ascii_case("json");
         let (kind, settings) = self.settings.chosen();
         let bar = if self.report.quiet {
@@ -132,6 +133,7 @@ impl SweepArgs {
         let swept = swept?;
         Outcome::new(swept.text(self.best), &swept)?.with_result_plot(
             &self.plot,
+            words,
             &swept,
             FigureStyle::default(),
         )

@@ -1,16 +1,18 @@
 //! `mechid trends`: the results of many records side by side.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
 use mechid::analysis::fleet::{TrendAxis, Trends};
-use mechid::report::{FigureStyle, trends_page};
+use mechid::report::{FigureStyle, PageSettings, trends_page};
 
 use super::report::html_file;
 use crate::args::word::word;
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
+use crate::{options, repeat};
 
 /// Show the results of `mechid fleet` side by side: parameters and modes over the records,
 /// outliers, failures
@@ -58,17 +60,18 @@ impl TrendsArgs {
     }
 
     /// Reads the results, and draws them.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let trends = Trends::read(&self.results, self.over)?;
         let mut outcome = Outcome::new(trends.to_string(), &trends)?;
         if let Some(file) = &self.output {
             let of_folder = || format!("Trends of {}", self.results.display());
-            let title = self.title.clone().unwrap_or_else(of_folder);
-            outcome = outcome.with_file(file, trends_page(&trends, &title)?);
+            let title = Some(self.title.clone().unwrap_or_else(of_folder));
+            let settings = PageSettings { title, ..repeat::settings(words) };
+            outcome = outcome.with_file(file, options::spelled(&trends_page(&trends, &settings)?));
         }
         if let Some(file) = &self.table {
             outcome = outcome.with_file(file, trends.csv());
         }
-        outcome.with_result_plot(&self.plot, &trends, FigureStyle::default())
+        outcome.with_result_plot(&self.plot, words, &trends, FigureStyle::default())
     }
 }

@@ -286,3 +286,41 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
         assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"), "{command}");
     }
 }
+
+/// Every page has the command that writes it again; a force has the name of its column, and a file
+/// no folder outside the command.
+#[test]
+fn pages_name_their_command_and_call_files_and_forces_by_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
+    write("one.json", MACHINE);
+    fs::create_dir(folder.join("day")).unwrap();
+    mechid(folder, "simulate one.json --output run.csv --quiet");
+    let text = fs::read_to_string(folder.join("run.csv")).unwrap();
+    write("day/run.csv", &text.replacen("force", "shaker", 1));
+    let columns = "--force shaker --displacement displacement --period 64";
+    let json = mechid(folder, &format!("identify day/run.csv {columns} --json"));
+    write("day/rig.json", &json);
+    let system = "--system day/rig.json --displacement displacement --period 64";
+    for command in [
+        format!("identify day/run.csv {columns}"),
+        format!("frf day/run.csv {columns}"),
+        format!("force day/run.csv {system}"),
+        "info day/run.csv".into(),
+        "modes day/rig.json".into(),
+        "simulate one.json --output again.csv".into(),
+        "stability".into(),
+        "multisine --samples 64 --rate 64 --lines 1:9".into(),
+    ] {
+        let command = format!("{command} --quiet --plot page.html");
+        mechid(folder, &command);
+        let page = fs::read_to_string(folder.join("page.html")).unwrap();
+        let (above, below) = page.split_once("How to repeat it</h2>").expect(&command);
+        assert!(below.contains(&format!("<code>mechid {command}</code>")), "{command}: {below}");
+        assert!(!above.contains("day/"), "{command}");
+        if command.starts_with("force") {
+            assert!(above.contains("Amplitude of shaker") && !above.contains("Force 1"));
+        }
+    }
+}

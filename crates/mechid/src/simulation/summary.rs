@@ -292,9 +292,9 @@ impl fmt::Display for SimulationSummary {
             Some(_) => "mode of the linear part",
             None => "mode",
         };
-        let mut rows = vec![header([mode, "natural frequency (Hz)", "damping ratio"])];
+        let mut rows = vec![header([mode, "natural frequency (Hz)", "damping ratio (%)"])];
         for (number, mode) in (1..).zip(&self.modes) {
-            let cells = [mode.natural_frequency_hz, mode.damping_ratio];
+            let cells = [mode.natural_frequency_hz, 100.0 * mode.damping_ratio];
             let mut row = vec![format!("{number}")];
             row.extend(cells.map(|v| significant(v, 5)));
             rows.push(row);

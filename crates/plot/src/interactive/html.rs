@@ -8,6 +8,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::squeeze::squeeze;
 use crate::canvas::escape;
+use crate::style::{Color, DARK_MODE};
 
 static SCRIPT: LazyLock<String> = LazyLock::new(|| squeeze(include_str!("script.js")));
 
@@ -31,8 +32,20 @@ pub fn content_policy() -> &'static str {
     &POLICY
 }
 
-/// Style of the elements that the script adds to a figure.
-pub const FIGURE_STYLE: &str = include_str!("figure.css");
+static STYLE: LazyLock<String> = LazyLock::new(|| {
+    let of_color = |(light, dark): &(Color, Color)| {
+        let of = |part: &str| format!("svg [{part}=\"{}\"] {{ {part}: {}; }}\n", light.0, dark.0);
+        of("fill") + &of("stroke")
+    };
+    let colors: String = DARK_MODE.iter().map(of_color).collect();
+    let style = include_str!("figure.css");
+    format!("{style}@media screen and (prefers-color-scheme: dark) {{\n{colors}}}\n")
+});
+
+/// Returns the style of figures: of the elements that the script adds, and of dark mode.
+pub fn figure_style() -> &'static str {
+    &STYLE
+}
 
 /// Returns a page of drawn figures.
 pub(super) fn page(title: &str, figures: &str) -> String {
@@ -43,9 +56,10 @@ pub(super) fn page(title: &str, figures: &str) -> String {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
          <meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\
          <meta name=\"color-scheme\" content=\"light dark\"><title>{heading}</title>\
-         <style>{FIGURE_STYLE}</style></head>\n<body><main>{above}{figures}</main>\
+         <style>{}</style></head>\n<body><main>{above}{figures}</main>\
          <script>{}</script></body></html>\n",
         content_policy(),
+        figure_style(),
         script()
     )
 }

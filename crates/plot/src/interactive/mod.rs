@@ -11,7 +11,7 @@ use crate::error::PlotError;
 use crate::figure::Figure;
 use crate::layout::Layout;
 
-pub use self::html::{FIGURE_STYLE, content_policy, script};
+pub use self::html::{content_policy, figure_style, script};
 
 /// Figures of one kind that are shown one at a time, such as the responses of a matrix.
 ///

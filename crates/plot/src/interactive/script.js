@@ -81,9 +81,9 @@ const at = (curve, x, Y = curve.Y) => {
 };
 const SHAPES = {s: "m-3-3h6v6h-6z", t: "m0-4l4 7h-8z", v: "m0 4l4-7h-8z", d: "m0-4l4 4-4 4-4-4z", x: "m-3-3l6 6m0-6l-6 6", p: "m-4 0h8m-4-4v8"};
 const markers = (parent, points, {m, o}) => {
-    const size = within(500 / points.length, 2.8, 6), shape = size > 4 && SHAPES[m], filled = shape && !"xp".includes(m);
+    const size = within(500 / points.length, 2.8, 6), shape = SHAPES[m]?.replace(/\d/g, v => px(v * size / 6)), filled = shape && !"xp".includes(m);
     draw(parent, "path", {d: points.map(([x, y]) => `M${px(x)} ${px(y)}${shape || "h0"}`).join(""), fill: filled ? o : "none",
-        stroke: filled ? "none" : o, "stroke-width": shape ? 1.5 : size, "stroke-linecap": "round"});
+        stroke: filled ? "none" : o, "stroke-width": shape ? size / 4 : size, "stroke-linecap": "round"});
 };
 const stroke = ({o, w, d}, width = w) => ({fill: "none", stroke: o, "stroke-width": width, "stroke-dasharray": d?.join(" ") ?? "none", "stroke-linejoin": "round"});
 const choice = (parent, label, options, value, change) => {
@@ -388,7 +388,7 @@ const plot = svg => {
                     return;
                 }
                 const [left, width, top, height] = boxed(x, y);
-                draw(svg, "rect", {class: "select", x: left, y: top, width, height, fill: "#0072b2", opacity: 0.2});
+                draw(svg, "rect", {class: "select", x: left, y: top, width, height, fill: INK, opacity: 0.2});
             });
         },
         pointerup: event => {
@@ -435,7 +435,7 @@ const plot = svg => {
 
 // Deflected lines: every point moves as its complex entry turns.
 const shapes = svg => {
-    const [{w, h, points, lines, names, modes, turn, tilt}, tools, out, figure] = begin(svg);
+    const [{w, h, points, lines, names, modes, turn, tilt, colors}, tools, out, figure] = begin(svg);
     const state = {mode: 0, amplitude: 1, phase: 0, running: false, turn, tilt}, ends = [0, 1, 2].map(d => points.map(p => p[d])).map(v => [min(...v), max(...v)]);
     const size = max(...ends.map(([a, b]) => b - a)) || 1;
     const [a, b, tall] = ends.map(([a, b]) => (b - a) / size), flat = Math.hypot(a, b) || 1, unit = min(0.7 * w / flat, 0.8 * h / (tall + 0.45 * flat));
@@ -445,7 +445,7 @@ const shapes = svg => {
     };
     clear(svg, w, h);
     const line = (name, stroke, width, more) => draw(svg, "path", {class: name, fill: "none", stroke, "stroke-width": width, "stroke-linecap": "round", ...more});
-    const rest = line("rest", "#808080", 1, {"stroke-dasharray": "4 3"}), moved = line("moved", "#0072b2", 2), dots = line("dots", "#d55e00", 6);
+    const rest = line("rest", colors[0], 1, {"stroke-dasharray": "4 3"}), moved = line("moved", colors[1], 2), dots = line("dots", colors[2], 6);
     const words = points.length <= 40 ? names.map(name => draw(svg, "text", {"font-size": 11.5, fill: INK}, name)) : [];
     const spot = ([x, y]) => px(x) + " " + px(y), path = all => lines.map(([a, b]) => `M${spot(all[a])}L${spot(all[b])}`).join("");
     const render = () => {

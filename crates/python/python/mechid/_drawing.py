@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._figures import NEPER
+
 try:
     from matplotlib import pyplot
     from matplotlib.ticker import MultipleLocator
@@ -56,15 +58,17 @@ def draw_shape(
     lines: Sequence[tuple[int, int]],
     names: Sequence[str],
     title: str,
+    colors: tuple[str, str, str],
     ax: Axes | None,
 ) -> Axes:
-    """Draw the lines of a structure at rest and deflected, whose points are projected."""
+    """Draw the lines of a structure at rest and deflected, whose points are projected, in the colors given."""
     axes = new_axes(ax)
     rest, moved = projected
+    at_rest, deflected, spots = colors
     for first, second in lines:
-        axes.plot(*rest[[first, second]].T, color="0.5", linestyle="--", linewidth=0.8)
-        axes.plot(*moved[[first, second]].T, color="#0072b2")
-    axes.plot(*moved.T, "o", color="#d55e00", markersize=4)
+        axes.plot(*rest[[first, second]].T, color=at_rest, linestyle="--", linewidth=0.8)
+        axes.plot(*moved[[first, second]].T, color=deflected)
+    axes.plot(*moved.T, "o", color=spots, markersize=4)
     for name, point in zip(names, moved, strict=True):
         axes.annotate(name, point, xytext=(5, 4), textcoords="offset points", fontsize="small")
     axes.set_title(title)
@@ -156,11 +160,16 @@ def _draw_curve(panel: Panel, curve: Curve, axes: Axes) -> None:
         axes.fill_between(curve.x, curve.y, upper, color=color, alpha=0.22, linewidth=0, label=label)
         return
     if curve.std_error is not None:
-        lower = curve.y - 2 * curve.std_error
+        lower, upper = curve.y - 2 * curve.std_error, curve.y + 2 * curve.std_error
+        if panel.y.is_decibel:
+            # The band is that of the magnitude; where it reaches zero, its level ends far below.
+            lower, upper = (
+                curve.y + NEPER * np.log(np.maximum(1 + sign * 2 * curve.std_error / NEPER, 1e-3)) for sign in (-1, 1)
+            )
         if panel.y.is_logarithmic:
             # A logarithmic axis shows no negative end of an interval.
             lower = np.maximum(lower, _least(panel, curve) / 10)
-        axes.fill_between(curve.x, lower, curve.y + 2 * curve.std_error, color=color, alpha=0.22, linewidth=0)
+        axes.fill_between(curve.x, lower, upper, color=color, alpha=0.22, linewidth=0)
     if curve.kind == "stems":
         foot = _least(panel, curve) if panel.y.is_logarithmic else 0.0
         axes.vlines(curve.x, foot, curve.y, color=color, linewidth=_POINTS * curve.width, label=label)

@@ -39,6 +39,9 @@ _CAPTION = re.compile(r"<figcaption>(.*?)</figcaption>", re.DOTALL)
 # Responses per unit force, in the order of the derivatives of the displacement.
 _ORDERS = (("Receptance", "m/N"), ("Mobility", "m/(s·N)"), ("Accelerance", "m/(s²·N)"))
 
+# A relative error times this number is one in dB.
+NEPER = float(20 * np.log10(np.e))
+
 # Number of bytes of single precision with which a list is written.
 _BYTES = {"h": 2, "m": 3, "f": 4}
 
@@ -57,6 +60,11 @@ class Axis:
     is_logarithmic: bool = False
     range: tuple[float, float] | None = None
     step: float | None = None
+
+    @property
+    def is_decibel(self) -> bool:
+        """Whether the axis has levels in dB."""
+        return self.unit.startswith("dB")
 
     @property
     def caption(self) -> str:
@@ -253,6 +261,7 @@ class ShapeFigure:
     lines: tuple[tuple[int, int], ...]
     displacements: tuple[NDArray[np.complex128], ...]
     _view: tuple[float, float] = field(repr=False)
+    _colors: tuple[str, str, str] = field(repr=False)
 
     def plot(
         self,
@@ -290,7 +299,7 @@ class ShapeFigure:
         turned = np.real(self.displacements[at] * np.exp(1j * np.radians(phase_deg)))
         moved = self.positions + _DEFLECTION * size * amplitude * turned
         ends = self._projected(self.positions), self._projected(moved)
-        return [draw_shape(ends, self.lines, self.points, self.members[at], ax)]
+        return [draw_shape(ends, self.lines, self.points, self.members[at], self._colors, ax)]
 
     def _projected(self, positions: Values) -> Values:
         turn, tilt = self._view
@@ -470,6 +479,7 @@ def _shapes(name: str, caption: str, data: dict[str, Any]) -> ShapeFigure:
         lines=tuple((first, second) for first, second in data["lines"]),
         displacements=tuple(part[..., 0] + 1j * part[..., 1] for part in parts),
         _view=(data["turn"], data["tilt"]),
+        _colors=tuple(data["colors"]),
     )
 
 
@@ -485,7 +495,7 @@ class _View:
             if show != "bode" or quantity is not None or scale is not None:
                 raise ValueError("`show`, `quantity` and `scale` are for responses per unit force, and this figure has none")
             return
-        self._drawn_scale: Scale = "decibel" if magnitude.y.unit.startswith("dB") else "log"
+        self._drawn_scale: Scale = "decibel" if magnitude.y.is_decibel else "log"
         self._scale = scale or self._drawn_scale
         _check("scale", self._scale, Scale)
         names = [name.lower() for name, _ in _ORDERS]
@@ -522,9 +532,11 @@ class _View:
         """Return the curve in the requested quantity, as a magnitude in its unit."""
         omega = curve.x if unit == "rad/s" else 2 * np.pi * curve.x
         gain = omega**self._turn if self._turn else np.ones_like(omega)
-        is_linear = self._drawn_scale != "decibel"
-        magnitude = curve.y if is_linear else 10 ** (curve.y / 20)
-        error = curve.std_error * gain if is_linear and curve.std_error is not None else None
+        magnitude, error = curve.y, curve.std_error
+        if self._drawn_scale == "decibel":
+            magnitude = 10 ** (curve.y / 20)
+            error = None if error is None else error * magnitude / NEPER
+        error = None if error is None else error * gain
         degrees = np.asarray(curve.phase_deg) + 90.0 * self._turn
         return replace(curve, y=magnitude * gain, std_error=error, phase_deg=degrees)
 
@@ -533,7 +545,7 @@ class _View:
         is_drawn = self._turn == 0 and self._scale == self._drawn_scale
         limits = panel.y.range if is_drawn else None
         if self._scale == "decibel":
-            curves = [replace(one, y=20 * np.log10(one.y), std_error=None) for one in curves]
+            curves = [replace(one, y=20 * np.log10(one.y), std_error=_decibels(one)) for one in curves]
             unit = f"dB re 1 {unit}"
         curves = [replace(one, phase_deg=None) for one in curves]
         return replace(panel, y=Axis(name, unit, self._scale == "log", limits), curves=tuple(curves))
@@ -550,6 +562,11 @@ class _View:
                 turned = [one if one.kind == "line" else _beside(one, line) for one in turned]
         turned = [replace(one, std_error=None, phase_deg=None) for one in turned]
         return replace(panel, title="", y=axis, curves=tuple(turned))
+
+
+def _decibels(curve: Curve) -> Values | None:
+    """Return the standard errors of a magnitude in dB."""
+    return None if curve.std_error is None else NEPER * curve.std_error / curve.y
 
 
 def _degrees(curve: Curve) -> Values:

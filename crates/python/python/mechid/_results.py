@@ -267,6 +267,7 @@ class _Compiled(Protocol):
     def text(self) -> str: ...
     def svg(self) -> str: ...
     def html(self) -> str: ...
+    def page(self, texts: Mapping[str, object]) -> str: ...
 
 
 def framed(page: str, text: str) -> str:
@@ -346,50 +347,6 @@ class Drawn(Result, Plotted):
         """
         return self._compiled.svg()
 
-    def to_html(self) -> str:
-        """Return the figure as an HTML page, which has zoom and cursor and loads no other file.
-
-        Raises
-        ------
-        MechidError
-            If there is nothing to draw.
-        """
-        return self._compiled.html()
-
-    @property
-    def _page(self) -> str:
-        return self.to_html()
-
-    @cached_property
-    def figures(self) -> Mapping[str, Figure]:
-        """Figures of the page of the result by their names, to draw with Matplotlib.
-
-        Raises
-        ------
-        MechidError
-            If there is nothing to draw.
-        """
-        return read_page(self._page)
-
-    def _repr_html_(self) -> str:
-        try:
-            return framed(self.to_html(), str(self))
-        except MechidError:
-            return _text_element(str(self))
-
-    def __str__(self) -> str:
-        return self._compiled.text()
-
-
-class _Paged(Protocol):
-    """A compiled result with a report."""
-
-    def page(self, texts: Mapping[str, object]) -> str: ...
-
-
-class Reported(Drawn):
-    """A result for which the program writes a report."""
-
     def report(
         self,
         path: str | os.PathLike[str] | None = None,
@@ -397,7 +354,7 @@ class Reported(Drawn):
         title: str | None = None,
         about: Mapping[str, str] | None = None,
     ) -> str:
-        """Return one HTML page with the whole result, and write it if a path is given.
+        """Return an HTML page of the result with a heading and details, and write it if a path is given.
 
         Parameters
         ----------
@@ -425,7 +382,6 @@ class Reported(Drawn):
         geometry: str | os.PathLike[str] | None = None,
         reconstruct_force: bool = False,
     ) -> str:
-        inner: _Paged = self.__dict__["_inner"]
         texts = {
             "title": title,
             "about": [(name, value) for name, value in (about or {}).items()],
@@ -433,25 +389,55 @@ class Reported(Drawn):
             "geometry": None if geometry is None else os.fspath(geometry),
             "reconstruct_force": reconstruct_force,
         }
-        page = inner.page(texts)
+        page = self._compiled.page(texts)
         if path is not None:
             with open(path, "w", encoding="utf-8") as file:
                 file.write(page)
         return page
 
     @property
-    def _page(self) -> str:
-        return self._written()
-
-    @property
     def _record(self) -> str:
         """First record, whose head may contain further details; empty without a record."""
         fields = self._told
-        records = fields.get("records") or fields.get("tests") or [fields]
-        return str(records[0].get("file", ""))
+        first = (fields.get("records") or fields.get("tests") or [fields])[0]
+        return str(first.get("file", "") if isinstance(first, dict) else first)
+
+    def to_html(self) -> str:
+        """Return the figure as an HTML page, which has zoom and cursor and loads no other file.
+
+        Raises
+        ------
+        MechidError
+            If there is nothing to draw.
+        """
+        return self._compiled.html()
+
+    @property
+    def _page(self) -> str:
+        return self._written()
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """Figures of the page of the result by their names, to draw with Matplotlib.
+
+        Raises
+        ------
+        MechidError
+            If there is nothing to draw.
+        """
+        return read_page(self._page)
+
+    def _repr_html_(self) -> str:
+        try:
+            return framed(self.to_html(), str(self))
+        except MechidError:
+            return _text_element(str(self))
+
+    def __str__(self) -> str:
+        return self._compiled.text()
 
 
-class Shaped(Reported):
+class Shaped(Drawn):
     """A result with modes, whose shapes can be drawn on a geometry and written."""
 
     def report(
@@ -1442,7 +1428,7 @@ class Modes(Shaped):
 
 
 @final
-class IdentifiedElements(Reported):
+class IdentifiedElements(Drawn):
     """Identified coefficients of a machine of named elements."""
 
     _inner: _mechid.IdentifiedElements

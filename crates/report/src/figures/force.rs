@@ -19,17 +19,14 @@ pub fn figure(reconstructed: &Reconstructed) -> Figure {
 pub fn figures(reconstructed: &Reconstructed) -> Vec<(String, Figure)> {
     let of_force = |dof: &usize| {
         let figure = Figure::new("").panel(history(reconstructed, *dof));
-        (name(reconstructed, *dof), figure.panel(spectrum(reconstructed, *dof)))
+        (name(reconstructed, *dof).to_owned(), figure.panel(spectrum(reconstructed, *dof)))
     };
     reconstructed.forced().iter().map(of_force).collect()
 }
 
-/// Returns the name of a force: with its number if there are several degrees of freedom.
-fn name(reconstructed: &Reconstructed, dof: usize) -> String {
-    match reconstructed.force().record().channels() {
-        1 => "Force".into(),
-        _ => format!("Force {}", dof + 1),
-    }
+/// Returns the name of a force.
+fn name(reconstructed: &Reconstructed, dof: usize) -> &str {
+    reconstructed.summary().forces.get(dof).map_or("", |row| row.name.as_str())
 }
 
 fn history(reconstructed: &Reconstructed, dof: usize) -> Panel {
@@ -55,7 +52,7 @@ fn spectrum(reconstructed: &Reconstructed, dof: usize) -> Panel {
     let spectrum = reconstructed.force().spectrum();
     let frequencies: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
     let lines: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.line(n, dof).norm()).collect();
-    let label = format!("Amplitude of {}", name(reconstructed, dof).to_lowercase());
+    let label = format!("Amplitude of {}", name(reconstructed, dof));
     let panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear(label, "N"));
     panel.curve(Curve::stems("", &frequencies, &lines).color(Color::VERMILION))
 }

@@ -75,7 +75,8 @@ pub trait ToFigure {
     ) -> Result<String, ReportError> {
         let figure = self.styled_figure(style)?;
         let title = settings.title.clone().unwrap_or_else(|| figure.name().to_owned());
-        figure_page(&title, vec![(String::new(), figure)], None)
+        let settings = PageSettings { title: Some(title), ..settings.clone() };
+        figure_page(vec![(String::new(), figure)], None, &settings)
     }
 }
 
@@ -87,10 +88,12 @@ fn modes_of_result(
     settings: &PageSettings,
 ) -> Result<String, ReportError> {
     let modes = SavedModes::from_result(summary)?;
-    let (shaped, points) = modes.shapes();
-    let shapes = shapes::ModeShapes::from_modes(&shaped, &points, settings.geometry.as_ref());
-    let figure = result.styled_figure(style)?;
-    modes_page(&modes, Some(figure), shapes.as_ref(), settings)
+    let shapes = shapes::ModeShapes::from_saved(&modes, settings.geometry.as_ref());
+    let figure = match result.styled_figure(style) {
+        Err(ReportError::NothingResonates { .. }) => None,
+        figure => Some(figure?),
+    };
+    modes_page(&modes, figure, shapes.as_ref(), settings)
 }
 
 /// Returns measured and identified responses per unit force, a figure for each pair; `None` for

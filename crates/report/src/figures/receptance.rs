@@ -96,8 +96,12 @@ pub fn receptance(
 /// Maximum number of pairs of response and force that a page draws.
 pub const DRAWN_PAIRS: usize = 128;
 
-/// Returns a separate figure for each pair, at most [`DRAWN_PAIRS`] of them, with the coherence of
-/// its response below if there is one. `None` if no line separates the forces.
+/// Maximum ratio of a response per unit force to the largest of all pairs that is a rounding error
+/// of a pair without a response.
+const ROUNDING: f64 = 1e-12;
+
+/// Returns a separate figure for each pair with a response, at most [`DRAWN_PAIRS`] of them, with
+/// the coherence of its response below if there is one. `None` if no line separates the forces.
 ///
 /// # Errors
 /// As [`receptance`].
@@ -108,7 +112,10 @@ pub fn receptance_set(
     style: FigureStyle,
     measured: Option<&ResponseCoherence>,
 ) -> Result<Option<Vec<(String, Figure)>>, ReportError> {
-    let Some(pairs) = pairs(data, system, names, style)? else { return Ok(None) };
+    let Some(mut pairs) = pairs(data, system, names, style)? else { return Ok(None) };
+    let size = |pair: &Pair| pair.measured.largest(style).max(pair.fitted.largest(style));
+    let largest = pairs.iter().map(size).fold(0.0, f64::max);
+    pairs.retain(|pair| size(pair) > ROUNDING * largest);
     let quantity = per_force(style.quantity.unwrap_or(data.measured()));
     let draw = |pair: Pair| {
         let Pair { motion, name, measured: points, fitted, .. } = pair;
@@ -364,5 +371,31 @@ mod tests {
             assert!(curves(&data).is_none());
             assert_eq!(responses("", &data, &machine(), names, style).unwrap().panels().len(), 2);
         }
+    }
+
+    #[test]
+    fn a_pair_whose_response_is_rounding_is_left_out() {
+        let alone = SecondOrderSystem::new(
+            dmatrix![2.0, 0.0; 0.0, 3.0],
+            dmatrix![4.0, 1e-15; 1e-15, 3.0],
+            dmatrix![9000.0, 1e-12; 1e-12, 6000.0],
+        )
+        .unwrap();
+        let driven = record(1, 0.0);
+        let motion = DMatrix::from_fn(driven.len(), 2, |row, dof| {
+            let h = alone.receptance(driven.omega()[row]).unwrap();
+            (h * driven.force().row(row).transpose())[dof]
+        });
+        let (omega, force) = (driven.omega().to_vec(), driven.force().clone());
+        let kind = ResponseQuantity::Displacement;
+        let data = FrequencyData::from_amplitudes(omega, force, motion, kind).unwrap();
+        let names = Names {
+            displacement: &|dof| format!("x{}", dof + 1),
+            force: &|dof| format!("F{}", dof + 1),
+        };
+        let set = receptance_set(&data, &alone, names, FigureStyle::default(), None);
+        let set = set.unwrap().expect("one force acts alone");
+        let drawn: Vec<&str> = set.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(drawn, ["x2 / F2"]);
     }
 }

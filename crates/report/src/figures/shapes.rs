@@ -1,6 +1,7 @@
 //! Mode shapes on the points of a structure: deflected lines and the modal assurance criterion.
 
 use mechid_analysis::modal::ShapedMode;
+use mechid_analysis::modes::SavedModes;
 use mechid_analysis::text::{compact, significant};
 use mechid_io::{Geometry, PointShape};
 use mechid_plot::{DrawnMode, DrawnSet, ShapeDrawing};
@@ -39,6 +40,14 @@ impl ModeShapes {
         let oscillating = modes.iter().filter(|mode| mode.row.oscillates);
         let modes: Vec<PointShape> = oscillating.map(of_mode).collect::<Option<_>>()?;
         (!modes.is_empty() && names.len() > 1).then_some(Self { geometry, modes })
+    }
+
+    /// Takes the shapes of a result at the places of its responses or, if a geometry has these
+    /// instead, at their columns. `None` as of [`from_modes`](Self::from_modes).
+    pub fn from_saved(modes: &SavedModes, geometry: Option<&Geometry>) -> Option<Self> {
+        let (shaped, places) = modes.shapes();
+        Self::from_modes(&shaped, &places, geometry)
+            .or_else(|| Self::from_modes(&shaped, &modes.columns(), geometry))
     }
 
     /// Draws the first mode on the undeformed lines, and small drawings of all modes, for the

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use mechid_plot::Figure;
 use mechid_plot::charts::{FrequencyResponse, Quantity, bode};
+use mechid_plot::{Figure, NEPER};
 use nalgebra::Complex;
 
 use super::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
@@ -70,13 +70,18 @@ impl Trace {
     }
 
     /// Returns the curve with standard errors of its magnitudes, one for each drawn point, in the
-    /// unit of the magnitudes; magnitudes in decibels get none, nor does a curve with an undefined
-    /// error.
+    /// unit of the response; a curve with an undefined error gets none.
     pub fn standard_error(mut self, style: FigureStyle, errors: Vec<f64>) -> Self {
         let is_whole = errors.len() == self.magnitude.len();
-        let is_known = is_whole && errors.iter().all(|error| error.is_finite());
-        if is_known && style.magnitude == MagnitudeScale::Logarithmic {
-            self.standard_error = errors;
+        if is_whole && errors.iter().all(|error| error.is_finite()) {
+            let of_decibels =
+                |(error, level): (f64, &f64)| NEPER * error / 10f64.powf(level / 20.0);
+            self.standard_error = match style.magnitude {
+                MagnitudeScale::Logarithmic => errors,
+                MagnitudeScale::Decibel => {
+                    errors.into_iter().zip(&self.magnitude).map(of_decibels).collect()
+                }
+            };
         }
         self
     }
@@ -122,6 +127,15 @@ impl Trace {
         self
     }
 
+    /// Returns the largest magnitude, in the unit of the response; 0 without points.
+    pub fn largest(&self, style: FigureStyle) -> f64 {
+        let magnitude = |value: &f64| match style.magnitude {
+            MagnitudeScale::Logarithmic => *value,
+            MagnitudeScale::Decibel => 10f64.powf(value / 20.0),
+        };
+        self.magnitude.iter().map(magnitude).fold(0.0, f64::max)
+    }
+
     /// Returns whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.magnitude.is_empty()
@@ -152,5 +166,25 @@ impl FigureStyle {
             .map(|traces| traces.iter().map(Trace::as_response).collect::<Vec<_>>());
         let axes = (self.frequency_axis(usual), self.magnitude_axis(magnitude));
         bode(title, axes.0, axes.1, &measured, &fitted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Judge: 20 log₁₀ of (1 ± 2·1 %) of the magnitude.
+    #[test]
+    fn levels_in_decibels_keep_the_error_of_their_magnitude() {
+        let style = FigureStyle { magnitude: MagnitudeScale::Decibel, ..FigureStyle::default() };
+        let points = [2e-6, 4e-3].map(|size| (1.0, Complex::new(0.0, size)));
+        let trace = Trace::line(style, String::new(), points.into_iter());
+        let trace = trace.standard_error(style, vec![2e-8, 4e-5]);
+        for (level, error) in trace.magnitude.iter().zip(&trace.standard_error) {
+            let upper = level + NEPER * (2.0 * error / NEPER).ln_1p();
+            assert!((upper - level - 20.0 * 1.02f64.log10()).abs() < 1e-12);
+        }
+        assert_eq!(trace.standard_error.len(), 2);
+        assert!((trace.largest(style) - 4e-3).abs() < 1e-15);
     }
 }

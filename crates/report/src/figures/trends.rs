@@ -57,7 +57,7 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
         }
     }
     for change in &series.changes {
-        let label = format!("{}, p = {}", change.kind.name(), significant(change.p_value, 2));
+        let label = format!("{}, p {}", change.kind.name(), change.p());
         panel = panel.reference(Reference::vertical(label, change.at).color(Color::PURPLE));
     }
     panel = panel.reference(Reference::horizontal("median", series.median));

@@ -4,7 +4,7 @@ use maud::{DOCTYPE, html};
 use mechid_plot::{Figure, matrix_of_squares};
 
 use super::figures::{Drawn, drawn_large};
-use super::{figure, figure_script, head};
+use super::{PageSettings, about, figure, figure_script, head, repeat};
 use crate::ReportError;
 use crate::figures::shapes::ModeShapes;
 
@@ -17,29 +17,31 @@ pub(super) const LIKENESS: &str = "Likeness of the mode shapes (modal assurance 
                                    0 for orthogonal ones.";
 
 /// Returns a page of named figures, with a choice if there are several, and of mode shapes if there
-/// are any: HTML that loads no other file and runs only the script of its figures.
+/// are any, with the heading, the details and the command of the settings: HTML that loads no other
+/// file and runs only the script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Plot`] without a figure, or if one cannot be drawn.
 pub fn figure_page(
-    title: &str,
     figures: Vec<(String, Figure)>,
     shapes: Option<&ModeShapes>,
+    settings: &PageSettings,
 ) -> Result<String, ReportError> {
     let figures = figures.into_iter().map(|(name, figure)| (name, figure.titled(""))).collect();
     let mut drawn = vec![drawn_large("figure".into(), figures, String::new())?];
     if let Some(shapes) = shapes {
         drawn.extend(shape_figures(shapes));
     }
-    let title = if title.is_empty() { "Figure" } else { title };
+    let title = settings.title.as_deref().filter(|title| !title.is_empty()).unwrap_or("Figure");
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             (head(title))
             body {
-                header { h1 { (title) } }
+                header { h1 { (title) } (about(&settings.about)) }
                 main {
                     @for one in &drawn { (figure(one)) }
+                    (repeat(settings.command.as_deref()))
                 }
                 (figure_script())
             }

@@ -46,7 +46,7 @@ pub fn elements_page(
         ("response", "Response and fit", response(identified)?),
         ("residual", "Residual", residual(summary)),
     ];
-    Ok(document(&title, &heading, &sections, settings.command.as_deref()))
+    Ok(document(&title, &heading, &sections, settings.command.as_deref(), &files))
 }
 
 fn data(found: &ElementSummary) -> Markup {

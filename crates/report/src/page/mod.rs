@@ -13,7 +13,7 @@ mod trends;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mechid_io::Geometry;
-use mechid_plot::{FIGURE_STYLE, content_policy, script};
+use mechid_plot::{content_policy, figure_style, script};
 
 use mechid_analysis::identify::Identified;
 use mechid_analysis::identify::rows::ModeRow;
@@ -45,7 +45,7 @@ fn head(title: &str) -> Markup {
             meta name="color-scheme" content="light dark";
             meta name="generator" content={ "mechid " (env!("CARGO_PKG_VERSION")) };
             title { (title) }
-            style { (PreEscaped(FIGURE_STYLE)) (PreEscaped(STYLE)) }
+            style { (PreEscaped(figure_style())) (PreEscaped(STYLE)) }
         }
     }
 }
@@ -167,23 +167,28 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
         .zip(bodies)
         .filter_map(|((id, name), body)| Some((id, name, body?)))
         .collect();
-    Ok(document(&contents.title, &heading(contents), &present, contents.command))
+    let summary = contents.review.identified.summary();
+    let files = summary.records.iter().map(|record| record.file.clone());
+    let validation = summary.validation.iter().map(|validation| validation.file.clone());
+    let files: Vec<String> = files.chain(validation).collect();
+    Ok(document(&contents.title, &heading(contents), &present, contents.command, &files))
 }
 
 /// Returns a document with a heading, its sections (identifier, name, body) and the command that
-/// writes it again.
+/// writes it again. It calls the files by their names without folders, except in the command.
 fn document(
     title: &str,
     heading: &Markup,
     present: &[(&str, &str, Markup)],
     command: Option<&str>,
+    files: &[String],
 ) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             (head(title))
             body {
-                (heading)
+                (without_folders(heading, files))
                 nav aria-label="Sections" { ul {
                     @for (id, name, _) in present { li { a href={ "#" (id) } { (name) } } }
                     li { a href="#repeat" { "How to repeat it" } }
@@ -192,7 +197,7 @@ fn document(
                     @for (id, name, body) in present {
                         section id=(id) aria-labelledby={ (id) "-heading" } {
                             h2 id={ (id) "-heading" } { (name) }
-                            (body)
+                            (without_folders(body, files))
                         }
                     }
                     (repeat(command))
@@ -202,6 +207,21 @@ fn document(
         }
     };
     page.into_string() + "\n"
+}
+
+/// Returns a part of a page in which files have no folders; of files with the same name, these
+/// stay.
+fn without_folders(part: &Markup, files: &[String]) -> Markup {
+    let escaped = |text: &str| html! { (text) }.into_string();
+    let is_alone = |file: &&String| {
+        let has_its_name = |other: &String| base_name(other) == base_name(file);
+        files.iter().all(|other| other == *file || !has_its_name(other))
+    };
+    let short = files
+        .iter()
+        .filter(is_alone)
+        .fold(part.0.clone(), |text, file| text.replace(&escaped(file), &escaped(base_name(file))));
+    PreEscaped(short)
 }
 
 /// Returns the name of a file without its folder.
@@ -351,5 +371,21 @@ fn repeat(command: Option<&str>) -> Markup {
                 p { "With mechid " (env!("CARGO_PKG_VERSION")) "." }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_have_no_folders_unless_their_names_are_equal() {
+        let part = html! { p { "a/x & y.csv: late; a/1.csv, b/1.csv: clipped" } };
+        let files = ["a/x & y.csv", "a/1.csv", "b/1.csv"].map(String::from);
+        let short = without_folders(&part, &files).into_string();
+        assert_eq!(short, "<p>x &amp; y.csv: late; a/1.csv, b/1.csv: clipped</p>");
+        // The same file in two records is no other file.
+        let twice = ["a/1.csv", "a/1.csv"].map(String::from);
+        assert!(!without_folders(&part, &twice).into_string().contains("a/1.csv"));
     }
 }

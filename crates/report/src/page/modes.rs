@@ -55,7 +55,8 @@ pub fn modes_page(
     ];
     let present: Vec<_> =
         bodies.into_iter().filter_map(|(id, name, body)| Some((id, name, body?))).collect();
-    Ok(document(&title, &heading, &present, settings.command.as_deref()))
+    let files: Vec<String> = modes.records.iter().map(|record| record.file.clone()).collect();
+    Ok(document(&title, &heading, &present, settings.command.as_deref(), &files))
 }
 
 /// Returns a title with the name of the first file, without its folder.

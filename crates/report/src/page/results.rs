@@ -4,17 +4,20 @@ use maud::{Markup, html};
 use mechid_analysis::bearing::{BearingSummary, BearingTable, CoefficientRow};
 use mechid_analysis::frf::table::{AveragedRecord, Response};
 use mechid_analysis::identify::checks::CheckRow;
-use mechid_analysis::identify::rows::Uncertain;
+use mechid_analysis::identify::nonlinear::NonlinearSummary;
+use mechid_analysis::identify::rows::{ProportionalDamping, Uncertain};
+use mechid_analysis::identify::summary::{FitRow, RecordRow};
 use mechid_analysis::inspect::channel::{Channel, Cut};
 use mechid_analysis::modes::ModeComparison;
 use mechid_analysis::reconstruct::summary::{ForceRow, ForceSummary};
 use mechid_analysis::text::{compact, significant};
 use mechid_analysis::{FrfTable, Identified, IdentifiedResponses, Inspected};
+use mechid_model::ResponseQuantity;
 use mechid_plot::{Figure, matrix_of_squares};
 use mechid_signal::message;
 
 use super::figures::{Drawn, drawn_large};
-use super::sections::{pair, percent};
+use super::sections::{identified_tables, machine_tables, pair, percent, predicted, shapes};
 use super::tables::Table;
 use super::{
     PageSettings, about, base_name, checks, document, figure, names_of, remarks, short_names,
@@ -66,7 +69,7 @@ pub fn result_page(
         sections.push(("numbers", "Numbers", tables));
     }
     sections.push(("drawn", "Figure", html! { div.figures { (figure(&drawn)) } }));
-    Ok(document(&title, &heading, &sections, settings.command.as_deref()))
+    Ok(document(&title, &heading, &sections, settings.command.as_deref(), &words.files))
 }
 
 /// Returns warnings (conspicuous checks, then remarks) and merits.
@@ -108,7 +111,7 @@ pub fn comparison_page(found: &ModeComparison, settings: &PageSettings) -> Strin
         ("numbers", "Numbers", as_text(&found.to_string())),
         ("shapes", "Mode shapes", html! { div.figures { (figure(&drawn)) } }),
     ];
-    document(&title, &heading, &sections, settings.command.as_deref())
+    document(&title, &heading, &sections, settings.command.as_deref(), &found.sets)
 }
 
 /// Returns a text with aligned columns, as a program prints it.
@@ -239,28 +242,22 @@ pub fn force_words(found: &ForceSummary) -> Words {
         "standard error, N"
     };
     let row = |force: &ForceRow| {
-        let number = force.dof.to_string();
+        let name = force.name.clone();
         if !force.sought {
-            return vec![
-                number,
-                "taken as zero".into(),
-                String::new(),
-                String::new(),
-                String::new(),
-            ];
+            return vec![name, "taken as zero".into(), String::new(), String::new(), String::new()];
         }
         let error = force.standard_error.map_or("not known".into(), |error| significant(error, 2));
         let (amplitude, hz) =
             (significant(force.strongest_amplitude, 4), compact(force.strongest_hz, 5));
         let [rms, peak] = [force.rms, force.peak].map(|value| significant(value, 4));
-        vec![number, rms, error, peak, format!("{amplitude} N at {hz} Hz")]
+        vec![name, rms, error, peak, format!("{amplitude} N at {hz} Hz")]
     };
     let header = ["force", "RMS, N", error, "peak, N", "strongest line"];
     let rows = found.forces.iter().map(row).collect();
     let facts = facts_of_force(found);
     Words {
         what: "Force in the record",
-        files: vec![found.file.clone()],
+        files: vec![found.file.clone(), found.machine.clone()],
         subtitle: vec![format!("{samples} at {} Hz", compact(found.sample_rate_hz, 8)), extent],
         warnings: found.remarks.clone(),
         merits: Vec::new(),
@@ -438,17 +435,41 @@ fn tables_of_record(inspected: &Inspected) -> Vec<Markup> {
     tables
 }
 
+/// Returns the quality of a fit.
+fn fit_table(fit: &FitRow, model: &str) -> Markup {
+    Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit.rows(model) }.html()
+}
+
 /// Returns the words on an identified machine.
 pub fn identified_words(identified: &Identified) -> Words {
     let summary = identified.summary();
     let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);
+    let mut tables = identified_tables(summary);
+    let model = if summary.nonlinear.is_some() { "model" } else { "linear model" };
+    tables.push(fit_table(&summary.fit, model));
+    let record = |RecordRow { file, window }: &RecordRow| {
+        let (first, last) = (window.first_sample, window.last_sample);
+        pair(file, format!("samples {first} to {last}, {} Hz", compact(window.sample_rate_hz, 8)))
+    };
+    let rows = summary.records.iter().map(record).collect();
+    let header = ["file", "what was used"];
+    tables.push(Table { caption: "Records", header: &header, numbers_from: 9, rows }.html());
+    tables.extend(summary.validation.as_ref().map(predicted));
+    if summary.unscaled.is_some() {
+        let kind = summary.channels.first_response().unwrap_or(ResponseQuantity::Displacement);
+        tables.push(shapes(&summary.modes, |dof| summary.channels.response_name(kind, dof)));
+    }
+    let nonlinear = summary.nonlinear.as_ref().map(NonlinearSummary::text).unwrap_or_default();
+    if !nonlinear.is_empty() {
+        tables.push(as_text(&nonlinear));
+    }
     Words {
         what: "Identification",
         files: summary.records.iter().map(|record| record.file.clone()).collect(),
         subtitle: vec![summary.estimator.to_owned()],
         warnings,
         merits,
-        tables: vec![as_text(&summary.to_string())],
+        tables,
         caption: "Measured, and computed with the identified machine.".into(),
     }
 }
@@ -457,13 +478,29 @@ pub fn identified_words(identified: &Identified) -> Words {
 pub fn table_words(identified: &IdentifiedResponses) -> Words {
     let summary = identified.summary();
     let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);
+    let factors = summary.proportional_damping.iter().flat_map(ProportionalDamping::rows);
+    let modes = ("Modes", summary.modes.as_slice());
+    let mut tables =
+        machine_tables(&summary.parameters, factors.collect(), modes, summary.confidence);
+    tables.push(fit_table(&summary.fit, "linear model"));
+    if summary.unscaled.is_some() {
+        tables.push(shapes(&summary.modes, |at| summary.points[at].clone()));
+    }
+    let [low, high] =
+        [summary.frequencies.first_hz, summary.frequencies.last_hz].map(|hz| compact(hz, 5));
+    let (points, forces) = (summary.points.join(", "), summary.forces.join(", "));
+    let frequencies = message::count(summary.frequencies.count, "frequency");
     Words {
         what: "Identification",
         files: summary.files.clone(),
-        subtitle: vec![summary.estimator.to_owned()],
+        subtitle: vec![
+            format!("{} at {points} per force at {forces}", summary.quantity),
+            summary.estimator.to_owned(),
+            format!("{frequencies}, {low} to {high} Hz"),
+        ],
         warnings,
         merits,
-        tables: vec![as_text(&identified.to_string())],
+        tables,
         caption: "Measured response per unit force, and that of the identified machine.".into(),
     }
 }

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use maud::{Markup, html};
 use mechid_analysis::Channels;
 use mechid_analysis::identify::checks::When;
-use mechid_analysis::identify::rows::{ModeRow, ParameterRow, Uncertain};
+use mechid_analysis::identify::rows::{ModeRow, ParameterRow, ProportionalDamping, Uncertain};
 use mechid_analysis::identify::summary::IdentificationSummary;
-use mechid_analysis::identify::validation::Share;
+use mechid_analysis::identify::validation::{Share, Validation};
 use mechid_analysis::modal::ShapedMode;
 use mechid_analysis::review::channels::Channel;
 use mechid_analysis::review::excitation::{DROP_DB, Excitation};
@@ -170,11 +170,59 @@ fn excitation_row(e: &Excitation, names: &Channels) -> Vec<String> {
     ]
 }
 
-pub fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
+fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
     let mut row = vec![name];
     row.extend(value.cells());
     row.push(unit.into());
     row
+}
+
+/// Maximum number of parameters in one table; more have a table for each matrix, so that tables
+/// side by side have similar lengths.
+const TOGETHER: usize = 12;
+
+/// Returns the tables of the parameters of a machine and of its modes; `terms` are the rows of
+/// parameters that are not entries of M, C or K.
+pub fn machine_tables(
+    parameters: &[ParameterRow],
+    terms: Vec<Vec<String>>,
+    (modes_of, modes): (&str, &[ShapedMode]),
+    confidence: f64,
+) -> Vec<Markup> {
+    let interval = format!("{} % interval", compact(100.0 * confidence, 3));
+    let table = |caption: &str, what: &str, rows: Vec<Vec<String>>| {
+        let header = [what, "value", "±", &interval, "unit"];
+        Table { caption, header: &header, numbers_from: 1, rows }.html()
+    };
+    let row = |p: &ParameterRow| uncertain(p.name.clone(), &p.estimate, p.unit);
+    let mut groups: Vec<(String, Vec<Vec<String>>)> = vec![("Parameters".into(), Vec::new())];
+    if parameters.len() + terms.len() > TOGETHER {
+        let of_matrix = |rows: &[ParameterRow]| {
+            let matrix = rows.first().map_or("", |row| row.matrix.as_str());
+            (format!("Parameters of {matrix}"), rows.iter().map(row).collect())
+        };
+        groups = parameters.chunk_by(|a, b| a.matrix == b.matrix).map(of_matrix).collect();
+        groups.push(("Further parameters".into(), terms));
+    } else {
+        groups[0].1.extend(parameters.iter().map(row).chain(terms));
+    }
+    let groups = groups.into_iter().filter(|(_, rows)| !rows.is_empty());
+    let mut tables: Vec<Markup> =
+        groups.map(|(caption, rows)| table(&caption, "parameter", rows)).collect();
+    let modes = ModeRow::quantities(&ShapedMode::rows(modes), true).into_iter();
+    let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
+    tables.push(table(modes_of, "mode", modes));
+    tables
+}
+
+/// Returns the tables of parameters and modes of an identification.
+pub fn identified_tables(report: &IdentificationSummary) -> Vec<Markup> {
+    let factors = report.proportional_damping.iter().flat_map(ProportionalDamping::rows);
+    let terms = report.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters);
+    let terms = terms.map(|p| uncertain(p.name.clone(), &p.estimate, &p.unit));
+    let modes_of = if report.nonlinear.is_some() { "Modes of the linear part" } else { "Modes" };
+    let terms = factors.chain(terms).collect();
+    machine_tables(&report.parameters, terms, (modes_of, &report.modes), report.confidence)
 }
 
 /// Returns parameters, matrices, modes and their shapes.
@@ -183,18 +231,7 @@ pub fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
 /// [`ReportError::Analysis`] if the modes cannot be computed.
 pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let report = contents.review.identified.summary();
-    let interval = format!("{} % interval", compact(100.0 * report.confidence, 3));
-    let header = |what| [what, "value", "±", &interval, "unit"];
-    let linear = report.parameters.iter();
-    let terms = report.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters);
-    let parameters = linear
-        .map(|p| uncertain(p.name.clone(), &p.estimate, p.unit))
-        .chain(terms.map(|p| uncertain(p.name.clone(), &p.estimate, &p.unit)))
-        .collect();
-    let modes_of = if report.nonlinear.is_some() { "Modes of the linear part" } else { "Modes" };
     let restoring = figures::restoring(contents.review.identified)?;
-    let modes = ModeRow::quantities(&ShapedMode::rows(&report.modes), true).into_iter();
-    let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
     let matrices = matrices(&report.parameters);
     let dofs = contents.review.identified.estimate().dof();
     let names = &report.channels;
@@ -208,10 +245,7 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         std::iter::once("").chain(numbered.iter().map(String::as_str)).collect();
     Ok(html! {
         div.tables {
-            @if !report.parameters.is_empty() {
-                (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
-            }
-            (Table { caption: modes_of, header: &header("mode"), numbers_from: 1, rows: modes }.html())
+            @for table in identified_tables(report) { (table) }
             (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit_rows(contents) }.html())
         }
         @if dofs > 1 {
@@ -253,7 +287,7 @@ fn matrices(parameters: &[ParameterRow]) -> Vec<(String, Vec<Vec<String>>)> {
 
 /// Returns the shapes of the modes, with modulus and phase of each response; `channel` returns its
 /// name.
-fn shapes(modes: &[ShapedMode], channel: impl Fn(usize) -> String) -> Markup {
+pub fn shapes(modes: &[ShapedMode], channel: impl Fn(usize) -> String) -> Markup {
     let name = |(number, mode): (usize, &ShapedMode)| {
         let [re, im] = mode.eigenvalue;
         format!("mode {number}, {} Hz", significant(re.hypot(im) / TAU, 4))
@@ -360,6 +394,14 @@ fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, R
     })
 }
 
+/// Returns how well each response of a record that was not fitted is predicted.
+pub fn predicted(validation: &Validation) -> Markup {
+    let row = |share: &Share| pair(&share.name, format!("{} %", significant(share.fit_percent, 4)));
+    let rows = validation.channels.iter().map(row).collect();
+    let header = ["motion", "fit"];
+    Table { caption: "What is predicted", header: &header, numbers_from: 1, rows }.html()
+}
+
 /// Returns the section about a record that was not fitted.
 pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError> {
     let identified = contents.review.identified;
@@ -371,8 +413,6 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
         return Ok(None);
     };
     let drawn = figures::validation(source, first)?;
-    let row = |share: &Share| pair(&share.name, format!("{} %", significant(share.fit_percent, 4)));
-    let rows = validation.channels.iter().map(row).collect();
     let (first_sample, last_sample) = (validation.first_sample, validation.last_sample);
     Ok(Some(html! {
         p {
@@ -380,7 +420,7 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
             ", compared with the measured response."
             @if judgement::was_fitted(contents.review) { " Some of these samples were fitted, so agreement proves little." }
         }
-        (Table { caption: "What is predicted", header: &["motion", "fit"], numbers_from: 1, rows }.html())
+        (predicted(validation))
         p.note { "Fit: 100 % minus the ratio of the difference to the motion about its mean, in RMS values; 0 % is no better than the mean." }
         div.figures { (figure(&drawn)) }
     }))
@@ -435,4 +475,39 @@ fn reconstruction_of(
         (Table { caption: &part.period_caption("Computed and measured force"), header: &header, numbers_from: 1, rows }.html())
         div.figures { (figure(&drawn)) }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Entries of M, C and K of a machine.
+    fn entries(dofs: usize) -> Vec<ParameterRow> {
+        let estimate =
+            Uncertain { value: 4e7, standard_error: Some(1e-3), interval: Some([3e7, 5e7]) };
+        let of_matrix = |matrix: &'static str| {
+            (0..dofs * dofs).map(move |at| ParameterRow {
+                name: format!("{matrix} {at}"),
+                matrix: matrix.into(),
+                row: at / dofs + 1,
+                column: at % dofs + 1,
+                unit: "N/m",
+                known: false,
+                estimate,
+            })
+        };
+        ["mass", "damping", "stiffness"].into_iter().flat_map(of_matrix).collect()
+    }
+
+    #[test]
+    fn many_parameters_have_a_table_for_each_matrix() {
+        for (dofs, tables) in [(1, 1), (2, 1), (3, 3)] {
+            let all = machine_tables(&entries(dofs), Vec::new(), ("Modes", &[]), 0.95);
+            assert_eq!(all.len(), tables + 1, "{dofs}");
+            let rows = |table: &Markup| table.0.matches("<tr>").count() - 1;
+            assert!(all.iter().all(|table| rows(table) <= TOGETHER));
+        }
+        let long = &machine_tables(&entries(3), Vec::new(), ("Modes", &[]), 0.95)[2];
+        assert!(long.0.contains("<td class=\"number\">4.0000000000e7</td>"), "{}", long.0);
+    }
 }

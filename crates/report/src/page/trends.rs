@@ -7,16 +7,18 @@ use mechid_plot::Figure;
 
 use super::figures::drawn;
 use super::tables::Table;
-use super::{Drawn, figure, figure_script, head};
+use super::{Drawn, PageSettings, about, figure, figure_script, head, repeat};
 use crate::ReportError;
 use crate::figures::trends::{DRAWN, panel};
 
 /// Returns a page of the results of many records: failures, every quantity over the records, and
-/// outliers; HTML that loads no other file and runs only the script of its figures.
+/// outliers, with the heading, the details and the command of the settings; HTML that loads no
+/// other file and runs only the script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Plot`] if a figure cannot be drawn.
-pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> {
+pub fn trends_page(trends: &Trends, settings: &PageSettings) -> Result<String, ReportError> {
+    let title = settings.title.as_deref().unwrap_or("Trends");
     let figures = figures(trends)?;
     let categories: Vec<String> = trends.series.iter().map(|one| one.category().into()).collect();
     let (quantities, changes) = (quantities(trends), changes(trends));
@@ -28,6 +30,7 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
             body {
                 header {
                     h1 { (title) }
+                    (about(&settings.about))
                     dl.summary {
                         div { dt { "Records" } dd { (trends.records) } }
                         div { dt { "Without a result" } dd { (trends.failed) } }
@@ -65,6 +68,7 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
                             (failures.html())
                         }
                     }
+                    (repeat(settings.command.as_deref()))
                 }
                 (figure_script())
             }
@@ -120,7 +124,7 @@ fn changes(trends: &Trends) -> Table<'static> {
             change.record.clone(),
             significant(change.size, 3),
             series.unit.clone(),
-            significant(change.p_value, 2),
+            change.p().trim_start_matches("= ").to_owned(),
         ]
     });
     Table {
