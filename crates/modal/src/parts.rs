@@ -48,7 +48,7 @@ impl PartsComparison {
         let mut error_scales = vec![None; whole.modes().len()];
         for (mode, at) in of_whole.unwrap_or_default() {
             let pair = pairs.iter().find(|pair| pair.first == at);
-            error_scales[mode] = pair.map(|pair| excess(pair));
+            error_scales[mode] = pair.map(excess);
         }
         Ok(Self { parts: [first, second], pairs, error_scales })
     }
