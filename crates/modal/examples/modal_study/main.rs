@@ -27,7 +27,7 @@ fn main() {
     let wanted = arguments.get(1).cloned().unwrap_or_default();
     let first: u64 = arguments.get(2).and_then(|text| text.parse().ok()).unwrap_or(0);
     println!(
-        "| Test | Records | f hold | ζ hold | Shapes hold | f over bound | ζ over bound | Bias | Modes found | False modes | Refused |\n|---|---|---|---|---|---|---|---|---|---|---|"
+        "| Test | Records | f hold | ζ hold | Shapes hold | f over bound | ζ over bound | Bias | Modes found | False modes |\n|---|---|---|---|---|---|---|---|---|---|"
     );
     let all = ModalSettings::default();
     let points = [(0, 0), (3, 1)].map(|(output, input)| DrivingPoint { output, input });
@@ -82,7 +82,7 @@ fn print_row(name: &str, score: &Score, bound: Option<&Bound>) {
         share => format!("{share:.1}"),
     };
     println!(
-        "| {} | {} | {:.1} | {:.1} | {shapes} | {} | {} | {bias:.2} | {:.2} | {} | {} |",
+        "| {} | {} | {:.1} | {:.1} | {shapes} | {} | {} | {bias:.2} | {:.2} | {} |",
         name.replacen('x', "×", 1),
         score.records,
         score.frequency.coverage(),
@@ -91,6 +91,5 @@ fn print_row(name: &str, score: &Score, bound: Option<&Bound>) {
         ratio(score.damping.deviation(), bound.map(|bound| &bound.damping)),
         score.found_share(),
         score.false_modes,
-        score.refused,
     );
 }

@@ -72,8 +72,6 @@ pub struct Score {
     found: usize,
     wanted: usize,
     pub false_modes: usize,
-    /// Records that were refused.
-    pub refused: usize,
     /// Number of tests of constraints, and of those that reject at 5 %.
     pub tests: [usize; 2],
 }
@@ -94,7 +92,6 @@ impl Score {
             score.records += 1;
             score.wanted += modes.len();
             let Ok(estimate) = identify_modes(&case.lines(seed), settings) else {
-                score.refused += 1;
                 continue;
             };
             for test in estimate.constraint_tests() {
