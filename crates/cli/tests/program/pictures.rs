@@ -321,6 +321,7 @@ fn pages_name_their_command_and_call_files_and_forces_by_their_names() {
         assert!(!above.contains("day/"), "{command}");
         if command.starts_with("force") {
             assert!(above.contains("Amplitude of shaker") && !above.contains("Force 1"));
+            assert!(above.contains("<h1>Force in the record of run.csv</h1>"), "{above}");
         }
     }
 }

@@ -257,7 +257,7 @@ pub fn force_words(found: &ForceSummary) -> Words {
     let facts = facts_of_force(found);
     Words {
         what: "Force in the record",
-        files: vec![found.file.clone(), found.machine.clone()],
+        files: vec![found.file.clone()],
         subtitle: vec![format!("{samples} at {} Hz", compact(found.sample_rate_hz, 8)), extent],
         warnings: found.remarks.clone(),
         merits: Vec::new(),
@@ -273,7 +273,7 @@ pub fn force_words(found: &ForceSummary) -> Words {
 /// Returns machine and method, and how well the force explains the responses.
 fn facts_of_force(found: &ForceSummary) -> Vec<Vec<String>> {
     let mut facts = vec![
-        pair("Machine", &found.machine),
+        pair("Machine", base_name(&found.machine)),
         pair("Method", found.method),
         pair("Reason", &found.why),
     ];
