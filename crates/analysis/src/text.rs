@@ -52,7 +52,7 @@ pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     pages.iter().map(|page| part(page)).collect::<Vec<_>>().join("\n")
 }
 
-/// Exponent of ten from which a number is written in scientific notation.
+/// Smallest exponent of ten that is written in scientific notation.
 const PLAIN: i32 = 6;
 
 /// Formats a number, in any unit, with a number of significant digits; in scientific notation if

@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// Covariance of parameters θ.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Covariance {
-    /// Full matrix, in products of SI units.
+    /// Full matrix, parameters × parameters, in products of SI units.
     Full(DMatrix<f64>),
     /// Factors, for equations that were solved one by one: n equations of 3n unknowns each have
     /// (3n²)² covariances, but these depend on not many more than (3n)² numbers.

@@ -31,8 +31,8 @@ type C = Complex<f64>;
 pub(crate) struct Covariance {
     /// Covariance of the parameters of the search.
     pub(crate) parameters: DMatrix<f64>,
-    /// Degrees of freedom of the noise estimate at each mode: real and imaginary parts in the window
-    /// of a line, or fewer with an unmeasured force.
+    /// Degrees of freedom of the noise estimate at each mode: real and imaginary parts in the
+    /// window of a line, or fewer with an unmeasured force.
     pub(crate) degrees_of_freedom: Vec<usize>,
     /// A⁺ C, the change of the linear unknowns of the modes with the parameters, `2m × parameters`.
     unknowns_by_parameter: DMatrix<f64>,

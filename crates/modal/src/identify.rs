@@ -87,8 +87,8 @@ pub fn identify_modes(
 /// Fits the modes of an estimate to other data of the same structure: a part of the record, or a
 /// record of another day.
 ///
-/// The search starts from the poles of the estimate and has its residual powers; modes that the
-/// data do not determine are left out.
+/// The search starts from the poles of the estimate and has its residual powers; the result has no
+/// modes that the data do not determine.
 ///
 /// # Errors
 /// [`ModalError`] as of [`identify_modes`].

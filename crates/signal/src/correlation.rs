@@ -191,7 +191,7 @@ pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
     (0..=lags).map(at).collect()
 }
 
-/// Returns values minus their mean, divided by a power of two near their peak. One value per
+/// Returns values minus their mean, in units of a power of two near their peak. One value per
 /// sample.
 ///
 /// # Errors

@@ -9,7 +9,7 @@ use super::sources::Recorded;
 use super::summary::ModalCheck;
 use crate::text::significant;
 
-/// What the two halves of a test say of its modes.
+/// Result of the comparison of the two halves of a test.
 pub(super) struct Halves {
     /// Check of their agreement; `None` if they have no common mode.
     pub check: Option<ModalCheck>,

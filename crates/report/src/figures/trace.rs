@@ -71,6 +71,9 @@ impl Trace {
 
     /// Returns the curve with standard errors of its magnitudes, one for each drawn point, in the
     /// unit of the response; a curve with an undefined error gets none.
+    ///
+    /// # Source
+    /// 20 lg(x) has the derivative 20/(x ln 10).
     pub fn standard_error(mut self, style: FigureStyle, errors: Vec<f64>) -> Self {
         let is_whole = errors.len() == self.magnitude.len();
         if is_whole && errors.iter().all(|error| error.is_finite()) {
