@@ -508,6 +508,6 @@ mod tests {
             assert!(all.iter().all(|table| rows(table) <= TOGETHER));
         }
         let long = &machine_tables(&entries(3), Vec::new(), ("Modes", &[]), 0.95)[2];
-        assert!(long.0.contains("<td class=\"number\">4.0000000000e7</td>"), "{}", long.0);
+        assert!(long.0.contains("<td class=\"number\">4.00000000000e7</td>"), "{}", long.0);
     }
 }

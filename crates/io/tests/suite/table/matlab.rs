@@ -47,7 +47,7 @@ fn what_makes_no_channel_is_named_when_it_is_asked_for() {
             ("nothing", "nothing"),
         ] {
             let message = table.column(column).unwrap_err().to_string();
-            assert!(message.contains(&format!("{column}\": it holds {what}, a")), "{message}");
+            assert!(message.contains(&format!("{column}\": it holds {what}, but a")), "{message}");
         }
         let e = table.column("gap").unwrap_err().to_string();
         assert!(e.ends_with("\"gap\": NaN is not a finite number"), "{e}");

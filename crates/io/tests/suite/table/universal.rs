@@ -160,7 +160,7 @@ fn broken_files_are_refused_with_the_line() {
         ),
         (
             with("17    0    0    0 NONE", "a7    0    0    0 NONE", 0),
-            "a.unv, line 21: \"a7\" in columns 1 to 10 is no whole number",
+            "a.unv, line 21: \"a7\" in columns 1 to 10 is not a whole number",
         ),
     ] {
         assert_eq!(Table::parse("a.unv", &bytes).unwrap_err().to_string(), message);
