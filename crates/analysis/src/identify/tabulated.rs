@@ -93,7 +93,7 @@ fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
     if table.functions.iter().any(|f| f.response == force) {
         return "";
     }
-    "; for a reciprocal machine (`structure` symmetric) a row of responses also serves as a column"
+    "; by reciprocity a row of responses also serves as a column (`structure` symmetric)"
 }
 
 /// Returns a table with missing responses replaced by their reciprocal ones, with a remark. Returns

@@ -123,7 +123,11 @@ fn a_record_is_swept_by_taking_fewer_samples() {
     // If a period is no multiple of the factor, the point of this setting says so.
     let uneven = report(&format!("{spectra} --decimate 1,7"));
     let reason = uneven["points"][1]["failure"].as_str().unwrap();
-    assert_eq!(reason, "a period of 240 samples cannot be reduced to every 7th sample");
+    assert_eq!(
+        reason,
+        "a period of 240 samples cannot be reduced to every 7th sample: the ratio must be a whole \
+         number"
+    );
     // Without a reference the report gives standard errors and says that they do not include bias.
     let own = told(&format!("{columns} --decimate 1,2"));
     assert!(own.contains("it does not include bias"), "{own}");
