@@ -160,8 +160,8 @@ impl ModalEstimate {
         if let Some(bad) = scales.iter().find(|scale| !(scale.is_finite() && **scale > 0.0)) {
             return Err(refused(*bad, "positive and finite"));
         }
-        let all = self.modes.iter_mut().zip(&mut self.parameters).zip(scales);
-        for ((mode, parameters), scale) in all {
+        let modes = self.modes.iter_mut().zip(&mut self.parameters);
+        for ((mode, parameters), scale) in modes.zip(scales) {
             *mode = mode.clone().with_error_scale(*scale);
             parameters.covariance *= scale * scale;
         }

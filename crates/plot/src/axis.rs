@@ -4,6 +4,10 @@
 /// times this number is one in decibels.
 pub const NEPER: f64 = 20.0 * std::f64::consts::LOG10_E;
 
+/// Maximum ratio of a value to the largest value of a figure that is a rounding error: logarithmic
+/// axes end there, and responses that are never larger are not drawn.
+pub const ROUNDING: f64 = 1e-12;
+
 /// Division of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {

@@ -57,7 +57,7 @@ mod text;
 mod ticks;
 mod trace;
 
-pub use axis::{Axis, NEPER, Scale};
+pub use axis::{Axis, NEPER, ROUNDING, Scale};
 pub use bitmap::svg_to_png;
 pub use canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 pub use curve::{Curve, Reference};

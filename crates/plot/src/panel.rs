@@ -1,13 +1,9 @@
 //! Panels: a pair of axes with curves and reference lines.
 
-use crate::axis::{Axis, Scale, padded};
+use crate::axis::{Axis, ROUNDING, Scale, padded};
 use crate::curve::{Curve, Kind, Reference};
 use crate::error::PlotError;
 use crate::style::Resolved;
-
-/// Maximum ratio of a value to the largest on the same logarithmic axis that is a rounding error;
-/// the axis ends there.
-const ROUNDING: f64 = 1e-12;
 
 /// Position of the legend of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -8,7 +8,7 @@ use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
 
 use super::averaged::{Sharpened, without_decay};
-use super::checks;
+use super::checks::{self, prediction_checks};
 use super::diagrams::{DiagramData, Forced};
 use super::halves::Halves;
 use super::rows::{dropped, mac, notes, row};
@@ -74,6 +74,8 @@ impl Test {
             share => Some(predicted(&recorded, band_hz, share, settings)?),
         };
         let Recorded { inputs, outputs, driving_points, hits, .. } = recorded;
+        let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
+        checks.extend(prediction_checks(predicted.as_deref().unwrap_or(&[]), &names));
         let context = Context {
             records,
             hits,
@@ -205,7 +207,6 @@ impl Context {
         let explained = estimate.variance_explained();
         let mut rows = self.checks;
         rows.extend(checks::output_checks(&explained, &names));
-        rows.extend(checks::prediction_checks(self.predicted.as_deref().unwrap_or(&[]), &names));
         rows.extend(checks::mode_checks(
             &reported,
             &self.inputs,

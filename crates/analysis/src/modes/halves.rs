@@ -27,7 +27,11 @@ impl Halves {
         estimate: &ModalEstimate,
         settings: &ModalSettings,
     ) -> Self {
-        let what = if recorded.parts.len() == 1 { "the record" } else { "the records" };
+        let what = match recorded.parts.len() {
+            1 => "the record",
+            _ if recorded.hits.is_empty() => "the records",
+            _ => "the hits",
+        };
         let compared = compared(recorded, band_hz, estimate, settings);
         let unknown = || vec![None; estimate.modes().len()];
         let scales = compared.as_ref().map_or_else(unknown, |halves| halves.error_scales.clone());
@@ -52,9 +56,9 @@ fn compared(
 
 /// Returns a note on the modes that are not common to both halves.
 fn undetermined(estimate: &ModalEstimate, scales: &[Option<f64>], what: &str) -> Option<String> {
-    let all = estimate.modes().iter().zip(scales).filter(|(_, scale)| scale.is_none());
+    let missing = estimate.modes().iter().zip(scales).filter(|(_, scale)| scale.is_none());
     let hz = |(mode, _): (&IdentifiedMode, _)| significant(mode.natural_frequency_hz.value, 4);
-    let missing = message::list(all.map(hz), ", ", LISTED);
+    let missing = message::list(missing.map(hz), ", ", LISTED);
     (!missing.is_empty()).then(|| {
         format!(
             "one half of {what} alone does not determine the modes at {missing} Hz, so they could \

@@ -377,4 +377,22 @@ fn modes_predict_a_record_that_was_not_fitted() {
     assert!(same > 0.999 && other < 0.9, "{same} {other}");
     found.add_validation(&[open("hammer-1.csv")]).unwrap();
     assert_eq!(found.summary().variance_predicted, Some(same));
+    assert!(check(&found, "predicted").passed);
+}
+
+/// Two records, each struck at its own point: the halves of the test have one force each.
+#[test]
+fn the_halves_of_a_roving_hammer_test_agree() {
+    let mut settings = ModesSettings {
+        test: ModalTest::Forced { hits: Some(HitRule::default()) },
+        band_hz: Some([2.0, 100.0]),
+        ..ModesSettings::default()
+    };
+    settings.places.forces = vec!["1".into(), "2".into()];
+    let channels = Channels::new("force", Acceleration, "a1");
+    let records = ["hammer-1.csv", "hammer-2.csv"]
+        .map(|file| Measurement::open(hammer(file), &channels).unwrap());
+    let found = mechid_analysis::modes(&records, &settings).unwrap();
+    let halves = check(&found, "halves");
+    assert!(halves.passed && halves.text.contains("of the hits agree"), "{}", halves.text);
 }

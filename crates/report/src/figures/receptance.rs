@@ -7,7 +7,7 @@ use mechid_analysis::review::receptance::ActingAlone;
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::linear_algebra::singular_values;
 use mechid_plot::charts::Quantity;
-use mechid_plot::{Axis, Curve, Figure, Panel};
+use mechid_plot::{Axis, Curve, Figure, Panel, ROUNDING};
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -95,10 +95,6 @@ pub fn receptance(
 
 /// Maximum number of pairs of response and force that a page draws.
 pub const DRAWN_PAIRS: usize = 128;
-
-/// Maximum ratio of a response per unit force to the largest of all pairs that is a rounding error
-/// of a pair without a response.
-const ROUNDING: f64 = 1e-12;
 
 /// Returns a separate figure for each pair with a response, at most [`DRAWN_PAIRS`] of them, with
 /// the coherence of its response below if there is one. `None` if no line separates the forces.
