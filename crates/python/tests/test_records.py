@@ -112,7 +112,7 @@ def test_responses_of_arrays_and_of_a_file_are_one(tmp_path: Path) -> None:
     [
         ({"response": np.ones((3, 2))}, "has not one entry, or one matrix"),
         ({"response": [1.0, 2.0, np.nan]}, "`response` has a value that is not finite"),
-        ({"std_error": [0.1, 0.1]}, "`std_error` of shape"),
+        ({"std_error": [0.1, 0.1]}, "`std_error` has the shape"),
         ({"coherence": np.ones((3, 2))}, "`coherence` of shape"),
         ({"points": ["x", "y"]}, "2 names of points and 1 of forces for 1 × 1"),
     ],

@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import math
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -40,7 +41,7 @@ _CAPTION = re.compile(r"<figcaption>(.*?)</figcaption>", re.DOTALL)
 _ORDERS = (("Receptance", "m/N"), ("Mobility", "m/(s·N)"), ("Accelerance", "m/(s²·N)"))
 
 # A relative error times this number is one in dB.
-NEPER = float(20 * np.log10(np.e))
+NEPER = 20 / math.log(10)
 
 # Number of bytes of single precision with which a list is written.
 _BYTES = {"h": 2, "m": 3, "f": 4}
