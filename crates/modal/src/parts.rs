@@ -1,18 +1,20 @@
 //! Comparison of the modes in two parts of the data.
 
+use mechid_signal::Record;
 use mechid_spectra::LineData;
 
-use crate::compare::{Difference, ModePair, PairingRule, pair_modes};
+use crate::ModalError;
+use crate::ambient::{AmbientError, AmbientEstimate, AmbientMode};
+use crate::compare::{ComparedMode, Difference, ModePair, PairingRule, compare, pair_modes};
 use crate::estimate::ModalEstimate;
 use crate::identify::{ModalSettings, refit_modes};
 use crate::limits::DIFFERENCE_PROBABILITY;
-use crate::{IdentifiedMode, ModalError};
 
 /// Modes of an estimate that were fitted to two parts of its data.
 #[derive(Debug, Clone)]
 pub struct PartsComparison {
-    /// Estimates from both parts.
-    pub parts: [ModalEstimate; 2],
+    /// Modes of both parts.
+    pub parts: [Vec<ComparedMode>; 2],
     /// Pairs of modes of both parts with the tests of their differences.
     pub pairs: Vec<ModePair>,
     /// Factor on the standard errors of each mode of the whole: 1 if the parts agree, otherwise the
@@ -40,25 +42,49 @@ impl PartsComparison {
         settings: &ModalSettings,
     ) -> Result<Self, ModalError> {
         let [first, second] = parts.map(|data| refit_modes(data, whole, settings));
-        let (first, second) = (first?, second?);
-        // The parts have the outputs of the whole, so that shapes can be compared.
-        let pairs = first.changes_to(&second).map_or(Vec::new(), |comparison| comparison.pairs);
-        let of_whole =
-            pair_modes(&whole.compared_modes(), &first.compared_modes(), PairingRule::default());
-        let mut error_scales = vec![None; whole.modes().len()];
-        for (mode, at) in of_whole.unwrap_or_default() {
+        let parts = [first?.compared_modes(), second?.compared_modes()];
+        Ok(Self::from_modes(&whole.compared_modes(), parts))
+    }
+
+    /// Fits the modes of an ambient record to two parts of it and tests the differences of their
+    /// natural frequencies and damping ratios. Modes without an interval in one of the parts are
+    /// not compared.
+    ///
+    /// # Errors
+    /// [`AmbientError`] if a part is too short for the spectrum of the whole.
+    ///
+    /// # Source
+    /// As of [`PartsComparison::new`].
+    pub fn of_ambient(whole: &AmbientEstimate, parts: [&Record; 2]) -> Result<Self, AmbientError> {
+        let [first, second] = parts.map(|record| whole.refitted(record));
+        let known = |modes: Vec<AmbientMode>| {
+            let modes = modes.iter().filter(|mode| mode.has_interval());
+            modes.map(AmbientMode::compared).collect()
+        };
+        let whole: Vec<ComparedMode> = whole.modes.iter().map(AmbientMode::compared).collect();
+        Ok(Self::from_modes(&whole, [known(first?), known(second?)]))
+    }
+
+    /// Compares the modes of two parts with each other and with those of the whole. All have the
+    /// same outputs.
+    fn from_modes(whole: &[ComparedMode], parts: [Vec<ComparedMode>; 2]) -> Self {
+        let [first, second] = &parts;
+        let rule = PairingRule::default();
+        let pairs = compare(first, second, rule).map_or(Vec::new(), |comparison| comparison.pairs);
+        let mut error_scales = vec![None; whole.len()];
+        for (mode, at) in pair_modes(whole, first, rule).unwrap_or_default() {
             let pair = pairs.iter().find(|pair| pair.first == at);
             error_scales[mode] = pair.map(excess);
         }
-        Ok(Self { parts: [first, second], pairs, error_scales })
+        Self { parts, pairs, error_scales }
     }
 
     /// Returns the mode that differs most, in both parts, with its pair; `None` if the parts have
     /// no common mode.
-    pub fn largest_difference(&self) -> Option<([&IdentifiedMode; 2], &ModePair)> {
+    pub fn largest_difference(&self) -> Option<([&ComparedMode; 2], &ModePair)> {
         let pair = self.pairs.iter().min_by(|a, b| p_value(a).total_cmp(&p_value(b)))?;
         let [first, second] = &self.parts;
-        Some(([&first.modes()[pair.first], &second.modes()[pair.second]], pair))
+        Some(([&first[pair.first], &second[pair.second]], pair))
     }
 
     /// Returns whether a mode differs between the parts by more than its errors allow.

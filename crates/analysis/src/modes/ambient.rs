@@ -11,6 +11,7 @@ use mechid_spectra::LineData;
 
 use super::checks;
 use super::diagrams::DiagramData;
+use super::halves::Halves;
 use super::settings::ModesSettings;
 use super::sources::{Output, outputs_of, responses_of};
 use super::summary::{
@@ -54,6 +55,8 @@ pub(super) fn modes(
             exclude_harmonics: without_harmonics,
         },
     )?;
+    let halves = Halves::of_ambient(&record, &estimate);
+    let estimate = estimate.with_error_scales(&halves.error_scales);
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
     let harmonic = |h: &mechid_modal::ambient::Harmonic| HarmonicRow {
@@ -74,8 +77,8 @@ pub(super) fn modes(
         harmonics: estimate.harmonics.iter().map(harmonic).collect(),
         variance_explained: None,
         variance_predicted: None,
-        checks: checks::channel_checks(measurements)?,
-        notes: notes(&estimate),
+        checks: checks::channel_checks(measurements)?.into_iter().chain(halves.check).collect(),
+        notes: notes(&estimate).into_iter().chain(halves.note).collect(),
         diagrams: None,
         model: None,
         analysis: settings.clone(),

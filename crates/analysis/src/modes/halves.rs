@@ -1,8 +1,9 @@
 //! Agreement of the modes in the two halves of a test.
 
-use mechid_modal::compare::ModePair;
-use mechid_modal::{IdentifiedMode, ModalEstimate, ModalSettings, PartsComparison, Uncertain};
-use mechid_signal::message;
+use mechid_modal::ambient::AmbientEstimate;
+use mechid_modal::compare::{ComparedMode, Measured, ModePair};
+use mechid_modal::{ModalEstimate, ModalSettings, PartsComparison};
+use mechid_signal::{Record, message};
 
 use super::forced::LISTED;
 use super::sources::Recorded;
@@ -32,12 +33,30 @@ impl Halves {
             _ if recorded.hits.is_empty() => "the records",
             _ => "the hits",
         };
-        let compared = compared(recorded, band_hz, estimate, settings);
-        let unknown = || vec![None; estimate.modes().len()];
+        let hz = estimate.modes().iter().map(|mode| mode.natural_frequency_hz.value).collect();
+        Self::of(compared(recorded, band_hz, estimate, settings), hz, what)
+    }
+
+    /// Compares the modes of the first and the second half of an ambient record.
+    pub(super) fn of_ambient(record: &Record, estimate: &AmbientEstimate) -> Self {
+        let len = record.len() / 2;
+        let half = |first: usize| record.window(first, len).ok();
+        let compare = |first: &Record, second: &Record| {
+            PartsComparison::of_ambient(estimate, [first, second]).ok()
+        };
+        let compared = half(0).zip(half(len)).and_then(|(first, second)| compare(&first, &second));
+        let hz = estimate.modes.iter().map(|mode| mode.natural_frequency_hz.value).collect();
+        Self::of(compared, hz, "the record")
+    }
+
+    /// Takes the results of a comparison; `natural_hz` has the frequencies of the modes of the
+    /// whole, in Hz.
+    fn of(compared: Option<PartsComparison>, natural_hz: Vec<f64>, what: &str) -> Self {
+        let unknown = || vec![None; natural_hz.len()];
         let scales = compared.as_ref().map_or_else(unknown, |halves| halves.error_scales.clone());
         Self {
             check: compared.as_ref().and_then(|compared| check(compared, what)),
-            note: undetermined(estimate, &scales, what),
+            note: undetermined(&natural_hz, &scales, what),
             error_scales: scales.into_iter().map(|scale| scale.unwrap_or(1.0)).collect(),
         }
     }
@@ -55,10 +74,9 @@ fn compared(
 }
 
 /// Returns a note on the modes that are not common to both halves.
-fn undetermined(estimate: &ModalEstimate, scales: &[Option<f64>], what: &str) -> Option<String> {
-    let missing = estimate.modes().iter().zip(scales).filter(|(_, scale)| scale.is_none());
-    let hz = |(mode, _): (&IdentifiedMode, _)| significant(mode.natural_frequency_hz.value, 4);
-    let missing = message::list(missing.map(hz), ", ", LISTED);
+fn undetermined(natural_hz: &[f64], scales: &[Option<f64>], what: &str) -> Option<String> {
+    let missing = natural_hz.iter().zip(scales).filter(|(_, scale)| scale.is_none());
+    let missing = message::list(missing.map(|(hz, _)| significant(*hz, 4)), ", ", LISTED);
     (!missing.is_empty()).then(|| {
         format!(
             "one half of {what} alone does not determine the modes at {missing} Hz, so they could \
@@ -84,15 +102,17 @@ fn check(compared: &PartsComparison, what: &str) -> Option<ModalCheck> {
 
 /// Returns the largest difference of a mode in words.
 fn difference(
-    [one, two]: [&IdentifiedMode; 2],
+    [one, two]: [&ComparedMode; 2],
     pair: &ModePair,
     compared: &PartsComparison,
     what: &str,
 ) -> String {
-    let uncertain = |value: Uncertain, factor: f64| {
-        let [value, error] = [value.value, value.standard_error].map(|value| factor * value);
+    let uncertain = |measured: Measured, factor: f64| {
+        let [value, error] = [measured.value, measured.standard_error].map(|x| factor * x);
         format!("{} ± {}", significant(value, 6), significant(error, 2))
     };
+    let [damping, damping_of_other] = [one, two]
+        .map(|mode| mode.damping_ratio.map_or(String::new(), |ratio| uncertain(ratio, 100.0)));
     let scales: Vec<f64> = compared.error_scales.iter().copied().flatten().collect();
     let scaled = match scales.iter().copied().fold(1.0, f64::max) {
         1.0 => String::new(),
@@ -105,12 +125,10 @@ fn difference(
     };
     format!(
         "the first and the second half of {what} differ most in one mode: {} and {} Hz, damping \
-         {} and {} %, MAC {} (p = {}): the structure changed or is nonlinear, or the model lacks \
+         {damping} and {damping_of_other} %, MAC {} (p = {}): the structure changed or is nonlinear, or the model lacks \
          something{scaled}",
         uncertain(one.natural_frequency_hz, 1.0),
         uncertain(two.natural_frequency_hz, 1.0),
-        uncertain(one.damping_ratio, 100.0),
-        uncertain(two.damping_ratio, 100.0),
         significant(pair.mac.value, 4),
         significant(compared.p_value(), 2)
     )

@@ -40,8 +40,8 @@ use limits::{DEFAULT_MAX_MODES, MAX_DAMPING, MIN_SHARE, POOLING};
 use lines::BandLines;
 use order::{Chosen, Wanted, choose};
 use prepare::{band_lines, checked_band, subspace_models};
-use result::RecordScale;
-use search::Fit;
+use result::{FittedSpectrum, RecordScale};
+use search::{Effort, Fit, search_pooled};
 
 use crate::stabilisation::Pole;
 
@@ -112,21 +112,39 @@ pub fn identify_ambient(
     if let Some(asked) = settings.modes.filter(|asked| *asked > identified) {
         return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
     }
-    let leakage_share = fitted_leakage(&fit, &band);
-    let scale = RecordScale { span: band.span, scale: &band.scale, leakage_share };
-    let modes = ambient_modes(&fit, &accepted, scale, &sinusoids)?;
+    let fitted_modes = fitted_modes(&fit, &band, &accepted, &sinusoids)?;
     let factor = fit.parameters.factor().select_rows(&accepted);
     Ok(AmbientEstimate {
-        modes,
+        modes: fitted_modes.modes,
         harmonics: sinusoids,
         dropped,
         stabilisation,
         band_hz,
         lines: band.omega.len(),
         log_likelihood: -fit.cost,
-        leakage_share,
+        leakage_share: fitted_modes.leakage_share,
         force_correlation: &factor * factor.transpose(),
+        spectrum: FittedSpectrum {
+            parameters: fit.parameters,
+            scale: band.scale,
+            sound: accepted,
+            excluded_hz,
+        },
     })
+}
+
+impl AmbientEstimate {
+    /// Fits the spectrum again to `record`, a part of the whole, and returns its modes.
+    pub(crate) fn refitted(&self, record: &Record) -> Result<Vec<AmbientMode>, AmbientError> {
+        let FittedSpectrum { parameters, scale, sound, excluded_hz } = &self.spectrum;
+        let record = harmonics::subtracted(record, excluded_hz)?;
+        let band = band_lines(&record, self.band_hz, excluded_hz)?;
+        let start = parameters.with_units(scale, &band.scale);
+        let size = start.layout.len();
+        let failed = AmbientError::Numerics { what: "the spectrum of a part", size };
+        let fit = search_pooled(start, &band, Effort::FULL).ok_or(failed)?;
+        Ok(fitted_modes(&fit, &band, sound, &[])?.modes)
+    }
 }
 
 /// Returns the clusters in the band, the one with the most orders first.
@@ -140,13 +158,23 @@ fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2])
     clusters.into_iter().map(|cluster| cluster.pole.clone()).collect()
 }
 
-fn fitted_leakage(fit: &Fit, band: &BandLines) -> f64 {
+/// Modes of a fit, and the share of leakage that limits their intervals.
+struct FittedModes {
+    modes: Vec<AmbientMode>,
+    leakage_share: f64,
+}
+
+fn fitted_modes(
+    fit: &Fit,
+    band: &BandLines,
+    sound: &[usize],
+    sinusoids: &[Harmonic],
+) -> Result<FittedModes, AmbientError> {
     let terms = fit.parameters.layout.noise_terms;
-    likelihood::leakage_share(
-        &fit.parameters,
-        &band.pooled(&fit.poles(), POOLING, terms),
-        band.span,
-    )
+    let lines = band.pooled(&fit.poles(), POOLING, terms);
+    let leakage_share = likelihood::leakage_share(&fit.parameters, &lines, band.span);
+    let scale = RecordScale { span: band.span, scale: &band.scale, leakage_share };
+    Ok(FittedModes { modes: ambient_modes(fit, sound, scale, sinusoids)?, leakage_share })
 }
 
 fn ambient_modes(

@@ -196,6 +196,22 @@ impl Parameters {
         Self { kernel: self.kernel, layout, values }
     }
 
+    /// Returns the parameters for outputs in other units, which differ from the present ones
+    /// (`from`) by the ratio to `to`.
+    pub fn with_units(&self, from: &[f64], to: &[f64]) -> Self {
+        let mut result = self.clone();
+        for (output, (from, to)) in from.iter().zip(to).enumerate() {
+            let ratio = from / to;
+            for mode in 0..self.layout.modes {
+                let index = self.layout.shape(mode) + output;
+                result.values[index] *= ratio;
+                result.values[index + self.layout.outputs] *= ratio;
+            }
+            result.values[self.layout.noise(0, output)] += 2.0 * ratio.ln();
+        }
+        result
+    }
+
     fn copy_noise(&mut self, from: &Self) {
         let (first, old) = (self.layout.noise(0, 0), from.layout.noise(0, 0));
         for i in 0..self.layout.noise_terms * self.layout.outputs {

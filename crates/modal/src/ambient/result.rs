@@ -6,6 +6,7 @@ use super::harmonics::Harmonic;
 use super::limits::{MAX_LEAKAGE, MIN_DECAY_TIMES};
 use super::parameters::{Parameters, Span};
 use super::search::Fit;
+use crate::compare::{ComparedMode, Measured};
 use crate::indicators::{Indicator, ShapeWithCovariance, mpc_with_error};
 use crate::stabilisation::Stabilisation;
 
@@ -71,6 +72,20 @@ impl ModalValue {
             Uncertainty::Known { standard_error, .. } => Some(standard_error),
             Uncertainty::RecordTooShort { .. } | Uncertainty::Leakage { .. } => None,
         }
+    }
+
+    /// Returns the value with its standard error multiplied by `scale`.
+    fn with_error_scale(mut self, scale: f64) -> Self {
+        if let Uncertainty::Known { standard_error, interval } = &mut self.uncertainty {
+            *standard_error *= scale;
+            *interval = interval.map(|end| self.value * (end / self.value).powf(scale));
+        }
+        self
+    }
+
+    /// Returns the value for a comparison; without a known standard error as an exact one.
+    fn measured(&self) -> Measured {
+        Measured::new(self.value, self.standard_error().unwrap_or(0.0))
     }
 
     /// Returns the interval of 95 %; `None` if it is not known well enough.
@@ -170,9 +185,53 @@ pub struct AmbientEstimate {
     pub leakage_share: f64,
     /// Correlation coefficients of the forces on the modes, modes × modes.
     pub force_correlation: DMatrix<f64>,
+    /// Whole spectrum, to fit it again to a part of the record.
+    pub(super) spectrum: FittedSpectrum,
+}
+
+/// Spectrum that was fitted to a record: its modes and the poles that are not modes.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct FittedSpectrum {
+    pub parameters: Parameters,
+    /// Unit of each output in the parameters.
+    pub scale: Vec<f64>,
+    /// Indices of the poles that are modes.
+    pub sound: Vec<usize>,
+    /// Frequencies of the excluded sinusoids, in Hz.
+    pub excluded_hz: Vec<f64>,
+}
+
+impl AmbientEstimate {
+    /// Returns the same estimate with the standard errors of frequency and damping of each mode
+    /// multiplied by its entry of `scales` (pure numbers ≥ 1): for halves of a record that disagree
+    /// by more than their errors.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227.
+    pub fn with_error_scales(mut self, scales: &[f64]) -> Self {
+        for (mode, scale) in self.modes.iter_mut().zip(scales) {
+            mode.natural_frequency_hz = mode.natural_frequency_hz.with_error_scale(*scale);
+            mode.damping_ratio = mode.damping_ratio.with_error_scale(*scale);
+        }
+        self
+    }
 }
 
 impl AmbientMode {
+    /// Returns whether the intervals of frequency and damping are known.
+    pub(crate) fn has_interval(&self) -> bool {
+        self.natural_frequency_hz.interval().and(self.damping_ratio.interval()).is_some()
+    }
+
+    /// Returns the mode for a comparison.
+    pub(crate) fn compared(&self) -> ComparedMode {
+        ComparedMode {
+            natural_frequency_hz: self.natural_frequency_hz.measured(),
+            damping_ratio: Some(self.damping_ratio.measured()),
+            shape: self.shape.clone(),
+        }
+    }
+
     /// Reads a mode from a fit; `None` if its shape is zero or not finite.
     pub(super) fn new(
         fit: &Fit,

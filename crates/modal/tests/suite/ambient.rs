@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use mechid_modal::PartsComparison;
 use mechid_modal::ambient::harmonics::harmonics;
 use mechid_modal::ambient::{
     AmbientError, AmbientEstimate, AmbientSettings, DropReason, Uncertainty, identify_ambient,
@@ -133,6 +134,60 @@ fn no_resonance_becomes_a_sinusoid() {
             assert!(ratio.ln().abs() < 4.0 * error, "{seed}: {ratio} ± {error}");
         }
     }
+}
+
+fn half(record: &Record, part: usize) -> Record {
+    let len = record.len() / 2;
+    record.window(part * len, len).unwrap()
+}
+
+fn halves(record: &Record, estimate: &AmbientEstimate) -> PartsComparison {
+    PartsComparison::of_ambient(estimate, [&half(record, 0), &half(record, 1)]).unwrap()
+}
+
+#[test]
+fn halves_of_an_unchanged_structure_agree() {
+    let truth = tower();
+    for seed in 0..3 {
+        let record = truth.record(Quantity::Velocity, 25.0, 15_000, 0.05, 60 + seed);
+        let estimate = identified(&record, AmbientSettings::default());
+        let halves = halves(&record, &estimate);
+        assert_eq!(halves.error_scales, [Some(1.0); 4], "{seed}: {}", halves.p_value());
+    }
+}
+
+/// The highest mode is 1 % lower in the second half of the record, as much as half the width of its
+/// resonance; the others do not change.
+#[test]
+fn a_mode_that_changes_has_wider_intervals() {
+    let truth = tower();
+    let mut softer = truth.clone();
+    softer.frequencies_hz[3] *= 0.99;
+    let part = |structure: &Structure, index| {
+        let record = structure.record(Quantity::Velocity, 25.0, 15_000, 0.05, 70);
+        half(&record, index).into_data()
+    };
+    let (before, after) = (part(&truth, 0), part(&softer, 1));
+    let len = before.nrows();
+    let data = DMatrix::from_fn(2 * len, 4, |row, column| {
+        if row < len { before[(row, column)] } else { after[(row - len, column)] }
+    });
+    let record = Record::new(Sampling::from_rate_hz(25.0, 2 * len).unwrap(), data).unwrap();
+    let estimate = identified(&record, AmbientSettings::default());
+    let halves = halves(&record, &estimate);
+    let ([one, two], _) = halves.largest_difference().unwrap();
+    for (mode, hz) in [(one, truth.frequencies_hz[3]), (two, softer.frequencies_hz[3])] {
+        let frequency = mode.natural_frequency_hz;
+        assert!((frequency.value - hz).abs() < 4.0 * frequency.standard_error, "{frequency:?}");
+    }
+    let scales: Vec<f64> = halves.error_scales.iter().map(|scale| scale.unwrap()).collect();
+    assert!(scales[3] > 4.0 && scales[..3] == [1.0; 3], "{scales:?}");
+    let narrow = estimate.modes[3].natural_frequency_hz;
+    let wide = estimate.with_error_scales(&scales).modes[3].natural_frequency_hz;
+    let ratio = wide.standard_error().unwrap() / narrow.standard_error().unwrap();
+    assert!((ratio / scales[3] - 1.0).abs() < 1e-12, "{ratio}");
+    let [low, high] = wide.interval().unwrap();
+    assert!(low < softer.frequencies_hz[3] && truth.frequencies_hz[3] < high, "{low} {high}");
 }
 
 fn with_sinusoid(record: &Record, frequency_hz: f64, amplitude: f64) -> Record {
