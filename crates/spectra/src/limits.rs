@@ -109,6 +109,10 @@ pub(crate) const LINES_PER_ORDER: usize = 8;
 /// Maximum number of bumps on a smooth spectrum.
 pub(crate) const MAX_BUMPS: usize = 24;
 
+/// Smallest part of a bump, relative to the bump, that the polynomial and the other bumps do not
+/// contain; a smaller one is rounding.
+pub(crate) const BUMP_REMAINDER: f64 = 1e-8;
+
 /// Minimum number of complex deviations behind a noise level that is lower than on the neighbouring
 /// lines: a few lines may be low by chance, and would then get all the weight.
 pub(crate) const QUIET_DEVIATIONS: f64 = 12.0;

@@ -4,14 +4,14 @@ mod bump;
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 pub(crate) use self::bump::Bump;
 use self::bump::{most_conspicuous, widths};
 use crate::limits::{
-    END_LEVERAGE, LINES_PER_ORDER, MAX_BUMPS, MAX_ORDER, QUIET_DEVIATIONS, SMOOTH_COMPARED,
-    SMOOTH_FLOOR, SMOOTH_SEARCHED, SMOOTH_STEPS, SMOOTH_TOLERANCE,
+    BUMP_REMAINDER, END_LEVERAGE, LINES_PER_ORDER, MAX_BUMPS, MAX_ORDER, QUIET_DEVIATIONS,
+    SMOOTH_COMPARED, SMOOTH_FLOOR, SMOOTH_SEARCHED, SMOOTH_STEPS, SMOOTH_TOLERANCE,
 };
 
 /// Form of a noise spectrum: the logarithm of the power is a polynomial in the logarithm of the
@@ -94,9 +94,6 @@ pub struct Smooth {
     pub basis: DMatrix<f64>,
     /// Logarithm of the power in the unit of the variances, lines × channels.
     pub log_power: DMatrix<f64>,
-    /// Sum of log p + v/p over lines and channels, with the power p and the sample variance v:
-    /// minus the log likelihood divided by the degrees of freedom.
-    pub(crate) misfit: f64,
     /// Bayesian information criterion of the chosen form.
     pub(crate) cost: f64,
 }
@@ -167,60 +164,119 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let per_term = (nu * lines as f64).max(2.0).ln();
     // This is the logarithm of the number of intervals that are tried.
     let per_place = ((lines * widths(lines).count()).max(2) as f64).ln();
-    let cost = |smooth: &Smooth| {
-        2.0 * nu * smooth.misfit
-            + channels * smooth.form.terms() as f64 * per_term
-            + 2.0 * smooth.form.bumps.len() as f64 * per_place
+    let cost = |trial: &Trial| {
+        2.0 * nu * trial.misfit
+            + channels * trial.form.terms() as f64 * per_term
+            + 2.0 * trial.form.bumps.len() as f64 * per_place
     };
-    let compared = |form: Form| fit_within(SMOOTH_COMPARED, form, omega, variances, nu);
     let of_order = |order: usize| {
-        let mut smooth = compared(Form { order, bumps: Vec::new() });
-        let mut least = cost(&smooth);
-        while smooth.form.bumps.len() < MAX_BUMPS && 4 * (smooth.form.terms() + 1) <= lines {
-            let Some(bump) = most_conspicuous(variances, &smooth.log_power, nu) else { break };
-            let mut form = smooth.form.clone();
-            form.bumps.push(bump);
-            let more = compared(form);
+        let mut trial = Trial::new(order, omega, variances);
+        let mut least = cost(&trial);
+        while trial.form.bumps.len() < MAX_BUMPS && 4 * (trial.form.terms() + 1) <= lines {
+            let more = trial.next_bump(variances, nu).and_then(|bump| trial.with(bump, variances));
+            let Some(more) = more else { break };
             let now = cost(&more);
             if now >= least {
                 break;
             }
-            (smooth, least) = (more, now);
+            (trial, least) = (more, now);
         }
-        (least, smooth)
+        (least, trial.form)
     };
     let orders = (0..=MAX_ORDER.min(lines / LINES_PER_ORDER)).into_par_iter();
-    let of_orders: Vec<(f64, Smooth)> = orders.map(of_order).collect();
+    let of_orders: Vec<(f64, Form)> = orders.map(of_order).collect();
     // The lower of two orders with equal costs is chosen.
     let best = of_orders.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let white = || (f64::INFINITY, Form { order: 0, bumps: Vec::new() });
-    let (cost, form) = best.map_or_else(white, |(cost, smooth)| (cost, smooth.form));
+    let (cost, form) = best.unwrap_or_else(white);
     Smooth { cost, ..fit(form, omega, variances, nu) }
+}
+
+/// Form whose cost is compared with that of others.
+struct Trial {
+    form: Form,
+    /// Orthonormal columns that span all log powers of the form.
+    basis: DMatrix<f64>,
+    /// Most likely log powers, lines × channels.
+    log_power: DMatrix<f64>,
+    /// Sum of log p + v/p over lines and channels, with the power p and the sample variance v:
+    /// minus the log likelihood divided by the degrees of freedom.
+    misfit: f64,
+}
+
+impl Trial {
+    /// Fits a polynomial without bumps.
+    fn new(order: usize, omega: &[f64], variances: &DMatrix<f64>) -> Self {
+        let form = Form { order, bumps: Vec::new() };
+        let basis = form.basis(omega);
+        let initial = DMatrix::from_columns(&initial_log_powers(&basis, variances));
+        Self::fitted(form, basis, initial, variances)
+    }
+
+    /// Returns the fit with one more bump, which begins at this one; `None` if the form already
+    /// contains the bump.
+    fn with(&self, bump: Bump, variances: &DMatrix<f64>) -> Option<Self> {
+        let mut form = self.form.clone();
+        form.bumps.push(bump);
+        let mut column = DVector::from_fn(self.basis.nrows(), |line, _| bump.at(line));
+        let length = column.norm();
+        // The second pass removes what the rounding of the first has left.
+        for _ in 0..2 {
+            column -= &self.basis * self.basis.tr_mul(&column);
+        }
+        let remaining = column.norm();
+        if !(remaining > BUMP_REMAINDER * length) {
+            return None;
+        }
+        let at = self.basis.ncols();
+        let mut basis = self.basis.clone().insert_column(at, 0.0);
+        basis.set_column(at, &(column / remaining));
+        Some(Self::fitted(form, basis, self.log_power.clone(), variances))
+    }
+
+    fn fitted(
+        form: Form,
+        basis: DMatrix<f64>,
+        mut log_power: DMatrix<f64>,
+        variances: &DMatrix<f64>,
+    ) -> Self {
+        let mut misfit = 0.0;
+        for (mut column, channel) in log_power.column_iter_mut().zip(variances.column_iter()) {
+            let (channel, initial) = (channel.into_owned(), column.clone_owned());
+            let (most, least) = most_likely(&basis, &channel, initial, SMOOTH_COMPARED);
+            column.copy_from(&most);
+            misfit += least;
+        }
+        Self { form, basis, log_power, misfit }
+    }
+
+    /// Returns the bump that would raise the likelihood most.
+    fn next_bump(&self, variances: &DMatrix<f64>, nu: f64) -> Option<Bump> {
+        if self.form.bumps.is_empty() {
+            return most_conspicuous(variances, &self.log_power, nu);
+        }
+        let mut filled = self.log_power.clone();
+        for column in 0..filled.ncols() {
+            let mut log_power = filled.column(column).into_owned();
+            fill_notches(&mut log_power, (QUIET_DEVIATIONS / nu) as usize);
+            filled.set_column(column, &log_power);
+        }
+        most_conspicuous(variances, &filled, nu)
+    }
 }
 
 /// Returns the spectrum of a given form.
 pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
-    fit_within(SMOOTH_TOLERANCE, form, omega, variances, nu)
-}
-
-/// Returns the spectrum of a given form, to within a `tolerance` of the log power (RMS).
-fn fit_within(
-    tolerance: f64,
-    form: Form,
-    omega: &[f64],
-    variances: &DMatrix<f64>,
-    nu: f64,
-) -> Smooth {
     let basis = form.basis(omega);
     let mut log_power = variances.clone();
-    let mut misfit = 0.0;
-    for (mut column, channel) in log_power.column_iter_mut().zip(variances.column_iter()) {
-        let (mut log_power, least) = most_likely(&basis, &channel.into_owned(), tolerance);
+    let initial = initial_log_powers(&basis, variances);
+    for (mut column, initial) in log_power.column_iter_mut().zip(initial) {
+        let channel = column.clone_owned();
+        let (mut log_power, _) = most_likely(&basis, &channel, initial, SMOOTH_TOLERANCE);
         if !form.bumps.is_empty() {
             fill_notches(&mut log_power, (QUIET_DEVIATIONS / nu) as usize);
         }
         column.copy_from(&log_power);
-        misfit += least;
     }
     let mut leverage: Vec<f64> = basis.row_iter().map(|row| row.norm_squared()).collect();
     for bump in &form.bumps {
@@ -232,29 +288,38 @@ fn fit_within(
     let ends: Vec<usize> = ends.map(|(line, _)| line).collect();
     if form.order > 0 && !ends.is_empty() {
         let lower = Form { order: form.order - 1, bumps: form.bumps.clone() };
-        let lower = fit_within(tolerance, lower, omega, variances, nu).log_power;
+        let lower = fit(lower, omega, variances, nu).log_power;
         for line in ends {
             for (own, lower) in log_power.row_mut(line).iter_mut().zip(lower.row(line).iter()) {
                 *own = own.max(*lower);
             }
         }
     }
-    Smooth { form, basis, log_power, misfit, cost: f64::INFINITY }
+    Smooth { form, basis, log_power, cost: f64::INFINITY }
 }
 
-/// Returns the maximum-likelihood log power log p in a basis, for the sample variances v of a
-/// channel, and Σ log p + v/p.
+/// Returns log powers of each channel in a basis near the logarithms of the sample variances.
+fn initial_log_powers(basis: &DMatrix<f64>, variances: &DMatrix<f64>) -> Vec<DVector<f64>> {
+    let initial = |variances: DVectorView<'_, f64>| {
+        let floor = (SMOOTH_FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
+        let logarithms = variances.map(|v| v.max(floor).ln());
+        let mut log_power = basis * basis.tr_mul(&logarithms);
+        // The likelihood determines the level directly.
+        let level = variances.zip_map(&log_power, |v, log| v * (-log).exp()).mean();
+        log_power.add_scalar_mut(level.max(f64::MIN_POSITIVE).ln());
+        log_power
+    };
+    variances.column_iter().map(initial).collect()
+}
+
+/// Returns the maximum-likelihood log power log p in a basis, to within a `tolerance` (RMS), for
+/// the sample variances v of a channel, and Σ log p + v/p.
 fn most_likely(
     basis: &DMatrix<f64>,
     variances: &DVector<f64>,
+    mut log_power: DVector<f64>,
     tolerance: f64,
 ) -> (DVector<f64>, f64) {
-    let floor = (SMOOTH_FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
-    let logarithms = variances.map(|v| v.max(floor).ln());
-    let mut log_power = basis * basis.tr_mul(&logarithms);
-    // The likelihood determines the level directly.
-    let level = variances.zip_map(&log_power, |v, log| v * (-log).exp()).mean();
-    log_power.add_scalar_mut(level.max(f64::MIN_POSITIVE).ln());
     let mut ratio = DVector::zeros(variances.len());
     let mut misfit = deviance(&log_power, variances, &mut ratio);
     let tolerance = tolerance * (variances.len() as f64).sqrt();
