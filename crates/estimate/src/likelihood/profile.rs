@@ -5,11 +5,13 @@ use super::limits::STEPS;
 use super::response_model::ResponseModel;
 use super::search::{Bounds, minimise};
 
-/// Maximum number of doublings of the distance in the search for the limit of an interval.
-const DOUBLINGS: usize = 24;
-/// Maximum number of bisections for the limit of an interval.
-const HALVINGS: usize = 20;
-/// Relative deviation from the required rise of the sum of squares that ends the bisection.
+/// Maximum number of steps away from the estimate until the sum of squares has risen enough.
+const OUTWARD_STEPS: usize = 24;
+/// Smallest and largest factor from one distance to the next on the way out.
+const OUTWARD: [f64; 2] = [1.5, 8.0];
+/// Maximum number of steps between two sides of the limit.
+const INWARD_STEPS: usize = 20;
+/// Relative deviation from the required rise of the sum of squares that ends the search.
 const TOLERANCE: f64 = 1e-3;
 
 /// Returns the limit of an interval of a parameter below (`direction` −1) or above (+1) its
@@ -31,40 +33,56 @@ pub(super) fn end<M: ResponseModel>(
     let bounds = &fit.space.bounds;
     let limit = if direction < 0.0 { bounds.min[parameter] } else { bounds.max[parameter] };
     let mut from = fit.minimum.parameters.clone();
-    let mut excess = |value: f64| -> Option<f64> {
+    // The square root of the rise is about linear in the distance from the estimate. It is infinite
+    // where the response does not exist, because the likelihood is zero there.
+    let needed = rise.sqrt();
+    let mut root_of_rise = |value: f64| -> f64 {
         let mut fixed: Bounds = bounds.clone();
         (fixed.min[parameter], fixed.max[parameter]) = (value, value);
         from[parameter] = value;
-        let minimum = minimise(&fit.residual(), &fixed, &from, STEPS)?;
-        let excess = minimum.cost - fit.minimum.cost - rise;
+        let Some(minimum) = minimise(&fit.residual(), &fixed, &from, STEPS) else {
+            return f64::INFINITY;
+        };
         from = minimum.parameters;
-        Some(excess)
+        (minimum.cost - fit.minimum.cost).max(0.0).sqrt()
     };
-    let (mut inside, mut step) = (estimate, first.abs().max(f64::MIN_POSITIVE));
-    let mut outside = None;
-    for _ in 0..DOUBLINGS {
+    let found = |root: f64| (root * root - rise).abs() <= TOLERANCE * rise;
+    let (mut inside, mut outside) = ((estimate, 0.0), None);
+    let mut step = first.abs().max(f64::MIN_POSITIVE);
+    for _ in 0..OUTWARD_STEPS {
         let value = estimate + direction * step;
         let beyond = if direction < 0.0 { value <= limit } else { value >= limit };
         let value = if beyond { limit } else { value };
-        match excess(value) {
-            Some(excess) if excess < 0.0 && beyond => return limit,
-            Some(excess) if excess < 0.0 => inside = value,
-            // The likelihood is zero if the response does not exist.
-            _ => {
-                outside = Some(value);
-                break;
-            }
+        let root = root_of_rise(value);
+        if found(root) {
+            return value;
         }
-        step *= 2.0;
+        if root >= needed {
+            outside = Some((value, root));
+            break;
+        }
+        if beyond {
+            return limit;
+        }
+        inside = (value, root);
+        step *= (1.1 * needed / root).clamp(OUTWARD[0], OUTWARD[1]);
     }
     let Some(mut outside) = outside else { return direction * f64::INFINITY };
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (inside + outside);
-        match excess(middle) {
-            Some(excess) if excess.abs() <= TOLERANCE * rise => return middle,
-            Some(excess) if excess < 0.0 => inside = middle,
-            _ => outside = middle,
+    for at in 0..INWARD_STEPS {
+        let ((low, low_root), (high, high_root)) = (inside, outside);
+        let share = (needed - low_root) / (high_root - low_root);
+        // Every other step halves the bracket, in case that the secant hardly shortens it.
+        let share = if at % 2 == 0 && share > 0.0 { share } else { 0.5 };
+        let value = low + share * (high - low);
+        let root = root_of_rise(value);
+        if found(root) {
+            return value;
+        }
+        if root < needed {
+            inside = (value, root);
+        } else {
+            outside = (value, root);
         }
     }
-    0.5 * (inside + outside)
+    0.5 * (inside.0 + outside.0)
 }

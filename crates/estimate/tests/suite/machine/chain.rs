@@ -8,6 +8,7 @@ use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machi
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
 
 use super::generator::{measured, random_phases, responses};
 use super::judge::judge;
@@ -106,10 +107,13 @@ pub fn fit_with_prior(seed: u64, away: f64) -> Option<LikelihoodEstimate> {
 
 #[test]
 fn a_bound_is_active_in_half_of_the_experiments() {
-    let judged = judge(&truth_with_bound(), 20, fit_with_bound);
+    let estimates: Vec<_> = (0..20).into_par_iter().map(fit_with_bound).collect();
+    let judged = judge(&truth_with_bound(), 20, |seed| estimates[seed as usize].clone());
     assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
-    let is_active = |seed| fit_with_bound(seed).unwrap().parameter("absent").unwrap().at_bound;
-    let active = (0..20).filter(|seed| is_active(*seed)).count();
+    let is_active = |estimate: &Option<LikelihoodEstimate>| {
+        estimate.as_ref().unwrap().parameter("absent").unwrap().at_bound
+    };
+    let active = estimates.iter().filter(|estimate| is_active(estimate)).count();
     // Of 20 experiments, fewer than 4 or more than 16 are active with a probability of 0.003.
     assert!((4..=16).contains(&active), "{active}");
 }
