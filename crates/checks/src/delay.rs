@@ -47,14 +47,18 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
     let driven = driven(&data.force().map(|f| f.norm()));
     let equations = DelayedForce::new(data, unknowns, &driven)?;
     let undelayed = equations.residual_power(0.0)?;
-    let delay = delay_of_equations(&equations, dt, &driven)?;
-    let power = equations.residual_power(delay * dt)?;
+    let (delay, power) = delay_of_equations(&equations, dt, &driven)?;
     finding(delay, dt, [undelayed, power], 2 * data.len(), unknowns)
         .filter(|_| is_delayed(data, delay * dt, unknowns))
 }
 
-/// Returns the delay, in samples, with which the equations of motion fit best.
-fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -> Option<f64> {
+/// Returns the delay, in samples, with which the equations of motion fit best, and their residual
+/// power with it.
+fn delay_of_equations(
+    equations: &DelayedForce<'_>,
+    dt: f64,
+    driven: &[usize],
+) -> Option<(f64, f64)> {
     let power = |samples: f64| equations.residual_power(samples * dt);
     let undelayed = power(0.0)?;
     let samples = |step: isize| step as f64 / STEPS_PER_SAMPLE as f64;
@@ -65,7 +69,8 @@ fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -
         let third = (high - low) / 3.0;
         if power(low + third)? < power(high - third)? { high -= third } else { low += third }
     }
-    Some(0.5 * (low + high))
+    let delay = 0.5 * (low + high);
+    Some((delay, power(delay)?))
 }
 
 /// Finds a delay of the responses of open records ([`Finding::Delay`]) that explains the residual
@@ -78,8 +83,8 @@ fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -
 /// The transients are estimated again for each delay; otherwise they would absorb a part of it.
 ///
 /// # Source
-/// Ours: equations of motion under Hann's window with the force times e^(−iωτ), then maximum
-/// likelihood.
+/// Ours: equations of motion, with and without Hann's window, with the force times e^(−iωτ), then
+/// maximum likelihood.
 pub fn delay_of_open_records(
     records: &[FrequencyData],
     dt: f64,
@@ -94,7 +99,7 @@ pub fn delay_of_open_records(
         .ok()?;
     let mut likelihood = DelayedOpenRecord::from_fit(&joined, unknowns, fit)?;
     let undelayed = likelihood.cost(0.0)?;
-    let near = delay_under_window(&joined, dt, unknowns, &fit.estimate).unwrap_or(0.0);
+    let near = delay_of_either_window(&joined, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     if near.abs() > DELAY_NEAR {
         likelihood.search(near * dt)?;
     }
@@ -144,25 +149,29 @@ fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Optio
     Some(correlations.all(|finding| finding.verdict() == Verdict::Good))
 }
 
-/// Returns the delay, in samples, that fits the equations of motion under Hann's window best, each
-/// line weighted by the dynamic stiffness of the estimate without a delay.
-fn delay_under_window(
+/// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the
+/// dynamic stiffness of the estimate without a delay: under Hann's window, which reduces the
+/// leakage of a lasting force, or without a window, which would weight a hit otherwise than its
+/// response.
+fn delay_of_either_window(
     data: &FrequencyData,
     dt: f64,
     unknowns: &Unknowns,
     estimate: &Estimate,
 ) -> Option<f64> {
-    delay_weighted(&data.under_hann_window(), dt, unknowns, estimate)
+    let of = |data: &FrequencyData| delay_weighted(data, dt, unknowns, estimate);
+    let found = of(&data.under_hann_window()).into_iter().chain(of(data));
+    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(delay, _)| delay)
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the
-/// dynamic stiffness of the estimate without a delay.
+/// dynamic stiffness of the estimate without a delay, and their residual power with it.
 fn delay_weighted(
     data: &FrequencyData,
     dt: f64,
     unknowns: &Unknowns,
     estimate: &Estimate,
-) -> Option<f64> {
+) -> Option<(f64, f64)> {
     let system = estimate.system().ok()?;
     let weight = |omega: &f64| {
         let unit = data.measured().per_displacement(*omega).norm();
@@ -187,7 +196,7 @@ pub fn delay_of_responses(
 ) -> Option<f64> {
     // The sampling interval with the highest line as Nyquist frequency.
     let dt = PI / data.omega().iter().copied().fold(0.0, f64::max);
-    Some(dt * delay_weighted(data, dt, unknowns, estimate)?)
+    Some(dt * delay_weighted(data, dt, unknowns, estimate)?.0)
 }
 
 /// Returns whether maximum likelihood, too, fits far better with the delay (s); true if it fails.

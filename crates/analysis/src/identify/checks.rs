@@ -186,6 +186,12 @@ impl CheckRow {
         self.verdict == Verdict::Bad
     }
 
+    /// Returns whether another record has the same kind of finding.
+    pub(crate) fn is_of_other_record(&self, other: &Self) -> bool {
+        let kind = |row: &Self| (row.subject, std::mem::discriminant(&row.finding));
+        self.record != other.record && kind(self) == kind(other)
+    }
+
     /// Returns the sentence of the finding, preceded by the name of its record.
     pub fn sentence(&self) -> String {
         match &self.record {

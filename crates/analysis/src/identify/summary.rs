@@ -361,8 +361,16 @@ pub(crate) fn verdict(checks: &[CheckRow]) -> String {
         0 => format!("{total} of {} passed\n", message::count(total, "check")),
         some => format!("{some} of {}: warning\n", message::count(total, "check")),
     };
-    for check in warnings {
-        text += &format!("  {}: {}\n", check.subject, check.sentence());
+    for (at, check) in warnings.iter().enumerate() {
+        let is_alike = |other: &&&CheckRow| check.is_of_other_record(other);
+        if warnings[..at].iter().any(|other| is_alike(&other)) {
+            continue;
+        }
+        let more = match warnings[at + 1..].iter().filter(is_alike).count() {
+            0 => String::new(),
+            more => format!(" (likewise in {} more)", message::count(more, "record")),
+        };
+        text += &format!("  {}: {}{more}\n", check.subject, check.sentence());
     }
     text
 }

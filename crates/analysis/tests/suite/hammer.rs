@@ -5,11 +5,12 @@ use mechid_analysis::{
     AnalysisError, Channels, FrfSettings, HitRule, Identified, Identify, IdentifyResponses,
     Measurement, ResponseQuantity, frf, frf_of_records, identify, identify_responses,
 };
+use mechid_checks::Subject;
 use mechid_io::FrequencyResponses;
 use mechid_model::Sdof;
 use mechid_problems::{HammerRecord, HammerTest, exact_harmonic_periodic};
 use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, Window, noise};
-use nalgebra::{Complex, dmatrix};
+use nalgebra::{Complex, DMatrix, dmatrix};
 use rayon::prelude::*;
 
 const ACCELERATION: ResponseQuantity = ResponseQuantity::Acceleration;
@@ -110,6 +111,43 @@ fn a_column_that_shows_noise_alone_is_no_second_hammer() {
 
 /// At least 85 % of 72 or of 36 intervals of 95 % must contain the true value; groups of twelve are
 /// correlated. The damping ratios scatter by some thousandths.
+/// Responses that come late or early by whole samples, as from a converter that scans its channels.
+#[test]
+fn a_late_response_to_hits_is_told_by_its_delay() {
+    for (late, seed) in [(0_isize, 2), (3, 0), (1, 1), (-2, 0)] {
+        let rig = rig(ACCELERATION);
+        let tests: Vec<Measurement> = (0..2)
+            .map(|dof| {
+                let record = rig.measure(dof, 0, 2 * seed + dof as u64).unwrap();
+                let all = record.response.data();
+                let data = DMatrix::from_fn(all.nrows(), all.ncols(), |row, column| {
+                    row.checked_add_signed(-late)
+                        .and_then(|at| all.get((at, column)))
+                        .copied()
+                        .unwrap_or(0.0)
+                });
+                let response = Record::new(record.response.sampling(), data).unwrap();
+                let level = NoiseLevel::StandardDeviation(0.05);
+                let response = noise::add_white(&response, level, 90 + seed).unwrap();
+                measured(&rig, &HammerRecord { response, ..record }, dof)
+            })
+            .collect();
+        let found = identify(&tests, &settings()).unwrap();
+        let checks = found.summary().checks.iter();
+        let delays: Vec<f64> = checks
+            .filter(|check| check.subject == Subject::Delay)
+            .filter_map(|check| check.value)
+            .collect();
+        match late {
+            0 => assert!(delays.is_empty(), "{delays:?}"),
+            _ => assert!(
+                matches!(delays[..], [samples] if (samples - late as f64).abs() < 0.05),
+                "{late}: {delays:?}"
+            ),
+        }
+    }
+}
+
 #[test]
 fn a_roving_hammer_finds_the_machine() {
     for (quantity, runs) in [(ACCELERATION, 6), (ResponseQuantity::Displacement, 3)] {
