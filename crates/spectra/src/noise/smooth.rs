@@ -225,7 +225,7 @@ impl Trial {
             column -= &self.basis * self.basis.tr_mul(&column);
         }
         let remaining = column.norm();
-        if !(remaining > BUMP_REMAINDER * length) {
+        if remaining.is_nan() || remaining <= BUMP_REMAINDER * length {
             return None;
         }
         let at = self.basis.ncols();
