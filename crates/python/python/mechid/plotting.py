@@ -240,7 +240,8 @@ def force(found: Reconstructed, dof: int = 1, *, ax: Axes | None = None) -> Axes
     KeyError
         If no force was reconstructed there.
     """
-    label = dict(enumerate((row["name"] for row in found.to_dict()["forces"]), start=1)).get(dof)
+    labels = [str(row["name"]) for row in found.to_dict()["forces"]]
+    label = labels[dof - 1] if 1 <= dof <= len(labels) else ""
     figure = found.figures["figure"]
     for member in range(1, len(figure.members) + 1):
         if isinstance(figure, Chart) and label in (panel.y.label for panel in figure.panels(member)):
