@@ -159,9 +159,9 @@ fn delay_of_either_window(
     unknowns: &Unknowns,
     estimate: &Estimate,
 ) -> Option<f64> {
-    let of = |data: &FrequencyData| delay_weighted(data, dt, unknowns, estimate);
-    let found = of(&data.under_hann_window()).into_iter().chain(of(data));
-    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(delay, _)| delay)
+    let best = |data: &FrequencyData| delay_weighted(data, dt, unknowns, estimate);
+    let candidates = best(&data.under_hann_window()).into_iter().chain(best(data));
+    candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(delay, _)| delay)
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the

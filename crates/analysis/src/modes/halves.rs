@@ -34,7 +34,7 @@ impl Halves {
             _ => "the hits",
         };
         let hz = estimate.modes().iter().map(|mode| mode.natural_frequency_hz.value).collect();
-        Self::of(compared(recorded, band_hz, estimate, settings), hz, what)
+        Self::from_comparison(compared(recorded, band_hz, estimate, settings), hz, what)
     }
 
     /// Compares the modes of the first and the second half of an ambient record.
@@ -46,12 +46,16 @@ impl Halves {
         };
         let compared = half(0).zip(half(len)).and_then(|(first, second)| compare(&first, &second));
         let hz = estimate.modes.iter().map(|mode| mode.natural_frequency_hz.value).collect();
-        Self::of(compared, hz, "the record")
+        Self::from_comparison(compared, hz, "the record")
     }
 
     /// Takes the results of a comparison; `natural_hz` has the frequencies of the modes of the
     /// whole, in Hz.
-    fn of(compared: Option<PartsComparison>, natural_hz: Vec<f64>, what: &str) -> Self {
+    fn from_comparison(
+        compared: Option<PartsComparison>,
+        natural_hz: Vec<f64>,
+        what: &str,
+    ) -> Self {
         let unknown = || vec![None; natural_hz.len()];
         let scales = compared.as_ref().map_or_else(unknown, |halves| halves.error_scales.clone());
         Self {

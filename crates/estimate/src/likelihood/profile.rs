@@ -46,7 +46,7 @@ pub(super) fn end<M: ResponseModel>(
         from = minimum.parameters;
         (minimum.cost - fit.minimum.cost).max(0.0).sqrt()
     };
-    let found = |root: f64| (root * root - rise).abs() <= TOLERANCE * rise;
+    let is_limit = |root: f64| (root * root - rise).abs() <= TOLERANCE * rise;
     let (mut inside, mut outside) = ((estimate, 0.0), None);
     let mut step = first.abs().max(f64::MIN_POSITIVE);
     for _ in 0..OUTWARD_STEPS {
@@ -54,7 +54,7 @@ pub(super) fn end<M: ResponseModel>(
         let beyond = if direction < 0.0 { value <= limit } else { value >= limit };
         let value = if beyond { limit } else { value };
         let root = root_of_rise(value);
-        if found(root) {
+        if is_limit(root) {
             return value;
         }
         if root >= needed {
@@ -75,7 +75,7 @@ pub(super) fn end<M: ResponseModel>(
         let share = if at % 2 == 0 && share > 0.0 { share } else { 0.5 };
         let value = low + share * (high - low);
         let root = root_of_rise(value);
-        if found(root) {
+        if is_limit(root) {
             return value;
         }
         if root < needed {
