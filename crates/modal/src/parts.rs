@@ -54,7 +54,7 @@ impl PartsComparison {
     /// [`AmbientError`] if a part is too short for the spectrum of the whole.
     ///
     /// # Source
-    /// As of [`PartsComparison::new`].
+    /// As [`PartsComparison::new`].
     pub fn of_ambient(whole: &AmbientEstimate, parts: [&Record; 2]) -> Result<Self, AmbientError> {
         let [first, second] = parts.map(|record| whole.refitted(record));
         let known = |modes: Vec<AmbientMode>| {

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use mechid_modal::ambient::{
-    AmbientEstimate, AmbientMode, AmbientSettings, DropReason, DroppedCandidate, ModalValue,
-    identify_ambient,
+    AmbientEstimate, AmbientMode, AmbientSettings, DropReason, DroppedCandidate, Harmonic,
+    ModalValue, identify_ambient,
 };
 use mechid_modal::indicators;
 use mechid_spectra::LineData;
@@ -59,10 +59,6 @@ pub(super) fn modes(
     let estimate = estimate.with_error_scales(&halves.error_scales);
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
-    let harmonic = |h: &mechid_modal::ambient::Harmonic| HarmonicRow {
-        frequency_hz: h.frequency_hz,
-        p_value: h.p_value,
-    };
     let summary = ModesSummary {
         records: vec![RecordRow::from_block(&block)],
         hits: Vec::new(),
@@ -74,7 +70,7 @@ pub(super) fn modes(
         modes: estimate.modes.iter().map(row).collect(),
         mac: shapes.iter().map(|a| mac(a)).collect(),
         dropped: estimate.dropped.iter().map(dropped).collect(),
-        harmonics: estimate.harmonics.iter().map(harmonic).collect(),
+        harmonics: estimate.harmonics.iter().map(harmonic_row).collect(),
         variance_explained: None,
         variance_predicted: None,
         checks: checks::channel_checks(measurements)?.into_iter().chain(halves.check).collect(),
@@ -86,6 +82,10 @@ pub(super) fn modes(
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
     let source = DiagramData::Ambient(estimate.stabilisation);
     Ok(Modes { summary, spectrum: spectrum(&data), source })
+}
+
+fn harmonic_row(harmonic: &Harmonic) -> HarmonicRow {
+    HarmonicRow { frequency_hz: harmonic.frequency_hz, p_value: harmonic.p_value }
 }
 
 fn output_row(output: Output) -> OutputRow {

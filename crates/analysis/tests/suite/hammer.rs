@@ -109,8 +109,6 @@ fn a_column_that_shows_noise_alone_is_no_second_hammer() {
     }
 }
 
-/// At least 85 % of 72 or of 36 intervals of 95 % must contain the true value; groups of twelve are
-/// correlated. The damping ratios scatter by some thousandths.
 /// Responses that come late or early by whole samples, as from a converter that scans its channels.
 #[test]
 fn a_late_response_to_hits_is_told_by_its_delay() {
@@ -138,6 +136,13 @@ fn a_late_response_to_hits_is_told_by_its_delay() {
             .filter(|check| check.subject == Subject::Delay)
             .filter_map(|check| check.value)
             .collect();
+        // The hits have the same kinds of findings, which the text states once.
+        let warnings = found.summary().checks.iter().filter(|check| check.is_conspicuous());
+        let whiteness = warnings.filter(|check| check.subject == Subject::Whiteness).count();
+        let text = found.to_string();
+        let lines = text.lines().filter(|line| line.starts_with("  whiteness: ")).count();
+        assert_eq!(whiteness > lines, late != 0, "{whiteness} {lines}");
+        assert_eq!(text.contains(" (likewise in "), late != 0, "{text}");
         match late {
             0 => assert!(delays.is_empty(), "{delays:?}"),
             _ => assert!(
@@ -148,6 +153,8 @@ fn a_late_response_to_hits_is_told_by_its_delay() {
     }
 }
 
+/// At least 85 % of 72 or of 36 intervals of 95 % must contain the true value; groups of twelve are
+/// correlated. The damping ratios scatter by some thousandths.
 #[test]
 fn a_roving_hammer_finds_the_machine() {
     for (quantity, runs) in [(ACCELERATION, 6), (ResponseQuantity::Displacement, 3)] {

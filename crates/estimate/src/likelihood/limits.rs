@@ -28,6 +28,24 @@ pub(super) const FIRST_STEPS: usize = 40;
 /// Maximum number of steps of a search.
 pub(super) const STEPS: usize = 200;
 
+/// Maximum number of steps away from the estimate until the profile of the likelihood has fallen
+/// enough for the limit of an interval.
+pub(super) const PROFILE_STEPS: usize = 24;
+
+/// Smallest and largest factor from one distance to the next on the way to that limit.
+pub(super) const PROFILE_FACTORS: [f64; 2] = [1.5, 8.0];
+
+/// Ratio of the next distance to the extrapolated distance of that limit: a step a little too far
+/// gives both sides of it.
+pub(super) const PROFILE_MARGIN: f64 = 1.1;
+
+/// Maximum number of steps between a value on either side of that limit.
+pub(super) const PROFILE_SECANTS: usize = 20;
+
+/// Relative deviation from the required rise of the sum of squares at that limit that ends the
+/// search: the limit then differs by a two-thousandth of its distance from the estimate.
+pub(super) const PROFILE_TOLERANCE: f64 = 1e-3;
+
 /// Maximum relative difference of the sums of squares of two searches with the same minimum.
 pub(super) const SAME_MINIMUM: f64 = 1e-6;
 

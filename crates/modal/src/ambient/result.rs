@@ -202,9 +202,9 @@ pub(super) struct FittedSpectrum {
 }
 
 impl AmbientEstimate {
-    /// Returns the same estimate with the standard errors of frequency and damping of each mode
-    /// multiplied by its entry of `scales` (pure numbers ≥ 1): for halves of a record that disagree
-    /// by more than their errors.
+    /// Returns the same estimate with the standard errors of each of its modes multiplied by its
+    /// entry of `scales` (pure numbers): for halves of a record that disagree by more than their
+    /// errors.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -212,6 +212,8 @@ impl AmbientEstimate {
         for (mode, scale) in self.modes.iter_mut().zip(scales) {
             mode.natural_frequency_hz = mode.natural_frequency_hz.with_error_scale(*scale);
             mode.damping_ratio = mode.damping_ratio.with_error_scale(*scale);
+            mode.shape = mode.shape.clone().with_error_scale(*scale);
+            mode.mpc = mpc_with_error(&mode.shape);
         }
         self
     }

@@ -72,6 +72,12 @@ impl ShapeWithCovariance {
         &self.covariance
     }
 
+    /// Returns the shape with all standard errors multiplied by `scale`.
+    pub(crate) fn with_error_scale(mut self, scale: f64) -> Self {
+        self.covariance *= scale * scale;
+        self
+    }
+
     /// Returns √(variance of the real part + variance of the imaginary part) of every entry.
     pub fn standard_errors(&self) -> DVector<f64> {
         let p = self.shape.len();

@@ -183,7 +183,11 @@ fn a_mode_that_changes_has_wider_intervals() {
     let scales: Vec<f64> = halves.error_scales.iter().map(|scale| scale.unwrap()).collect();
     assert!(scales[3] > 4.0 && scales[..3] == [1.0; 3], "{scales:?}");
     let narrow = estimate.modes[3].natural_frequency_hz;
-    let wide = estimate.with_error_scales(&scales).modes[3].natural_frequency_hz;
+    let error = estimate.modes[3].shape.standard_errors().max();
+    let wide = &estimate.with_error_scales(&scales).modes[3];
+    let scaled = wide.shape.standard_errors().max();
+    assert!((scaled / error / scales[3] - 1.0).abs() < 1e-12, "{error} {scaled}");
+    let wide = wide.natural_frequency_hz;
     let ratio = wide.standard_error().unwrap() / narrow.standard_error().unwrap();
     assert!((ratio / scales[3] - 1.0).abs() < 1e-12, "{ratio}");
     let [low, high] = wide.interval().unwrap();
