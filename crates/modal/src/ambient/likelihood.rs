@@ -233,23 +233,3 @@ fn add_correlations(parameters: &Parameters, slopes: &DMatrix<f64>, gradient: &m
         gradient[parameters.layout.correlation(index)] = slope;
     }
 }
-
-/// Returns the mean share of leakage of the open record in the expected power of a line.
-///
-/// Leakage comes from the states at the two ends and is therefore correlated between lines; the
-/// likelihood assumes independent lines.
-pub(super) fn leakage_share(parameters: &Parameters, lines: &[PooledLines], span: Span) -> f64 {
-    let coefficients = Coefficients::new(parameters);
-    let endless = Span { duration: f64::INFINITY, ..span };
-    let share = |line: &PooledLines| {
-        let variances = noise(parameters, &line.terms);
-        let spectrum =
-            |span| coefficients.spectrum(&coefficients.kernels(line.omega, span), &variances);
-        let (open, steady) = (spectrum(span), spectrum(endless));
-        let change = &open - steady;
-        let relative = positive_factor(open).map(|factor| factor.solve(&change).trace().re);
-        line.count * relative.map_or(1.0, |r| r.abs() / parameters.layout.outputs as f64)
-    };
-    let total: f64 = lines.iter().map(|line| line.count).sum();
-    lines.iter().map(share).sum::<f64>() / total
-}

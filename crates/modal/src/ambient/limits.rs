@@ -44,13 +44,6 @@ pub(super) const POOLING: f64 = 0.1;
 /// nearest pole.
 pub(super) const COARSE_POOLING: f64 = 0.3;
 
-/// Maximum mean share of leakage in the power of a line for which an interval is given. Leakage
-/// comes from the states at the two ends and is correlated between lines, but the likelihood
-/// assumes independent lines: above the limit, intervals cover less than they state. In the study,
-/// 95 % intervals of ζ hold in 90 to 98 % of the records at a share of 0.02, and in 79 to 94 % at
-/// 0.064 (displacements, whose spectrum falls faster than the leakage).
-pub const MAX_LEAKAGE: f64 = 0.04;
-
 /// Number of Chebyshev polynomials of the logarithm of a sensor's noise over the band, while modes
 /// are chosen.
 pub(super) const NOISE_TERMS: usize = 3;
@@ -71,6 +64,17 @@ pub(super) const ENOUGH: f64 = 1e-3;
 
 /// Largest step of the logarithm of a damping ratio or of another unknown of unit scale.
 pub(super) const LARGEST_STEP: f64 = 0.7;
+
+/// Minimum eigenvalue of the information, scaled to a unit diagonal, of a combination of parameters
+/// that the lines determine.
+pub(super) const DETERMINED_SHARE: f64 = 1e-8;
+
+/// Maximum bias of ln ω or ln ζ that is subtracted, in standard errors: the bias is the first term
+/// of a series that is of use where its terms fall.
+pub(super) const MAX_BIAS: f64 = 1.0;
+
+/// Maximum number of alternations between the parameters and the motion at the ends of the record.
+pub(super) const END_ROUNDS: usize = 6;
 
 /// Number of refused candidates that ends the search for further modes.
 pub(super) const REFUSALS: usize = 2;

@@ -2,6 +2,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
+use super::ends::Ends;
 use super::parameters::Span;
 
 /// Maximum width of pooled lines, as a share of the band: the noise varies, even far from the
@@ -17,8 +18,10 @@ pub(super) struct BandLines {
     pub amplitudes: DMatrix<Complex<f64>>,
     /// RMS value of each output in the band.
     pub scale: Vec<f64>,
-    /// Time axis of the record.
+    /// Time axis of the record; endless if the motion at its ends was taken from the lines.
     pub span: Span,
+    /// Remaining uncertainty of the motion at the ends, if it was taken from the lines.
+    pub ends: Option<Ends>,
 }
 
 /// Neighbouring lines with their mean periodogram.
@@ -84,11 +87,15 @@ impl BandLines {
         let rows = self.amplitudes.rows(first, count);
         let total = rows.transpose() * rows.conjugate();
         let omega = self.omega[first..first + count].iter().sum::<f64>() / count as f64;
+        let mut periodogram = total / Complex::from(count as f64);
+        if let Some(ends) = &self.ends {
+            periodogram += ends.power(omega);
+        }
         PooledLines {
             omega,
             count: count as f64,
             terms: self.noise_terms(omega, noise_terms),
-            periodogram: total / Complex::from(count as f64),
+            periodogram,
         }
     }
 }

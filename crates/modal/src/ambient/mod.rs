@@ -5,6 +5,8 @@
 //! periodogram, which includes the leakage of the open record; no window, no averaging and no
 //! choice of a model order are needed.
 
+mod bias;
+mod ends;
 mod error;
 pub mod harmonics;
 mod information;
@@ -26,7 +28,7 @@ mod tests;
 
 pub use error::AmbientError;
 pub use harmonics::Harmonic;
-pub use limits::{MAX_LEAKAGE, MIN_DECAY_TIMES};
+pub use limits::MIN_DECAY_TIMES;
 pub use result::{
     AmbientEstimate, AmbientMode, DropReason, DroppedCandidate, ModalValue, Uncertainty,
 };
@@ -36,11 +38,12 @@ use std::f64::consts::TAU;
 
 use mechid_signal::Record;
 
+use ends::{IndependentFit, search_beside_ends};
 use limits::{DEFAULT_MAX_MODES, MAX_DAMPING, MIN_SHARE, POOLING};
 use lines::BandLines;
 use order::{Chosen, Wanted, choose};
 use prepare::{band_lines, checked_band, subspace_models};
-use result::{FittedSpectrum, RecordScale};
+use result::{FittedSpectrum, RecordScale, Statistics};
 use search::{Effort, Fit, search_pooled};
 
 use crate::stabilisation::Pole;
@@ -107,29 +110,24 @@ pub fn identify_ambient(
     let (chosen, dropped) = choose(&candidates, &band, requested);
     let [from_hz, to_hz] = band_hz;
     let none = AmbientError::NoMode { candidates: dropped.len(), from_hz, to_hz };
-    let Chosen { fit, sound: accepted } = chosen.ok_or(none)?;
+    let Chosen { fitted, sound: accepted } = chosen.ok_or(none)?;
     let identified = accepted.len();
     if let Some(asked) = settings.modes.filter(|asked| *asked > identified) {
         return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
     }
-    let fitted_modes = fitted_modes(&fit, &band, &accepted, &sinusoids)?;
-    let factor = fit.parameters.factor().select_rows(&accepted);
+    let modes = fitted_modes(&fitted, &band, &accepted, &sinusoids)?;
+    let parameters = fitted.fit.parameters;
+    let factor = parameters.factor().select_rows(&accepted);
     Ok(AmbientEstimate {
-        modes: fitted_modes.modes,
+        modes,
         harmonics: sinusoids,
         dropped,
         stabilisation,
         band_hz,
         lines: band.omega.len(),
-        log_likelihood: -fit.cost,
-        leakage_share: fitted_modes.leakage_share,
+        log_likelihood: -fitted.cost,
         force_correlation: &factor * factor.transpose(),
-        spectrum: FittedSpectrum {
-            parameters: fit.parameters,
-            scale: band.scale,
-            sound: accepted,
-            excluded_hz,
-        },
+        spectrum: FittedSpectrum { parameters, scale: band.scale, sound: accepted, excluded_hz },
     })
 }
 
@@ -142,8 +140,10 @@ impl AmbientEstimate {
         let start = parameters.with_units(scale, &band.scale);
         let size = start.layout.len();
         let failed = AmbientError::Numerics { what: "the spectrum of a part", size };
-        let fit = search_pooled(start, &band, Effort::FULL).ok_or(failed)?;
-        Ok(fitted_modes(&fit, &band, sound, &[])?.modes)
+        let fitted = search_pooled(start, &band, Effort::FULL)
+            .and_then(|fit| search_beside_ends(fit, &band))
+            .ok_or(failed)?;
+        fitted_modes(&fitted, &band, sound, &[])
     }
 }
 
@@ -158,40 +158,36 @@ fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2])
     clusters.into_iter().map(|cluster| cluster.pole.clone()).collect()
 }
 
-/// Modes of a fit, and the share of leakage that limits their intervals.
-struct FittedModes {
-    modes: Vec<AmbientMode>,
-    leakage_share: f64,
-}
-
 fn fitted_modes(
-    fit: &Fit,
+    fitted: &IndependentFit,
     band: &BandLines,
     sound: &[usize],
     sinusoids: &[Harmonic],
-) -> Result<FittedModes, AmbientError> {
-    let terms = fit.parameters.layout.noise_terms;
-    let lines = band.pooled(&fit.poles(), POOLING, terms);
-    let leakage_share = likelihood::leakage_share(&fit.parameters, &lines, band.span);
-    let scale = RecordScale { span: band.span, scale: &band.scale, leakage_share };
-    Ok(FittedModes { modes: ambient_modes(fit, sound, scale, sinusoids)?, leakage_share })
+) -> Result<Vec<AmbientMode>, AmbientError> {
+    let IndependentFit { fit, lines, .. } = fitted;
+    let pooled = lines.pooled(&fit.poles(), POOLING, fit.parameters.layout.noise_terms);
+    let size = fit.parameters.layout.len();
+    let failed = |what| AmbientError::Numerics { what, size };
+    let covariance = fit.covariance().ok_or(failed("the covariance of the modes"))?;
+    let bias = fit.bias(&pooled, lines.span).ok_or(failed("the bias of the modes"))?;
+    let statistics = Statistics { covariance: &covariance, bias: &bias };
+    let scale = RecordScale { span: band.span, scale: &band.scale };
+    ambient_modes(fit, statistics, sound, scale, sinusoids)
 }
 
 fn ambient_modes(
     fit: &Fit,
+    statistics: Statistics<'_>,
     accepted: &[usize],
     scale: RecordScale<'_>,
     sinusoids: &[Harmonic],
 ) -> Result<Vec<AmbientMode>, AmbientError> {
-    let failed = AmbientError::Numerics {
-        what: "the covariance of the modes",
-        size: fit.parameters.layout.len(),
-    };
-    let covariance = fit.covariance().ok_or(failed.clone())?;
+    let failed =
+        AmbientError::Numerics { what: "the shape of a mode", size: fit.parameters.layout.len() };
     let spacing_hz = 1.0 / scale.span.duration;
     let mut modes = Vec::with_capacity(accepted.len());
     for &mode in accepted {
-        let mut one = AmbientMode::new(fit, &covariance, mode, scale).ok_or(failed.clone())?;
+        let mut one = AmbientMode::new(fit, statistics, mode, scale).ok_or(failed.clone())?;
         let frequency_hz = fit.poles()[mode].im / TAU;
         let width_hz = -fit.poles()[mode].re / TAU + spacing_hz;
         let at = |h: &Harmonic| (h.frequency_hz - frequency_hz).abs() < width_hz;

@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use super::ends::{IndependentFit, search_beside_ends};
 use super::initial::{initial_fit, match_amplitudes, scan};
 use super::limits::{
     DAMPING_SIGNIFICANCE, MAX_DAMPING, NUISANCE_POLES, POOLING, REFUSALS, STRONG_EVIDENCE,
@@ -25,7 +26,7 @@ pub(super) struct Wanted {
 
 /// Selected modes.
 pub(super) struct Chosen {
-    pub fit: Fit,
+    pub fitted: IndependentFit,
     /// Indices of the poles that are modes; the others explain a background or noise.
     pub sound: Vec<usize>,
 }
@@ -57,7 +58,9 @@ pub(super) fn choose(
         .map(|fit| choice.pruned(fit))
         .map(|fit| choice.extended(fit, limit))
         .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL))
-        .map(|fit| with_enough_noise_terms(fit, band));
+        .and_then(|fit| search_beside_ends(fit, band))
+        .map(|known| with_enough_noise_terms(known.fit, &known.lines))
+        .and_then(|fit| search_beside_ends(fit, band));
     let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
     (chosen, choice.dropped)
 }
@@ -89,10 +92,11 @@ impl Choice<'_> {
     }
 
     /// Separates modes from other poles, and keeps at most the requested number.
-    fn judged(&mut self, fit: Fit) -> Chosen {
+    fn judged(&mut self, fitted: IndependentFit) -> Chosen {
+        let fit = &fitted.fit;
         let mut sound = Vec::new();
         for mode in 0..fit.parameters.layout.modes {
-            match self.broken_rule(&fit, mode) {
+            match self.broken_rule(fit, mode) {
                 Some(reason) => self.drop_mode(&fit.parameters, mode, reason),
                 None => sound.push(mode),
             }
@@ -108,7 +112,7 @@ impl Choice<'_> {
             let mode = sound.remove(weakest);
             self.drop_mode(&fit.parameters, mode, DropReason::NumberReached { number });
         }
-        Chosen { fit, sound }
+        Chosen { fitted, sound }
     }
 
     fn sound_modes(&self, fit: &Fit) -> usize {

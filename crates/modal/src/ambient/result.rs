@@ -1,9 +1,9 @@
 //! Modes of an ambient record with their uncertainty, harmonics and rejected candidates.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::harmonics::Harmonic;
-use super::limits::{MAX_LEAKAGE, MIN_DECAY_TIMES};
+use super::limits::{MAX_BIAS, MIN_DECAY_TIMES};
 use super::parameters::{Parameters, Span};
 use super::search::Fit;
 use crate::compare::{ComparedMode, Measured};
@@ -32,14 +32,6 @@ pub enum Uncertainty {
         /// Smallest ζωT for an interval.
         needed: f64,
     },
-    /// Leakage of the open record contributes too much to the lines, as in displacements with
-    /// little noise: differentiate the record (to velocities or accelerations) or record longer.
-    Leakage {
-        /// Mean part of the power of a line that is leakage.
-        share: f64,
-        /// Largest share of leakage for which an interval is given.
-        most: f64,
-    },
 }
 
 /// Frequency or damping ratio with its uncertainty.
@@ -53,11 +45,9 @@ pub struct ModalValue {
 
 impl ModalValue {
     /// Creates a value whose logarithm has the standard error `relative`.
-    fn new(value: f64, relative: f64, decay_times: f64, share: f64) -> Self {
+    fn new(value: f64, relative: f64, decay_times: f64) -> Self {
         let uncertainty = if decay_times < MIN_DECAY_TIMES {
             Uncertainty::RecordTooShort { decay_times, needed: MIN_DECAY_TIMES }
-        } else if share > MAX_LEAKAGE {
-            Uncertainty::Leakage { share, most: MAX_LEAKAGE }
         } else {
             let end = |side: f64| value * (side * QUANTILE * relative).exp();
             let interval = [end(-1.0), end(1.0)];
@@ -70,7 +60,7 @@ impl ModalValue {
     pub fn standard_error(&self) -> Option<f64> {
         match self.uncertainty {
             Uncertainty::Known { standard_error, .. } => Some(standard_error),
-            Uncertainty::RecordTooShort { .. } | Uncertainty::Leakage { .. } => None,
+            Uncertainty::RecordTooShort { .. } => None,
         }
     }
 
@@ -92,7 +82,7 @@ impl ModalValue {
     pub fn interval(&self) -> Option<[f64; 2]> {
         match self.uncertainty {
             Uncertainty::Known { interval, .. } => Some(interval),
-            Uncertainty::RecordTooShort { .. } | Uncertainty::Leakage { .. } => None,
+            Uncertainty::RecordTooShort { .. } => None,
         }
     }
 }
@@ -181,8 +171,6 @@ pub struct AmbientEstimate {
     /// Logarithm ln L of the likelihood of the lines, with each output divided by its RMS value in
     /// the band.
     pub log_likelihood: f64,
-    /// Mean share of leakage of the open record in the power of a line.
-    pub leakage_share: f64,
     /// Correlation coefficients of the forces on the modes, modes × modes.
     pub force_correlation: DMatrix<f64>,
     /// Whole spectrum, to fit it again to a part of the record.
@@ -237,17 +225,18 @@ impl AmbientMode {
     /// Reads a mode from a fit; `None` if its shape is zero or not finite.
     pub(super) fn new(
         fit: &Fit,
-        covariance: &DMatrix<f64>,
+        statistics: Statistics<'_>,
         mode: usize,
         record: RecordScale<'_>,
     ) -> Option<Self> {
         let parameters = &fit.parameters;
-        let (omega, zeta) = (parameters.omega(mode), parameters.zeta(mode));
-        let decay_times = zeta * omega * record.span.duration;
         let layout = &parameters.layout;
-        let relative = |index: usize| covariance[(index, index)].max(0.0).sqrt();
+        let relative = |index: usize| statistics.standard_error(index);
+        let omega = parameters.omega(mode) * (-statistics.bias(layout.frequency(mode))).exp();
+        let zeta = parameters.zeta(mode) * (-statistics.bias(layout.damping(mode))).exp();
+        let decay_times = zeta * omega * record.span.duration;
         let frequency_hz = omega / std::f64::consts::TAU;
-        let shape = scaled_shape(parameters, covariance, mode, record.scale)?;
+        let shape = scaled_shape(parameters, statistics.covariance, mode, record.scale)?;
         let largest = shape.shape()[shape.largest_entry()].norm();
         let shape = shape.normalised();
         Some(Self {
@@ -255,14 +244,8 @@ impl AmbientMode {
                 frequency_hz,
                 relative(layout.frequency(mode)),
                 decay_times,
-                record.leakage_share,
             ),
-            damping_ratio: ModalValue::new(
-                zeta,
-                relative(layout.damping(mode)),
-                decay_times,
-                record.leakage_share,
-            ),
+            damping_ratio: ModalValue::new(zeta, relative(layout.damping(mode)), decay_times),
             force_power: 2.0 * record.span.sample_interval * largest * largest,
             mpc: mpc_with_error(&shape),
             shape,
@@ -278,8 +261,25 @@ pub(super) struct RecordScale<'a> {
     pub span: Span,
     /// Unit of each output of the fit.
     pub scale: &'a [f64],
-    /// Mean part of the power of a line that is leakage.
-    pub leakage_share: f64,
+}
+
+/// Covariance and bias of the parameters of a fit.
+#[derive(Clone, Copy)]
+pub(super) struct Statistics<'a> {
+    pub covariance: &'a DMatrix<f64>,
+    pub bias: &'a DVector<f64>,
+}
+
+impl Statistics<'_> {
+    fn standard_error(self, index: usize) -> f64 {
+        self.covariance[(index, index)].max(0.0).sqrt()
+    }
+
+    /// Returns the bias of a parameter, 0 if it is too large to be known.
+    fn bias(self, index: usize) -> f64 {
+        let bias = self.bias[index];
+        if bias.abs() <= MAX_BIAS * self.standard_error(index) { bias } else { 0.0 }
+    }
 }
 
 fn scaled_shape(

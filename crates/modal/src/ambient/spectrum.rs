@@ -102,20 +102,8 @@ impl Coefficients {
     }
 
     pub fn kernels(&self, omega: f64, span: Span) -> Kernels {
-        let s = Complex::new(0.0, omega);
-        let half = 0.5 * span.sample_interval;
         let at = |pole: Complex<f64>| {
-            let distance = s - pole;
-            let (inverse, square) = match self.kernel {
-                Kernel::Static | Kernel::Vanishing => {
-                    let inverse = distance.inv();
-                    (inverse, inverse * inverse)
-                }
-                Kernel::Sampled => {
-                    let sine = (distance * half).sinh().inv() * half;
-                    ((distance * half).cosh() * sine, sine * sine)
-                }
-            };
+            let (inverse, square) = self.inverse(omega, pole, span);
             let decay = (pole * span.duration).exp();
             let lost = (Complex::from(1.0) - decay) / span.duration;
             let leakage = lost * square;
@@ -125,6 +113,28 @@ impl Coefficients {
         let pairs = self.poles.iter().map(|pole| [at(*pole), at(pole.conj())]);
         let (value, derivative) = pairs.map(|[a, b]| ([a.0, b.0], [a.1, b.1])).unzip();
         Kernels { value, derivative }
+    }
+
+    /// Returns 1/(jω − λ) and minus its derivative by jω, or the sums of both over the frequencies
+    /// that fold onto ω.
+    pub fn inverse(
+        &self,
+        omega: f64,
+        pole: Complex<f64>,
+        span: Span,
+    ) -> (Complex<f64>, Complex<f64>) {
+        let distance = Complex::new(0.0, omega) - pole;
+        match self.kernel {
+            Kernel::Static | Kernel::Vanishing => {
+                let inverse = distance.inv();
+                (inverse, inverse * inverse)
+            }
+            Kernel::Sampled => {
+                let half = 0.5 * span.sample_interval;
+                let sine = (distance * half).sinh().inv() * half;
+                ((distance * half).cosh() * sine, sine * sine)
+            }
+        }
     }
 
     /// Returns the spectral matrix at a line for sensor noise of the variances `noise`.

@@ -1,0 +1,215 @@
+//! Motion at the two ends of an open record.
+//!
+//! A mode obeys z′ = λz + w. Its transform over the record is Z = W/(jω − λ) − L t, where t is the
+//! change of z over the record: one number for all lines. A likelihood of independent lines counts
+//! the leakage L t as often as there are lines, so that one large end value would decide the
+//! damping. Here t is a random effect: it is predicted from all lines together, and the lines
+//! without it are independent.
+//!
+//! For samples at intervals Δ, L = Δ/(1 − exp(−aΔ)) with a = jω − λ. The mean of W for a known t is
+//! tα/a* with α = −Re λ, so the response to t is −L (1 − α/a*).
+
+use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::likelihood::{TASK, log_determinant, noise, positive_factor};
+use super::limits::END_ROUNDS;
+use super::lines::BandLines;
+use super::parameters::{Parameters, Span};
+use super::search::{Effort, Fit, search_pooled};
+use super::spectrum::Coefficients;
+
+/// Remaining uncertainty of the motion at the ends, after its prediction.
+#[derive(Debug, Clone)]
+pub(super) struct Ends {
+    coefficients: Coefficients,
+    /// Covariance of the real parts and then the imaginary parts of t, 2 modes × 2 modes.
+    covariance: DMatrix<f64>,
+    span: Span,
+}
+
+impl Ends {
+    /// Returns the power of the remaining motion at a line, outputs × outputs.
+    pub fn power(&self, omega: f64) -> DMatrix<Complex<f64>> {
+        let gain = self.coefficients.end_gains(omega, self.span);
+        &gain * self.covariance.map(Complex::from) * gain.adjoint()
+    }
+}
+
+/// Prediction of the motion at the ends.
+struct Prediction {
+    /// Real parts and then imaginary parts of t, one of each per mode.
+    mean: DVector<f64>,
+    ends: Ends,
+    /// −log L of the lines, with the motion at the ends integrated out.
+    cost: f64,
+}
+
+/// Maximum of the likelihood with the motion at the ends as a random effect.
+pub(super) struct IndependentFit {
+    pub fit: Fit,
+    /// Lines without the motion at the ends, to which the spectrum was fitted.
+    pub lines: BandLines,
+    /// −log L of all lines, with the motion at the ends integrated out.
+    pub cost: f64,
+}
+
+/// Searches from the parameters of `fit`, in alternation with the motion at the ends.
+///
+/// # Source
+/// Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.
+pub(super) fn search_beside_ends(mut fit: Fit, band: &BandLines) -> Option<IndependentFit> {
+    let mut predicted = predicted(&fit.parameters, band)?;
+    let mut round = 0;
+    loop {
+        let lines = band.without_ends(&predicted);
+        fit = search_pooled(fit.parameters, &lines, Effort::FULL)?;
+        let before = predicted.cost;
+        predicted = self::predicted(&fit.parameters, band)?;
+        round += 1;
+        let cost = predicted.cost;
+        log::debug!("motion at the ends, round {round}: cost {cost:.4}");
+        if (before - cost).abs() < Effort::FULL.slow || round == END_ROUNDS {
+            return Some(IndependentFit { fit, lines, cost });
+        }
+    }
+}
+
+/// Predicts the motion at the ends from all lines.
+///
+/// # Source
+/// Harville (1977), Journal of the American Statistical Association 72, 320–338 (best linear
+/// unbiased prediction and the likelihood without the random effects).
+fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
+    let coefficients = Coefficients::new(parameters);
+    let unknowns = 2 * parameters.layout.modes;
+    let indices: Vec<usize> = (0..band.omega.len()).collect();
+    let chunk = |indices: &[usize]| {
+        let mut sums = EndSums::zero(unknowns);
+        indices.iter().try_for_each(|at| sums.add_line(parameters, &coefficients, band, *at))?;
+        Some(sums)
+    };
+    let parts: Option<Vec<_>> = indices.par_chunks(TASK).map(chunk).collect();
+    let mut sums = EndSums::zero(unknowns);
+    for part in parts? {
+        sums.add(&part);
+    }
+    let EndSums { information, score, mut cost } = sums;
+    let prior = coefficients.end_covariance(band.span);
+    let factor = (DMatrix::identity(unknowns, unknowns) + &prior * information).lu();
+    let covariance = factor.solve(&prior)?;
+    let mean = &covariance * &score;
+    cost += 0.5 * (factor.determinant().abs().ln() - score.dot(&mean));
+    let sound = cost.is_finite() && mean.iter().all(|value| value.is_finite());
+    let ends = Ends { coefficients, covariance, span: band.span };
+    sound.then_some(Prediction { mean, ends, cost })
+}
+
+/// Sums over the lines for the prediction.
+struct EndSums {
+    /// 2 Re Σ Gᴴ S⁻¹ G with the lines G of unit changes.
+    information: DMatrix<f64>,
+    /// 2 Re Σ Gᴴ S⁻¹ Y.
+    score: DVector<f64>,
+    /// −log L of the lines without motion at the ends.
+    cost: f64,
+}
+
+impl EndSums {
+    fn zero(unknowns: usize) -> Self {
+        let (information, score) = (DMatrix::zeros(unknowns, unknowns), DVector::zeros(unknowns));
+        Self { information, score, cost: 0.0 }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.information += &other.information;
+        self.score += &other.score;
+        self.cost += other.cost;
+    }
+
+    /// Adds line `index`; `None` if its spectral matrix is not positive definite.
+    fn add_line(
+        &mut self,
+        parameters: &Parameters,
+        coefficients: &Coefficients,
+        band: &BandLines,
+        index: usize,
+    ) -> Option<()> {
+        let omega = band.omega[index];
+        let endless = Span { duration: f64::INFINITY, ..band.span };
+        let terms = band.noise_terms(omega, parameters.layout.noise_terms);
+        let kernels = coefficients.kernels(omega, endless);
+        let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &terms));
+        let factor = positive_factor(spectrum)?;
+        let line = band.amplitudes.row(index).transpose();
+        let gain = coefficients.end_gains(omega, band.span);
+        let (whole, of_gain) = (factor.solve(&line), factor.solve(&gain));
+        self.cost += log_determinant(&factor) + line.dotc(&whole).re;
+        self.information += gain.ad_mul(&of_gain).map(|z| 2.0 * z.re);
+        self.score += gain.ad_mul(&whole).map(|z| 2.0 * z.re);
+        Some(())
+    }
+}
+
+impl BandLines {
+    /// Returns the lines without the predicted motion at the ends: those of an endless record.
+    fn without_ends(&self, predicted: &Prediction) -> Self {
+        let mean = predicted.mean.map(Complex::from);
+        let mut amplitudes = self.amplitudes.clone();
+        for (mut line, omega) in amplitudes.row_iter_mut().zip(&self.omega) {
+            let motion = predicted.ends.coefficients.end_gains(*omega, self.span) * &mean;
+            line -= motion.transpose();
+        }
+        Self {
+            amplitudes,
+            span: Span { duration: f64::INFINITY, ..self.span },
+            ends: Some(predicted.ends.clone()),
+            ..self.clone()
+        }
+    }
+}
+
+impl Coefficients {
+    /// Returns the lines of unit real and then unit imaginary changes of each mode over the record,
+    /// outputs × 2 modes.
+    pub fn end_gains(&self, omega: f64, span: Span) -> DMatrix<Complex<f64>> {
+        let (outputs, modes) = self.shapes.shape();
+        let mut gains = DMatrix::zeros(outputs, 2 * modes);
+        for (r, pole) in self.poles.iter().enumerate() {
+            let gain = |pole: Complex<f64>| {
+                let (inverse, _) = self.inverse(omega, pole, span);
+                let turn = (Complex::new(0.0, omega) - pole) * -span.sample_interval;
+                let leakage = (Complex::from(1.0) - turn.exp()).inv() * span.sample_interval;
+                -leakage * (Complex::from(1.0) + inverse.conj() * pole.re)
+            };
+            let (gain, mirrored) = (gain(*pole), gain(pole.conj()));
+            for (i, shape) in self.shapes.column(r).iter().enumerate() {
+                let (own, other) = (shape * gain, shape.conj() * mirrored);
+                gains[(i, r)] = own + other;
+                gains[(i, modes + r)] = Complex::<f64>::i() * (own - other);
+            }
+        }
+        gains
+    }
+
+    /// Returns the covariance of the real and then the imaginary parts of the changes of the modes
+    /// over the record, 2 modes × 2 modes.
+    pub fn end_covariance(&self, span: Span) -> DMatrix<f64> {
+        let modes = self.poles.len();
+        let lost = |pole: Complex<f64>| Complex::from(1.0) - (pole * span.duration).exp();
+        let mut covariance = DMatrix::zeros(2 * modes, 2 * modes);
+        for (r, one) in self.poles.iter().enumerate() {
+            for (s, other) in self.poles.iter().enumerate() {
+                let half = 0.5 * self.correlation[(r, s)] / span.duration;
+                let product =
+                    |other: Complex<f64>| -(lost(*one) + lost(other)) / (one + other) * half;
+                let (with_conjugate, plain) = (product(other.conj()), product(*other));
+                covariance[(r, s)] = (with_conjugate + plain).re;
+                covariance[(modes + r, modes + s)] = (with_conjugate - plain).re;
+                covariance[(modes + r, s)] = (with_conjugate + plain).im;
+                covariance[(r, modes + s)] = (plain - with_conjugate).im;
+            }
+        }
+        covariance
+    }
+}
