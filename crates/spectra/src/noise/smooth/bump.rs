@@ -25,9 +25,9 @@ enum Shape {
     Flat,
     /// Height that decreases linearly from the middle to both ends.
     Tent,
-    /// Height ln(1 + A/(1 + x²)), with x = 1 at a distance of `half_width` lines: a resonance on a
-    /// floor.
-    Peak { above_floor: f64, half_width: f64 },
+    /// Height ln(1 + A/(1 + x²)) over its value ln(1 + A) at the `top`, with x = 1 at a distance of
+    /// `half_width` lines: a resonance on a floor.
+    Peak { above_floor: f64, half_width: f64, top: f64 },
 }
 
 impl Bump {
@@ -42,14 +42,15 @@ impl Bump {
 
     fn peak(middle: f64, half_width: f64, above_floor: f64) -> Self {
         let reach = PEAK_REACH * half_width * above_floor.sqrt();
-        Self { shape: Shape::Peak { above_floor, half_width }, middle, reach }
+        let top = above_floor.ln_1p();
+        Self { shape: Shape::Peak { above_floor, half_width, top }, middle, reach }
     }
 
     /// Returns this bump converted to a line spacing finer by the factor `times`.
     pub(super) fn finer(&self, times: f64) -> Self {
         let shape = match self.shape {
-            Shape::Peak { above_floor, half_width } => {
-                Shape::Peak { above_floor, half_width: times * half_width }
+            Shape::Peak { above_floor, half_width, top } => {
+                Shape::Peak { above_floor, half_width: times * half_width, top }
             }
             other => other,
         };
@@ -82,7 +83,7 @@ impl Bump {
                     Self::tent(middle, self.reach + by),
                 ]
             }
-            Shape::Peak { above_floor, half_width } => vec![
+            Shape::Peak { above_floor, half_width, .. } => vec![
                 Self::peak(middle - 0.5 * half_width, half_width, above_floor),
                 Self::peak(middle + 0.5 * half_width, half_width, above_floor),
                 Self::peak(middle, half_width / BUMP_WIDER, above_floor),
@@ -99,8 +100,8 @@ impl Bump {
             Shape::Flat => f64::from(u8::from(away < self.reach)),
             Shape::Tent => (1.0 - away / self.reach).max(0.0),
             Shape::Peak { .. } if away > self.reach => 0.0,
-            Shape::Peak { above_floor, half_width } => {
-                (above_floor / (1.0 + (away / half_width).powi(2))).ln_1p() / above_floor.ln_1p()
+            Shape::Peak { above_floor, half_width, top } => {
+                (1.0 + above_floor / (1.0 + (away / half_width).powi(2))).ln() / top
             }
         }
     }
@@ -111,7 +112,7 @@ impl Bump {
             Shape::Flat => self.reach - 0.5,
             Shape::Tent => 0.5 * self.reach,
             // The height is half the logarithm of the peak at this distance.
-            Shape::Peak { above_floor, half_width } => half_width * above_floor.powf(0.25),
+            Shape::Peak { above_floor, half_width, .. } => half_width * above_floor.powf(0.25),
         };
         // The band has at least the line nearest to the middle.
         let nearest = (self.middle.round().max(0.0) as usize).min(lines.saturating_sub(1));
@@ -153,11 +154,12 @@ pub(super) fn most_conspicuous(
     let (of_flat, band) = flat.first()?;
     let none = vec![0.0; channels];
     let shapes = flat.iter().flat_map(|(_, band)| Bump::about(band));
-    let mut fitted = best(&mut shapes.map(|bump| Gained::fit(bump, &none, &levels, nu)))?;
+    let fit = |bump: Bump, start: &[f64]| Gained::fit(bump, start, &levels, &gains);
+    let mut fitted = best(&mut shapes.map(|bump| fit(bump, &none)))?;
     for _ in 0..BUMP_VARIATIONS {
         let varied = fitted.bump.varied().into_iter();
         let inside = varied.filter(|bump| (0.0..lines as f64).contains(&bump.middle));
-        let with_gain = |bump: Bump| Gained::fit(bump, &fitted.heights, &levels, nu);
+        let with_gain = |bump: Bump| fit(bump, &fitted.heights);
         match best(&mut inside.map(with_gain)).filter(|varied| varied.gain > fitted.gain) {
             Some(varied) => fitted = varied,
             None => break,
@@ -233,16 +235,18 @@ struct Gained {
 }
 
 impl Gained {
-    /// Fits the heights, beginning with `start`, to the levels v/p.
-    fn fit(bump: Bump, start: &[f64], levels: &DMatrix<f64>, nu: f64) -> Self {
-        let support = bump.support(levels.nrows());
+    /// Fits the heights, beginning with `start`, to the levels v/p, whose cumulative sums `sums`
+    /// has.
+    fn fit(bump: Bump, start: &[f64], levels: &DMatrix<f64>, sums: &FlatGains) -> Self {
+        let lines = levels.nrows();
+        let support = bump.support(lines);
         let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
         let mut heights = start.to_vec();
-        let gains = heights.iter_mut().zip(levels.column_iter()).map(|(height, all)| {
-            let (before, inside) = all.as_slice().split_at(support.start);
-            let (inside, after) = inside.split_at(parts.len());
-            let outside = before.iter().chain(after).sum();
-            raised(&parts, inside, outside, levels.nrows() as f64, height, nu)
+        let channels = levels.column_iter().zip(sums.below.column_iter());
+        let gains = heights.iter_mut().zip(channels).map(|(height, (all, below))| {
+            let inside = &all.as_slice()[support.clone()];
+            let outside = below[support.start] + (below[lines] - below[support.end]);
+            raised(&parts, inside, outside, lines as f64, height, sums.nu)
         });
         let gain = gains.sum();
         Self { bump, gain, heights }
