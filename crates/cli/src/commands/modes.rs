@@ -216,8 +216,8 @@ impl ModesArgs {
 
     fn table_modes(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         self.refuse(
-            "a table of frequency responses, as which a file without named columns is read; name \
-             the columns of a record, for example --acceleration a1,a2",
+            "a table of frequency responses. A file without named columns is read as such a table; \
+             name the columns of a record, for example --acceleration a1,a2",
             &self.record_options(),
         )?;
         let files = std::iter::once(&self.input.record).chain(&self.more);

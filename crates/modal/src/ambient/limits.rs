@@ -65,16 +65,16 @@ pub(super) const ENOUGH: f64 = 1e-3;
 /// Largest step of the logarithm of a damping ratio or of another unknown of unit scale.
 pub(super) const LARGEST_STEP: f64 = 0.7;
 
-/// Minimum eigenvalue of the information, scaled to a unit diagonal, of a combination of parameters
-/// that the lines determine.
+/// Minimum eigenvalue of the information (scaled to a unit diagonal): combinations of parameters
+/// below it are undetermined.
 pub(super) const DETERMINED_SHARE: f64 = 1e-8;
 
-/// Maximum bias of ln ω or ln ζ that is subtracted, in standard errors: the bias is the first term
-/// of a series that is of use where its terms fall.
+/// Maximum bias of ln ω or ln ζ that is subtracted, in standard errors. A larger bias is not
+/// subtracted, because the first-order formula is then unreliable.
 pub(super) const MAX_BIAS: f64 = 1.0;
 
-/// Maximum number of alternations between the parameters and the motion at the ends of the record.
-pub(super) const END_ROUNDS: usize = 6;
+/// Maximum number of alternations between the parameters and the transient.
+pub(super) const TRANSIENT_ROUNDS: usize = 6;
 
 /// Number of refused candidates that ends the search for further modes.
 pub(super) const REFUSALS: usize = 2;

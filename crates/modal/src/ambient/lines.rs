@@ -2,8 +2,8 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::ends::Ends;
 use super::parameters::Span;
+use super::transient::Transient;
 
 /// Maximum width of pooled lines, as a share of the band: the noise varies, even far from the
 /// poles.
@@ -18,10 +18,10 @@ pub(super) struct BandLines {
     pub amplitudes: DMatrix<Complex<f64>>,
     /// RMS value of each output in the band.
     pub scale: Vec<f64>,
-    /// Time axis of the record; endless if the motion at its ends was taken from the lines.
+    /// Time axis of the record; endless if the transient was subtracted.
     pub span: Span,
-    /// Remaining uncertainty of the motion at the ends, if it was taken from the lines.
-    pub ends: Option<Ends>,
+    /// Remaining uncertainty of the transient, if it was subtracted.
+    pub transient: Option<Transient>,
 }
 
 /// Neighbouring lines with their mean periodogram.
@@ -88,8 +88,8 @@ impl BandLines {
         let total = rows.transpose() * rows.conjugate();
         let omega = self.omega[first..first + count].iter().sum::<f64>() / count as f64;
         let mut periodogram = total / Complex::from(count as f64);
-        if let Some(ends) = &self.ends {
-            periodogram += ends.power(omega);
+        if let Some(transient) = &self.transient {
+            periodogram += transient.power(omega);
         }
         PooledLines {
             omega,

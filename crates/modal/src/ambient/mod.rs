@@ -2,11 +2,10 @@
 //!
 //! A subspace method ([`ssi_cov`]) gives initial poles and shapes. Poles, shapes, correlated white
 //! forces on the modes and smooth sensor noise then maximise Whittle's likelihood with the expected
-//! periodogram, which includes the leakage of the open record; no window, no averaging and no
-//! choice of a model order are needed.
+//! periodogram, and at last a likelihood with the transient of the open record as a random effect;
+//! no window, no averaging and no choice of a model order are needed.
 
 mod bias;
-mod ends;
 mod error;
 pub mod harmonics;
 mod information;
@@ -22,6 +21,7 @@ mod result;
 mod search;
 mod spectrum;
 mod subspace;
+mod transient;
 
 #[cfg(test)]
 mod tests;
@@ -37,14 +37,15 @@ pub use subspace::ssi_cov;
 use std::f64::consts::TAU;
 
 use mechid_signal::Record;
+use nalgebra::DVector;
 
-use ends::{IndependentFit, search_beside_ends};
 use limits::{DEFAULT_MAX_MODES, MAX_DAMPING, MIN_SHARE, POOLING};
 use lines::BandLines;
 use order::{Chosen, Wanted, choose};
 use prepare::{band_lines, checked_band, subspace_models};
 use result::{FittedSpectrum, RecordScale, Statistics};
 use search::{Effort, Fit, search_pooled};
+use transient::{FitWithTransient, search_with_transient};
 
 use crate::stabilisation::Pole;
 
@@ -141,7 +142,7 @@ impl AmbientEstimate {
         let size = start.layout.len();
         let failed = AmbientError::Numerics { what: "the spectrum of a part", size };
         let fitted = search_pooled(start, &band, Effort::FULL)
-            .and_then(|fit| search_beside_ends(fit, &band))
+            .and_then(|fit| search_with_transient(fit, &band))
             .ok_or(failed)?;
         fitted_modes(&fitted, &band, sound, &[])
     }
@@ -159,17 +160,18 @@ fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2])
 }
 
 fn fitted_modes(
-    fitted: &IndependentFit,
+    fitted: &FitWithTransient,
     band: &BandLines,
     sound: &[usize],
     sinusoids: &[Harmonic],
 ) -> Result<Vec<AmbientMode>, AmbientError> {
-    let IndependentFit { fit, lines, .. } = fitted;
+    let FitWithTransient { fit, lines, .. } = fitted;
     let pooled = lines.pooled(&fit.poles(), POOLING, fit.parameters.layout.noise_terms);
     let size = fit.parameters.layout.len();
-    let failed = |what| AmbientError::Numerics { what, size };
-    let covariance = fit.covariance().ok_or(failed("the covariance of the modes"))?;
-    let bias = fit.bias(&pooled, lines.span).ok_or(failed("the bias of the modes"))?;
+    let failed = AmbientError::Numerics { what: "the covariance of the modes", size };
+    let covariance = fit.covariance().ok_or(failed)?;
+    // Where the bias cannot be computed, none is subtracted.
+    let bias = fit.bias(&pooled, band.span).unwrap_or_else(|| DVector::zeros(size));
     let statistics = Statistics { covariance: &covariance, bias: &bias };
     let scale = RecordScale { span: band.span, scale: &band.scale };
     ambient_modes(fit, statistics, sound, scale, sinusoids)

@@ -3,7 +3,6 @@
 
 use std::f64::consts::TAU;
 
-use super::ends::{IndependentFit, search_beside_ends};
 use super::initial::{initial_fit, match_amplitudes, scan};
 use super::limits::{
     DAMPING_SIGNIFICANCE, MAX_DAMPING, NUISANCE_POLES, POOLING, REFUSALS, STRONG_EVIDENCE,
@@ -13,6 +12,7 @@ use super::noise_order::with_enough_noise_terms;
 use super::parameters::Parameters;
 use super::result::{DropReason, DroppedCandidate};
 use super::search::{Effort, Fit, search_pooled};
+use super::transient::{FitWithTransient, search_with_transient};
 use crate::stabilisation::Pole;
 
 /// Requested number of modes.
@@ -26,7 +26,7 @@ pub(super) struct Wanted {
 
 /// Selected modes.
 pub(super) struct Chosen {
-    pub fitted: IndependentFit,
+    pub fitted: FitWithTransient,
     /// Indices of the poles that are modes; the others explain a background or noise.
     pub sound: Vec<usize>,
 }
@@ -58,9 +58,9 @@ pub(super) fn choose(
         .map(|fit| choice.pruned(fit))
         .map(|fit| choice.extended(fit, limit))
         .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL))
-        .and_then(|fit| search_beside_ends(fit, band))
+        .and_then(|fit| search_with_transient(fit, band))
         .map(|known| with_enough_noise_terms(known.fit, &known.lines))
-        .and_then(|fit| search_beside_ends(fit, band));
+        .and_then(|fit| search_with_transient(fit, band));
     let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
     (chosen, choice.dropped)
 }
@@ -92,7 +92,7 @@ impl Choice<'_> {
     }
 
     /// Separates modes from other poles, and keeps at most the requested number.
-    fn judged(&mut self, fitted: IndependentFit) -> Chosen {
+    fn judged(&mut self, fitted: FitWithTransient) -> Chosen {
         let fit = &fitted.fit;
         let mut sound = Vec::new();
         for mode in 0..fit.parameters.layout.modes {

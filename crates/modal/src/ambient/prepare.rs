@@ -73,7 +73,7 @@ pub(super) fn band_lines(
     check_copies(&amplitudes)?;
     let omega = included.iter().map(|k| data.omega()[*k]).collect();
     let span = Span { duration, sample_interval };
-    Ok(BandLines { omega, amplitudes, scale, span, ends: None })
+    Ok(BandLines { omega, amplitudes, scale, span, transient: None })
 }
 
 fn check_copies(amplitudes: &DMatrix<Complex<f64>>) -> Result<(), AmbientError> {

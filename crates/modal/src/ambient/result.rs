@@ -21,7 +21,7 @@ pub enum Uncertainty {
     Known {
         /// Standard error, in the unit of the value.
         standard_error: f64,
-        /// Ends of the interval, in the unit of the value.
+        /// Transient of the interval, in the unit of the value.
         interval: [f64; 2],
     },
     /// The record is too short: the distribution of the estimate is not known well enough for an
@@ -275,7 +275,7 @@ impl Statistics<'_> {
         self.covariance[(index, index)].max(0.0).sqrt()
     }
 
-    /// Returns the bias of a parameter, 0 if it is too large to be known.
+    /// Returns the bias of a parameter, 0 if it exceeds [`MAX_BIAS`].
     fn bias(self, index: usize) -> f64 {
         let bias = self.bias[index];
         if bias.abs() <= MAX_BIAS * self.standard_error(index) { bias } else { 0.0 }

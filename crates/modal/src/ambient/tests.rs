@@ -37,7 +37,7 @@ fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
         (40..400).map(|k| std::f64::consts::TAU * f64::from(k) / DURATION).collect();
     let amplitudes = DMatrix::zeros(omega.len(), parameters.layout.outputs);
     let scale = vec![1.0; parameters.layout.outputs];
-    let band = BandLines { omega, amplitudes, scale, span: SPAN, ends: None };
+    let band = BandLines { omega, amplitudes, scale, span: SPAN, transient: None };
     let coefficients = Coefficients::new(parameters);
     let mut pooled = band.pooled(&[], 0.1, 3);
     pooled = (0..360)
@@ -168,8 +168,8 @@ fn modes_keep_their_values_when_others_come_and_go() {
     );
 }
 
-/// Judge: the logarithm of the mean of n squared magnitudes is −1/(2n) + O(1/n²) on average where
-/// that of the variance is 0.
+/// Judge: the logarithm of the mean of n squared magnitudes of unit variance is −1/(2n) + O(1/n²) on
+/// average.
 #[test]
 fn the_bias_of_a_noise_level_is_that_of_a_logarithm() {
     let layout = Layout::new(0, 1, 1);
@@ -189,10 +189,9 @@ fn the_bias_of_a_noise_level_is_that_of_a_logarithm() {
 }
 
 /// Judge: the covariance of two lines as the double sum of the covariance function of the state
-/// equations over all pairs of samples. Beside a resonance it is that of the motion at the ends;
-/// without this motion lines are taken to be independent.
+/// equations over all pairs of samples. Beside a resonance it is that of the transient.
 #[test]
-fn the_motion_at_the_ends_correlates_the_lines() {
+fn the_transient_correlates_the_lines() {
     let layout = Layout::new(1, 1, 1);
     let (hz, zeta) = (2.0, 0.02);
     let omega = hz * std::f64::consts::TAU;
@@ -223,12 +222,12 @@ fn the_motion_at_the_ends_correlates_the_lines() {
             let terms = first.iter().enumerate();
             let terms = terms.map(|(t, z)| z * Complex::cis(second * t as f64 * dt));
             let exact = terms.sum::<Complex<f64>>() * (dt * dt / DURATION);
-            let [one, other] = [lines[j], *second].map(|w| coefficients.end_gains(w, SPAN));
-            let prior = coefficients.end_covariance(SPAN).map(Complex::from);
+            let [one, other] = [lines[j], *second].map(|w| coefficients.transient_gains(w, SPAN));
+            let prior = coefficients.transient_covariance(SPAN).map(Complex::from);
             let modelled = (one * prior * other.adjoint())[(0, 0)];
             let gap = (exact - modelled).norm() / exact.norm();
-            // Given the motion at the ends, the forces of two lines still have the correlation
-            // −α/T; the forces and the mirrored pole have a share of ζ in common.
+            // Given the transient, two lines still have the covariance −α/(T |a_j|² |a_k|²); the
+            // mirrored pole has a share of ζ.
             let apart = (lines[j] - pole.im) * (second - pole.im);
             let ignored = pole.re.powi(2) / apart.abs() + 2.0 * zeta;
             assert!(gap < ignored, "{j} {k}: {gap} {ignored} {exact} {modelled}");

@@ -120,8 +120,8 @@ fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
 }
 
 /// Two records for which a wrong quantity has the larger maximum of the likelihood, and two for
-/// which independent lines do, because a mode changes much between the ends: at damping ratios a
-/// tenth of the true ones or less.
+/// which the likelihood of independent lines has a false one, because a mode changes much between
+/// the ends: at damping ratios a tenth of the true ones or less.
 #[test]
 fn no_resonance_becomes_a_sinusoid() {
     let truth = tower();

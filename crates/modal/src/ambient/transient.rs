@@ -1,10 +1,10 @@
-//! Motion at the two ends of an open record.
+//! Transient of an open record: the part of its lines that comes from the motion at its two ends.
 //!
 //! A mode obeys z′ = λz + w. Its transform over the record is Z = W/(jω − λ) − L t, where t is the
 //! change of z over the record: one number for all lines. A likelihood of independent lines counts
-//! the leakage L t as often as there are lines, so that one large end value would decide the
+//! the transient L t as often as there are lines: one large change would then determine the
 //! damping. Here t is a random effect: it is predicted from all lines together, and the lines
-//! without it are independent.
+//! without it are nearly independent.
 //!
 //! For samples at intervals Δ, L = Δ/(1 − exp(−aΔ)) with a = jω − λ. The mean of W for a known t is
 //! tα/a* with α = −Re λ, so the response to t is −L (1 − α/a*).
@@ -13,69 +13,78 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::likelihood::{TASK, log_determinant, noise, positive_factor};
-use super::limits::END_ROUNDS;
+use super::limits::TRANSIENT_ROUNDS;
 use super::lines::BandLines;
 use super::parameters::{Parameters, Span};
 use super::search::{Effort, Fit, search_pooled};
 use super::spectrum::Coefficients;
 
-/// Remaining uncertainty of the motion at the ends, after its prediction.
+/// Remaining uncertainty of the transient, after its prediction.
 #[derive(Debug, Clone)]
-pub(super) struct Ends {
+pub(super) struct Transient {
     coefficients: Coefficients,
     /// Covariance of the real parts and then the imaginary parts of t, 2 modes × 2 modes.
     covariance: DMatrix<f64>,
     span: Span,
 }
 
-impl Ends {
-    /// Returns the power of the remaining motion at a line, outputs × outputs.
+impl Transient {
+    /// Returns the power of the remaining transient at a line, outputs × outputs.
     pub fn power(&self, omega: f64) -> DMatrix<Complex<f64>> {
-        let gain = self.coefficients.end_gains(omega, self.span);
+        let gain = self.coefficients.transient_gains(omega, self.span);
         &gain * self.covariance.map(Complex::from) * gain.adjoint()
     }
 }
 
-/// Prediction of the motion at the ends.
+/// Prediction of the transient.
 struct Prediction {
     /// Real parts and then imaginary parts of t, one of each per mode.
     mean: DVector<f64>,
-    ends: Ends,
-    /// −log L of the lines, with the motion at the ends integrated out.
+    transient: Transient,
+    /// −log L of the lines, with the transient integrated out.
     cost: f64,
 }
 
-/// Maximum of the likelihood with the motion at the ends as a random effect.
-pub(super) struct IndependentFit {
+/// Fit with the transient as a random effect.
+pub(super) struct FitWithTransient {
     pub fit: Fit,
-    /// Lines without the motion at the ends, to which the spectrum was fitted.
+    /// Lines without the predicted transient, to which the spectrum was fitted.
     pub lines: BandLines,
-    /// −log L of all lines, with the motion at the ends integrated out.
+    /// −log L of all lines, with the transient integrated out.
     pub cost: f64,
 }
 
-/// Searches from the parameters of `fit`, in alternation with the motion at the ends.
+/// Searches from the parameters of `fit`, in alternation with the transient, until the likelihood
+/// rises no more.
+///
+/// What the transient itself tells of the poles is left out: its share is that of one line in those
+/// of a resonance.
 ///
 /// # Source
-/// Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.
-pub(super) fn search_beside_ends(mut fit: Fit, band: &BandLines) -> Option<IndependentFit> {
+/// After Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.
+pub(super) fn search_with_transient(fit: Fit, band: &BandLines) -> Option<FitWithTransient> {
     let mut predicted = predicted(&fit.parameters, band)?;
-    let mut round = 0;
-    loop {
-        let lines = band.without_ends(&predicted);
-        fit = search_pooled(fit.parameters, &lines, Effort::FULL)?;
-        let before = predicted.cost;
+    let mut parameters = fit.parameters;
+    let mut best: Option<FitWithTransient> = None;
+    for round in 1..=TRANSIENT_ROUNDS {
+        let lines = band.without_transient(&predicted);
+        let fit = search_pooled(parameters.clone(), &lines, Effort::FULL)?;
         predicted = self::predicted(&fit.parameters, band)?;
-        round += 1;
         let cost = predicted.cost;
-        log::debug!("motion at the ends, round {round}: cost {cost:.4}");
-        if (before - cost).abs() < Effort::FULL.slow || round == END_ROUNDS {
-            return Some(IndependentFit { fit, lines, cost });
+        log::debug!("transient, round {round}: cost {cost:.4}");
+        let gain = best.as_ref().map_or(f64::INFINITY, |best| best.cost - cost);
+        if gain > 0.0 {
+            parameters.clone_from(&fit.parameters);
+            best = Some(FitWithTransient { fit, lines, cost });
+        }
+        if gain < Effort::FULL.slow {
+            break;
         }
     }
+    best
 }
 
-/// Predicts the motion at the ends from all lines.
+/// Predicts the transient from all lines.
 ///
 /// # Source
 /// Harville (1977), Journal of the American Statistical Association 72, 320–338 (best linear
@@ -85,37 +94,38 @@ fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
     let unknowns = 2 * parameters.layout.modes;
     let indices: Vec<usize> = (0..band.omega.len()).collect();
     let chunk = |indices: &[usize]| {
-        let mut sums = EndSums::zero(unknowns);
+        let mut sums = TransientSums::zero(unknowns);
         indices.iter().try_for_each(|at| sums.add_line(parameters, &coefficients, band, *at))?;
         Some(sums)
     };
     let parts: Option<Vec<_>> = indices.par_chunks(TASK).map(chunk).collect();
-    let mut sums = EndSums::zero(unknowns);
+    let mut sums = TransientSums::zero(unknowns);
     for part in parts? {
         sums.add(&part);
     }
-    let EndSums { information, score, mut cost } = sums;
-    let prior = coefficients.end_covariance(band.span);
+    let TransientSums { information, score, mut cost } = sums;
+    let prior = coefficients.transient_covariance(band.span);
     let factor = (DMatrix::identity(unknowns, unknowns) + &prior * information).lu();
     let covariance = factor.solve(&prior)?;
     let mean = &covariance * &score;
-    cost += 0.5 * (factor.determinant().abs().ln() - score.dot(&mean));
+    let log_determinant: f64 = factor.u().diagonal().iter().map(|pivot| pivot.abs().ln()).sum();
+    cost += 0.5 * (log_determinant - score.dot(&mean));
     let sound = cost.is_finite() && mean.iter().all(|value| value.is_finite());
-    let ends = Ends { coefficients, covariance, span: band.span };
-    sound.then_some(Prediction { mean, ends, cost })
+    let transient = Transient { coefficients, covariance, span: band.span };
+    sound.then_some(Prediction { mean, transient, cost })
 }
 
 /// Sums over the lines for the prediction.
-struct EndSums {
+struct TransientSums {
     /// 2 Re Σ Gᴴ S⁻¹ G with the lines G of unit changes.
     information: DMatrix<f64>,
     /// 2 Re Σ Gᴴ S⁻¹ Y.
     score: DVector<f64>,
-    /// −log L of the lines without motion at the ends.
+    /// −log L of the lines with no transient.
     cost: f64,
 }
 
-impl EndSums {
+impl TransientSums {
     fn zero(unknowns: usize) -> Self {
         let (information, score) = (DMatrix::zeros(unknowns, unknowns), DVector::zeros(unknowns));
         Self { information, score, cost: 0.0 }
@@ -142,7 +152,7 @@ impl EndSums {
         let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &terms));
         let factor = positive_factor(spectrum)?;
         let line = band.amplitudes.row(index).transpose();
-        let gain = coefficients.end_gains(omega, band.span);
+        let gain = coefficients.transient_gains(omega, band.span);
         let (whole, of_gain) = (factor.solve(&line), factor.solve(&gain));
         self.cost += log_determinant(&factor) + line.dotc(&whole).re;
         self.information += gain.ad_mul(&of_gain).map(|z| 2.0 * z.re);
@@ -152,18 +162,19 @@ impl EndSums {
 }
 
 impl BandLines {
-    /// Returns the lines without the predicted motion at the ends: those of an endless record.
-    fn without_ends(&self, predicted: &Prediction) -> Self {
+    /// Returns the lines without the predicted transient: the remaining ones have no leakage.
+    fn without_transient(&self, predicted: &Prediction) -> Self {
         let mean = predicted.mean.map(Complex::from);
         let mut amplitudes = self.amplitudes.clone();
         for (mut line, omega) in amplitudes.row_iter_mut().zip(&self.omega) {
-            let motion = predicted.ends.coefficients.end_gains(*omega, self.span) * &mean;
-            line -= motion.transpose();
+            let transient =
+                predicted.transient.coefficients.transient_gains(*omega, self.span) * &mean;
+            line -= transient.transpose();
         }
         Self {
             amplitudes,
             span: Span { duration: f64::INFINITY, ..self.span },
-            ends: Some(predicted.ends.clone()),
+            transient: Some(predicted.transient.clone()),
             ..self.clone()
         }
     }
@@ -172,7 +183,7 @@ impl BandLines {
 impl Coefficients {
     /// Returns the lines of unit real and then unit imaginary changes of each mode over the record,
     /// outputs × 2 modes.
-    pub fn end_gains(&self, omega: f64, span: Span) -> DMatrix<Complex<f64>> {
+    pub fn transient_gains(&self, omega: f64, span: Span) -> DMatrix<Complex<f64>> {
         let (outputs, modes) = self.shapes.shape();
         let mut gains = DMatrix::zeros(outputs, 2 * modes);
         for (r, pole) in self.poles.iter().enumerate() {
@@ -194,7 +205,7 @@ impl Coefficients {
 
     /// Returns the covariance of the real and then the imaginary parts of the changes of the modes
     /// over the record, 2 modes × 2 modes.
-    pub fn end_covariance(&self, span: Span) -> DMatrix<f64> {
+    pub fn transient_covariance(&self, span: Span) -> DMatrix<f64> {
         let modes = self.poles.len();
         let lost = |pole: Complex<f64>| Complex::from(1.0) - (pole * span.duration).exp();
         let mut covariance = DMatrix::zeros(2 * modes, 2 * modes);
