@@ -11,8 +11,8 @@ use super::search::{Fit, full_step, scaled};
 use super::spectrum::Coefficients;
 use crate::decomposition::hermitian_eigen;
 
-/// Step of the second differences of the spectrum: in standard errors of a combination of
-/// parameters, and at most this change of a parameter, all of which have unit scale.
+/// Step of the second differences of the spectrum, in standard errors of a combination of
+/// parameters, and largest change of a parameter; the parameters have unit scale.
 const STEP: f64 = 0.05;
 
 /// Parameters beside those of a fit.
@@ -28,10 +28,10 @@ impl Fit {
     /// without their transient; `None` if the information of the fit cannot be decomposed.
     ///
     /// Averaged over the estimation errors, the fitted spectrum exceeds S by
-    /// M = ½ Σ C_ab ∂²S/∂θ_a∂θ_b, with the covariance C. The expected periodogram of the open record
-    /// without its transient is also not quite S, the spectrum of an endless record. The bias is one
-    /// scoring step from S to the expected periodogram minus M. It is proportional to 1/T, the
-    /// standard errors to 1/√T.
+    /// M = ½ Σ C_ab ∂²S/∂θ_a∂θ_b, with the covariance C. The expected periodogram of the open
+    /// record without its transient is also not quite S, the spectrum of an endless record. The
+    /// bias is one scoring step from S to the expected periodogram minus M. It is proportional to
+    /// 1/T, the standard errors to 1/√T.
     ///
     /// # Source
     /// Cox & Snell (1968), Journal of the Royal Statistical Society B 30, 248–265; Box (1971),
@@ -68,7 +68,8 @@ impl Fit {
         let eigen = hermitian_eigen(scaled)?;
         let mut moved = Vec::with_capacity(2 * scale.len());
         let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
-        // The lines do not determine the phase of a mode far from all others; nothing depends on it.
+        // The lines do not determine the phase of a mode far from all others; no result depends on
+        // it.
         for (value, direction) in directions.filter(|(value, _)| **value > DETERMINED_SHARE) {
             let error = direction.component_mul(&scale) / value.sqrt();
             let step = STEP / error.amax().max(1.0);

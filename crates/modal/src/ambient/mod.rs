@@ -170,7 +170,7 @@ fn fitted_modes(
     let size = fit.parameters.layout.len();
     let failed = AmbientError::Numerics { what: "the covariance of the modes", size };
     let covariance = fit.covariance().ok_or(failed)?;
-    // Where the bias cannot be computed, none is subtracted.
+    // A bias that cannot be computed is not subtracted.
     let bias = fit.bias(&pooled, band.span).unwrap_or_else(|| DVector::zeros(size));
     let statistics = Statistics { covariance: &covariance, bias: &bias };
     let scale = RecordScale { span: band.span, scale: &band.scale };

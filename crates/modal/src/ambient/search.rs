@@ -236,7 +236,8 @@ fn damped_step(
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 
-/// Returns the information scaled to a unit diagonal plus `damping`, and the scale of rows and columns.
+/// Returns the information scaled to a unit diagonal plus `damping`, and the scale of rows and
+/// columns.
 pub(super) fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
     let largest = information.diagonal().amax().max(f64::MIN_POSITIVE);
     let floor = LEAST_INFORMATION.powi(2) * largest;

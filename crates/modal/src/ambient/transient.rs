@@ -57,8 +57,8 @@ pub(super) struct FitWithTransient {
 /// Searches from the parameters of `fit`, in alternation with the transient, until the likelihood
 /// rises no more.
 ///
-/// What the transient itself tells of the poles is left out: its share is that of one line in those
-/// of a resonance.
+/// The information of the transient itself on the poles is not used: its share is that of one line
+/// among those of a resonance.
 ///
 /// # Source
 /// After Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.
