@@ -180,6 +180,8 @@ fn a_table_gives_the_modes_of_the_record() {
     assert!(
         refused(path, "modes table.csv --hits").contains("--hits: it does not apply to a table")
     );
+    let message = refused(path, "modes hammer-1.csv --ambient");
+    assert!(message.contains("name the columns of a record"), "{message}");
 }
 
 /// Reference: two records of the same machine, and its description.

@@ -13,7 +13,7 @@ use crate::decomposition::hermitian_eigen;
 
 /// Step of the second differences of the spectrum, in standard errors of a combination of
 /// parameters, and largest change of a parameter; the parameters have unit scale.
-const STEP: f64 = 0.05;
+const ERROR_STEP: f64 = 0.05;
 
 /// Parameters beside those of a fit.
 struct Moved {
@@ -72,7 +72,7 @@ impl Fit {
         // it.
         for (value, direction) in directions.filter(|(value, _)| **value > DETERMINED_SHARE) {
             let error = direction.component_mul(&scale) / value.sqrt();
-            let step = STEP / error.amax().max(1.0);
+            let step = ERROR_STEP / error.amax().max(1.0);
             for side in [step, -step] {
                 let mut parameters = self.parameters.clone();
                 parameters.values.axpy(side, &error, 1.0);

@@ -188,6 +188,31 @@ fn the_bias_of_a_noise_level_is_that_of_a_logarithm() {
     assert!((bias + 0.01).abs() < 1e-5, "{bias}");
 }
 
+/// Judge: the estimate of the decay rate α of a complex Ornstein–Uhlenbeck process with zero mean is
+/// 1/T too high on average, to first order, as that of a complex autoregression of order one is. A
+/// lightly damped mode with little noise is such a process.
+#[test]
+fn the_bias_of_a_damping_ratio_is_that_of_an_autoregression() {
+    let layout = Layout::new(1, 1, 1);
+    let (omega, zeta) = (4.0 * std::f64::consts::TAU, 0.02);
+    let values = DVector::from_vec(vec![omega.ln(), f64::ln(zeta), 1.0, 0.0, -18.0]);
+    let parameters = Parameters { kernel: Kernel::Static, layout, values };
+    let line = |k: i32| PooledLines {
+        omega: std::f64::consts::TAU * f64::from(k) / DURATION,
+        count: 1.0,
+        terms: vec![1.0],
+        periodogram: DMatrix::zeros(1, 1),
+    };
+    let lines: Vec<_> = (20..460).map(line).collect();
+    let endless = Span { duration: f64::INFINITY, ..SPAN };
+    let information = information(&parameters, &lines, endless).unwrap();
+    let index = parameters.layout.damping(0);
+    let fit = Fit { parameters, cost: 0.0, information };
+    let bias = fit.bias(&lines, SPAN).unwrap()[index];
+    let decay_times = zeta * omega * DURATION;
+    assert!((bias * decay_times - 1.0).abs() < 0.1, "{}", bias * decay_times);
+}
+
 /// Judge: the covariance of two lines as the double sum of the covariance function of the state
 /// equations over all pairs of samples. Beside a resonance it is that of the transient.
 #[test]

@@ -105,7 +105,11 @@ fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
     }
     let TransientSums { information, score, mut cost } = sums;
     let prior = coefficients.transient_covariance(band.span);
-    let factor = (DMatrix::identity(unknowns, unknowns) + &prior * information).lu();
+    let matrix = DMatrix::identity(unknowns, unknowns) + &prior * information;
+    if !matrix.iter().all(|entry| entry.is_finite()) {
+        return None;
+    }
+    let factor = matrix.lu();
     let covariance = factor.solve(&prior)?;
     let mean = &covariance * &score;
     let log_determinant: f64 = factor.u().diagonal().iter().map(|pivot| pivot.abs().ln()).sum();

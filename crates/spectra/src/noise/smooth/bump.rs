@@ -235,8 +235,8 @@ struct Gained {
 }
 
 impl Gained {
-    /// Fits the heights, beginning with `start`, to the levels v/p, whose cumulative sums `sums`
-    /// has.
+    /// Fits the heights, beginning with `start`, to the levels v/p; `sums` holds their cumulative
+    /// sums.
     fn fit(bump: Bump, start: &[f64], levels: &DMatrix<f64>, sums: &FlatGains) -> Self {
         let lines = levels.nrows();
         let support = bump.support(lines);
