@@ -107,8 +107,9 @@ impl<'a> ForceTable<'a> {
         let Some(record) = record else { return };
         match k.checked_sub(record.len()) {
             None => {
-                let row = record.data().as_slice()[k..].iter().step_by(record.len());
-                self.act(row, out);
+                // A force without channels has no values at all.
+                let rest = record.data().as_slice().get(k..).unwrap_or(&[]);
+                self.act(rest.iter().step_by(record.len()), out);
             }
             Some(after) => self.act(self.after[after].iter(), out),
         }

@@ -115,6 +115,26 @@ fn selected_degrees_of_freedom_are_those_of_the_whole() {
 }
 
 #[test]
+fn a_force_without_channels_leaves_the_free_motion() {
+    let (_, system) = systems().swap_remove(4);
+    let (n, sampling) = (system.dof(), Sampling::new(5e-3, 60).unwrap());
+    let zero = |channels| {
+        mechid_signal::Record::new(sampling, DMatrix::zeros(sampling.len(), channels)).unwrap()
+    };
+    let dofs = SelectedDofs { forced: &[], observed: &[0] };
+    let released = nalgebra::DVector::from_element(n, 1e-2);
+    let start = InitialState::new(released, nalgebra::DVector::zeros(n)).unwrap();
+    for scheme in schemes() {
+        let scheme = scheme.as_ref();
+        let free = integrate_selected(scheme, &system, dofs, &zero(0), &start).unwrap();
+        let unloaded = integrate(scheme, &system, &zero(n), &start).unwrap();
+        for (free, unloaded) in parts(&free).into_iter().zip(parts(&unloaded)) {
+            assert_eq!(free.column(0), unloaded.column(0), "{}", scheme.name());
+        }
+    }
+}
+
+#[test]
 fn selections_that_do_not_fit_are_refused() {
     let (_, system) = systems().swap_remove(0);
     let force = force(Sampling::new(5e-3, 10).unwrap(), 2);
