@@ -54,10 +54,6 @@ pub(super) const NOISE_TERMS_ADDED: usize = 2;
 /// Maximum number of polynomials of the noise; Akaike's criterion chooses the number.
 pub(super) const MOST_NOISE_TERMS: usize = 15;
 
-/// Number of neighbouring modes on either side whose forces may be correlated with the force of a
-/// mode.
-pub(super) const CORRELATED_NEIGHBOURS: usize = 4;
-
 /// Gain in log-likelihood of a step below which a search ends: the parameters then move by less
 /// than a twentieth of their standard errors.
 pub(super) const ENOUGH: f64 = 1e-3;

@@ -2,8 +2,6 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::limits::CORRELATED_NEIGHBOURS;
-
 /// Kernel of a mode, distinguished by the response of the output to a constant force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kernel {
@@ -32,14 +30,14 @@ pub(super) struct Layout {
     pub modes: usize,
     pub outputs: usize,
     pub noise_terms: usize,
-    /// Pairs (later, earlier) of modes whose forces may be correlated.
+    /// Pairs (later, earlier) of modes, whose forces may be correlated.
     pub pairs: Vec<(usize, usize)>,
 }
 
 impl Layout {
     pub fn new(modes: usize, outputs: usize, noise_terms: usize) -> Self {
-        let near = |r: usize| (r.saturating_sub(CORRELATED_NEIGHBOURS)..r).map(move |s| (r, s));
-        Self { modes, outputs, noise_terms, pairs: (0..modes).flat_map(near).collect() }
+        let pairs = (0..modes).flat_map(|r| (0..r).map(move |s| (r, s))).collect();
+        Self { modes, outputs, noise_terms, pairs }
     }
 
     pub fn len(&self) -> usize {
