@@ -66,11 +66,11 @@ impl BandLines {
         part: f64,
         noise_terms: usize,
     ) -> Vec<PooledLines> {
+        let whole = self.omega[self.omega.len() - 1] - self.omega[0];
         let distance = |omega: f64| {
             let to = |pole: &Complex<f64>| (Complex::new(0.0, omega) - pole).norm();
-            poles.iter().map(to).fold(f64::INFINITY, f64::min)
+            poles.iter().map(to).fold(whole, f64::min)
         };
-        let whole = self.omega[self.omega.len() - 1] - self.omega[0];
         let mut pooled = Vec::new();
         let mut first = 0;
         while first < self.omega.len() {
