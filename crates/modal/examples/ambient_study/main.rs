@@ -10,6 +10,7 @@
 #[path = "../../tests/suite/ambient_generator.rs"]
 mod ambient_generator;
 
+use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -22,7 +23,10 @@ use mechid_modal::ambient::{
 use mechid_modal::indicators::mac;
 use mechid_modal::stabilisation::{Pole, Stabilisation};
 use mechid_signal::Record;
-use nalgebra::{Complex, DVector, dmatrix};
+use nalgebra::{Complex, DMatrix, DVector, dmatrix};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 /// Structure, quantity, sampling rate, number of samples and noise of a case.
 struct Case {
@@ -68,6 +72,16 @@ fn cases() -> Vec<Case> {
         shapes: dmatrix![1.0, 0.8, -0.9].map(Complex::from),
         forces: dmatrix![1.0, 0.3; 2.0, -2.0; -3.0, 6.0],
     };
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    // Each force drives all modes, so that far modes have correlated forces, too.
+    let bridge = Structure {
+        frequencies_hz: vec![1.1, 1.7, 2.6, 3.2, 3.3, 4.8, 6.0, 7.1],
+        dampings: vec![0.01; 8],
+        shapes: DMatrix::from_fn(8, 8, |i, r| {
+            Complex::from((PI * (r as f64 + 0.5) * (i as f64 + 1.0) / 8.0).sin())
+        }),
+        forces: DMatrix::from_fn(8, 5, |_, _| StandardNormal.sample(&mut random)),
+    };
     let case = |name, structure: &Structure, quantity, rate_hz, seconds: f64, level: f64| Case {
         name,
         structure: structure.clone(),
@@ -96,6 +110,7 @@ fn cases() -> Vec<Case> {
         with_pole("the same, 300 s, white noise", 0.0),
         with_pole("the same, noise that rises with frequency", -0.5),
         with_pole("the same, noise that falls steeply", 0.9),
+        case("bridge, accelerations, 300 s", &bridge, Quantity::Acceleration, 20.0, 300.0, 0.1),
     ]
 }
 

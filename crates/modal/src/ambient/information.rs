@@ -132,18 +132,21 @@ impl LineInformation<'_> {
     ) {
         let gram = x.ad_mul(whitened);
         let (p, columns) = x.shape();
+        let weight = 2.0 * self.line.count;
         for b in 0..columns {
-            for a in 0..=b {
-                for j in 0..p {
+            for j in 0..p {
+                let mut column = sum.column_mut(self.shape_index(b, j));
+                let column = column.as_mut_slice();
+                for a in 0..=b {
                     let first = self.shape_index(a, 0);
-                    for i in 0..p {
-                        let (row, column) = (first + i, self.shape_index(b, j));
-                        if row > column {
-                            continue;
-                        }
-                        let product = whitened[(j, a)] * whitened[(i, b)]
-                            + self.inverse[(j, i)] * gram[(a, b)];
-                        sum[(row, column)] += self.line.count * 2.0 * product.re;
+                    let rows = if a < b { p } else { j + 1 };
+                    let (turned, inner) = (whitened[(j, a)], gram[(a, b)]);
+                    let entries = column[first..first + rows].iter_mut();
+                    // P is Hermitian: P_ji is the conjugate of P_ij, which is next to P_i+1,j.
+                    let factors = whitened.column(b).into_iter().zip(self.inverse.column(j));
+                    for (entry, (other, inverse)) in entries.zip(factors) {
+                        let value = turned * other + inverse.conj() * inner;
+                        *entry += weight * value.re;
                     }
                 }
             }
@@ -177,5 +180,7 @@ impl LineInformation<'_> {
 
 /// Returns the real and imaginary parts of the entries, one after the other.
 fn parts(matrix: &DMatrix<Complex<f64>>) -> Vec<f64> {
-    matrix.iter().flat_map(|z| [z.re, z.im]).collect()
+    let mut parts = Vec::with_capacity(2 * matrix.len());
+    matrix.iter().for_each(|z| parts.extend([z.re, z.im]));
+    parts
 }

@@ -8,7 +8,7 @@ use super::likelihood::{noise, positive_factor};
 use super::limits::{COARSE_POOLING, MIN_DECAY_TIMES, NOISE_TERMS};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
-use super::search::{Effort, Fit, search, search_pooled};
+use super::search::{Effort, Fit, SearchLines, search, search_pooled};
 use super::spectrum::Coefficients;
 use crate::indicators::mean_phase;
 use crate::stabilisation::Pole;
@@ -40,12 +40,13 @@ const QUANTITIES: [(Kernel, f64); 5] = [
 pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
+    let lines = SearchLines { pooled: &pooled, coarse: &pooled, span: band.span };
     let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
         let initial = initial_parameters(modes, band.outputs(), &pooled, band, kernel, phase);
-        search(initial, &pooled, band.span, Effort::HELD)
+        search(initial, lines, Effort::HELD)
     });
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    let rough = search(best.parameters, &pooled, band.span, Effort::SHORT)?;
+    let rough = search(best.parameters, lines, Effort::SHORT)?;
     search_pooled(rough.parameters, band, Effort::TEST)
 }
 

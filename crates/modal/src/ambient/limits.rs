@@ -40,8 +40,8 @@ pub(super) const MIN_SHARE: f64 = 0.3;
 /// equals the spectrum at the centre within 0.25 %.
 pub(super) const POOLING: f64 = 0.1;
 
-/// Width of pooled lines for the comparison of initial estimates, as a share of the distance to the
-/// nearest pole.
+/// Width of pooled lines for the comparison of initial estimates and for the information of a step,
+/// as a share of the distance to the nearest pole.
 pub(super) const COARSE_POOLING: f64 = 0.3;
 
 /// Number of Chebyshev polynomials of the logarithm of a sensor's noise over the band, while modes

@@ -7,19 +7,20 @@ use super::lines::BandLines;
 use super::parameters::Parameters;
 use super::search::{Effort, Fit, full_step, search_pooled};
 
-/// Adds polynomials to the noise of all sensors as long as Akaike's criterion falls.
+/// Returns the fit with further polynomials of the noise of all sensors, added while Akaike's
+/// criterion falls; `None` if it does not fall.
 ///
 /// Noise that the polynomials cannot follow is attributed to the tails of the resonances and biases
 /// the damping; longer records are affected more.
 ///
-///
 /// # Source
 /// Akaike (1974), IEEE Transactions on Automatic Control 19, 716–723.
-pub(super) fn with_enough_noise_terms(mut fit: Fit, band: &BandLines) -> Fit {
-    while let Some(next) = extended(&fit, band) {
-        fit = next;
+pub(super) fn with_more_noise_terms(fit: &Fit, band: &BandLines) -> Option<Fit> {
+    let mut best = extended(fit, band)?;
+    while let Some(next) = extended(&best, band) {
+        best = next;
     }
-    fit
+    Some(best)
 }
 
 /// Returns the fit with further polynomials, if they lower the criterion.

@@ -8,7 +8,7 @@ use super::limits::{
     DAMPING_SIGNIFICANCE, MAX_DAMPING, NUISANCE_POLES, POOLING, REFUSALS, STRONG_EVIDENCE,
 };
 use super::lines::BandLines;
-use super::noise_order::with_enough_noise_terms;
+use super::noise_order::with_more_noise_terms;
 use super::parameters::Parameters;
 use super::result::{DropReason, DroppedCandidate};
 use super::search::{Effort, Fit, search_pooled};
@@ -59,8 +59,10 @@ pub(super) fn choose(
         .map(|fit| choice.extended(fit, limit))
         .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL))
         .and_then(|fit| search_with_transient(fit, band))
-        .map(|known| with_enough_noise_terms(known.fit, &known.lines))
-        .and_then(|fit| search_with_transient(fit, band));
+        .and_then(|known| match with_more_noise_terms(&known.fit, &known.lines) {
+            Some(fit) => search_with_transient(fit, band),
+            None => Some(known),
+        });
     let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
     (chosen, choice.dropped)
 }

@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::information::information;
 use super::likelihood::{cost, gradient};
-use super::limits::{ENOUGH, LARGEST_STEP, POOLING};
+use super::limits::{COARSE_POOLING, ENOUGH, LARGEST_STEP, POOLING};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Parameters, Span};
 
@@ -70,28 +70,46 @@ pub(super) struct Fit {
     pub parameters: Parameters,
     /// −log L.
     pub cost: f64,
+    /// Fisher information; after [`search`] only that of the last steps.
     pub information: DMatrix<f64>,
 }
 
-/// Searches from `start` over pooled lines; `None` if the likelihood is not defined at `start`.
+/// Lines of a search.
+#[derive(Clone, Copy)]
+pub(super) struct SearchLines<'a> {
+    /// Lines of the likelihood.
+    pub pooled: &'a [PooledLines],
+    /// The same lines, pooled at least as coarsely, for the information of the steps: it determines
+    /// the path, not the maximum.
+    pub coarse: &'a [PooledLines],
+    pub span: Span,
+}
+
+/// Searches from `start`; `None` if the likelihood is not defined there.
 ///
-/// The information costs as much as a hundred gradients. The steps therefore update it from the
+/// The information costs as much as tens of gradients. The steps therefore update it from the
 /// gradients that they meet, and it is computed anew where they become slow or are refused.
-pub(super) fn search(
+pub(super) fn search(start: Parameters, lines: SearchLines<'_>, effort: Effort) -> Option<Fit> {
+    let information = information(&start, lines.coarse, lines.span)?;
+    search_with_information(start, information, 0, lines, effort)
+}
+
+/// Searches from `start` with information that was computed there (no `updates`), or near it.
+fn search_with_information(
     start: Parameters,
-    lines: &[PooledLines],
-    span: Span,
+    information: DMatrix<f64>,
+    updates: usize,
+    lines: SearchLines<'_>,
     effort: Effort,
 ) -> Option<Fit> {
-    let cost = cost(&start, lines, span);
+    let cost = cost(&start, lines.pooled, lines.span);
     if !cost.is_finite() {
         return None;
     }
-    let information = information(&start, lines, span)?;
-    let slope = gradient(&start, lines, span)?;
+    let slope = gradient(&start, lines.pooled, lines.span)?;
     let mut fit = Fit { parameters: start, cost, information };
     let first_free = if effort.holds_poles { 2 * fit.parameters.layout.modes } else { 0 };
-    let mut path = Path { lines, span, first_free, slope, damping: FIRST_DAMPING, updates: 0 };
+    let mut path = Path { lines, first_free, slope, damping: FIRST_DAMPING, updates };
     let mut slow = 0;
     for _ in 0..effort.iterations {
         let gain = path.step(&mut fit)?;
@@ -105,10 +123,9 @@ pub(super) fn search(
         }
         path.renew(&mut fit)?;
     }
-    path.renew(&mut fit)?;
     log::debug!(
         "{} lines, {} unknowns: cost {:.4}",
-        lines.len(),
+        lines.pooled.len(),
         fit.parameters.layout.len(),
         fit.cost
     );
@@ -117,8 +134,7 @@ pub(super) fn search(
 
 /// State of a search between two steps.
 struct Path<'a> {
-    lines: &'a [PooledLines],
-    span: Span,
+    lines: SearchLines<'a>,
     /// Index of the first parameter that may move; poles come before all others.
     first_free: usize,
     /// Gradient at the parameters of the fit.
@@ -134,10 +150,10 @@ impl Path<'_> {
         for _ in 0..TRIALS {
             if let Some(step) = self.proposed(&fit.information) {
                 let candidate = moved(&fit.parameters, &step);
-                let next = cost(&candidate, self.lines, self.span);
+                let next = cost(&candidate, self.lines.pooled, self.lines.span);
                 if next < fit.cost {
                     let gain = fit.cost - next;
-                    let slope = gradient(&candidate, self.lines, self.span)?;
+                    let slope = gradient(&candidate, self.lines.pooled, self.lines.span)?;
                     let distance = &candidate.values - &fit.parameters.values;
                     update(&mut fit.information, &distance, &(&slope - &self.slope));
                     (fit.parameters, fit.cost, self.slope) = (candidate, next, slope);
@@ -169,10 +185,11 @@ impl Path<'_> {
         Some(step)
     }
 
-    /// Computes the information at the parameters of the fit, unless it was computed there.
+    /// Computes the information of the steps at the parameters of the fit, unless it was computed
+    /// there.
     fn renew(&mut self, fit: &mut Fit) -> Option<()> {
         if self.updates > 0 {
-            fit.information = information(&fit.parameters, self.lines, self.span)?;
+            fit.information = information(&fit.parameters, self.lines.coarse, self.lines.span)?;
             self.updates = 0;
             // Steps that were refused for the updates do not concern the new information.
             self.damping = self.damping.min(FIRST_DAMPING);
@@ -206,13 +223,20 @@ fn update(information: &mut DMatrix<f64>, step: &DVector<f64>, change: &DVector<
 /// Searches from `start` with lines pooled around its poles, and again with lines pooled around the
 /// resulting poles.
 pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort) -> Option<Fit> {
-    let terms = start.layout.noise_terms;
-    let first =
-        search(start.clone(), &band.pooled(&start.poles(), POOLING, terms), band.span, effort)?;
-    let pooled = band.pooled(&first.parameters.poles(), POOLING, terms);
-    let mut fit = search(first.parameters, &pooled, band.span, effort)?;
+    let (terms, span) = (start.layout.noise_terms, band.span);
+    let around = |parameters: &Parameters| {
+        let poles = parameters.poles();
+        [POOLING, COARSE_POOLING].map(|part| band.pooled(&poles, part, terms))
+    };
+    let [pooled, coarse] = around(&start);
+    let first = search(start, SearchLines { pooled: &pooled, coarse: &coarse, span }, effort)?;
+    let [pooled, coarse] = around(&first.parameters);
+    let lines = SearchLines { pooled: &pooled, coarse: &coarse, span };
+    let Fit { parameters, information: nearby, .. } = first;
+    let mut fit = search_with_information(parameters, nearby, TRUSTED_UPDATES, lines, effort)?;
+    fit.information = information(&fit.parameters, &pooled, span)?;
     // The cost is computed on all lines, so that fits with different pooling can be compared.
-    fit.cost = cost(&fit.parameters, &band.pooled(&[], 0.0, terms), band.span);
+    fit.cost = cost(&fit.parameters, &band.pooled(&[], 0.0, terms), span);
     Some(fit)
 }
 
@@ -242,11 +266,16 @@ pub(super) fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>,
     let largest = information.diagonal().amax().max(f64::MIN_POSITIVE);
     let floor = LEAST_INFORMATION.powi(2) * largest;
     let scale = information.diagonal().map(|d| 1.0 / d.max(floor).sqrt());
-    let mut scaled = DMatrix::from_diagonal(&scale) * information * DMatrix::from_diagonal(&scale);
+    let mut scaled = scaled_symmetrically(information, &scale);
     for i in 0..scale.len() {
         scaled[(i, i)] += damping;
     }
     (scaled, scale)
+}
+
+/// Returns a matrix with each row and each column multiplied by its scale.
+fn scaled_symmetrically(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * matrix[(i, j)] * scale[j])
 }
 
 /// Returns the parameters after a step; the steps of parameters in which the likelihood is far from
@@ -280,8 +309,7 @@ impl Fit {
     /// Returns the covariance of the parameters, the inverse of the information.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let (scaled, scale) = scaled(&self.information, LEAST_INFORMATION);
-        let inverse = scaled.cholesky()?.inverse();
-        Some(DMatrix::from_diagonal(&scale) * inverse * DMatrix::from_diagonal(&scale))
+        Some(scaled_symmetrically(&scaled.cholesky()?.inverse(), &scale))
     }
 
     pub fn poles(&self) -> Vec<Complex<f64>> {

@@ -251,7 +251,10 @@ fn add_pair(
 }
 
 /// Returns A + Aᴴ + B of a real symmetric B.
-fn hermitian_sum(half: &DMatrix<Complex<f64>>, real: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
+pub(super) fn hermitian_sum(
+    half: &DMatrix<Complex<f64>>,
+    real: &DMatrix<f64>,
+) -> DMatrix<Complex<f64>> {
     let (rows, columns) = half.shape();
     DMatrix::from_fn(rows, columns, |i, j| half[(i, j)] + half[(j, i)].conj() + real[(i, j)])
 }

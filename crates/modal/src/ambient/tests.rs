@@ -151,6 +151,14 @@ fn the_expected_periodogram_is_the_sum_of_the_covariances() {
 }
 
 #[test]
+fn without_poles_every_line_stands_alone() {
+    let omega: Vec<f64> = (40..400).map(f64::from).collect();
+    let amplitudes = DMatrix::zeros(omega.len(), 1);
+    let band = BandLines { omega, amplitudes, scale: vec![1.0], span: SPAN, transient: None };
+    assert_eq!(band.pooled(&[], 0.0, 1).len(), 360);
+}
+
+#[test]
 fn modes_keep_their_values_when_others_come_and_go() {
     let parameters = parameters(Kernel::Vanishing, 2);
     let pole = Complex::new(-0.3, 18.0);
@@ -221,6 +229,41 @@ fn the_bias_of_a_damping_ratio_is_that_of_an_autoregression() {
     let bias = fit.bias(&lines, SPAN).unwrap()[index];
     let decay_times = zeta * omega * DURATION;
     assert!((bias * decay_times - 1.0).abs() < 0.1, "{}", bias * decay_times);
+}
+
+/// Judge: half the sum of all mixed second differences of the spectrum, times the covariances.
+#[test]
+fn the_mean_excess_is_half_the_second_derivative_times_the_covariance() {
+    let parameters = parameters(Kernel::Vanishing, 2);
+    let size = parameters.layout.len();
+    let mut random = ChaCha8Rng::seed_from_u64(12);
+    let root = DMatrix::from_fn(size, size, |i, j| {
+        random.random_range(-0.2..0.2) + if i == j { 1.0 } else { 0.0 }
+    });
+    let information = &root * root.transpose() * 1e6;
+    let covariance = information.clone().cholesky().unwrap().inverse();
+    let line = expected_lines(&parameters, 1.0).swap_remove(80);
+    let spectrum = |steps: [(usize, f64); 2]| {
+        let mut moved = parameters.clone();
+        steps.iter().for_each(|(index, step)| moved.values[*index] += step);
+        let coefficients = Coefficients::new(&moved);
+        let kernels = coefficients.kernels(line.omega, SPAN);
+        coefficients.spectrum(&kernels, &noise(&moved, &line.terms))
+    };
+    let h = 1e-4;
+    let mut exact = DMatrix::<Complex<f64>>::zeros(2, 2);
+    for a in 0..size {
+        for b in 0..size {
+            let equal = spectrum([(a, h), (b, h)]) + spectrum([(a, -h), (b, -h)]);
+            let opposite = spectrum([(a, h), (b, -h)]) + spectrum([(a, -h), (b, h)]);
+            exact += (equal - opposite) * Complex::from(covariance[(a, b)] / (8.0 * h * h));
+        }
+    }
+    let variances = noise(&parameters, &line.terms);
+    let fit = Fit { parameters: parameters.clone(), cost: 0.0, information };
+    let excess = fit.excess().unwrap().at(&line, &variances, SPAN);
+    let gap = (&excess - &exact).norm() / exact.norm();
+    assert!(gap < 1e-3, "{gap:.1e} {excess} {exact}");
 }
 
 /// Judge: the covariance of two lines as the double sum of the covariance function of the state
