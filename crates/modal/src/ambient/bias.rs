@@ -119,8 +119,8 @@ impl Fit {
 }
 
 impl Excess {
-    /// Adds the changes of ψγᵀ and D Q Dᵀ from the centre to coefficients with the same poles, times
-    /// `weight`.
+    /// Adds the changes of ψγᵀ and D Q Dᵀ from the centre to coefficients with the same poles,
+    /// times `weight`.
     fn add_residues(&mut self, moved: &Coefficients, weight: f64) {
         for (r, sum) in self.residues.iter_mut().enumerate() {
             for (coefficients, sign) in [(moved, weight), (&self.centre, -weight)] {
