@@ -108,8 +108,8 @@ impl<'a> ForceTable<'a> {
         match k.checked_sub(record.len()) {
             None => {
                 // A force without channels has no values at all.
-                let rest = record.data().as_slice().get(k..).unwrap_or(&[]);
-                self.act(rest.iter().step_by(record.len()), out);
+                let values = record.data().as_slice().get(k..).unwrap_or(&[]);
+                self.act(values.iter().step_by(record.len()), out);
             }
             Some(after) => self.act(self.after[after].iter(), out),
         }

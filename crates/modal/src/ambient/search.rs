@@ -87,7 +87,7 @@ pub(super) struct SearchLines<'a> {
 
 /// Searches from `start`; `None` if the likelihood is not defined there.
 ///
-/// The information costs as much as tens of gradients. The steps therefore update it from the
+/// The information costs much more than a gradient. The steps therefore update it from the
 /// gradients that they meet, and it is computed anew where they become slow or are refused.
 pub(super) fn search(start: Parameters, lines: SearchLines<'_>, effort: Effort) -> Option<Fit> {
     let information = information(&start, lines.coarse, lines.span)?;
@@ -233,6 +233,7 @@ pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort)
     let [pooled, coarse] = around(&first.parameters);
     let lines = SearchLines { pooled: &pooled, coarse: &coarse, span };
     let Fit { parameters, information: nearby, .. } = first;
+    // Information from nearby is computed anew as soon as a step is refused.
     let mut fit = search_with_information(parameters, nearby, TRUSTED_UPDATES, lines, effort)?;
     fit.information = information(&fit.parameters, &pooled, span)?;
     // The cost is computed on all lines, so that fits with different pooling can be compared.

@@ -7,7 +7,8 @@
 //! without it are nearly independent.
 //!
 //! For samples at intervals Δ, L = Δ/(1 − exp(−aΔ)) with a = jω − λ. The mean of W for a known t is
-//! tα/a* with α = −Re λ, so the response to t is −L (1 − α/a*).
+//! tα/a* with α = −Re λ, so the response to t is −L (1 − α/a*). This is exact if the forces on the
+//! modes are independent; correlated forces of close modes change it, but hardly the estimates.
 
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
