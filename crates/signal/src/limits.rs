@@ -95,6 +95,14 @@ pub(crate) const MEDIAN_PEAK_FRACTION: f64 = 0.1;
 /// windows.
 pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
 
+/// Smallest force that counts as ringing of a filter, relative to the smallest peak of a hit: four
+/// standard deviations of the noise. Weaker ringing is lost in the noise that is set to zero.
+pub(crate) const RINGING_OVER_FLOOR: f64 = 1.0 / 3.0;
+
+/// Largest number of weak samples within the ringing of a filter: near its zero crossings it is
+/// below the noise. With more, slow forces of a swinging hammer would count as ringing.
+pub(crate) const RINGING_GAP: usize = 8;
+
 /// Default number of samples before a pulse, as a multiple of the number of samples in the pulse.
 pub(crate) const PRE_TRIGGER: usize = 2;
 

@@ -134,6 +134,9 @@ pub struct Hits {
 pub struct Hit {
     /// Samples around the peak where the force is above a tenth of it, counted from 0.
     pub pulse: Range<usize>,
+    /// Samples around the peak with a force, counted from 0: the pulse, light rebounds of the
+    /// hammer, and the ringing of anti-aliasing filters as far as it exceeds the noise.
+    pub contact: Range<usize>,
     /// Largest force without the offset, in its unit; negative if the hits are.
     pub peak: f64,
     /// Samples that belong to the hit, counted from 0: some before the pulse, and the response
@@ -266,7 +269,10 @@ pub fn hits(force: &[f64], dt: f64, rule: &HitRule) -> Result<Hits, SignalError>
         let below = |from: usize| (from..push.len()).find(|k| push[*k] <= trigger);
         let end = first.saturating_add(bounce).max(below(first).unwrap_or(push.len()));
         at = below(end).unwrap_or(push.len());
-        hits.push(Hit::around(&push, first..end.min(push.len()), sign));
+        let last = (first..at).rfind(|k| push[*k] > trigger).unwrap_or(first);
+        let mut hit = Hit::around(&push, first..end.min(push.len()), sign);
+        hit.contact = with_ringing(&push, first.min(hit.pulse.start)..last + 1, floor);
+        hits.push(hit);
     }
     windows(&mut hits, push.len(), rule);
     find_faults(&mut hits, force, &push, dt, floor, rule);
@@ -295,8 +301,8 @@ impl Hits {
     }
 
     /// Returns the force in the window of a hit, in its unit, one value per sample: without the
-    /// offset, and zero away from the pulse (a *force window*), where the hammer has no contact and
-    /// the transducer measures only noise.
+    /// offset, and zero away from the pulse and its rebounds (a *force window*), where the hammer has
+    /// no contact and the transducer measures only noise.
     ///
     /// # Panics
     /// If the window is outside this force.
@@ -304,10 +310,31 @@ impl Hits {
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation.
     pub fn pulse_alone(&self, force: &[f64], hit: &Hit) -> Vec<f64> {
-        let margin = hit.pulse.len();
-        let around_pulse = hit.pulse.start.saturating_sub(margin)..hit.pulse.end + margin;
-        let value = |k: usize| if around_pulse.contains(&k) { force[k] - self.offset } else { 0.0 };
-        hit.window.clone().map(value).collect()
+        self.pulses_alone(force, std::slice::from_ref(hit))
+    }
+
+    /// Returns the force of consecutive hits as [`Hits::pulse_alone`] does, from the beginning of
+    /// the first window to the end of the last; empty without a hit.
+    ///
+    /// # Panics
+    /// If a window is outside this force.
+    ///
+    /// # Source
+    /// As [`Hits::pulse_alone`].
+    pub fn pulses_alone(&self, force: &[f64], hits: &[Hit]) -> Vec<f64> {
+        let ends = |hit: &Hit| {
+            let margin = hit.pulse.len();
+            let first = hit.pulse.start.saturating_sub(margin).min(hit.contact.start);
+            first..hit.contact.end.max(hit.pulse.end + margin)
+        };
+        let acts: Vec<Range<usize>> = hits.iter().map(ends).collect();
+        let value = |k: usize| {
+            let is_force = acts.iter().any(|acts| acts.contains(&k));
+            if is_force { force[k] - self.offset } else { 0.0 }
+        };
+        let (first, last) = (hits.first(), hits.last());
+        let window = first.zip(last).map_or(0..0, |(a, b)| a.window.start..b.window.end);
+        window.map(value).collect()
     }
 }
 
@@ -318,8 +345,29 @@ impl Hit {
         let limit = limits::PULSE_FRACTION * push[at];
         let start = (0..at).rev().find(|k| push[*k] <= limit).map_or(0, |k| k + 1);
         let end = (at..push.len()).find(|k| push[*k] <= limit).unwrap_or(push.len());
-        Self { pulse: start..end, peak: sign * push[at], window: start..end, faults: Vec::new() }
+        let pulse = || start..end;
+        Self {
+            pulse: pulse(),
+            contact: pulse(),
+            peak: sign * push[at],
+            window: pulse(),
+            faults: Vec::new(),
+        }
     }
+}
+
+/// Returns a range of samples with the ringing before and after it: further samples above a part of
+/// the `floor` of a hit, with gaps of at most [`limits::RINGING_GAP`] samples.
+fn with_ringing(push: &[f64], range: Range<usize>, floor: f64) -> Range<usize> {
+    let is_loud = |k: &usize| push[*k].abs() > limits::RINGING_OVER_FLOOR * floor;
+    let Range { mut start, mut end } = range;
+    while let Some(k) = (start.saturating_sub(limits::RINGING_GAP)..start).find(is_loud) {
+        start = k;
+    }
+    while let Some(k) = (end..(end + limits::RINGING_GAP).min(push.len())).rfind(is_loud) {
+        end = k + 1;
+    }
+    start..end
 }
 
 /// Sets the window of every hit, and the fault of a window that is too short.
