@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use mechid_signal::{Hit, HitFault, HitRule, Hits, Record, hits, message};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::AnalysisError;
@@ -125,11 +126,11 @@ pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
     })
 }
 
-/// Good hits, each a separate record, and a row for every hit.
+/// Good hits as records, and a row for every hit.
 #[derive(Default)]
 pub(crate) struct Cut {
     pub hits: Vec<Windowed>,
-    /// Noise of the force of each of these hits.
+    /// Noise of the force of each of these records.
     pub noise: Vec<HitNoise>,
     pub rows: Vec<HitRow>,
     /// Number of good hits of each record; records in memory all have the same name.
@@ -198,16 +199,29 @@ fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
 pub(crate) struct HitNoise {
     /// Standard deviation between the hits, in N.
     pub deviation: f64,
-    /// Samples of the window that belong to the pulse, counted from 0.
+    /// Samples of the window from the first to the last with a force, counted from 0.
     pub pulse: Range<usize>,
 }
 
-/// Divides fully buffered records into their hits.
+/// Windows of consecutive good hits without a gap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Windows {
+    /// Each is a record.
+    Separate,
+    /// They are one record: the motion at the end of a window is that at the beginning of the next.
+    Joined,
+}
+
+/// Divides fully buffered records into their good hits.
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] for an invalid rule, and if several forces act;
 /// [`AnalysisError::NoHit`] if a record has no good hit.
-pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisError> {
+pub(crate) fn cut(
+    records: &[Windowed],
+    rule: &HitRule,
+    windows: Windows,
+) -> Result<Cut, AnalysisError> {
     let mut cut = Cut::default();
     for record in records {
         let buffered = &record.held;
@@ -235,20 +249,23 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
             };
             return Err(AnalysisError::NoHit { file: buffered.file.clone(), reasons });
         }
-        for (hit, row) in found.all.iter().zip(&rows).filter(|(_, row)| row.used) {
-            let mut pulse = buffered.force.window(hit.window.start, hit.window.len())?.into_data();
-            pulse.fill(0.0);
-            let alone = found.pulse_alone(force, hit);
+        for (at, hits) in pieces(&found.all, windows).into_iter().enumerate() {
+            let window = found.all[hits.start].window.start..found.all[hits.end - 1].window.end;
+            let alone = found.pulses_alone(force, &found.all[hits.clone()]);
             let first = alone.iter().position(|f| *f != 0.0).unwrap_or(0);
             let last = alone.iter().rposition(|f| *f != 0.0).unwrap_or(first);
             cut.noise.push(HitNoise { deviation: found.noise, pulse: first..last + 1 });
-            pulse.column_mut(dof).copy_from_slice(&alone);
-            let pulse = Record::new(buffered.force.sampling().with_len(hit.window.len())?, pulse)?;
-            let mut part = record.part(hit.window.clone(), pulse)?;
-            part.held.file = format!("{}, hit {}", buffered.file, row.number);
+            let mut pulses = DMatrix::zeros(window.len(), buffered.force.channels());
+            pulses.column_mut(dof).copy_from_slice(&alone);
+            let sampling = buffered.force.sampling().with_len(window.len())?;
+            let mut part = record.part(window, Record::new(sampling, pulses)?)?;
+            part.held.file = match hits.len() {
+                1 => format!("{}, hit {}", buffered.file, hits.end),
+                _ => format!("{}, hits {} to {}", buffered.file, hits.start + 1, hits.end),
+            };
             part.held.driven = vec![dof];
             // The notes on units appear once for each record.
-            if rows.iter().find(|row| row.used).is_some_and(|first| first.number != row.number) {
+            if at > 0 {
                 part.held.unit_remarks.clear();
                 part.held.unit_findings.clear();
             }
@@ -257,4 +274,19 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
         cut.rows.extend(rows);
     }
     Ok(cut)
+}
+
+/// Returns the ranges of good hits that make one record each.
+fn pieces(all: &[Hit], windows: Windows) -> Vec<Range<usize>> {
+    let follows = |a: &Hit, b: &Hit| {
+        let both_good = a.faults.is_empty() && b.faults.is_empty();
+        windows == Windows::Joined && both_good && a.window.end == b.window.start
+    };
+    let mut next = 0;
+    let chunks = all.chunk_by(follows).map(|hits| {
+        let range = next..next + hits.len();
+        next = range.end;
+        range
+    });
+    chunks.filter(|range| all[range.start].faults.is_empty()).collect()
 }

@@ -45,6 +45,16 @@ pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
 /// the shapes at this response are unreliable.
 pub const LEAST_EXPLAINED: f64 = 0.5;
 
+/// Minimum share of the samples in the smaller half of a test that is divided between two records.
+/// With a smaller one, the half determines the modes so badly that its test has little power; the
+/// longest record is divided instead.
+pub const SMALLER_HALF: f64 = 0.25;
+
+/// Number of modes of an ambient record within one half-width at which a peak of the unmeasured
+/// forces is suspected. Two are a close pair, as of a symmetric tower; a force with a peak gives one
+/// mode for each independent force.
+pub const CROWDED_MODES: usize = 3;
+
 /// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest
 /// power, for lines of the default band. At −40 dB the response to the force is below the noise of
 /// usual sensors (60 to 80 dB below their range); a lower limit would include lines of noise alone.

@@ -1,7 +1,7 @@
 //! Spectral lines of records: of whole periods, with the noise from their scatter, or of open
 //! records.
 
-use mechid_checks::NoiseSource;
+use mechid_checks::{Finding, NoiseSource};
 use mechid_model::ResponseQuantity;
 use mechid_model::elements::Input;
 use mechid_signal::{HitRule, Record};
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::data::{TestKind, TestRow, joined};
 use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
-use crate::hits;
+use crate::hits::{self, Windows};
 use crate::identify::checks;
 use crate::identify::left_out::LineRule;
 use crate::identify::rows::WindowRow;
@@ -49,8 +49,7 @@ impl ElementData {
     }
 }
 
-/// Reads the good hits of a record, each as a separate open record with only the force of its
-/// pulse.
+/// Reads the good hits of a record as open records with only the forces of their pulses.
 fn from_hits(
     measurement: &Measurement,
     rule: &HitRule,
@@ -64,11 +63,12 @@ fn from_hits(
         let why = "a hammer test needs an input that is a force".into();
         return Err(AnalysisError::Setting { setting: "hits", why });
     }
-    let cut = hits::cut(&[measurement.hold_any()?], rule)?;
+    let cut = hits::cut(&[measurement.hold_any()?], rule, Windows::Joined)?;
     let tests = cut.hits.into_iter().map(|hit| {
         let block = hit.into_held();
         let mut data = Signals::new(&block, how)?.open(&block, TestKind::Hit, how)?;
         data.remarks = block.unit_notes();
+        data.findings = sensor_findings(&block);
         Ok(data)
     });
     let mut data = joined(tests)?;
@@ -90,9 +90,13 @@ fn from_record(
         signals.open(&block, TestKind::Open, how)?
     };
     data.remarks = block.unit_notes();
-    data.findings =
-        checks::sensor_findings(&block).into_iter().map(|finding| (0, finding)).collect();
+    data.findings = sensor_findings(&block);
     Ok(data)
+}
+
+/// Returns the faults of the sensors of one test.
+fn sensor_findings(block: &Block) -> Vec<(usize, Finding)> {
+    checks::sensor_findings(block).into_iter().map(|finding| (0, finding)).collect()
 }
 
 impl Signals {

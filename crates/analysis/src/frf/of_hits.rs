@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 use super::{FrfSettings, Responses};
 use crate::AnalysisError;
-use crate::hits::{Cut, cut};
+use crate::hits::{Cut, Windows, cut};
 use crate::identify::left_out::LineRule;
 use crate::measurement::Windowed;
 use crate::text::significant;
@@ -111,7 +111,7 @@ pub(super) fn responses_of_hits(
     lines: LineRule<'_>,
     how: &FrfSettings,
 ) -> Result<OfHits, AnalysisError> {
-    let cut = cut(records, rule)?;
+    let cut = cut(records, rule, Windows::Separate)?;
     let averaged = average_of_hits(&cut.hits, lines, how.exponential_percent)?;
     let AverageOfHits { average, lines, driven, segments, added_decay, at_end, before } = averaged;
     let frf = average.frf(how.estimator.estimator())?;

@@ -96,7 +96,7 @@ pub use self::tables::{IdentifiedResponses, identify_responses};
 pub use self::unscaled::Unscaled;
 pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;
-use crate::hits::{self, HitNoise};
+use crate::hits::{self, HitNoise, Windows};
 use crate::machine::Machine;
 use crate::measurement::{Block, Channels, Hold, Measurement, Windowed};
 use crate::modes::resonances;
@@ -131,7 +131,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     let (mut hits, mut hit_noise, mut of_hits) = (Vec::new(), Vec::new(), Vec::new());
     how.check_open(period_given)?;
     if let Source::Hits(HitFit { rule, .. }) = &how.source {
-        let cut = hits::cut(&records, rule)?;
+        let cut = hits::cut(&records, rule, Windows::Separate)?;
         (records, hits, hit_noise, of_hits) = (cut.hits, cut.rows, cut.noise, cut.remarks);
     }
     counts::check(how, &records, &unknowns, period_given)?;

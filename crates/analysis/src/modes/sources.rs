@@ -7,14 +7,15 @@ use nalgebra::DMatrix;
 
 use super::settings::Places;
 use crate::AnalysisError;
-use crate::hits::{self, HitRow};
-use crate::limits::{DRIVEN_LINES, DRIVEN_POWER};
+use crate::hits::{self, HitRow, Windows};
+use crate::limits::{DRIVEN_LINES, DRIVEN_POWER, SMALLER_HALF};
 use crate::measurement::{Block, Channels, Measurement};
 
 /// Records of one test: inputs and outputs with their names.
 #[derive(Debug)]
 pub(super) struct Recorded {
-    /// Forces (N, samples × inputs) and responses (samples × outputs) of each record or hit.
+    /// Forces (N, samples × inputs) and responses (samples × outputs) of each record, or of its
+    /// hits without a gap.
     pub parts: Vec<Part>,
     /// Names of the forces.
     pub inputs: Vec<String>,
@@ -26,7 +27,7 @@ pub(super) struct Recorded {
     pub hits: Vec<HitRow>,
 }
 
-/// One record, or one hit of it.
+/// One record, or hits of it without a gap.
 #[derive(Debug)]
 pub(super) struct Part {
     /// Forces, samples × inputs, in N; `None` without forces.
@@ -76,7 +77,7 @@ impl Recorded {
             let blocks = match rule {
                 None => vec![measurement.whole_block()?],
                 Some(rule) => {
-                    let cut = hits::cut(&[measurement.hold_any()?], rule)?;
+                    let cut = hits::cut(&[measurement.hold_any()?], rule, Windows::Joined)?;
                     hits.extend(cut.rows.into_iter().map(|row| columns.placed(at, row)));
                     cut.hits.into_iter().map(|hit| hit.into_held()).collect()
                 }
@@ -103,25 +104,47 @@ impl Recorded {
         Ok(self.with_parts(parts))
     }
 
-    /// Returns the two halves of a single record, or the first and the second half of several.
+    /// Returns the first and the second half of the records: between two records if the smaller
+    /// half then has at least the share [`SMALLER_HALF`] of the samples, otherwise at the middle of
+    /// the longest record.
     ///
     /// Forces that are zero in a half are not among its inputs.
     pub fn halves(&self) -> Result<[Self; 2], AnalysisError> {
-        if self.parts.len() == 1 {
-            return Ok([self.between(0.0, 0.5)?, self.between(0.5, 1.0)?]);
+        let lens: Vec<usize> = self.parts.iter().map(|part| part.responses.len()).collect();
+        let total: usize = lens.iter().sum();
+        let smaller = |count: &usize| {
+            let first: usize = lens[..*count].iter().sum();
+            first.min(total - first)
+        };
+        // Of equally good places the last one is taken.
+        let place = (1..lens.len()).max_by_key(smaller);
+        if let Some(count) = place.filter(|c| smaller(c) as f64 >= SMALLER_HALF * total as f64) {
+            let (first, second) = self.parts.split_at(count);
+            return Ok([self.acting(first)?, self.acting(second)?]);
         }
-        let (first, second) = self.parts.split_at(self.parts.len().div_ceil(2));
-        Ok([self.acting(first)?, self.acting(second)?])
+        let longest = (0..lens.len()).max_by_key(|at| lens[*at]).ok_or(AnalysisError::NoRecord)?;
+        let half = |from: f64, to: f64, whole: &[Part]| {
+            let cut = self.parts[longest].between(from, to)?;
+            let all: Vec<&Part> = if from > 0.0 {
+                std::iter::once(&cut).chain(whole).collect()
+            } else {
+                whole.iter().chain(std::iter::once(&cut)).collect()
+            };
+            self.acting(all)
+        };
+        let (before, after) = (&self.parts[..longest], &self.parts[longest + 1..]);
+        Ok([half(0.0, 0.5, before)?, half(0.5, 1.0, after)?])
     }
 
     /// Returns some of the records with the forces that act in them.
-    fn acting(&self, parts: &[Part]) -> Result<Self, AnalysisError> {
+    fn acting<'p>(&self, parts: impl IntoIterator<Item = &'p Part>) -> Result<Self, AnalysisError> {
+        let parts: Vec<&Part> = parts.into_iter().collect();
         let acts = |input: &usize| {
             let mut forces = parts.iter().filter_map(|part| part.forces.as_ref());
             forces.any(|record| record.channel(*input).iter().any(|value| *value != 0.0))
         };
         let inputs: Vec<usize> = (0..self.inputs.len()).filter(acts).collect();
-        let part = |part: &Part| -> Result<Part, AnalysisError> {
+        let part = |part: &&Part| -> Result<Part, AnalysisError> {
             let acting = |forces: &Record| {
                 Record::new(forces.sampling(), forces.data().select_columns(&inputs))
             };

@@ -15,7 +15,8 @@ use crate::outcome::{Files, Outcome};
 /// In the frequency domain (the default) one kind of response is enough. For a periodic excitation
 /// the window must contain whole periods, which are averaged. For a random excitation, or any
 /// record that is not whole periods, the transient is estimated together with the machine; for a
-/// hammer test, the transient of each good hit (--hits). In the time domain any record is possible.
+/// hammer test, the transient of each good hit (--hits), or with --machine of each run of good hits
+/// without a gap. In the time domain any record is possible.
 /// The equation of motion itself needs displacement, velocity and acceleration; displacement and
 /// velocity are enough with an assumption on the force between the samples. --derivatives computes
 /// what was not measured.

@@ -289,7 +289,7 @@ def identify_elements(
     without_hz : sequence of float or dict
         Frequencies whose lines are excluded, as in `identify`.
     hits : bool or str or dict, optional
-        Divide the records of a hammer test into hits and use the good ones, as in `identify`.
+        Find the hits of a hammer test and use the good ones; those without a gap are one record.
     noise : str
         Noise spectrum that weights the lines, as in `identify`.
     starts : int, optional
@@ -735,7 +735,7 @@ def modes(
         Points of the force and response columns, such as ``3`` or ``"12+Z"``. If several records
         have one force column, of a roving hammer: the struck point of each record.
     hits : bool or dict, optional
-        Divide the records into hits of a hammer and use the good ones, as in `identify`.
+        Find the hits of a hammer and use the good ones; those without a gap are one record.
     ambient : bool
         Whether forces act that are not measured, such as wind or traffic.
     without_hz : sequence of float
