@@ -10,7 +10,7 @@ use crate::constraint::ModalConstraint;
 use crate::covariance::Covariance;
 use crate::estimate::{ModalEstimate, log_likelihood};
 use crate::initial_poles::initial_poles;
-use crate::limits::{MAX_DAMPING, NEIGHBOUR_HALF_WIDTHS};
+use crate::limits::{MAX_DAMPING, MAX_TRIES, NEIGHBOUR_HALF_WIDTHS};
 use crate::lines::Lines;
 use crate::mode::{DropReason, DroppedCandidate};
 use crate::model::{Model, ResidualPowers};
@@ -79,8 +79,15 @@ pub fn identify_modes(
     }
     let mut search = Identification::new(&lines, settings)?;
     search.choose_modes();
-    search.choose_powers();
-    search.apply_rules();
+    // A mode may represent residual terms that were not in the model when it was chosen.
+    loop {
+        search.remove_replaceable();
+        search.choose_powers();
+        search.apply_rules();
+        if !search.remove_replaceable() {
+            break;
+        }
+    }
     search.finish()
 }
 
@@ -277,34 +284,78 @@ impl<'a> Identification<'a> {
 
     /// Removes modes whose loss is below the penalty of their parameters, until all others are
     /// significant.
-    ///
-    /// Neighbours may explain the same response; therefore only one of them is removed at a time.
     fn remove_insignificant(&mut self, required: f64) {
         while self.settings.modes.is_none() {
             let losses = removal_losses(&self.fit);
             let protected = self.protected();
-            let mut order: Vec<usize> = (0..losses.len())
-                .filter(|mode| losses[*mode] < required && !protected[*mode])
-                .collect();
-            order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
-            let poles = &self.fit.model.poles;
-            let mut reasons: Vec<Option<DropReason>> = vec![None; losses.len()];
-            for mode in order {
-                let is_near = |other: usize| {
-                    let width = (-poles[mode].re).max(-poles[other].re);
-                    (poles[mode].im - poles[other].im).abs() < NEIGHBOUR_HALF_WIDTHS * width
-                };
-                if !(0..losses.len()).any(|other| reasons[other].is_some() && is_near(other)) {
-                    reasons[mode] =
-                        Some(DropReason::Insignificant { gain: losses[mode], required });
-                }
-            }
+            let reason = |mode: usize| {
+                let gain = losses[mode];
+                let is_insignificant = gain < required && !protected[mode];
+                is_insignificant.then_some(DropReason::Insignificant { gain, required })
+            };
+            let reasons: Vec<_> = (0..losses.len()).map(reason).collect();
+            let reasons = weakest_of_neighbours(&self.fit.model.poles, &losses, reasons);
             if reasons.iter().all(Option::is_none) {
                 return;
             }
             self.remove(&reasons);
             self.remove_impossible();
         }
+    }
+
+    /// Removes the weakest modes without which the likelihood, maximised again, falls by less than
+    /// the penalty of their parameters; returns whether there were any.
+    ///
+    /// The loss at fixed poles and participations is larger if the other modes can take over the
+    /// response of a mode.
+    fn remove_replaceable(&mut self) -> bool {
+        let required = required_gain(self.lines);
+        let mut removed = false;
+        let mut tried = 0;
+        while self.settings.modes.is_none() && tried < MAX_TRIES {
+            let losses = removal_losses(&self.fit);
+            let protected = self.protected();
+            let mut order: Vec<usize> = (0..losses.len())
+                .filter(|mode| {
+                    !protected[*mode] && self.lines.contains(self.fit.model.poles[*mode])
+                })
+                .collect();
+            order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
+            let Some(&mode) = order.get(tried) else { break };
+            let mut trial = self.fit.clone();
+            let retained: Vec<usize> = (0..losses.len()).filter(|other| *other != mode).collect();
+            trial.model.select(&retained);
+            trial.refresh();
+            trial.search_roughly_to(self.fit.cost() + required);
+            // A mode that leaves the band or its damping to replace another one would be lost, too.
+            let is_lost = |(before, after): (&usize, &Complex<f64>)| -> bool {
+                self.is_possible(self.fit.model.poles[*before]) && !self.is_possible(*after)
+            };
+            let loses = retained.iter().zip(&trial.model.poles).any(is_lost);
+            let gain = trial.cost() - self.fit.cost();
+            log::debug!(
+                "without {:.3} Hz: loss {:.0}, {gain:.0} after {} steps, required {required:.0}",
+                self.fit.model.poles[mode].im / TAU,
+                losses[mode],
+                trial.steps - self.fit.steps,
+            );
+            if gain < required && !loses {
+                let mut reasons = vec![None; losses.len()];
+                reasons[mode] = Some(DropReason::Insignificant { gain, required });
+                self.reject(&reasons);
+                self.fit = trial;
+                self.update_noise();
+                (removed, tried) = (true, 0);
+            } else {
+                tried += 1;
+            }
+        }
+        removed
+    }
+
+    /// Returns whether a pole may be that of a resonance within reach of the band.
+    fn is_possible(&self, pole: Complex<f64>) -> bool {
+        -pole.re / pole.norm() <= MAX_DAMPING && self.lines.reaches(pole)
     }
 
     /// Returns which modes were requested by frequency: no rule removes them.
@@ -334,6 +385,14 @@ impl<'a> Identification<'a> {
         if reasons.iter().all(Option::is_none) {
             return;
         }
+        let retained = self.reject(reasons);
+        self.fit.model.select(&retained);
+        self.fit.refresh();
+        self.fit.search_roughly();
+    }
+
+    /// Lists the modes with a reason as rejected, and returns the indices of the others.
+    fn reject(&mut self, reasons: &[Option<DropReason>]) -> Vec<usize> {
         for (pole, reason) in self.fit.model.poles.iter().zip(reasons) {
             if let Some(reason) = reason {
                 self.dropped.push(DroppedCandidate::new(*pole, *reason));
@@ -341,13 +400,11 @@ impl<'a> Identification<'a> {
         }
         let retained: Vec<usize> =
             (0..reasons.len()).filter(|mode| reasons[*mode].is_none()).collect();
-        self.fit.model.select(&retained);
         self.noise.process = retained
             .iter()
             .map(|mode| self.noise.process.get(*mode).copied().unwrap_or(0.0))
             .collect();
-        self.fit.refresh();
-        self.fit.search_roughly();
+        retained
     }
 
     /// Chooses the residual powers by Akaike's criterion: too few terms bias the poles, too many
@@ -358,21 +415,20 @@ impl<'a> Identification<'a> {
         }
         let unknowns =
             |model: &Model| (model.columns(self.lines) * self.lines.outputs.len()) as f64;
-        let mut best = (f64::INFINITY, self.fit.model.powers.clone());
+        let mut best: Option<(f64, Fit<'_>)> = None;
         for powers in power_sets() {
             let mut trial = self.fit.clone();
             trial.model.powers = powers.clone();
             trial.refresh();
+            trial.search_roughly();
             let criterion = trial.cost() + 2.0 * unknowns(&trial.model);
             log::debug!("residual powers {:?}: {criterion:.1}", powers.forces);
-            if criterion < best.0 {
-                best = (criterion, powers);
+            if best.as_ref().is_none_or(|(least, _)| criterion < *least) {
+                best = Some((criterion, trial));
             }
         }
-        if best.1 != self.fit.model.powers {
-            self.fit.model.powers = best.1;
-            self.fit.refresh();
-            self.fit.search_roughly();
+        if let Some((_, fit)) = best.filter(|(_, fit)| fit.model.powers != self.fit.model.powers) {
+            self.fit = fit;
             self.update_noise();
         }
     }
@@ -385,6 +441,8 @@ impl<'a> Identification<'a> {
             for (reason, protected) in reasons.iter_mut().zip(self.protected()) {
                 *reason = reason.filter(|_| !protected);
             }
+            let losses = removal_losses(&self.fit);
+            let reasons = weakest_of_neighbours(&self.fit.model.poles, &losses, reasons);
             if reasons.iter().all(Option::is_none) {
                 return;
             }
@@ -442,6 +500,28 @@ impl<'a> Identification<'a> {
         let (fit, noise) = (&self.fit, &self.noise);
         Ok(ModalEstimate::new(fit, noise, &covariance, self.dropped, &stated, constraints))
     }
+}
+
+/// Returns the reasons without those of modes beside a weaker one that is removed: neighbours may
+/// explain the same response, and a mode that is removed may be all that makes another doubtful.
+fn weakest_of_neighbours(
+    poles: &[Complex<f64>],
+    losses: &[f64],
+    reasons: Vec<Option<DropReason>>,
+) -> Vec<Option<DropReason>> {
+    let mut order: Vec<usize> = (0..poles.len()).filter(|mode| reasons[*mode].is_some()).collect();
+    order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
+    let mut weakest = vec![None; poles.len()];
+    for mode in order {
+        let is_near = |other: usize| {
+            let width = (-poles[mode].re).max(-poles[other].re);
+            (poles[mode].im - poles[other].im).abs() < NEIGHBOUR_HALF_WIDTHS * width
+        };
+        if !(0..poles.len()).any(|other| weakest[other].is_some() && is_near(other)) {
+            weakest[mode] = reasons[mode];
+        }
+    }
+    weakest
 }
 
 /// Weights a fit by a noise estimate.

@@ -59,7 +59,8 @@ pub const MIN_ORDER_SHARE: f64 = 0.4;
 pub const CLUSTER_FREQUENCY: f64 = 5e-3;
 /// Maximum relative difference in damping between roots of one cluster.
 pub const CLUSTER_DAMPING: f64 = 0.3;
-/// Maximum number of candidates that are tried before the search for further modes ends.
+/// Maximum number of failed trials before the search for further modes, or for modes that the
+/// others can replace, ends.
 pub const MAX_TRIES: usize = 3;
 /// Number of half-widths on either side of a candidate over which its gain is computed.
 pub const SCAN_HALF_WIDTHS: f64 = 12.0;

@@ -44,22 +44,28 @@ impl<'a> Fit<'a> {
 
     /// Takes steps until the cost no longer falls, at most `MAX_STEPS`.
     pub(crate) fn search(&mut self) {
-        self.search_until(MAX_STEPS, COST_TOLERANCE);
+        self.search_until(MAX_STEPS, COST_TOLERANCE, f64::INFINITY);
     }
 
     /// Takes a few steps: accurate enough to estimate the noise and the number of modes.
     pub(crate) fn search_roughly(&mut self) {
-        self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE);
+        self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE, f64::INFINITY);
     }
 
-    /// Takes steps until the cost falls by less than `tolerance`, at most `limit`.
-    fn search_until(&mut self, limit: usize, tolerance: f64) {
+    /// Takes a few steps, and ends if the cost will hardly fall to `goal`.
+    pub(crate) fn search_roughly_to(&mut self, goal: f64) {
+        self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE, goal);
+    }
+
+    /// Takes steps until the cost falls by less than `tolerance`, at most `limit`; also ends if the
+    /// cost would stay above `goal` even if every further step lowered it as much as the last one.
+    fn search_until(&mut self, limit: usize, tolerance: f64, goal: f64) {
         if self.model.modes() == 0 {
             return;
         }
         let mut cost = self.cost();
         let mut damping = 1e-3;
-        for _ in 0..limit {
+        for further in (0..limit).rev() {
             let Some(next) = self.step(cost, &mut damping) else {
                 self.projection.solve(self.lines, &self.model);
                 return;
@@ -67,7 +73,7 @@ impl<'a> Fit<'a> {
             self.steps += 1;
             let decrease = cost - next;
             cost = next;
-            if decrease < tolerance {
+            if decrease < tolerance || cost - goal > further as f64 * decrease {
                 return;
             }
         }
