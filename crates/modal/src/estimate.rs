@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::ModalError;
 use crate::compare::{ComparedMode, Comparison, Measured, PairingRule, compare};
-use crate::constraint::{self, ConstraintTest, ModalConstraint};
+use crate::constraint::{self, ConstraintTest, DrivingPoint, ModalConstraint};
 use crate::covariance::Covariance;
 use crate::indicators::IndicatorError;
 use crate::limits::GROUP_HALF_WIDTHS;
@@ -114,6 +114,28 @@ impl ModalEstimate {
     /// Returns the poles of all modes of the model, also of those that were not requested.
     pub(crate) fn poles(&self) -> Vec<C> {
         self.modes.iter().chain(&self.others).map(|mode| mode.pole).collect()
+    }
+
+    /// Returns the modal mass of a mode for the shape with a largest entry of 1, if the output of
+    /// `point` measures the `derivative`-th time derivative of the displacement at which its input
+    /// acts as a force; `None` without such a mode, output or input, and if the mode does not move
+    /// at the point.
+    ///
+    /// It holds for light, proportional damping, and is in kg if the input is in N and the output
+    /// in m, m/s or m/s².
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), sections 2.4 and 3.5; the standard error is to first
+    /// order.
+    pub fn modal_mass(
+        &self,
+        mode: usize,
+        point: DrivingPoint,
+        derivative: i32,
+    ) -> Option<Uncertain> {
+        let parameters = self.parameters.get(mode)?;
+        let exists = point.output < parameters.outputs && point.input < parameters.inputs;
+        if exists { parameters.modal_mass(point, derivative) } else { None }
     }
 
     /// Returns the modes with the joint covariance of their shapes, for comparisons.

@@ -66,18 +66,6 @@ impl IdentifiedMode {
         let scale = largest.copied().unwrap_or(Complex::new(1.0, 0.0));
         self.participation.iter().map(|value| value / scale).collect()
     }
-
-    /// Returns the modal mass for the scaling of `shape`, if `output` measures the `derivative`-th
-    /// time derivative of the displacement at which `input` acts as a force.
-    ///
-    /// With mass-normalised shapes ψ the residue of a displacement is ψ_i ψ_j/(2jω_d) for light,
-    /// proportional damping; the mass of a shape scaled to `shape` is shape_i²/ψ_i². It is in kg if
-    /// the input is in N and the output in m, m/s or m/s².
-    pub fn modal_mass(&self, output: usize, input: usize, derivative: i32) -> Complex<f64> {
-        let residue = self.residue(output, input) / self.pole.powi(derivative);
-        let squared = residue * Complex::new(0.0, 2.0 * self.pole.im);
-        self.shape[output] * self.shape[output] / squared
-    }
 }
 
 /// Reason for which a candidate was rejected.

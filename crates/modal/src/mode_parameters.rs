@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use mechid_numerics::Uncertain;
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
 
+use crate::constraint::DrivingPoint;
 use crate::indicators::ShapeWithCovariance;
 use crate::modal_model::ModalTerm;
 use crate::mode::IdentifiedMode;
@@ -101,6 +102,48 @@ impl ModeParameters {
         ShapeWithCovariance::new(shape, covariance).ok()
     }
 
+    /// Returns the index of the largest entry of the shape.
+    fn largest_output(&self) -> usize {
+        let size = |output: &usize| self.shape(*output).norm();
+        (0..self.outputs).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0)
+    }
+
+    /// Returns the modal mass of the shape with a largest entry of 1, if the output of `point`
+    /// measures the `derivative`-th time derivative of the displacement at which its input acts.
+    ///
+    /// `None` if the shape or the participation is zero at the point.
+    ///
+    /// The residue of the displacement is ψ²/(2jω_d) with the mass-normalised ψ at the point, so
+    /// that the mass is φ²/ψ² with the entry φ of the shape.
+    pub(crate) fn modal_mass(&self, point: DrivingPoint, derivative: i32) -> Option<Uncertain> {
+        let (pole, largest) = (self.pole(), self.largest_output());
+        let [entry, scale] = [point.output, largest].map(|output| self.shape(output));
+        let participation = self.participation(point.input);
+        let squared = participation / pole.powi(derivative) * C::new(0.0, 2.0 * pole.im);
+        let mass = entry / (scale * scale * squared);
+        // Derivatives of the complex mass with respect to each complex parameter.
+        let terms = [
+            (Self::shape_index(point.output), mass / entry),
+            (Self::shape_index(largest), mass * -2.0 / scale),
+            (self.participation_index(point.input), -mass / participation),
+        ];
+        let mut gradient = DVector::zeros(self.values.len());
+        for (index, factor) in terms {
+            gradient[index] += factor.re;
+            gradient[index + 1] -= factor.im;
+        }
+        let by_pole = mass * f64::from(derivative) / pole;
+        gradient[0] = by_pole.re * pole.re;
+        gradient[1] = -by_pole.im * pole.im - mass.re;
+        let variance = gradient.dot(&(&self.covariance * &gradient));
+        // A mode without motion or force at the point does not determine its mass.
+        (mass.re.is_finite() && variance.is_finite()).then(|| Uncertain {
+            value: mass.re,
+            standard_error: variance.max(0.0).sqrt(),
+            degrees_of_freedom: self.degrees_of_freedom,
+        })
+    }
+
     /// Returns the mode with these parameters: its shape divided by the largest entry, and its
     /// participations multiplied by it.
     pub(crate) fn mode(&self) -> IdentifiedMode {
@@ -108,8 +151,7 @@ impl ModeParameters {
         let (frequency, damping, frequency_damping_covariance) =
             natural_frequency_and_damping(pole, &self.block(0, 0), self.degrees_of_freedom);
         let shape: Vec<C> = (0..self.outputs).map(|output| self.shape(output)).collect();
-        let largest = |a: &usize, b: &usize| shape[*a].norm().total_cmp(&shape[*b].norm());
-        let reference = (0..self.outputs).max_by(largest).unwrap_or(0);
+        let reference = self.largest_output();
         let (scale, at) = (shape[reference], Self::shape_index(reference));
         let errors = |covariance: Matrix2<f64>| {
             C::new(covariance[(0, 0)].max(0.0).sqrt(), covariance[(1, 1)].max(0.0).sqrt())

@@ -58,6 +58,8 @@ pub(super) fn modes(
     let halves = Halves::of_ambient(&record, &estimate);
     let estimate = estimate.with_error_scales(&halves.error_scales);
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
+    let modes: Vec<ModalModeRow> = estimate.modes.iter().map(row).collect();
+    let of_modes = halves.check.into_iter().chain(checks::force_peak_check(&modes));
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
     let summary = ModesSummary {
         records: vec![RecordRow::from_block(&block)],
@@ -67,13 +69,13 @@ pub(super) fn modes(
         band_hz: estimate.band_hz,
         lines: estimate.lines,
         confidence: LEVEL,
-        modes: estimate.modes.iter().map(row).collect(),
+        modes,
         mac: shapes.iter().map(|a| mac(a)).collect(),
         dropped: estimate.dropped.iter().map(dropped).collect(),
         harmonics: estimate.harmonics.iter().map(harmonic_row).collect(),
         variance_explained: None,
         variance_predicted: None,
-        checks: checks::channel_checks(measurements)?.into_iter().chain(halves.check).collect(),
+        checks: checks::channel_checks(measurements)?.into_iter().chain(of_modes).collect(),
         notes: notes(&estimate).into_iter().chain(halves.note).collect(),
         diagrams: None,
         model: None,
@@ -125,6 +127,7 @@ fn row(mode: &AmbientMode) -> ModalModeRow {
         phase_collinearity: mode.mpc.value,
         driven_share: None,
         modal_mass: None,
+        modal_mass_standard_error: None,
         decay_times: Some(mode.decay_times),
     }
 }

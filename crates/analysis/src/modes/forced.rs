@@ -11,7 +11,7 @@ use super::averaged::{Sharpened, without_decay};
 use super::checks::{self, prediction_checks};
 use super::diagrams::{DiagramData, Forced};
 use super::halves::Halves;
-use super::rows::{dropped, mac, notes, row};
+use super::rows::{dropped, mac, modal_mass, notes, row};
 use super::settings::ModesSettings;
 use super::sources::{Output, Recorded};
 use super::summary::{LEVEL, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow};
@@ -213,10 +213,10 @@ impl Context {
             &self.outputs,
             &self.driving_points,
         ));
-        let fitted = reported.iter().zip(estimate.modes());
-        let modes: Vec<ModalModeRow> = fitted
-            .map(|(mode, fitted)| row(mode, fitted, &self.outputs, &self.driving_points))
-            .collect();
+        // The masses are those of the fitted modes, which contain the decay of an exponential window.
+        let mass = |at| modal_mass(&estimate, at, &self.outputs, &self.driving_points);
+        let modes: Vec<ModalModeRow> =
+            reported.iter().enumerate().map(|(at, mode)| row(mode, mass(at))).collect();
         let mut model = estimate.model().clone();
         for term in &mut model.terms {
             term.pole[0] += self.added_decay.unwrap_or(0.0);

@@ -1,7 +1,9 @@
 //! Rows of modes and candidates of a test with forces, and notes on them.
 
 use mechid_io::derivative;
-use mechid_modal::{DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, indicators};
+use mechid_modal::{
+    DrivingPoint, DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, indicators,
+};
 use nalgebra::{Complex, DVector};
 
 use super::sources::Output;
@@ -11,13 +13,10 @@ use crate::limits::NOTED_UNMEASURED;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, significant};
 
-/// Returns the row of a mode; the modal mass comes from `fitted`, the fitted mode with the decay of
-/// an exponential window.
+/// Returns the row of a mode with its modal mass.
 pub(super) fn row(
     mode: &IdentifiedMode,
-    fitted: &IdentifiedMode,
-    outputs: &[Output],
-    points: &[(usize, usize)],
+    modal_mass: Option<mechid_modal::Uncertain>,
 ) -> ModalModeRow {
     let entries = |values: &[Complex<f64>], errors: &[Complex<f64>], scale: Complex<f64>| {
         let entry = |(value, error): (&Complex<f64>, &Complex<f64>)| {
@@ -30,12 +29,6 @@ pub(super) fn row(
     };
     let largest = mode.participation.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
     let scale = largest.filter(|z| z.norm() > 0.0).unwrap_or(Complex::from(1.0));
-    let modal_mass = points.iter().filter_map(|&(input, output)| {
-        let power = derivative(outputs[output].quantity?) as i32;
-        Some((mode.residue(output, input).norm(), fitted.modal_mass(output, input, power).re))
-    });
-    // The driving point with the largest residue determines the mass best.
-    let modal_mass = modal_mass.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, mass)| mass);
     let values = [
         uncertain(&mode.natural_frequency_hz),
         damped_frequency(mode),
@@ -47,9 +40,25 @@ pub(super) fn row(
         participation: entries(&mode.participation, &mode.participation_standard_error, scale),
         phase_collinearity: indicators::mpc(&vector(&mode.shape)),
         driven_share: mode.driven_share,
-        modal_mass,
+        modal_mass: modal_mass.map(|mass| mass.value),
+        modal_mass_standard_error: modal_mass.map(|mass| mass.standard_error),
         decay_times: None,
     }
+}
+
+/// Returns the modal mass of a mode by the driving point that determines it best.
+pub(super) fn modal_mass(
+    estimate: &ModalEstimate,
+    mode: usize,
+    outputs: &[Output],
+    points: &[(usize, usize)],
+) -> Option<mechid_modal::Uncertain> {
+    let masses = points.iter().filter_map(|&(input, output)| {
+        let derivative = derivative(outputs[output].quantity?) as i32;
+        estimate.modal_mass(mode, DrivingPoint { output, input }, derivative)
+    });
+    let relative_error = |mass: &mechid_modal::Uncertain| mass.standard_error / mass.value.abs();
+    masses.min_by(|a, b| relative_error(a).total_cmp(&relative_error(b)))
 }
 
 /// Returns f√(1 − ζ²), with its standard error to first order.

@@ -72,6 +72,8 @@ pub struct SavedMode {
     pub driven_share: Option<f64>,
     /// Modal mass for the shape scaled to 1 at its largest entry, in kg.
     pub modal_mass: Option<f64>,
+    /// Standard error of the modal mass, in kg.
+    pub modal_mass_standard_error: Option<f64>,
     /// Share of the sum of squares of all modes of a free decay, a ratio.
     pub energy_share: Option<f64>,
 }

@@ -187,6 +187,9 @@ pub struct ModalModeRow {
     /// point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_mass: Option<f64>,
+    /// Standard error of the modal mass, in kg.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_mass_standard_error: Option<f64>,
     /// Length of an ambient record in decay times of the mode, ζωT, a pure number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay_times: Option<f64>,

@@ -1,7 +1,7 @@
 //! Data other than a record with forces: tables, free decays, roving hammers, and common properties
 //! of all.
 
-use mechid_modal::{ModalEstimate, ModalSettings, identify_modes};
+use mechid_modal::{DrivingPoint, ModalEstimate, ModalSettings, identify_modes};
 
 use crate::generator::{Case, pair, roving};
 
@@ -49,15 +49,20 @@ fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
     let estimate = identify_modes(&case.lines(1), &ModalSettings::default()).unwrap();
     let deviation = largest_deviation(&case, &estimate);
     assert!(deviation < BOUND, "{deviation}");
-    for (mode, truth) in estimate.modes().iter().zip(&case.participation) {
+    let point = DrivingPoint { output: 0, input: 0 };
+    for (index, (mode, truth)) in estimate.modes().iter().zip(&case.participation).enumerate() {
         let largest = truth.iter().copied().fold(0.0, f64::max);
         for (value, truth) in mode.shape_at_inputs().iter().zip(truth) {
             assert!((value - truth / largest).norm() < 0.02, "{value} {}", truth / largest);
         }
         // The accelerometer is at the point of input 0; its shape is 1 there, so the mass is 1/ψ².
-        let mass = mode.modal_mass(0, 0, 2);
-        assert!((mass * truth[0] * truth[0] - 1.0).norm() < 0.03, "{mass}");
+        let mass = estimate.modal_mass(index, point, 2).unwrap();
+        let error = mass.value - 1.0 / (truth[0] * truth[0]);
+        assert!(error.abs() < 3.5 * mass.standard_error, "{mass:?} {error}");
+        assert!(mass.standard_error < 0.02 * mass.value, "{mass:?}");
     }
+    let outside = DrivingPoint { output: 1, input: 0 };
+    assert!(estimate.modal_mass(0, outside, 2).is_none());
 }
 
 #[test]

@@ -96,10 +96,13 @@ fn merits(modes: &SavedModes) -> Vec<String> {
 /// Returns all modes, with the columns that some mode has.
 fn mode_table(modes: &SavedModes) -> Markup {
     type Cell = fn(&SavedMode) -> Option<String>;
-    let optional: [(&str, Cell); 5] = [
+    let optional: [(&str, Cell); 6] = [
         ("driven, %", |mode| mode.driven_share.map(|share| significant(100.0 * share, 4))),
         ("energy, %", |mode| mode.energy_share.map(|share| significant(100.0 * share, 3))),
         ("modal mass, kg", |mode| mode.modal_mass.map(|mass| significant(mass, 4))),
+        ("± (modal mass), kg", |mode| {
+            mode.modal_mass_standard_error.map(|error| significant(error, 2))
+        }),
         ("collinearity", |mode| mode.phase_collinearity.map(|value| significant(value, 4))),
         ("remark", |mode| mode_remark(&mode.mode.row)),
     ];

@@ -1,6 +1,7 @@
 //! Checks of a modal test: channels and tables before the fit, residual and modes after it.
 
 mod driving_point;
+mod force_peak;
 mod idle_force;
 mod reciprocity;
 mod table;
@@ -9,6 +10,7 @@ mod tested;
 use mechid_checks::Verdict;
 use mechid_modal::IdentifiedMode;
 
+pub(super) use self::force_peak::force_peak_check;
 pub(super) use self::table::table_checks;
 use self::tested::Tested;
 use super::sources::Output;
