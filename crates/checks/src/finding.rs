@@ -98,6 +98,8 @@ findings! {
     Clipping in clipping,
     /// A channel has the same value in all samples.
     ConstantChannel in constant_channel,
+    /// A channel has the value of another one in every sample.
+    RepeatedChannel in repeated_channel,
     /// Every value of a frequency response is real and positive.
     ConstantPhase in constant_phase,
     /// A channel has a few equally spaced values only.
@@ -135,6 +137,8 @@ findings! {
     PartsAgreement in parts,
     /// Agreement of the prior of a parameter with its estimate from the data.
     PriorAgreement in prior,
+    /// Delay between the inputs and the sensors of a machine.
+    SensorDelay in sensor_delay,
     /// Number of searches that ended at the highest likelihood.
     SearchAgreement in search,
     /// Residual of a fit that is attributed to unmeasured forces.

@@ -59,9 +59,11 @@ mod power;
 mod prior;
 mod quantisation;
 mod regressors;
+mod repeated_channel;
 mod response_residual;
 mod seam;
 mod search;
+mod sensor_delay;
 mod serialised;
 mod spectral;
 mod spectral_residual;
@@ -127,9 +129,11 @@ pub use power::power;
 pub use prior::PriorAgreement;
 pub use quantisation::{Quantisation, quantised_channels};
 pub use regressors::noise_on_response;
+pub use repeated_channel::{RepeatedChannel, repeated_channels};
 pub use response_residual::{after_response_fit, after_table_fit};
 pub use seam::{Seam, periodicity, periodicity_across};
 pub use search::SearchAgreement;
+pub use sensor_delay::{SensorDelay, delay_of_sensors};
 pub use spectral::{before_spectral_fit, steady_periods};
 pub use spectral_residual::SpectralResidual;
 pub use spike::{Spike, spiked_channels};
@@ -188,7 +192,7 @@ pub enum Subject {
     Unit,
     /// Conditioning of the regressors.
     Conditioning,
-    /// Channels that are clipped, constant, coarsely quantised, or have a spike.
+    /// Channels that are clipped, constant, repeated, coarsely quantised, or have a spike.
     Range,
     /// Consistency of displacement, velocity and acceleration.
     Kinematics,

@@ -61,7 +61,10 @@ pub fn identify_elements(
             likelihood.combinations.iter().map(ToString::to_string).collect();
         return Err(AnalysisError::Undetermined { combinations: sentences.join("; ") });
     }
-    let summary = ElementSummary::new(data, &estimate, how)?;
+    let checks = summary::checks(data, &estimate);
+    let (estimate, is_late) = summary::allowing_for_delay(estimate, &checks);
+    let mut summary = ElementSummary::new(data, &estimate, how, checks)?;
+    summary.notes.extend(is_late.then_some(ElementNote::Delayed));
     Ok(IdentifiedElements { estimate, summary, spectrum: ElementSpectrum::new(data) })
 }
 

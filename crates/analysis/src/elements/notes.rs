@@ -44,6 +44,9 @@ pub enum ElementNote {
         /// Largest number of entries.
         most: usize,
     },
+    /// Standard errors and intervals include the change of the parameters by the delay that the
+    /// residual shows.
+    Delayed,
     /// Standard errors of M, C and K do not include the uncertainty of a parameter at its bound.
     BoundInSystem,
     /// Remark on the data that were read.
@@ -75,6 +78,10 @@ impl fmt::Display for ElementNote {
             Self::NoCovariance { most } => write!(
                 f,
                 "more than {most} entries of M, C and K are uncertain: their covariance is left out"
+            ),
+            Self::Delayed => f.write_str(
+                "the residual shows a delay of the sensors: the values are not corrected for it, but \
+                 standard errors and intervals include the change that it causes",
             ),
             Self::BoundInSystem => f.write_str(
                 "the covariance of M, C and K treats parameters at their bounds as known",

@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use mechid_checks::{Finding, adjust_p_values, after_machine_fit, whiteness_of_lines};
+use mechid_checks::{
+    Finding, Verdict, adjust_p_values, after_machine_fit, delay_of_sensors, whiteness_of_lines,
+};
 use mechid_estimate::likelihood::machine::{Candidate, CandidateGain, MachineEstimate};
 use mechid_estimate::likelihood::{
     Combination, FoundMinimum, IntervalKind, ParameterEstimate, PriorReport,
@@ -147,6 +149,7 @@ impl ElementSummary {
         data: &ElementData,
         estimate: &MachineEstimate,
         how: &IdentifyElements,
+        checks: Vec<CheckRow>,
     ) -> Result<Self, AnalysisError> {
         let (likelihood, lines) = (&estimate.likelihood, &data.lines);
         let equations = 2 * lines.outputs().len();
@@ -175,7 +178,7 @@ impl ElementSummary {
             condition_number: likelihood.condition,
             candidates: candidates(data, estimate, how)?,
             modes: modes(estimate, equations)?,
-            checks: checks(data, estimate),
+            checks,
             notes: notes_of(estimate).chain(notes).chain(remarks).collect(),
             system: system.as_ref().map(SystemMatrices::from),
             covariance,
@@ -266,12 +269,32 @@ fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, A
     ModeRow::all(&machine.modes()?, machine.is_exact())
 }
 
-fn checks(data: &ElementData, estimate: &MachineEstimate) -> Vec<CheckRow> {
+/// Returns whether the sensors are late by more than the noise explains. If they are, the standard
+/// errors and intervals of the estimate include the change of the parameters by the delay.
+pub(super) fn allowing_for_delay(
+    estimate: MachineEstimate,
+    checks: &[CheckRow],
+) -> (MachineEstimate, bool) {
+    let is_found = |check: &CheckRow| {
+        let is_delay = matches!(check.finding, Finding::SensorDelay(_));
+        is_delay && check.finding.verdict() != Verdict::Good
+    };
+    let changes = estimate.delay.as_ref().map(|score| score.changes.clone());
+    let changes = changes.filter(|_| checks.iter().any(is_found));
+    match changes {
+        Some(changes) => (estimate.with_parameter_errors(&changes), true),
+        None => (estimate, false),
+    }
+}
+
+/// Returns the checks of data and fit.
+pub(super) fn checks(data: &ElementData, estimate: &MachineEstimate) -> Vec<CheckRow> {
     let before =
         data.findings.iter().map(|(at, finding)| (When::Before, Some(*at), finding.clone()));
     let mut findings: Vec<(When, Option<usize>, Finding)> = before.collect();
     let after = after_machine_fit(estimate, data.source);
-    findings.extend(after.into_iter().map(|finding| (When::After, None, finding)));
+    let delay = delay_of_sensors(estimate);
+    findings.extend(after.into_iter().chain(delay).map(|finding| (When::After, None, finding)));
     for (at, (rows, _)) in data.lines.records().iter().enumerate() {
         let white = whiteness_of_lines(estimate, &data.lines, rows);
         findings.extend(white.into_iter().map(|finding| (When::After, Some(at), finding)));

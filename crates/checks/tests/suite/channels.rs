@@ -4,7 +4,7 @@ use mechid_checks::{Bias, Clipping, Spike};
 use mechid_checks::{
     Channel, Finding, Quantity, Subject, Verdict, clipped_channels, constant_channels,
     delay_at_samples, delay_between_samples, delay_of_lines, kinematics, noise_on_response, power,
-    quantised_channels, spiked_channels,
+    quantised_channels, repeated_channels, spiked_channels,
 };
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{EstimateError, Unknowns};
@@ -226,6 +226,7 @@ fn nothing_is_said_of_channels_that_are_as_they_should_be() {
                 let quantity = Quantity::Response(ResponseQuantity::Displacement);
                 assert_eq!(clipped_channels(quantity, x), []);
                 assert_eq!(constant_channels(quantity, x), []);
+                assert_eq!(repeated_channels(&[(Quantity::Force, &force), (quantity, x)]), []);
                 assert_eq!(quantised_channels(quantity, x), []);
                 assert_eq!(spiked_channels(quantity, x, &force), []);
                 assert_eq!(kinematics(&motions(&response)).unwrap(), []);
@@ -234,6 +235,29 @@ fn nothing_is_said_of_channels_that_are_as_they_should_be() {
             }
         }
     }
+}
+
+#[test]
+fn a_channel_recorded_twice_is_found() {
+    let sampling = Sampling::from_rate_hz(100.0, 50).unwrap();
+    let noise = |seed| noise::white(sampling, 1, 1.0, seed).unwrap().channel(0).to_vec();
+    let still = vec![2.0; 50];
+    let motion = [noise(1), noise(2), noise(1), still.clone(), still];
+    let force = [noise(2), noise(3), noise(3)];
+    let motion = Record::from_channels(sampling, &motion).unwrap();
+    let force = Record::from_channels(sampling, &force).unwrap();
+    let kind = Quantity::Response(ResponseQuantity::Velocity);
+    let found = repeated_channels(&[(Quantity::Force, &force), (kind, &motion)]);
+    let pairs: Vec<_> = found
+        .iter()
+        .map(|finding| match finding {
+            Finding::RepeatedChannel(repeated) => (repeated.original, repeated.channel),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    let channel = |quantity, index| Channel { quantity, index };
+    let of_force = (channel(Quantity::Force, 0), channel(kind, 1));
+    assert_eq!(pairs, [of_force, (channel(kind, 0), channel(kind, 2))]);
 }
 
 /// Motions that are unrelated to the force are part of the test: half of their lines extract power.

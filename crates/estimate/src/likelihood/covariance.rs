@@ -23,6 +23,8 @@ pub(super) struct Information {
     pub(super) rank: usize,
     /// Covariance of all parameters; 0 for parameters at a bound.
     pub(super) covariance: DMatrix<f64>,
+    /// Ratio of the covariance to the inverse information.
+    pub(super) inflation: f64,
     /// Flag of each parameter that is determined.
     pub(super) is_determined: Vec<bool>,
 }
@@ -70,7 +72,16 @@ impl Information {
             let undetermined = directions.columns_range(rank..).row(i).norm();
             is_determined[*row] = undetermined < PART;
         }
-        Ok(Self { free, scale, directions, singular_values, rank, covariance, is_determined })
+        Ok(Self {
+            free,
+            scale,
+            directions,
+            singular_values,
+            rank,
+            covariance,
+            inflation,
+            is_determined,
+        })
     }
 
     /// Standard error of a parameter; `None` if it is not determined.

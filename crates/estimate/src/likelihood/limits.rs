@@ -14,6 +14,10 @@ pub(super) const TRANSIENT_RANK: f64 = 1e-12;
 /// parameters: the rounding of the responses, with a reserve.
 pub(super) const RANK: f64 = 1e-9;
 
+/// Minimum share of the squared effect of a delay that the parameters do not explain. Below it
+/// rounding would decide the delay; above it the standard error of the delay does.
+pub(super) const DETERMINED_DELAY: f64 = 1e-9;
+
 /// Maximum relative standard error for a Wald interval. For a larger one the interval comes from
 /// the profile of the likelihood, because the likelihood is not quadratic over such a distance.
 pub(super) const WEAK: f64 = 0.3;

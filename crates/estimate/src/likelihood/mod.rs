@@ -5,6 +5,7 @@
 //! with one derivative, one bounded search, and one covariance.
 
 mod covariance;
+mod delay_score;
 pub mod entries;
 mod error;
 mod estimate;
@@ -22,6 +23,7 @@ mod unknown_noise;
 mod weight_uncertainty;
 mod weights;
 
+pub use delay_score::DelayScore;
 pub use error::LikelihoodError;
 pub use estimate::{
     Combination, FoundMinimum, IntervalKind, LikelihoodEstimate, ParameterEstimate, PriorReport,

@@ -60,6 +60,13 @@ pub(super) struct LineErrors {
     pub(super) receptances: Vec<DMatrix<Complex<f64>>>,
 }
 
+/// Responses and weights of the lines of one record.
+pub(super) struct RecordLines<'r, L> {
+    pub(super) lines: &'r [(L, WeightedLine)],
+    /// Orthonormal basis of the weighted columns of the transient of an open record.
+    pub(super) basis: Option<&'r DMatrix<f64>>,
+}
+
 /// Residual of the lines of one record.
 struct RecordResidual<L> {
     lines: Vec<(L, WeightedLine)>,
@@ -186,6 +193,22 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         jacobian.iter().all(|value| value.is_finite()).then_some(jacobian)
     }
 
+    /// Visits the lines of each record with their responses and the factors L of their covariance,
+    /// and the basis of the transient of an open record; `None` if a response does not exist or a
+    /// visit fails.
+    pub(super) fn for_each_record(
+        &self,
+        parameters: &[f64],
+        mut visit: impl FnMut(&Range<usize>, RecordLines<'_, M::Line<'a>>) -> Option<()>,
+    ) -> Option<()> {
+        for (rows, kind) in self.data.records() {
+            let record = self.record(parameters, rows, *kind)?;
+            let basis = record.eliminated.as_ref().map(|fitted| &fitted.basis);
+            visit(rows, RecordLines { lines: &record.lines, basis })?;
+        }
+        Some(())
+    }
+
     /// Rows of the priors.
     fn prior_rows(&self, parameters: &[f64]) -> Vec<f64> {
         let row = |prior: &PriorRow| (parameters[prior.parameter] - prior.mean) / prior.deviation;
@@ -252,6 +275,15 @@ impl<M: ResponseModel> LeastSquaresProblem for Residual<'_, M> {
         let Linearisation { residual, jacobian } = Residual::linearise(self, parameters)?;
         Some((residual, jacobian))
     }
+}
+
+/// Returns √2 times the real and imaginary parts of complex rows, each pair of rows together.
+pub(super) fn real_rows(white: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
+    let mut rows = DMatrix::zeros(2 * white.nrows(), white.ncols());
+    for (column, mut to) in white.column_iter().zip(rows.column_iter_mut()) {
+        write_real(column.iter(), to.as_mut_slice());
+    }
+    rows
 }
 
 fn write_real<'c>(white: impl Iterator<Item = &'c Complex<f64>>, part: &mut [f64]) {

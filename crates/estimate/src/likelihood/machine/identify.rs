@@ -5,6 +5,7 @@ use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{MachineModel, MeasuredPart};
+use crate::likelihood::delay_score::{DelayScore, delay_score};
 use crate::likelihood::estimate::LikelihoodEstimate;
 use crate::likelihood::fit::{ParameterSpace, fit};
 use crate::likelihood::limits::OPEN_DOFS;
@@ -40,8 +41,33 @@ pub struct MachineEstimate {
     /// Orthonormal basis of the sensitivities of the residual (pure numbers), with the rows of
     /// [`MachineEstimate::residual`].
     pub explained: DMatrix<f64>,
+    /// Delay that explains most of the residual; `None` if the data do not determine any.
+    pub delay: Option<DelayScore>,
     /// Part with a measured receptance.
     pub(super) part: Option<MeasuredPart>,
+}
+
+impl MachineEstimate {
+    /// Returns the same estimate with the squares of possible errors of the parameters, one for
+    /// each in its unit, added to their covariance. The intervals become wider by the ratio of the
+    /// standard errors, up to the bounds of the parameters.
+    #[must_use]
+    pub fn with_parameter_errors(mut self, errors: &[f64]) -> Self {
+        let error = DVector::from_column_slice(errors);
+        self.likelihood.covariance += &error * error.transpose();
+        let parameters = self.likelihood.parameters.iter_mut().zip(self.assembly.parameters());
+        for ((parameter, described), error) in parameters.zip(errors) {
+            let Some(before) = parameter.standard_error.filter(|before| *before > 0.0) else {
+                continue;
+            };
+            let (value, after) = (parameter.value, before.hypot(*error));
+            let wider = |end: f64| value + (end - value) * after / before;
+            let within = |end: f64| wider(end).max(described.min).min(described.max);
+            parameter.interval = parameter.interval.map(within);
+            parameter.standard_error = Some(after);
+        }
+        self
+    }
 }
 
 /// Identifies the unknown coefficients of a machine from line data. The outputs of the data are the
@@ -150,9 +176,12 @@ fn identify(
     let linearised = fit.residual().linearise(parameters).ok_or_else(failed)?;
     let errors = fit.residual().errors(parameters).ok_or_else(failed)?.errors;
     let rows = 2 * data.outputs().len();
+    let known: Vec<bool> =
+        assembly.sensors().iter().map(|sensor| sensor.delay_parameter.is_none()).collect();
+    let delay = delay_score(&fit, &linearised, &known);
     let explained = linearised.jacobian.rows(0, rows).into_owned().qr().q();
     let residual = linearised.residual.rows(0, rows).into_owned();
-    Ok(MachineEstimate { likelihood, assembly, variance, errors, residual, explained, part })
+    Ok(MachineEstimate { likelihood, assembly, variance, errors, residual, explained, delay, part })
 }
 
 fn parameter_space(assembly: &Assembly) -> ParameterSpace {

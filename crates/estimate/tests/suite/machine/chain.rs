@@ -14,7 +14,7 @@ use super::generator::{measured, random_phases, responses};
 use super::judge::judge;
 
 pub const MASSES: [f64; 5] = [2.0, 1.5, 1.8, 1.2, 1.0];
-const STIFFNESSES: [f64; 5] = [4e4, 3e4, 2.5e4, 3.5e4, 2e4];
+pub const STIFFNESSES: [f64; 5] = [4e4, 3e4, 2.5e4, 3.5e4, 2e4];
 const DAMPINGS: [f64; 5] = [6.0, 4.0, 5.0, 3.0, 4.0];
 
 fn chain(values: &[f64; 5]) -> DMatrix<f64> {
@@ -31,7 +31,7 @@ fn chain(values: &[f64; 5]) -> DMatrix<f64> {
 }
 
 /// Force on mass 1, displacements of masses 1 and 5 with 0.5 % noise.
-fn data(stiffnesses: &[f64; 5], seed: u64) -> LineData {
+pub fn data(stiffnesses: &[f64; 5], seed: u64) -> LineData {
     let omega: Vec<f64> = (4..=400).map(|line| TAU * 0.125 * f64::from(line)).collect();
     let phases = random_phases(omega.len(), 1, 1000 + seed);
     let force = phases.clone().insert_columns(1, 4, Complex::default());
@@ -41,7 +41,7 @@ fn data(stiffnesses: &[f64; 5], seed: u64) -> LineData {
 }
 
 /// The chain with one initial value for all springs, and one for all dampers.
-fn machine() -> Machine {
+pub fn machine() -> Machine {
     let mut machine = Machine::new(["x1", "x2", "x3", "x4", "x5"]);
     let dofs = machine.dofs.clone();
     for (at, dof) in dofs.iter().enumerate() {
@@ -55,7 +55,7 @@ fn machine() -> Machine {
     machine
 }
 
-fn instruments() -> Instruments {
+pub fn instruments() -> Instruments {
     Instruments {
         sensors: ["x1", "x5"].map(|dof| Sensor::new(dof, ResponseQuantity::Displacement)).to_vec(),
         inputs: vec![Input::force("x1")],
@@ -93,6 +93,14 @@ pub fn truth_with_bound() -> Vec<(String, f64)> {
 /// The chain with a prior of 1 % on the first spring, `away` of its standard deviations from the
 /// truth.
 pub fn fit_with_prior(seed: u64, away: f64) -> Option<LikelihoodEstimate> {
+    let data = data(&STIFFNESSES, seed);
+    let settings = Settings::default();
+    let machine = machine_with_prior(away);
+    Some(identify_machine(&data, &machine, &instruments(), &settings).ok()?.likelihood)
+}
+
+/// Machine of [`fit_with_prior`].
+pub fn machine_with_prior(away: f64) -> Machine {
     let deviation = 0.01 * STIFFNESSES[0];
     let mut machine = machine();
     machine.elements[1].1 = Element::spring_damper(
@@ -100,9 +108,7 @@ pub fn fit_with_prior(seed: u64, away: f64) -> Option<LikelihoodEstimate> {
         FreeCoefficient::from_start(3e4).with_prior(STIFFNESSES[0] + away * deviation, deviation),
         FreeCoefficient::from_start(4.0).at_least(0.0),
     );
-    let data = data(&STIFFNESSES, seed);
-    let settings = Settings::default();
-    Some(identify_machine(&data, &machine, &instruments(), &settings).ok()?.likelihood)
+    machine
 }
 
 #[test]

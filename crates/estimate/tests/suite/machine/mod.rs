@@ -2,6 +2,7 @@
 
 mod agreement;
 mod chain;
+mod delay;
 mod entries;
 mod frame;
 mod generator;

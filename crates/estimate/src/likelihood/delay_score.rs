@@ -1,0 +1,170 @@
+//! Score test for a delay between the inputs and the outputs of a fit.
+//!
+//! # Source
+//! Rao (1948), Proceedings of the Cambridge Philosophical Society 44, 50–57 (score test).
+
+use std::f64::consts::SQRT_2;
+
+use mechid_numerics::linear_algebra::svd;
+use nalgebra::{Complex, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::fit::Fit;
+use super::limits::{DETERMINED_DELAY, RANK};
+use super::residual::{Linearisation, real_rows};
+use super::response_model::{LineResponse, ResponseModel};
+
+/// Delay that explains most of a residual, of one output or of all.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DelayScore {
+    /// The late output; `None`: all outputs are late by the same time.
+    pub output: Option<usize>,
+    /// Delay of the output, in s, to first order.
+    pub delay: f64,
+    /// Standard error of the delay, in s.
+    pub standard_error: f64,
+    /// Probability that noise alone gives a delay as large relative to its standard error; it
+    /// allows for the choice among the outputs.
+    pub p_value: f64,
+    /// Change of each parameter if the delay is an unknown of the model, in its unit and to first
+    /// order.
+    pub changes: Vec<f64>,
+}
+
+/// Factors QR of the derivatives of residual and priors with respect to the parameters that are not
+/// at a bound.
+struct Factors {
+    /// Indices of these parameters.
+    free: Vec<usize>,
+    /// Orthonormal basis Q of the derivatives.
+    basis: DMatrix<f64>,
+    /// Triangular factor R.
+    triangle: DMatrix<f64>,
+}
+
+/// Sums over all lines for a delay of each output.
+struct Sums {
+    /// DᵀD with the derivative D of the residual with respect to the delays, p × p.
+    squares: DMatrix<f64>,
+    /// Dᵀr, p entries.
+    products: DVector<f64>,
+    /// QᵀD.
+    explained: DMatrix<f64>,
+}
+
+/// Returns the delay that explains most of the residual beyond what the parameters explain; `None`
+/// if the data do not determine any. Outputs with a `known` entry of `false` have a delay among the
+/// parameters, and are not tested.
+pub(super) fn delay_score<M: ResponseModel>(
+    fit: &Fit<'_, M>,
+    linearised: &Linearisation,
+    known: &[bool],
+) -> Option<DelayScore> {
+    let factors = Factors::new(linearised, &fit.minimum.at_bound);
+    let sums = Sums::new(fit, &linearised.residual, &factors.basis)?;
+    let p = known.len();
+    let error_scale = fit.information.inflation.sqrt() * fit.error_scale();
+    let score = |output: Option<usize>| {
+        let direction = direction_of(output, p);
+        let all = (&sums.squares * &direction).dot(&direction);
+        let free = all - (&sums.explained * &direction).norm_squared();
+        let product = sums.products.dot(&direction);
+        (free > DETERMINED_DELAY * all)
+            .then(|| (output, -product / free, error_scale / free.sqrt()))
+    };
+    let all = known.iter().all(|known| *known).then_some(None);
+    let alone = (0..p).filter(|output| p > 1 && known[*output]).map(Some);
+    let scores: Vec<_> = all.into_iter().chain(alone).filter_map(score).collect();
+    let size = |score: &(_, f64, f64)| (score.1 / score.2).abs();
+    let best = scores.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let (output, delay, standard_error) = *best;
+    let freedom = fit.degrees_of_freedom.clamp(1.0, 1e6);
+    let alone = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(size(best));
+    let p_value = (alone * scores.len() as f64).min(1.0);
+    let effect = &sums.explained * direction_of(output, p) * delay;
+    let changes = factors.changes(&effect, fit.minimum.parameters.len())?;
+    Some(DelayScore { output, delay, standard_error, p_value, changes })
+}
+
+/// Returns the direction of a delay of one output or of all, among the delays of p outputs.
+fn direction_of(output: Option<usize>, p: usize) -> DVector<f64> {
+    DVector::from_fn(p, |at, _| f64::from(output.is_none_or(|one| one == at)))
+}
+
+impl Factors {
+    fn new(linearised: &Linearisation, at_bound: &[bool]) -> Self {
+        let free: Vec<usize> = (0..at_bound.len()).filter(|at| !at_bound[*at]).collect();
+        let factors = linearised.jacobian.select_columns(&free).qr();
+        Self { free, basis: factors.q(), triangle: factors.r() }
+    }
+
+    /// Returns the changes x of all parameters that minimise ‖R x + Qᵀd‖², with the effect Qᵀd of a
+    /// delay.
+    fn changes(&self, effect: &DVector<f64>, count: usize) -> Option<Vec<f64>> {
+        let mut changes = vec![0.0; count];
+        if self.free.is_empty() {
+            return Some(changes);
+        }
+        let mut rows = self.triangle.clone();
+        let lengths: Vec<f64> = rows.column_iter().map(|column| column.norm()).collect();
+        for (mut column, length) in rows.column_iter_mut().zip(&lengths) {
+            if *length > 0.0 {
+                column.unscale_mut(*length);
+            }
+        }
+        let decomposition = svd(rows).ok()?;
+        let smallest = RANK * decomposition.singular_values.max();
+        let scaled = decomposition.solve(&-effect, smallest).ok()?;
+        for ((at, length), value) in self.free.iter().zip(&lengths).zip(scaled.iter()) {
+            changes[*at] = if *length > 0.0 { value / length } else { 0.0 };
+        }
+        Some(changes)
+    }
+}
+
+impl Sums {
+    fn new<M: ResponseModel>(
+        fit: &Fit<'_, M>,
+        white: &DVector<f64>,
+        basis: &DMatrix<f64>,
+    ) -> Option<Self> {
+        let (data, p) = (fit.data, fit.data.outputs().ncols());
+        let mut sums = Self {
+            squares: DMatrix::zeros(p, p),
+            products: DVector::zeros(p),
+            explained: DMatrix::zeros(basis.ncols(), p),
+        };
+        fit.residual().for_each_record(&fit.minimum.parameters, |rows, record| {
+            let mut of_transient = record.basis.map(|basis| DMatrix::zeros(basis.ncols(), p));
+            for (at, (line, weighted)) in record.lines.iter().enumerate() {
+                let row = rows.start + at;
+                let (here, all) = ((2 * p * at, 2 * p), (2 * p * row, 2 * p));
+                let of_line = white.rows(all.0, all.1);
+                let pairs = of_line.as_slice().chunks_exact(2);
+                let pairs = pairs.map(|pair| Complex::new(pair[0], pair[1]) / SQRT_2);
+                let errors = DVector::from_iterator(p, pairs);
+                // The modelled outputs are the measured ones without their errors: with the
+                // transient, and with the most likely inputs.
+                let input = data.inputs().row(row).transpose();
+                let likely = weighted.likely_input(input.clone(), &errors);
+                let mut modelled = data.outputs().row(row).transpose();
+                modelled += line.receptance() * (likely - input) - &weighted.lower * errors;
+                let turn = Complex::new(0.0, data.omega()[row]);
+                let mut late = DMatrix::from_diagonal(&(modelled * turn));
+                weighted.lower.solve_lower_triangular_mut(&mut late).then_some(())?;
+                let derivative = real_rows(&late);
+                sums.squares += derivative.tr_mul(&derivative);
+                sums.products += derivative.tr_mul(&of_line);
+                sums.explained += basis.rows(all.0, all.1).tr_mul(&derivative);
+                if let Some((sum, basis)) = of_transient.as_mut().zip(record.basis) {
+                    *sum += basis.rows(here.0, here.1).tr_mul(&derivative);
+                }
+            }
+            if let Some(of_transient) = of_transient {
+                sums.squares -= of_transient.tr_mul(&of_transient);
+            }
+            Some(())
+        })?;
+        Some(sums)
+    }
+}
