@@ -8,6 +8,7 @@ pub mod summary;
 use std::fmt;
 use std::ops::Range;
 
+use mechid_checks::{Finding, Quantity, clipped_channels, dropped_channels, repeated_channels};
 use mechid_modal::free_decay::{FreeDecay, FreeDecayEstimate, free_decay};
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
@@ -18,6 +19,7 @@ use self::release::release;
 use self::steps::{coarse, last_shown};
 pub use self::summary::DecaySummary;
 use crate::AnalysisError;
+use crate::identify::checks;
 use crate::identify::prediction::Compared;
 use crate::measurement::{Block, Measurement, Window};
 use crate::text::significant;
@@ -108,6 +110,8 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
             significant(last.step, 3)
         )
     }));
+    let faults = faulty_channels(kind, &record);
+    summary.remarks.extend(faults.iter().map(|fault| checks::sentence(fault, &whole.names)));
     summary.remarks.extend(coarse.into_iter().map(|(channel, steps)| {
         format!(
             "the values of {} span {steps} steps of its converter: rounding of so few steps differs from noise and may appear as modes; \
@@ -119,6 +123,16 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     let names = summary.channels.iter().map(|channel| channel.column.clone()).collect();
     let compared = Compared { kind, names, measured: record, predicted };
     Ok(Decayed { summary, estimate, compared })
+}
+
+/// Returns the faults of the channels of a decay apart from the resolution, which has its own
+/// remark.
+fn faulty_channels(kind: ResponseQuantity, record: &Record) -> Vec<Finding> {
+    let quantity = Quantity::Response(kind);
+    let mut faults = clipped_channels(quantity, record);
+    faults.extend(dropped_channels(quantity, record));
+    faults.extend(repeated_channels(&[(quantity, record)]));
+    faults
 }
 
 /// Returns the only quantity of the response columns of a record.

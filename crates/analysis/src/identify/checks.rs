@@ -4,7 +4,8 @@ use mechid_checks::UnmeasuredForce;
 use mechid_checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
     constant_channels, dropped_channels, gain_symmetry, instability, kinematics, mass_symmetry,
-    negative_mass, power, quantised_channels, spiked_channels, unrelated_response,
+    negative_mass, power, quantised_channels, repeated_channels, spiked_channels,
+    unrelated_response,
 };
 use mechid_estimate::IdentifiedMode;
 use mechid_model::ResponseQuantity;
@@ -123,7 +124,7 @@ fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding
         .map(|fraction| Finding::UnmeasuredForce(UnmeasuredForce { fraction }))
 }
 
-/// Returns the faults of the sensors, each channel checked separately.
+/// Returns the faults of the sensors, independent of any model.
 pub(crate) fn sensor_findings(measured: &Block) -> Vec<Finding> {
     let mut findings = clipped_channels(Quantity::Force, &measured.force);
     for (kind, motion) in measured.responses() {
@@ -133,6 +134,10 @@ pub(crate) fn sensor_findings(measured: &Block) -> Vec<Finding> {
         findings.extend(spiked_channels(Quantity::Response(kind), motion, &measured.force));
         findings.extend(dropped_channels(Quantity::Response(kind), motion));
     }
+    let responses = measured.responses();
+    let motions = responses.iter().map(|(kind, motion)| (Quantity::Response(*kind), *motion));
+    let all: Vec<_> = std::iter::once((Quantity::Force, &measured.force)).chain(motions).collect();
+    findings.extend(repeated_channels(&all));
     findings
 }
 
