@@ -79,14 +79,12 @@ pub fn identify_modes(
     }
     let mut search = Identification::new(&lines, settings)?;
     search.choose_modes();
-    // A mode may represent residual terms that were not in the model when it was chosen.
-    loop {
-        search.remove_replaceable();
-        search.choose_powers();
+    search.choose_powers(usize::MAX);
+    search.apply_rules();
+    // A mode that is removed may have been all that needed the residual terms.
+    while search.remove_replaceable() {
+        search.choose_powers(search.fit.model.powers.forces.len());
         search.apply_rules();
-        if !search.remove_replaceable() {
-            break;
-        }
     }
     search.finish()
 }
@@ -407,28 +405,29 @@ impl<'a> Identification<'a> {
         retained
     }
 
-    /// Chooses the residual powers by Akaike's criterion: too few terms bias the poles, too many
-    /// only add variance.
-    fn choose_powers(&mut self) {
+    /// Chooses the residual powers, at most `most`, by Akaike's criterion: too few terms bias the
+    /// poles, too many only add variance.
+    fn choose_powers(&mut self, most: usize) {
         if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
             return;
         }
         let unknowns =
             |model: &Model| (model.columns(self.lines) * self.lines.outputs.len()) as f64;
-        let mut best: Option<(f64, Fit<'_>)> = None;
-        for powers in power_sets() {
+        let mut best = (f64::INFINITY, self.fit.model.powers.clone());
+        for powers in power_sets().into_iter().filter(|powers| powers.forces.len() <= most) {
             let mut trial = self.fit.clone();
             trial.model.powers = powers.clone();
             trial.refresh();
-            trial.search_roughly();
             let criterion = trial.cost() + 2.0 * unknowns(&trial.model);
             log::debug!("residual powers {:?}: {criterion:.1}", powers.forces);
-            if best.as_ref().is_none_or(|(least, _)| criterion < *least) {
-                best = Some((criterion, trial));
+            if criterion < best.0 {
+                best = (criterion, powers);
             }
         }
-        if let Some((_, fit)) = best.filter(|(_, fit)| fit.model.powers != self.fit.model.powers) {
-            self.fit = fit;
+        if best.1 != self.fit.model.powers {
+            self.fit.model.powers = best.1;
+            self.fit.refresh();
+            self.fit.search_roughly();
             self.update_noise();
         }
     }

@@ -65,7 +65,7 @@ mod tests {
         let hump = [(1.6, 0.01), (2.97, 0.042), (2.99, 0.032), (3.0, 0.042), (3.68, 0.021)];
         let suspected = check(&hump).unwrap();
         assert!(!suspected.passed && suspected.value == 3.0);
-        assert!(suspected.text.contains("2.97, 2.99, 3 Hz"), "{}", suspected.text);
+        assert!(suspected.text.contains("2.970, 2.990, 3.000 Hz"), "{}", suspected.text);
         assert!(check(&[]).is_none());
         assert!(check(&[(3.0, 0.01), (3.01, 0.01), (3.2, 0.01), (9.0, 0.2)]).is_none());
         // Two sharp modes within a broad one.
