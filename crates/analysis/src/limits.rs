@@ -51,8 +51,8 @@ pub const LEAST_EXPLAINED: f64 = 0.5;
 pub const SMALLER_HALF: f64 = 0.25;
 
 /// Number of modes of an ambient record within one half-width at which a peak of the unmeasured
-/// forces is suspected. Two are a close pair, as of a symmetric tower; a force with a peak gives one
-/// mode for each independent force.
+/// forces is suspected. Two are a close pair, as of a symmetric tower; a force with a peak gives
+/// one mode for each independent force.
 pub const CROWDED_MODES: usize = 3;
 
 /// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest

@@ -213,7 +213,7 @@ impl Context {
             &self.outputs,
             &self.driving_points,
         ));
-        // The masses are those of the fitted modes, which contain the decay of an exponential window.
+        // The masses are those of the fitted modes, with the decay of an exponential window.
         let mass = |at| modal_mass(&estimate, at, &self.outputs, &self.driving_points);
         let modes: Vec<ModalModeRow> =
             reported.iter().enumerate().map(|(at, mode)| row(mode, mass(at))).collect();

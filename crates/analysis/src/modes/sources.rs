@@ -116,7 +116,7 @@ impl Recorded {
             let first: usize = lens[..*count].iter().sum();
             first.min(total - first)
         };
-        // Of equally good places the last one is taken.
+        // The last one of equally good places.
         let place = (1..lens.len()).max_by_key(smaller);
         if let Some(count) = place.filter(|c| smaller(c) as f64 >= SMALLER_HALF * total as f64) {
             let (first, second) = self.parts.split_at(count);

@@ -301,8 +301,8 @@ impl Hits {
     }
 
     /// Returns the force in the window of a hit, in its unit, one value per sample: without the
-    /// offset, and zero away from the pulse and its rebounds (a *force window*), where the hammer has
-    /// no contact and the transducer measures only noise.
+    /// offset, and zero away from the pulse and its rebounds (a *force window*), where the hammer
+    /// has no contact and the transducer measures only noise.
     ///
     /// # Panics
     /// If the window is outside this force.
@@ -313,8 +313,9 @@ impl Hits {
         self.pulses_alone(force, std::slice::from_ref(hit))
     }
 
-    /// Returns the force of consecutive hits as [`Hits::pulse_alone`] does, from the beginning of
-    /// the first window to the end of the last; empty without a hit.
+    /// Returns the force of consecutive hits, in its unit, as [`Hits::pulse_alone`] does: one value
+    /// per sample from the beginning of the first window to the end of the last; empty without a
+    /// hit.
     ///
     /// # Panics
     /// If a window is outside this force.

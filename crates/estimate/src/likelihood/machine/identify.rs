@@ -51,6 +51,9 @@ impl MachineEstimate {
     /// Returns the same estimate with the squares of possible errors of the parameters, one for
     /// each in its unit, added to their covariance. The intervals become wider by the ratio of the
     /// standard errors, up to the bounds of the parameters.
+    ///
+    /// # Source
+    /// Ours: the mean square of an estimate's error is its variance plus the square of its bias.
     #[must_use]
     pub fn with_parameter_errors(mut self, errors: &[f64]) -> Self {
         let error = DVector::from_column_slice(errors);
