@@ -15,9 +15,10 @@ use super::{Subject, Verdict};
 pub struct SensorDelay {
     /// Name of the sensor; `None`: all sensors are late by the same time.
     pub sensor: Option<String>,
-    /// Delay of the sensor, in s.
+    /// Delay of the sensor, in s, to first order.
     pub seconds: f64,
-    /// Standard error of the delay, in s.
+    /// Standard error of the delay by the noise, in s; a large delay also has an error of second
+    /// order.
     pub standard_error: f64,
     /// Probability of a delay as large by noise alone.
     #[cfg_attr(feature = "serde", serde(flatten))]
@@ -62,15 +63,14 @@ impl Check for SensorDelay {
             return write!(f, "no delay between inputs and sensors ({})", self.p_value);
         }
         let direction = if self.seconds > 0.0 { "late" } else { "early" };
-        let [size, error] =
-            [self.seconds.abs(), self.standard_error].map(|s| three_digits(1e3 * s));
+        let size = three_digits(1e3 * self.seconds.abs());
         let late = match &self.sensor {
             Some(sensor) => format!("{sensor} is"),
             None => "all sensors are".to_owned(),
         };
         write!(
             f,
-            "{late} {size} ± {error} ms {direction} ({}): a filter, a scanning converter or an error of \
+            "{late} about {size} ms {direction} ({}): a filter, a scanning converter or an error of \
              the machine with the same effect; shift the channel, or make the delay of the sensors \
              a parameter",
             self.p_value

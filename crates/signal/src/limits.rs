@@ -100,7 +100,8 @@ pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
 pub(crate) const RINGING_OVER_FLOOR: f64 = 1.0 / 3.0;
 
 /// Largest number of weak samples within the ringing of a filter: near its zero crossings it is
-/// below the noise. With more, slow forces of a swinging hammer would count as ringing.
+/// below the noise, and half of it pulls. With more, slow forces of a swinging hammer would count
+/// as ringing.
 pub(crate) const RINGING_GAP: usize = 8;
 
 /// Default number of samples before a pulse, as a multiple of the number of samples in the pulse.

@@ -117,20 +117,20 @@ impl Recorded {
             first.min(total - first)
         };
         // The last one of equally good places.
-        let place = (1..lens.len()).max_by_key(smaller);
-        if let Some(count) = place.filter(|c| smaller(c) as f64 >= SMALLER_HALF * total as f64) {
+        let boundary = (1..lens.len()).max_by_key(smaller);
+        if let Some(count) = boundary.filter(|c| smaller(c) as f64 >= SMALLER_HALF * total as f64) {
             let (first, second) = self.parts.split_at(count);
             return Ok([self.acting(first)?, self.acting(second)?]);
         }
         let longest = (0..lens.len()).max_by_key(|at| lens[*at]).ok_or(AnalysisError::NoRecord)?;
         let half = |from: f64, to: f64, whole: &[Part]| {
             let cut = self.parts[longest].between(from, to)?;
-            let all: Vec<&Part> = if from > 0.0 {
+            let parts: Vec<&Part> = if from > 0.0 {
                 std::iter::once(&cut).chain(whole).collect()
             } else {
                 whole.iter().chain(std::iter::once(&cut)).collect()
             };
-            self.acting(all)
+            self.acting(parts)
         };
         let (before, after) = (&self.parts[..longest], &self.parts[longest + 1..]);
         Ok([half(0.0, 0.5, before)?, half(0.5, 1.0, after)?])

@@ -66,21 +66,21 @@ pub(super) fn delay_score<M: ResponseModel>(
     let error_scale = fit.information.inflation.sqrt() * fit.error_scale();
     let score = |output: Option<usize>| {
         let direction = direction_of(output, p);
-        let all = (&sums.squares * &direction).dot(&direction);
-        let free = all - (&sums.explained * &direction).norm_squared();
+        let square = (&sums.squares * &direction).dot(&direction);
+        let free = square - (&sums.explained * &direction).norm_squared();
         let product = sums.products.dot(&direction);
-        (free > DETERMINED_DELAY * all)
+        (free > DETERMINED_DELAY * square)
             .then(|| (output, -product / free, error_scale / free.sqrt()))
     };
-    let all = known.iter().all(|known| *known).then_some(None);
-    let alone = (0..p).filter(|output| p > 1 && known[*output]).map(Some);
-    let scores: Vec<_> = all.into_iter().chain(alone).filter_map(score).collect();
+    let common = known.iter().all(|known| *known).then_some(None);
+    let single = (0..p).filter(|output| p > 1 && known[*output]).map(Some);
+    let scores: Vec<_> = common.into_iter().chain(single).filter_map(score).collect();
     let size = |score: &(_, f64, f64)| (score.1 / score.2).abs();
     let best = scores.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
     let (output, delay, standard_error) = *best;
     let freedom = fit.degrees_of_freedom.clamp(1.0, 1e6);
-    let alone = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(size(best));
-    let p_value = (alone * scores.len() as f64).min(1.0);
+    let of_one_test = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(size(best));
+    let p_value = (of_one_test * scores.len() as f64).min(1.0);
     let effect = &sums.explained * direction_of(output, p) * delay;
     let changes = factors.changes(&effect, fit.minimum.parameters.len())?;
     Some(DelayScore { output, delay, standard_error, p_value, changes })
@@ -138,8 +138,8 @@ impl Sums {
             let mut of_transient = record.basis.map(|basis| DMatrix::zeros(basis.ncols(), p));
             for (at, (line, weighted)) in record.lines.iter().enumerate() {
                 let row = rows.start + at;
-                let (here, all) = ((2 * p * at, 2 * p), (2 * p * row, 2 * p));
-                let of_line = white.rows(all.0, all.1);
+                let (in_record, in_data) = (2 * p * at, 2 * p * row);
+                let of_line = white.rows(in_data, 2 * p);
                 let pairs = of_line.as_slice().chunks_exact(2);
                 let pairs = pairs.map(|pair| Complex::new(pair[0], pair[1]) / SQRT_2);
                 let errors = DVector::from_iterator(p, pairs);
@@ -155,9 +155,9 @@ impl Sums {
                 let derivative = real_rows(&late);
                 sums.squares += derivative.tr_mul(&derivative);
                 sums.products += derivative.tr_mul(&of_line);
-                sums.explained += basis.rows(all.0, all.1).tr_mul(&derivative);
+                sums.explained += basis.rows(in_data, 2 * p).tr_mul(&derivative);
                 if let Some((sum, basis)) = of_transient.as_mut().zip(record.basis) {
-                    *sum += basis.rows(here.0, here.1).tr_mul(&derivative);
+                    *sum += basis.rows(in_record, 2 * p).tr_mul(&derivative);
                 }
             }
             if let Some(of_transient) = of_transient {

@@ -300,37 +300,25 @@ impl Hits {
         Ok(())
     }
 
-    /// Returns the force in the window of a hit, in its unit, one value per sample: without the
-    /// offset, and zero away from the pulse and its rebounds (a *force window*), where the hammer
-    /// has no contact and the transducer measures only noise.
-    ///
-    /// # Panics
-    /// If the window is outside this force.
-    ///
-    /// # Source
-    /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation.
-    pub fn pulse_alone(&self, force: &[f64], hit: &Hit) -> Vec<f64> {
-        self.pulses_alone(force, std::slice::from_ref(hit))
-    }
-
-    /// Returns the force of consecutive hits, in its unit, as [`Hits::pulse_alone`] does: one value
-    /// per sample from the beginning of the first window to the end of the last; empty without a
-    /// hit.
+    /// Returns the force of consecutive hits, in its unit, one value per sample from the beginning
+    /// of the first window to the end of the last: without the offset, and zero away from the
+    /// contacts (a *force window*), where the hammer touches no part and the transducer measures
+    /// only noise. Empty without a hit.
     ///
     /// # Panics
     /// If a window is outside this force.
     ///
     /// # Source
-    /// As [`Hits::pulse_alone`].
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation.
     pub fn pulses_alone(&self, force: &[f64], hits: &[Hit]) -> Vec<f64> {
-        let ends = |hit: &Hit| {
+        let contact = |hit: &Hit| {
             let margin = hit.pulse.len();
             let first = hit.pulse.start.saturating_sub(margin).min(hit.contact.start);
             first..hit.contact.end.max(hit.pulse.end + margin)
         };
-        let acts: Vec<Range<usize>> = hits.iter().map(ends).collect();
+        let contacts: Vec<Range<usize>> = hits.iter().map(contact).collect();
         let value = |k: usize| {
-            let is_force = acts.iter().any(|acts| acts.contains(&k));
+            let is_force = contacts.iter().any(|contact| contact.contains(&k));
             if is_force { force[k] - self.offset } else { 0.0 }
         };
         let (first, last) = (hits.first(), hits.last());
@@ -357,10 +345,13 @@ impl Hit {
     }
 }
 
-/// Returns a range of samples with the ringing before and after it: further samples above a part of
+/// Returns a range of samples with the ringing before and after it: further pushes above a part of
 /// the `floor` of a hit, with gaps of at most [`limits::RINGING_GAP`] samples.
+///
+/// Ringing pushes and pulls in turn. A long pull alone is the undershoot of an AC-coupled
+/// transducer, and no force.
 fn with_ringing(push: &[f64], range: Range<usize>, floor: f64) -> Range<usize> {
-    let is_loud = |k: &usize| push[*k].abs() > limits::RINGING_OVER_FLOOR * floor;
+    let is_loud = |k: &usize| push[*k] > limits::RINGING_OVER_FLOOR * floor;
     let Range { mut start, mut end } = range;
     while let Some(k) = (start.saturating_sub(limits::RINGING_GAP)..start).find(is_loud) {
         start = k;

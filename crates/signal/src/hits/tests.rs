@@ -45,7 +45,7 @@ fn good_hits_are_found_with_their_windows() {
             assert!((hit.peak / peak - 1.0).abs() < 0.03, "{hit:?}");
             assert!(hit.pulse.start.abs_diff((start / DT) as usize) <= 2, "{hit:?}");
             assert!((7..=9).contains(&hit.pulse.len()), "{hit:?}");
-            let alone = found.pulse_alone(&force, hit);
+            let alone = found.pulses_alone(&force, std::slice::from_ref(hit));
             let momentum: f64 = alone.iter().sum::<f64>() * DT;
             let exact = HalfSine::new(peak, start, 9e-3).unwrap().momentum();
             assert!((momentum / exact - 1.0).abs() < 0.03, "{momentum} {exact}");
@@ -54,6 +54,29 @@ fn good_hits_are_found_with_their_windows() {
         let ends: Vec<usize> = found.all.iter().map(|hit| hit.window.end).collect();
         let starts: Vec<usize> = found.all.iter().map(|hit| hit.window.start).collect();
         assert_eq!((ends[3], &ends[..3]), (9000, &starts[1..]));
+    }
+}
+
+/// Reference: the force itself. A rebound of 3 % and ringing about zero are forces; the undershoot
+/// of an AC-coupled transducer is not.
+#[test]
+fn rebounds_and_ringing_are_forces_and_an_undershoot_is_not() {
+    for seed in 0..20 {
+        let mut force = record(&[(100.0, 1.0), (3.0, 1.06)], 3000, 0.02, seed);
+        // Ringing at 0.4 of the sampling rate from the end of the pulse, and a slow undershoot.
+        for k in 1010..1110 {
+            let phase = 0.8 * std::f64::consts::PI * (k - 1010) as f64;
+            force[k] += 2.0 * (-0.1 * (k - 1010) as f64).exp() * phase.sin();
+        }
+        (1120..2500).for_each(|k| force[k] -= 1.0);
+        let found = found(&force);
+        let alone = found.pulses_alone(&force, &found.all);
+        let first = found.all[0].window.start;
+        assert_eq!(found.all.len(), 1);
+        for k in (1030..1040).chain(1062..1068) {
+            assert_eq!(alone[k - first], force[k] - found.offset, "seed {seed}, sample {k}");
+        }
+        assert!(alone[1130 - first..].iter().all(|f| *f == 0.0), "seed {seed}");
     }
 }
 
