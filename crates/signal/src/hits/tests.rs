@@ -64,11 +64,11 @@ fn rebounds_and_ringing_are_forces_and_an_undershoot_is_not() {
     for seed in 0..20 {
         let mut force = record(&[(100.0, 1.0), (3.0, 1.06)], 3000, 0.02, seed);
         // Ringing at 0.4 of the sampling rate from the end of the pulse, and a slow undershoot.
-        for k in 1010..1110 {
-            let phase = 0.8 * std::f64::consts::PI * (k - 1010) as f64;
-            force[k] += 2.0 * (-0.1 * (k - 1010) as f64).exp() * phase.sin();
+        for (k, value) in force[1010..1110].iter_mut().enumerate() {
+            let phase = 0.8 * std::f64::consts::PI * k as f64;
+            *value += 2.0 * (-0.1 * k as f64).exp() * phase.sin();
         }
-        (1120..2500).for_each(|k| force[k] -= 1.0);
+        force[1120..2500].iter_mut().for_each(|value| *value -= 1.0);
         let found = found(&force);
         let alone = found.pulses_alone(&force, &found.all);
         let first = found.all[0].window.start;
