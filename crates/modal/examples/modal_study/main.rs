@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p mechid-modal --example modal_study -- SEEDS [CASE] [FIRST]` prints one
 //! row per case. The scatter is divided by an independent Cramér–Rao bound (`bound.rs`), the bias
-//! by the scatter. The row "sensor noise only" leaves unmeasured forces out of the noise model; the
+//! by the scatter. The modal masses are those of the first response and the first force. The row "sensor noise only" leaves unmeasured forces out of the noise model; the
 //! number of modes is given there.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
@@ -27,7 +27,7 @@ fn main() {
     let wanted = arguments.get(1).cloned().unwrap_or_default();
     let first: u64 = arguments.get(2).and_then(|text| text.parse().ok()).unwrap_or(0);
     println!(
-        "| Test | Records | f hold | ζ hold | Shapes hold | f over bound | ζ over bound | Bias | Modes found | False modes |\n|---|---|---|---|---|---|---|---|---|---|"
+        "| Test | Records | f hold | ζ hold | Shapes hold | Masses hold | f over bound | ζ over bound | Bias | Modes found | False modes |\n|---|---|---|---|---|---|---|---|---|---|---|"
     );
     let all = ModalSettings::default();
     let points = [(0, 0), (3, 1)].map(|(output, input)| DrivingPoint { output, input });
@@ -82,11 +82,12 @@ fn print_row(name: &str, score: &Score, bound: Option<&Bound>) {
         share => format!("{share:.1}"),
     };
     println!(
-        "| {} | {} | {:.1} | {:.1} | {shapes} | {} | {} | {bias:.2} | {:.2} | {} |",
+        "| {} | {} | {:.1} | {:.1} | {shapes} | {:.1} | {} | {} | {bias:.2} | {:.2} | {} |",
         name.replacen('x', "×", 1),
         score.records,
         score.frequency.coverage(),
         score.damping.coverage(),
+        score.mass.coverage(),
         ratio(score.frequency.deviation(), bound.map(|bound| &bound.frequency)),
         ratio(score.damping.deviation(), bound.map(|bound| &bound.damping)),
         score.found_share(),

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use mechid_modal::{IdentifiedMode, ModalSettings, identify_modes};
+use mechid_modal::{DrivingPoint, IdentifiedMode, ModalEstimate, ModalSettings, identify_modes};
 
 use nalgebra::Complex;
 
@@ -67,6 +67,8 @@ pub struct Score {
     pub records: usize,
     pub frequency: Errors,
     pub damping: Errors,
+    /// Relative errors of the modal masses by the first output and the first input.
+    pub mass: Errors,
     shape_holds: usize,
     shape_count: usize,
     found: usize,
@@ -88,6 +90,7 @@ impl Score {
         let mut score = Self::default();
         score.frequency.0 = vec![Vec::new(); modes.len()];
         score.damping.0 = vec![Vec::new(); modes.len()];
+        score.mass.0 = vec![Vec::new(); modes.len()];
         for seed in seeds {
             score.records += 1;
             score.wanted += modes.len();
@@ -102,7 +105,7 @@ impl Score {
             score.false_modes += estimate.modes().len() - pairs.len();
             score.found += pairs.len();
             for &(place, mode) in &pairs {
-                score.add(case, modes[place], place, &estimate.modes()[mode]);
+                score.add(case, modes[place], place, &estimate, mode);
             }
         }
         score
@@ -131,10 +134,30 @@ impl Score {
         pairs
     }
 
-    fn add(&mut self, case: &Case, truth: usize, place: usize, mode: &IdentifiedMode) {
+    fn add(
+        &mut self,
+        case: &Case,
+        truth: usize,
+        place: usize,
+        estimate: &ModalEstimate,
+        index: usize,
+    ) {
+        let mode = &estimate.modes()[index];
         let (f, z) = (mode.natural_frequency_hz, mode.damping_ratio);
         self.frequency.0[place].push((f.value - case.frequency_hz[truth], f.standard_error));
         self.damping.0[place].push((z.value - case.damping[truth], z.standard_error));
+        // The residue at the point is ψ²; the largest entry of the shape is scaled to 1.
+        let is_largest = |value: &C| (value - 1.0).norm() < 1e-12;
+        let largest = mode.shape.iter().position(is_largest).unwrap_or(0);
+        let shape = &case.shape[truth];
+        let true_mass =
+            shape[0].norm() / (shape[largest].norm_sqr() * case.participation[truth][0]);
+        let point = DrivingPoint { output: 0, input: 0 };
+        if let Some(mass) = estimate.modal_mass(index, point, 2) {
+            let relative =
+                (mass.value.abs() / true_mass.abs() - 1.0, mass.standard_error / mass.value.abs());
+            self.mass.0[place].push(relative);
+        }
         if case.roving {
             // The residues at the struck points are the shape.
             let scale = C::new(0.0, 2.0 * case.poles()[truth].im);
@@ -147,8 +170,6 @@ impl Score {
             }
             return;
         }
-        let largest = mode.shape.iter().position(|value| (value - 1.0).norm() < 1e-12).unwrap_or(0);
-        let shape = &case.shape[truth];
         for (output, value) in mode.shape.iter().enumerate().filter(|(k, _)| *k != largest) {
             self.add_shape(
                 value - shape[output] / shape[largest],
