@@ -95,6 +95,9 @@ pub const SHARPENING_ROUNDS: usize = 20;
 /// window bias.
 pub const SHARPENING_SETTLED: f64 = 0.1;
 
+/// Maximum number of delays that a note lists one by one.
+pub(crate) const LISTED_DELAYS: usize = 6;
+
 /// Maximum p-value, adjusted for the number of tests, of a failed check of the modes.
 pub const MODAL_SIGNIFICANCE: f64 = 0.01;
 

@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Complex, DMatrix, DVector, Matrix2};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 
 use crate::dense::transposed_product;
@@ -156,7 +156,8 @@ impl Covariance {
         &by_reference * sum * by_reference.transpose()
     }
 
-    /// Returns pole, shape and participations of a mode with their joint covariance.
+    /// Returns pole, shape and participations of a mode with their joint covariance, which includes
+    /// the errors of the delays of the outputs.
     pub(crate) fn mode_parameters(
         &self,
         fit: &Fit<'_>,
@@ -164,7 +165,15 @@ impl Covariance {
         shape: &[C],
     ) -> ModeParameters {
         let (outputs, inputs) = (shape.len(), fit.lines.inputs());
-        let (values, covariance) = self.joint(fit, &[(mode, shape)]);
+        let (values, mut covariance) = self.joint(fit, &[(mode, shape)]);
+        for (output, delay) in fit.lines.delays.iter().enumerate() {
+            // A delay that is too large by δ turns the entry φ by jωδφ.
+            let change = shape[output] * C::new(0.0, fit.model.poles[mode].im);
+            let by_delay = Vector2::new(change.re, change.im) * delay.standard_error;
+            let at = ModeParameters::shape_index(output);
+            let mut block = covariance.fixed_view_mut::<2, 2>(at, at);
+            block += by_delay * by_delay.transpose();
+        }
         let (gauge, degrees_of_freedom) = (fit.model.gauge[mode], self.degrees_of_freedom[mode]);
         ModeParameters { outputs, inputs, gauge, values, covariance, degrees_of_freedom }
     }

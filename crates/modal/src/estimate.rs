@@ -11,6 +11,7 @@ use crate::ModalError;
 use crate::compare::{ComparedMode, Comparison, Measured, PairingRule, compare};
 use crate::constraint::{self, ConstraintTest, DrivingPoint, ModalConstraint};
 use crate::covariance::Covariance;
+use crate::delays::OutputDelay;
 use crate::indicators::IndicatorError;
 use crate::limits::GROUP_HALF_WIDTHS;
 use crate::lines::Lines;
@@ -38,6 +39,7 @@ pub struct ModalEstimate {
     dropped: Vec<DroppedCandidate>,
     powers: ResidualPowers,
     model: ModalModel,
+    delays: Vec<OutputDelay>,
     explained: Vec<f64>,
     noise_level: Vec<f64>,
     noise_spectrum: Vec<Vec<f64>>,
@@ -96,8 +98,10 @@ impl ModalEstimate {
                 reference: model.reference,
                 powers: model.powers.forces.clone(),
                 residuals: residual_coefficients(fit),
+                delays: fit.lines.delays.iter().map(|delay| delay.seconds).collect(),
                 groups,
             },
+            delays: fit.lines.delays.clone(),
             explained: explained(fit),
             noise_level: noise.sensor.iter().map(level).collect(),
             noise_spectrum: noise.sensor.clone(),
@@ -122,7 +126,8 @@ impl ModalEstimate {
     /// at the point.
     ///
     /// It holds for light, proportional damping, and is in kg if the input is in N and the output
-    /// in m, m/s or m/s².
+    /// in m, m/s or m/s². It is negative if the response has the wrong sign. A delay between the
+    /// channels of less than a quarter of a period does not change it.
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), sections 2.4 and 3.5; the standard error is to first
@@ -238,6 +243,12 @@ impl ModalEstimate {
         &self.model
     }
 
+    /// Returns the delay of each output behind the forces, which the shapes do not contain; empty
+    /// if the data determine none.
+    pub fn delays(&self) -> &[OutputDelay] {
+        &self.delays
+    }
+
     /// Returns the frequency response at ω (rad/s), outputs × inputs.
     pub fn response(&self, omega: f64) -> DMatrix<C> {
         self.model.response(omega)
@@ -257,12 +268,17 @@ impl ModalEstimate {
         }
         let mut predicted = DMatrix::zeros(data.len(), outputs);
         for (line, omega) in data.omega().iter().enumerate() {
-            let row = self.response(*omega) * data.inputs().row(line).transpose();
+            let row = self.model.undelayed(*omega) * data.inputs().row(line).transpose();
             predicted.row_mut(line).copy_from(&row.transpose());
         }
-        let lines = Lines::new(data);
+        let lines = Lines::new(data).advanced(self.delays.clone());
         let modes: Vec<&IdentifiedMode> = self.modes.iter().chain(&self.others).collect();
         add_transients(&lines, &modes, &self.powers.transients, &mut predicted);
+        for (output, mut column) in predicted.column_iter_mut().enumerate() {
+            for (value, omega) in column.iter_mut().zip(data.omega()) {
+                *value *= self.model.delay_factor(output, *omega);
+            }
+        }
         Ok(predicted)
     }
 }

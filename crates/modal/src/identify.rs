@@ -8,12 +8,13 @@ use nalgebra::Complex;
 use crate::ModalError;
 use crate::constraint::ModalConstraint;
 use crate::covariance::Covariance;
+use crate::delays::{OutputDelay, apparent_delays, determined_delays};
 use crate::estimate::{ModalEstimate, log_likelihood};
 use crate::initial_poles::initial_poles;
 use crate::limits::{MAX_DAMPING, MAX_TRIES, NEIGHBOUR_HALF_WIDTHS};
 use crate::lines::Lines;
 use crate::mode::{DropReason, DroppedCandidate};
-use crate::model::{Model, ResidualPowers};
+use crate::model::{Model, ResidualPowers, first_powers};
 use crate::noise::{Noise, shapes};
 use crate::order::{add_best, hidden, is_within_resonance, removal_losses, required_gain};
 use crate::projection::Weights;
@@ -58,7 +59,8 @@ impl Default for ModalSettings {
 ///
 /// The search varies the poles and participation factors; the shapes and residual terms then follow
 /// from linear least squares. The transient of each open record (one that is not whole periods) is
-/// estimated as one more force, common to all outputs.
+/// estimated as one more force, common to all outputs. Delays of the outputs behind the forces are
+/// part of the model if the data determine them ([`ModalEstimate::delays`]).
 ///
 /// # Errors
 /// [`ModalError`] if the data do not suffice for a mode, or if no mode is significant.
@@ -77,23 +79,27 @@ pub fn identify_modes(
     for constraint in &settings.constraints {
         constraint.check(lines.outputs.len(), lines.inputs())?;
     }
-    let mut search = Identification::new(&lines, settings)?;
-    search.choose_modes();
-    search.choose_powers(usize::MAX);
-    search.apply_rules();
-    // A mode that is removed may have been all that needed the residual terms.
-    while search.remove_replaceable() {
-        search.choose_powers(search.fit.model.powers.forces.len());
-        search.apply_rules();
-    }
-    search.finish()
+    let poles = initial_poles(&lines)?;
+    let delays = apparent_delays(&lines, &poles);
+    let plain = Identification::selected(&lines, settings, poles);
+    let Some(delays) = delays else { return plain.finish() };
+    let advanced = lines.advanced(delays.iter().copied().map(OutputDelay::exact).collect());
+    let Ok(poles) = initial_poles(&advanced) else { return plain.finish() };
+    let search = Identification::selected(&advanced, settings, poles);
+    // Many residual terms can take the place of the delays.
+    let determined = determined_delays(&lines, &search.fit, delays).unwrap_or_default();
+    let lines = lines.advanced(determined);
+    let search = search.on(&lines);
+    let (without, with) = (plain.criterion(), search.criterion());
+    log::debug!("criterion {without:.0}, after delays {with:.0}");
+    if with < without { search.finish() } else { plain.finish() }
 }
 
 /// Fits the modes of an estimate to other data of the same structure: a part of the record, or a
 /// record of another day.
 ///
-/// The search starts from the poles of the estimate and has its residual powers; the result has no
-/// modes that the data do not determine.
+/// The search starts from the poles of the estimate and has its residual powers and delays; the
+/// result has no modes that the data do not determine.
 ///
 /// # Errors
 /// [`ModalError`] as of [`identify_modes`].
@@ -106,6 +112,14 @@ pub fn refit_modes(
     let settings = ModalSettings { residual_powers, modes: None, ..settings.clone() };
     let lines = Lines::new(data);
     lines.check()?;
+    let known = estimate.delays();
+    if !known.is_empty() && known.len() != lines.outputs.len() {
+        let (inputs, outputs) = (lines.inputs(), lines.outputs.len());
+        let (model_inputs, model_outputs) = (estimate.model().inputs(), known.len());
+        return Err(ModalError::Size { inputs, outputs, model_inputs, model_outputs });
+    }
+    let known = known.iter().map(|delay| OutputDelay::exact(delay.seconds));
+    let lines = lines.advanced(known.collect());
     let mut search = Identification::from_poles(&lines, &settings, estimate.poles());
     search.apply_rules();
     search.finish()
@@ -130,18 +144,51 @@ struct Identification<'a> {
     fit: Fit<'a>,
     noise: Noise,
     dropped: Vec<DroppedCandidate>,
+    /// `true` after the first choice of the residual powers: the noise is known well enough then.
+    has_chosen_powers: bool,
 }
 
 impl<'a> Identification<'a> {
-    /// Searches from the poles of the subspace method, and from the requested frequencies.
-    fn new(lines: &'a Lines, settings: &'a ModalSettings) -> Result<Self, ModalError> {
-        let mut poles = initial_poles(lines)?;
+    /// Searches from given poles and from the requested frequencies, and chooses modes and residual
+    /// powers.
+    fn selected(
+        lines: &'a Lines,
+        settings: &'a ModalSettings,
+        mut poles: Vec<Complex<f64>>,
+    ) -> Self {
         log::debug!("{} poles to start with", poles.len());
         if !settings.near_hz.is_empty() {
             poles.extend(missing_poles(&poles, &settings.near_hz));
         }
         poles.truncate(settings.max_modes);
-        Ok(Self::from_poles(lines, settings, poles))
+        let mut search = Self::from_poles(lines, settings, poles);
+        search.choose_modes();
+        search.choose_powers(AKAIKE);
+        search.apply_rules();
+        // A mode that is removed may have been all that needed the residual terms.
+        while search.remove_replaceable() {
+            search.choose_powers(lines.schwarz());
+            search.apply_rules();
+        }
+        search
+    }
+
+    /// Returns the same state for lines with other delays.
+    fn on<'b>(self, lines: &'b Lines) -> Identification<'b>
+    where
+        'a: 'b,
+    {
+        let steps = self.fit.steps;
+        let fit = Fit { steps, ..Fit::new(lines, self.fit.model, self.fit.weights) };
+        Identification { lines, fit, ..self }
+    }
+
+    /// Returns Schwarz's criterion: −2 log L and the penalty of all unknowns.
+    fn criterion(&self) -> f64 {
+        let (model, lines) = (&self.fit.model, self.lines);
+        let linear = model.columns(lines) * lines.outputs.len();
+        let unknowns = linear + model.parameters(lines) + lines.delays.len();
+        -2.0 * log_likelihood(&self.fit) + lines.schwarz() * unknowns as f64
     }
 
     /// Searches from given poles.
@@ -157,7 +204,8 @@ impl<'a> Identification<'a> {
         let mut fit = Fit::new(lines, model, weights);
         fit.search_roughly();
         let noise = Noise::from_fit(&fit, None);
-        let mut identification = Self { lines, settings, fit, noise, dropped: Vec::new() };
+        let mut identification =
+            Self { lines, settings, fit, noise, dropped: Vec::new(), has_chosen_powers: false };
         identification.remove_impossible();
         // The first search is unweighted; unmeasured forces are estimated after a search with
         // weights.
@@ -281,8 +329,9 @@ impl<'a> Identification<'a> {
     }
 
     /// Removes modes whose loss is below the penalty of their parameters, until all others are
-    /// significant.
-    fn remove_insignificant(&mut self, required: f64) {
+    /// significant; returns whether there were any.
+    fn remove_insignificant(&mut self, required: f64) -> bool {
+        let mut removed = false;
         while self.settings.modes.is_none() {
             let losses = removal_losses(&self.fit);
             let protected = self.protected();
@@ -294,11 +343,13 @@ impl<'a> Identification<'a> {
             let reasons: Vec<_> = (0..losses.len()).map(reason).collect();
             let reasons = weakest_of_neighbours(&self.fit.model.poles, &losses, reasons);
             if reasons.iter().all(Option::is_none) {
-                return;
+                break;
             }
             self.remove(&reasons);
             self.remove_impossible();
+            removed = true;
         }
+        removed
     }
 
     /// Removes the weakest modes without which the likelihood, maximised again, falls by less than
@@ -379,6 +430,9 @@ impl<'a> Identification<'a> {
     }
 
     /// Removes the modes with a reason and searches again.
+    ///
+    /// A removed mode may have taken the place of residual terms. Their powers are therefore chosen
+    /// again, with the weights of the fit that contained the mode.
     fn remove(&mut self, reasons: &[Option<DropReason>]) {
         if reasons.iter().all(Option::is_none) {
             return;
@@ -386,6 +440,9 @@ impl<'a> Identification<'a> {
         let retained = self.reject(reasons);
         self.fit.model.select(&retained);
         self.fit.refresh();
+        if self.has_chosen_powers {
+            self.choose_powers(self.lines.schwarz());
+        }
         self.fit.search_roughly();
     }
 
@@ -393,6 +450,7 @@ impl<'a> Identification<'a> {
     fn reject(&mut self, reasons: &[Option<DropReason>]) -> Vec<usize> {
         for (pole, reason) in self.fit.model.poles.iter().zip(reasons) {
             if let Some(reason) = reason {
+                log::debug!("{:.3} Hz removed: {reason:?}", pole.im / TAU);
                 self.dropped.push(DroppedCandidate::new(*pole, *reason));
             }
         }
@@ -405,20 +463,24 @@ impl<'a> Identification<'a> {
         retained
     }
 
-    /// Chooses the residual powers, at most `most`, by Akaike's criterion: too few terms bias the
-    /// poles, too many only add variance.
-    fn choose_powers(&mut self, most: usize) {
+    /// Chooses the residual powers by Akaike's criterion: too few terms bias the poles, too many
+    /// only add variance. Terms beyond the number of the current ones have another `penalty`.
+    fn choose_powers(&mut self, penalty: f64) {
         if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
             return;
         }
         let unknowns =
             |model: &Model| (model.columns(self.lines) * self.lines.outputs.len()) as f64;
+        let current = unknowns(&self.fit.model);
         let mut best = (f64::INFINITY, self.fit.model.powers.clone());
-        for powers in power_sets().into_iter().filter(|powers| powers.forces.len() <= most) {
+        self.has_chosen_powers = true;
+        for powers in power_sets() {
             let mut trial = self.fit.clone();
             trial.model.powers = powers.clone();
             trial.refresh();
-            let criterion = trial.cost() + 2.0 * unknowns(&trial.model);
+            let count = unknowns(&trial.model);
+            let criterion =
+                trial.cost() + AKAIKE * count.min(current) + penalty * (count - current).max(0.0);
             log::debug!("residual powers {:?}: {criterion:.1}", powers.forces);
             if criterion < best.0 {
                 best = (criterion, powers);
@@ -479,7 +541,9 @@ impl<'a> Identification<'a> {
         self.update_noise();
         self.update_noise();
         self.fit.search();
-        while self.remove_impossible() {
+        // The last search can move a mode out of the band, or make one insignificant.
+        let required = required_gain(self.lines);
+        while self.remove_impossible() || self.remove_insignificant(required) {
             self.update_noise();
             self.fit.search();
         }
@@ -530,11 +594,8 @@ fn weigh(fit: &mut Fit<'_>, noise: &Noise) {
     fit.refresh();
 }
 
-/// Returns the initial residual powers.
-fn first_powers(lines: &Lines) -> ResidualPowers {
-    let transients = if lines.inputs() == 0 { Vec::new() } else { vec![0, 1, 2] };
-    ResidualPowers { forces: vec![-4, -2, 0, 2, 4], transients }
-}
+/// Penalty of one unknown in −2 log L by Akaike's criterion.
+const AKAIKE: f64 = 2.0;
 
 /// Returns the sets of residual powers that are compared.
 fn power_sets() -> Vec<ResidualPowers> {

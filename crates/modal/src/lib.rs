@@ -26,6 +26,7 @@ pub mod compare;
 mod constraint;
 mod covariance;
 mod decomposition;
+mod delays;
 mod dense;
 mod error;
 mod estimate;
@@ -57,6 +58,7 @@ mod unmeasured;
 pub use mechid_numerics::Uncertain;
 
 pub use constraint::{ConstraintTest, DrivingPoint, ModalConstraint};
+pub use delays::OutputDelay;
 pub use error::ModalError;
 pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes, refit_modes};

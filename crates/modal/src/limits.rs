@@ -114,3 +114,21 @@ pub const CONSTRAINT_STEPS: usize = 4;
 /// Maximum eigenvalue of the covariance of a constraint's equations, relative to the largest, at
 /// which an equation depends on the others.
 pub const DEPENDENT_EQUATION: f64 = 1e-9;
+/// Maximum delay between outputs and forces, in periods at the upper edge of the band; beyond it
+/// none is estimated.
+pub(crate) const MAX_DELAY_TURNS: f64 = 1.0;
+/// Number of outputs that give the initial estimate of the delay.
+pub(crate) const DELAY_OUTPUTS: usize = 4;
+/// Maximum number of Gauss–Newton steps of the delays at initial poles: an estimate that the final
+/// modes refine.
+pub(crate) const ROUGH_DELAY_STEPS: usize = 4;
+/// Maximum number of Gauss–Newton steps of the delays with the final modes.
+pub(crate) const DELAY_STEPS: usize = 10;
+/// Minimum share of the power of the derivative of an output by its delay, without the part that
+/// modes and residual terms explain, that is not noise; below it the data do not determine the
+/// delay.
+pub(crate) const LEAST_DELAY_INFORMATION: f64 = 0.5;
+/// Maximum step of a delay, relative to the maximum delay.
+pub(crate) const MAX_DELAY_STEP: f64 = 0.1;
+/// Step of a delay, in standard errors, that ends the steps.
+pub(crate) const DELAY_SETTLED: f64 = 0.1;

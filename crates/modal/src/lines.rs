@@ -6,6 +6,7 @@ use mechid_spectra::{LineData, Transient};
 use nalgebra::Complex;
 
 use crate::ModalError;
+use crate::delays::OutputDelay;
 use crate::limits::{BLOCK_LINES, DEAD_CHANNEL, DEPENDENT_INPUTS, OUTSIDE_DISTANCE};
 
 /// One column of the extended inputs.
@@ -44,6 +45,8 @@ pub(crate) struct Lines {
     /// Amplitude of each load on every line; empty for a transient, which is 1 on its record.
     pub(crate) amplitude: Vec<Vec<Complex<f64>>>,
     pub(crate) blocks: Vec<Block>,
+    /// Delays that the outputs had before they were removed; empty: none.
+    pub(crate) delays: Vec<OutputDelay>,
 }
 
 impl Lines {
@@ -80,7 +83,29 @@ impl Lines {
         }
         blocks.retain(|block| block.len() > 0);
         let (omega, outputs) = (data.omega().to_vec(), columns(data.outputs()));
-        Self { omega, outputs, loads, amplitude, blocks }
+        Self { omega, outputs, loads, amplitude, blocks, delays: Vec::new() }
+    }
+
+    /// Returns an output without its delay, in s.
+    pub(crate) fn advanced_output(&self, output: usize, delay: f64) -> Vec<Complex<f64>> {
+        let values = self.outputs[output].iter().zip(&self.omega);
+        values.map(|(value, omega)| value * Complex::cis(omega * delay)).collect()
+    }
+
+    /// Returns the same lines with outputs without their delays; no delays: the outputs as they
+    /// are.
+    pub(crate) fn advanced(&self, delays: Vec<OutputDelay>) -> Self {
+        let mut lines = self.clone();
+        for (output, delay) in delays.iter().enumerate() {
+            lines.outputs[output] = self.advanced_output(output, delay.seconds);
+        }
+        lines.delays = delays;
+        lines
+    }
+
+    /// Returns the penalty of one unknown in −2 log L by Schwarz's criterion.
+    pub(crate) fn schwarz(&self) -> f64 {
+        ((2 * self.len()) as f64).ln()
     }
 
     /// Returns the number of lines.

@@ -8,10 +8,10 @@ type C = Complex<f64>;
 
 /// Modes and residual terms of a test: its frequency responses, valid in the band of the test.
 ///
-/// At ω and under forces f, output i is Σ_r [φ_ir L_rᵀf/(jω − λ_r) + φ_ir* L_rᴴf/(jω − λ_r*)] + Σ_n
-/// c_inᵀf (jω/ω₀)ⁿ, with the poles λ, shapes φ, participations L and coefficients c of the residual
-/// terms. The covariance includes poles, shapes and participations; residual terms, and modes
-/// outside the band, count as exact.
+/// At ω and under forces f, output i is e^{−jωτ_i} {Σ_r [φ_ir L_rᵀf/(jω − λ_r) + φ_ir* L_rᴴf/(jω −
+/// λ_r*)] + Σ_n c_inᵀf (jω/ω₀)ⁿ}, with the delays τ of the outputs, poles λ, shapes φ,
+/// participations L and coefficients c of the residual terms. The covariance includes poles, shapes
+/// and participations; delays, residual terms, and modes outside the band count as exact.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.6 (modal sum and residual terms).
@@ -28,6 +28,9 @@ pub struct ModalModel {
     /// Coefficients c of the residual terms, in the unit of the output per N: one list for each
     /// output, in it one for each input, in it one for each power.
     pub residuals: Vec<Vec<Vec<f64>>>,
+    /// Delay of each output behind the forces, in s; empty: none.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub delays: Vec<f64>,
     /// Modes whose errors belong together, with their covariance.
     pub groups: Vec<ModalGroup>,
 }
@@ -156,6 +159,7 @@ impl ModalModel {
                 && rows.into_iter().all(|(length, row)| row.len() == length)
         };
         self.reference > 0.0
+            && (self.delays.is_empty() || self.delays.len() == outputs)
             && self.terms.iter().all(fits)
             && self.residuals.iter().all(whole)
             && self.groups.iter().all(grouped)
@@ -166,8 +170,22 @@ impl ModalModel {
         self.groups.iter_mut().for_each(|group| group.scale_errors(&self.terms, scales));
     }
 
+    /// Returns e^{−jωτ} with the delay of an output.
+    pub(crate) fn delay_factor(&self, output: usize, omega: f64) -> C {
+        self.delays.get(output).map_or(C::from(1.0), |delay| C::cis(-omega * delay))
+    }
+
     /// Returns the frequency response at ω (rad/s), outputs × inputs.
     pub fn response(&self, omega: f64) -> DMatrix<C> {
+        let mut response = self.undelayed(omega);
+        for (output, mut row) in response.row_iter_mut().enumerate() {
+            row *= self.delay_factor(output, omega);
+        }
+        response
+    }
+
+    /// Returns the frequency response without the delays of the outputs.
+    pub(crate) fn undelayed(&self, omega: f64) -> DMatrix<C> {
         let scaled = C::new(0.0, omega / self.reference);
         let mut response = DMatrix::from_fn(self.outputs(), self.inputs(), |output, input| {
             let terms = self.powers.iter().zip(&self.residuals[output][input]);
@@ -228,10 +246,11 @@ impl ModalModel {
     ) -> Vec<(usize, C)> {
         let mut first = 0;
         let mut gradient = Vec::new();
+        let factor = self.delay_factor(output, omega);
         for mode in &group.modes {
             let term = &self.terms[*mode];
             let derivatives = term.derivatives(output, omega, forces).into_iter();
-            gradient.extend(derivatives.map(|(index, value)| (first + index, value)));
+            gradient.extend(derivatives.map(|(index, value)| (first + index, value * factor)));
             first += term.parameters();
         }
         gradient

@@ -48,7 +48,9 @@ impl IdentifiedMode {
     }
 
     /// Returns the residue of an output and an input: the numerator of 1/(jω − λ) in their
-    /// response.
+    /// response, without a delay of the output ([`ModalEstimate::delays`]).
+    ///
+    /// [`ModalEstimate::delays`]: crate::ModalEstimate::delays
     pub fn residue(&self, output: usize, input: usize) -> Complex<f64> {
         self.shape[output] * self.participation[input]
     }

@@ -114,32 +114,34 @@ impl ModeParameters {
     /// `None` if the shape or the participation is zero at the point.
     ///
     /// The residue of the displacement is ψ²/(2jω_d) with the mass-normalised ψ at the point, so
-    /// that the mass is φ²/ψ² with the entry φ of the shape.
+    /// that the mass is φ²/ψ² with the entry φ of the shape: the modulus of this complex quotient,
+    /// with the sign of its real part, because a delay between the channels changes only the phase.
     pub(crate) fn modal_mass(&self, point: DrivingPoint, derivative: i32) -> Option<Uncertain> {
         let (pole, largest) = (self.pole(), self.largest_output());
         let [entry, scale] = [point.output, largest].map(|output| self.shape(output));
         let participation = self.participation(point.input);
         let squared = participation / pole.powi(derivative) * C::new(0.0, 2.0 * pole.im);
         let mass = entry / (scale * scale * squared);
-        // Derivatives of the complex mass with respect to each complex parameter.
+        // Derivatives of the logarithm of the complex mass with respect to each complex parameter.
         let terms = [
-            (Self::shape_index(point.output), mass / entry),
-            (Self::shape_index(largest), mass * -2.0 / scale),
-            (self.participation_index(point.input), -mass / participation),
+            (Self::shape_index(point.output), 1.0 / entry),
+            (Self::shape_index(largest), -2.0 / scale),
+            (self.participation_index(point.input), -1.0 / participation),
         ];
         let mut gradient = DVector::zeros(self.values.len());
         for (index, factor) in terms {
             gradient[index] += factor.re;
             gradient[index + 1] -= factor.im;
         }
-        let by_pole = mass * f64::from(derivative) / pole;
+        let by_pole = f64::from(derivative) / pole;
         gradient[0] = by_pole.re * pole.re;
-        gradient[1] = -by_pole.im * pole.im - mass.re;
+        gradient[1] = -by_pole.im * pole.im - 1.0;
         let variance = gradient.dot(&(&self.covariance * &gradient));
         // A mode without motion or force at the point does not determine its mass.
-        (mass.re.is_finite() && variance.is_finite()).then(|| Uncertain {
-            value: mass.re,
-            standard_error: variance.max(0.0).sqrt(),
+        let size = mass.norm();
+        (size.is_finite() && variance.is_finite()).then(|| Uncertain {
+            value: size.copysign(mass.re),
+            standard_error: size * variance.max(0.0).sqrt(),
             degrees_of_freedom: self.degrees_of_freedom,
         })
     }

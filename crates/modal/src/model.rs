@@ -49,6 +49,12 @@ pub(crate) struct Model {
     pub(crate) reference: f64,
 }
 
+/// Returns the initial residual powers.
+pub(crate) fn first_powers(lines: &Lines) -> ResidualPowers {
+    let transients = if lines.inputs() == 0 { Vec::new() } else { vec![0, 1, 2] };
+    ResidualPowers { forces: vec![-4, -2, 0, 2, 4], transients }
+}
+
 /// Response of one mode to unit loads on one line; `mirror` is the response of the conjugate mode.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Kernel {

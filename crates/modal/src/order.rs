@@ -35,7 +35,7 @@ pub(crate) struct Candidate {
 /// logarithm of the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
 pub(crate) fn required_gain(lines: &Lines) -> f64 {
     let parameters = 2 * (lines.outputs.len() + lines.loads.len() - 1) + 2;
-    parameters as f64 * ((2 * lines.len()) as f64).ln()
+    parameters as f64 * lines.schwarz()
 }
 
 /// Returns the increase of the cost if one mode is removed and all other poles and participations

@@ -8,9 +8,9 @@ use crate::projection::{Design, Projection, Weights};
 
 /// Linear model with an unconstrained residue for every mode and load, and with the residual terms
 /// of the modes outside the band.
-struct FreeResidues<'a> {
+pub(crate) struct FreeResidues<'a> {
     /// Poles and powers of jω in the residual terms; the participations are not used.
-    model: &'a Model,
+    pub(crate) model: &'a Model,
 }
 
 impl FreeResidues<'_> {

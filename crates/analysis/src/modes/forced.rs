@@ -212,6 +212,7 @@ impl Context {
             &self.inputs,
             &self.outputs,
             &self.driving_points,
+            estimate.delays(),
         ));
         // The masses are those of the fitted modes, with the decay of an exponential window.
         let mass = |at| modal_mass(&estimate, at, &self.outputs, &self.driving_points);
@@ -244,7 +245,7 @@ impl Context {
             variance_explained: Some(mean(&explained)),
             variance_predicted: self.predicted.as_deref().map(mean),
             checks: rows,
-            notes: notes(&estimate).into_iter().chain(self.notes).collect(),
+            notes: notes(&estimate, &self.outputs).into_iter().chain(self.notes).collect(),
             diagrams: None,
             model: Some(model),
             analysis: settings.clone(),

@@ -2,14 +2,15 @@
 
 use mechid_io::derivative;
 use mechid_modal::{
-    DrivingPoint, DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, indicators,
+    DrivingPoint, DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, OutputDelay,
+    indicators,
 };
 use nalgebra::{Complex, DVector};
 
 use super::sources::Output;
 use super::summary::{DroppedRow, ModalModeRow};
 use crate::identify::rows::Uncertain;
-use crate::limits::NOTED_UNMEASURED;
+use crate::limits::{LISTED_DELAYS, NOTED_UNMEASURED};
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, significant};
 
@@ -125,8 +126,32 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
     DroppedRow { frequency_hz, damping_ratio, reason }
 }
 
-pub(super) fn notes(estimate: &ModalEstimate) -> Vec<String> {
-    let mut notes = Vec::new();
+/// Returns the note on delays that are part of the model: each, or the range of many.
+fn delay_note(delays: &[OutputDelay], outputs: &[Output]) -> Option<String> {
+    let words = |delay: &OutputDelay| {
+        let direction = if delay.seconds > 0.0 { "late" } else { "early" };
+        let value = significant(1e3 * delay.seconds.abs(), 3);
+        format!("{value} ± {} ms {direction}", significant(1e3 * delay.standard_error, 2))
+    };
+    let by_size = |a: &&OutputDelay, b: &&OutputDelay| a.seconds.total_cmp(&b.seconds);
+    let least = delays.iter().min_by(by_size)?;
+    let most = delays.iter().max_by(by_size)?;
+    let list = if delays.len() > LISTED_DELAYS {
+        format!("from {} to {}", words(least), words(most))
+    } else {
+        let named = delays.iter().zip(outputs);
+        let one =
+            |(delay, output): (&OutputDelay, &Output)| format!("{} {}", output.name, words(delay));
+        named.map(one).collect::<Vec<_>>().join(", ")
+    };
+    Some(format!(
+        "delays between forces and responses are part of the model (filters, or a scanning \
+         converter): {list}; ± is one standard error"
+    ))
+}
+
+pub(super) fn notes(estimate: &ModalEstimate, outputs: &[Output]) -> Vec<String> {
+    let mut notes: Vec<String> = delay_note(estimate.delays(), outputs).into_iter().collect();
     for (number, mode) in (1..).zip(estimate.modes()) {
         let hz = significant(mode.natural_frequency_hz.value, 4);
         if mode.near_edge {

@@ -95,6 +95,15 @@ fn are_true(rows: &[ModalModeRow], bias: f64) {
     }
 }
 
+/// Asserts that the modal masses are within 2 % of those of [`SHAPES`].
+fn masses_are_true(found: &Modes) {
+    for (row, shape) in found.summary().modes.iter().zip(SHAPES) {
+        let largest = shape.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let mass = row.modal_mass.unwrap();
+        assert!((mass * largest * largest - 1.0).abs() < 0.02, "{mass}");
+    }
+}
+
 fn failed(modes: &Modes) -> Vec<&ModalCheck> {
     modes.summary().checks.iter().filter(|check| !check.passed).collect()
 }
@@ -104,11 +113,7 @@ fn a_table_gives_modes_masses_and_good_checks() {
     let found = modes(&plain([1.0; 3], 1));
     are_true(&found.summary().modes, 0.0);
     assert!(failed(&found).is_empty(), "{found}");
-    for (row, shape) in found.summary().modes.iter().zip(SHAPES) {
-        let largest = shape.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-        let mass = row.modal_mass.unwrap();
-        assert!((mass * largest * largest - 1.0).abs() < 0.02, "{mass}");
-    }
+    masses_are_true(&found);
     let diagrams = found.diagrams().unwrap();
     let stable = diagrams.stabilisation.is_stable.iter().filter(|stable| **stable).count();
     assert!(stable > 20, "{stable}");
@@ -194,6 +199,64 @@ fn a_wrong_gain_and_a_wrong_sign_are_named() {
     let found = modes(&table);
     let signs: Vec<_> = failed(&found).into_iter().map(|check| check.code).collect();
     assert!(signs.contains(&"driving_point") && signs.contains(&"reciprocity"), "{found}");
+}
+
+/// Reference: the closed form, with all displacements 1 ms late. Complex shapes take the place of
+/// the delay; the check of the driving points finds it, and the masses are those of the structure.
+#[test]
+fn a_delay_of_displacements_is_named_and_does_not_change_the_masses() {
+    let delay = 1e-3;
+    let late =
+        |omega: f64| receptance(C::new(0.0, omega), [1.0; 3]) * C::new(0.0, -delay * omega).exp();
+    let found = modes(&table(Displacement, 0.05, 0.01, 7, late));
+    masses_are_true(&found);
+    assert!(found.summary().model.as_ref().unwrap().delays.is_empty());
+    let delays: Vec<_> = failed(&found).into_iter().map(|check| check.code).collect();
+    assert_eq!(delays, ["delay", "delay"], "{found}");
+    let text = &check(&found, "delay").text;
+    let size: f64 = text.split(" is ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((size / 1e3 / delay - 1.0).abs() < 0.02 && text.contains("ms late for"), "{text}");
+}
+
+/// Reference: the closed form, with all accelerations 1 ms late. The delay is part of the model,
+/// the masses are those of the structure, and predictions contain the delay.
+#[test]
+fn a_delay_of_accelerations_is_part_of_the_model() {
+    let delay = 1e-3;
+    let late = |omega: f64| {
+        let turn = C::new(0.0, -delay * omega).exp() * (-omega * omega);
+        receptance(C::new(0.0, omega), [1.0; 3]) * turn
+    };
+    let found = modes(&table(Acceleration, 0.05, 0.01, 7, late));
+    masses_are_true(&found);
+    assert!(failed(&found).is_empty(), "{found}");
+    let model = found.summary().model.as_ref().unwrap();
+    assert!(model.delays.iter().all(|found| (found / delay - 1.0).abs() < 1e-2), "{model:?}");
+    let named = |note: &&String| note.contains("part of the model") && note.contains(" ms late");
+    assert_eq!(found.summary().notes.iter().filter(named).count(), 1, "{found}");
+    for hz in [20.1, 41.3, 66.2] {
+        let (modelled, exact) = (model.response(TAU * hz), late(TAU * hz));
+        assert!((&modelled - &exact).norm() < 0.01 * exact.norm(), "{hz}: {modelled} {exact}");
+    }
+}
+
+/// Reference: H = ψψᵀ/(ω_r²(1 + jη) − ω²), whose residues have phases of −η/2 in every mode.
+#[test]
+fn structural_damping_is_no_delay() {
+    for seed in 0..4 {
+        let structural = |omega: f64| {
+            DMatrix::from_fn(4, 2, |i, j| {
+                let of_mode = |mode: usize| {
+                    let (hz, zeta) = MODES[mode];
+                    let gain = SHAPES[mode][i] * SHAPES[mode][FORCES[j]];
+                    C::from(gain) / (C::new(1.0, 2.0 * zeta) * (TAU * hz).powi(2) - omega * omega)
+                };
+                (0..3).map(of_mode).sum()
+            })
+        };
+        let found = modes(&table(Displacement, 0.05, 0.01, seed, structural));
+        assert!(failed(&found).is_empty(), "{seed}: {:?}", failed(&found));
+    }
 }
 
 /// On correct tables the p-value of the reciprocity check is rarely small, because the check is

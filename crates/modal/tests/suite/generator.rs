@@ -47,6 +47,8 @@ pub struct Case {
     pub unmeasured: f64,
     /// Noise of the measured forces, relative to their root-mean-square.
     pub force_noise: f64,
+    /// Delays of the outputs behind the forces, in samples; repeated if the outputs are more.
+    pub delays: Vec<f64>,
     /// One record for each struck point instead of one record of all forces.
     pub roving: bool,
 }
@@ -126,6 +128,11 @@ impl Case {
         }
     }
 
+    /// Returns the delay of an output, in samples.
+    pub fn delay(&self, output: usize) -> f64 {
+        self.delays.get(output % self.delays.len().max(1)).copied().unwrap_or(0.0)
+    }
+
     /// Returns forces and accelerations of one record.
     pub fn record(&self, seed: u64) -> (Record, Record) {
         let mut normal = Normal::new(seed);
@@ -140,6 +147,11 @@ impl Case {
             self.add_response(omega, &self.participation, &forces, line, &mut motion);
             if self.unmeasured > 0.0 {
                 self.add_response(omega, &hidden, &disturbance, line, &mut motion);
+            }
+        }
+        for (output, mut column) in motion.column_iter_mut().enumerate() {
+            for (line, value) in column.iter_mut().enumerate() {
+                *value *= C::cis(-TAU * line as f64 / period as f64 * self.delay(output));
             }
         }
         let cut = |lines: DMatrix<C>| {
@@ -270,6 +282,7 @@ fn case(
         colour: 0.5,
         unmeasured: 0.0,
         force_noise: 0.0,
+        delays: Vec::new(),
         roving: false,
     }
 }
@@ -367,6 +380,10 @@ pub fn cases() -> Vec<Case> {
         beyond_the_edge(),
         with("8x2, unmeasured forces of 5 %", &|case| case.unmeasured = 0.05),
         with("8x2, noise of 3 % on the forces", &|case| case.force_noise = 0.03),
+        with("8x2, responses early by half a sample", &|case| case.delays = vec![-0.5]),
+        with("8x2, responses late by 0 to 0.7 samples", &|case| {
+            case.delays = (0..8).map(|output| 0.1 * f64::from(output)).collect();
+        }),
         with("8x2, 2 s instead of 8 s", &|case| case.samples = 2048),
         with("8x2, pair 0.3 % apart", &|case| case.frequency_hz[3] = 131.4),
     ]

@@ -65,6 +65,30 @@ fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
     assert!(estimate.modal_mass(0, outside, 2).is_none());
 }
 
+/// Reference: the delays of the generator, which shapes and participations do not contain, and no
+/// delays where there are none.
+#[test]
+fn delays_between_forces_and_responses_are_part_of_the_model() {
+    for (seed, delays) in [(1, vec![-0.5]), (2, vec![0.0, 0.3, 0.7]), (3, Vec::new())] {
+        let case = Case { delays, ..pair(8) };
+        let estimate = identify_modes(&case.lines(seed), &ModalSettings::default()).unwrap();
+        let deviation = largest_deviation(&case, &estimate);
+        assert!(deviation < BOUND, "{seed}: {deviation}");
+        let found = estimate.delays();
+        assert_eq!(found.len(), if case.delays.is_empty() { 0 } else { 8 }, "{seed}");
+        for (output, delay) in found.iter().enumerate() {
+            let error = delay.seconds * case.rate_hz - case.delay(output);
+            let spread = delay.standard_error * case.rate_hz;
+            assert!(error.abs() < 4.5 * spread && spread < 0.01, "{seed} {output}: {delay:?}");
+        }
+        // The synthesis of another record contains the delays.
+        let other = case.lines(seed + 10);
+        let left = other.outputs() - estimate.synthesis(&other).unwrap();
+        let share = left.norm_squared() / other.outputs().norm_squared();
+        assert!(share < 1.5 * case.noise * case.noise, "{seed}: {share}");
+    }
+}
+
 #[test]
 fn number_and_frequencies_can_be_stated() {
     let data = pair(8).lines(2);

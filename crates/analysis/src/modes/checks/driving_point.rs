@@ -25,8 +25,7 @@ pub(super) fn tests(
     let test = |&(input, output): &(usize, usize)| {
         let power = derivative(outputs[output].quantity?) as i32;
         let worst = (1..).zip(modes).map(|(number, mode)| {
-            let turned = receptance_residue(mode, output, input, power)
-                * Complex::new(0.0, 2.0 * mode.pole.im);
+            let turned = turned_residue(mode, output, input, power);
             let deviation = relative_error(mode, output, input) * turned.norm() / 2f64.sqrt();
             (number, turned.re / deviation)
         });
@@ -44,6 +43,17 @@ pub(super) fn tests(
         })
     };
     driving_points.iter().filter_map(test).collect()
+}
+
+/// Returns the residue of the displacement times 2jω_d: positive for proportional damping and a
+/// driving point.
+pub(super) fn turned_residue(
+    mode: &IdentifiedMode,
+    output: usize,
+    input: usize,
+    power: i32,
+) -> Complex<f64> {
+    receptance_residue(mode, output, input, power) * Complex::new(0.0, 2.0 * mode.pole.im)
 }
 
 /// Returns the residue of the displacement if the output measures its `power`-th derivative.

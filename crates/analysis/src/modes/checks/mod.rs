@@ -1,5 +1,6 @@
 //! Checks of a modal test: channels and tables before the fit, residual and modes after it.
 
+mod delay;
 mod driving_point;
 mod force_peak;
 mod idle_force;
@@ -8,7 +9,7 @@ mod table;
 mod tested;
 
 use mechid_checks::Verdict;
-use mechid_modal::IdentifiedMode;
+use mechid_modal::{IdentifiedMode, OutputDelay};
 
 pub(super) use self::force_peak::force_peak_check;
 pub(super) use self::table::table_checks;
@@ -77,16 +78,22 @@ fn share_checks(
     shares.iter().zip(names).map(row).collect()
 }
 
-/// Returns the checks of the modes: unexcited inputs, modal masses at driving points, and
-/// reciprocity between driving points.
+/// Returns the checks of the modes: unexcited inputs, modal masses and delays at driving points,
+/// and reciprocity between driving points. Outputs with a delay in the model are not tested for
+/// one.
 pub(super) fn mode_checks(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
     driving_points: &[(usize, usize)],
+    delays: &[OutputDelay],
 ) -> Vec<ModalCheck> {
     let mut rows = idle_force::checks(modes, inputs);
     let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, driving_points);
+    let has_delay = |output: usize| delays.get(output).is_some_and(|delay| delay.seconds != 0.0);
+    let others: Vec<_> =
+        driving_points.iter().copied().filter(|(_, output)| !has_delay(*output)).collect();
+    tests.extend(delay::tests(modes, inputs, outputs, &others));
     tests.extend(reciprocity::tests(modes, inputs, outputs, driving_points));
     rows.extend(tested::adjusted(tests));
     rows
