@@ -15,7 +15,7 @@ use crate::delays::OutputDelay;
 use crate::indicators::IndicatorError;
 use crate::limits::GROUP_HALF_WIDTHS;
 use crate::lines::Lines;
-use crate::modal_model::{ModalGroup, ModalModel};
+use crate::modal_model::{ModalGroup, ModalModel, ModalTerm};
 use crate::mode::{DroppedCandidate, IdentifiedMode};
 use crate::mode_parameters::ModeParameters;
 use crate::model::ResidualPowers;
@@ -93,14 +93,7 @@ impl ModalEstimate {
             others: parameters_of_others.iter().zip(&unrequested).map(unrequested_mode).collect(),
             dropped,
             powers: model.powers.clone(),
-            model: ModalModel {
-                terms,
-                reference: model.reference,
-                powers: model.powers.forces.clone(),
-                residuals: residual_coefficients(fit),
-                delays: fit.lines.delays.iter().map(|delay| delay.seconds).collect(),
-                groups,
-            },
+            model: modal_model(fit, terms, groups),
             delays: fit.lines.delays.clone(),
             explained: explained(fit),
             noise_level: noise.sensor.iter().map(level).collect(),
@@ -312,6 +305,18 @@ fn group(
     let modes: Vec<_> =
         requested[range.clone()].iter().map(|mode| (*mode, &shapes[*mode][..])).collect();
     ModalGroup::new(range.collect(), &covariance.joint(fit, &modes).1)
+}
+
+/// Returns the frequency responses of a fit with the given modes.
+fn modal_model(fit: &Fit<'_>, terms: Vec<ModalTerm>, groups: Vec<ModalGroup>) -> ModalModel {
+    ModalModel {
+        terms,
+        reference: fit.model.reference,
+        powers: fit.model.powers.forces.clone(),
+        residuals: residual_coefficients(fit),
+        delays: fit.lines.delays.iter().map(|delay| delay.seconds).collect(),
+        groups,
+    }
 }
 
 /// Returns the coefficients of the residual terms: `[output][input][power]`.

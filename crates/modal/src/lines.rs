@@ -45,7 +45,7 @@ pub(crate) struct Lines {
     /// Amplitude of each load on every line; empty for a transient, which is 1 on its record.
     pub(crate) amplitude: Vec<Vec<Complex<f64>>>,
     pub(crate) blocks: Vec<Block>,
-    /// Delays that the outputs had before they were removed; empty: none.
+    /// Delays that were removed from the outputs; empty: none.
     pub(crate) delays: Vec<OutputDelay>,
 }
 

@@ -222,7 +222,6 @@ impl Context {
         for term in &mut model.terms {
             term.pole[0] += self.added_decay.unwrap_or(0.0);
         }
-        let mean = |shares: &[f64]| shares.iter().sum::<f64>() / shares.len().max(1) as f64;
         let outputs = self.outputs.iter().enumerate().map(|(at, output)| OutputRow {
             column: output.name.clone(),
             unit: output.quantity.map(|quantity| quantity.unit()),
@@ -262,6 +261,11 @@ impl Context {
         }));
         Ok(Modes { summary, spectrum, source })
     }
+}
+
+/// Returns the mean of the shares of all outputs.
+fn mean(shares: &[f64]) -> f64 {
+    shares.iter().sum::<f64>() / shares.len().max(1) as f64
 }
 
 /// Returns the RMS of an output over the lines, never zero.
