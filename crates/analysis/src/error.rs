@@ -102,6 +102,17 @@ pub enum AnalysisError {
     /// No record was given.
     #[error("no record: an identification needs at least one")]
     NoRecord,
+    /// Two records of one analysis are equal in every sample.
+    #[error(
+        "{first} and {second} are equal in every sample: they are one test, and counted \
+         twice it would halve the variances of all results; leave one out"
+    )]
+    RepeatedRecord {
+        /// The record given first.
+        first: String,
+        /// The record that repeats it.
+        second: String,
+    },
     /// A table of frequency responses does not contain all responses for its forces and points.
     #[error(
         "{file} has no response at {response} to a force at {force}: every point needs a response to \

@@ -17,7 +17,9 @@ use crate::identify::IdentifyResponses;
 use crate::identify::checks::sensor_findings;
 use crate::identify::left_out::LineRule;
 use crate::identify::tabulated::response_data;
-use crate::measurement::{Block, CHUNK_SAMPLES, Channels, Hold, Measurement, Windowed};
+use crate::measurement::{
+    Block, CHUNK_SAMPLES, Channels, Hold, Measurement, Windowed, check_distinct,
+};
 
 /// Minimum number of degrees of freedom of a noise covariance that weights the rows: with at least
 /// this number, the weights lose less than 3 % of the information.
@@ -71,6 +73,7 @@ impl BearingData {
         how: &IdentifyBearing,
     ) -> Result<Self, AnalysisError> {
         how.check()?;
+        check_distinct(tests)?;
         let data = tests.iter().map(|test| Self::from_record(test, how));
         let data = data.collect::<Result<Vec<_>, _>>()?.into_iter();
         data.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?

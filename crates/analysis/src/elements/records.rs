@@ -18,7 +18,7 @@ use crate::identify::checks;
 use crate::identify::left_out::LineRule;
 use crate::identify::rows::WindowRow;
 use crate::identify::{LeftOut, LineChoice};
-use crate::measurement::{Block, Measurement};
+use crate::measurement::{Block, Measurement, check_distinct};
 use crate::modes::driven_band;
 
 /// Inputs and outputs of one record, in the order of the instruments.
@@ -42,6 +42,7 @@ impl ElementData {
         measurements: &[Measurement],
         how: &IdentifyElements,
     ) -> Result<Self, AnalysisError> {
+        check_distinct(measurements)?;
         joined(measurements.iter().map(|measurement| match &how.hits {
             Some(rule) => from_hits(measurement, rule, how),
             None => from_record(measurement, how),

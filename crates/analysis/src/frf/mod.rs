@@ -21,7 +21,7 @@ pub use self::table::FrfTable;
 use crate::AnalysisError;
 use crate::identify::left_out::{LeftOut, LineRule};
 use crate::identify::lines::LineChoice;
-use crate::measurement::{Hold, Measurement, Windowed};
+use crate::measurement::{Hold, Measurement, Windowed, check_distinct};
 use crate::text::significant;
 use crate::words;
 
@@ -122,6 +122,7 @@ pub fn frf_of_records(
 
 /// Reads the records, at least one, and checks that all have the same number of forces.
 fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, AnalysisError> {
+    check_distinct(measurements)?;
     let records = measurements.iter().map(|measured| measured.hold(hold));
     let records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
     let dofs = records.first().ok_or(AnalysisError::NoRecord)?.held.force.channels();

@@ -98,7 +98,7 @@ pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;
 use crate::hits::{self, HitNoise, Windows};
 use crate::machine::Machine;
-use crate::measurement::{Block, Channels, Hold, Measurement, Windowed};
+use crate::measurement::{Block, Channels, Hold, Measurement, Windowed, check_distinct};
 use crate::modes::resonances;
 pub use mechid_nonlinear::RestoringForce;
 
@@ -114,6 +114,7 @@ pub const CONSPICUOUS: f64 = 0.05;
 /// data explain why, otherwise that failure; errors of the settings, such as
 /// [`AnalysisError::TimeDomainMotions`]; and [`AnalysisError::Io`] if a file cannot be read again.
 pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identified, AnalysisError> {
+    check_distinct(measurements)?;
     let hold = how.hold();
     let records = measurements.iter().map(|measured| measured.hold(hold));
     let mut records: Vec<Windowed> = records.collect::<Result<_, _>>()?;

@@ -4,6 +4,7 @@ pub mod channels;
 #[cfg(feature = "parquet")]
 mod many;
 mod reading;
+mod repeated;
 pub mod units;
 mod window;
 
@@ -21,6 +22,7 @@ pub use self::channels::Channels;
 #[cfg(feature = "parquet")]
 pub(crate) use self::many::{open_all, records_of};
 pub use self::reading::{Detrend, Reading, RecordPlan};
+pub(crate) use self::repeated::check_distinct;
 use self::units::ToSi;
 pub(crate) use self::window::Hold;
 pub use self::window::{Window, Windowed};

@@ -9,7 +9,7 @@ use super::settings::Places;
 use crate::AnalysisError;
 use crate::hits::{self, HitRow, Windows};
 use crate::limits::{DRIVEN_LINES, DRIVEN_POWER, SMALLER_HALF};
-use crate::measurement::{Block, Channels, Measurement};
+use crate::measurement::{Block, Channels, Measurement, check_distinct};
 
 /// Records of one test: inputs and outputs with their names.
 #[derive(Debug)]
@@ -62,6 +62,7 @@ impl Recorded {
         rule: Option<&HitRule>,
         places: &Places,
     ) -> Result<Self, AnalysisError> {
+        check_distinct(measurements)?;
         let first = measurements.first().ok_or(AnalysisError::NoRecord)?;
         if first.channels().force.is_empty() {
             return Err(AnalysisError::NoForce);

@@ -4,9 +4,9 @@
 use mechid_analysis::identify::{KnownMass, Method, ValidationWindow};
 use mechid_analysis::reconstruct::reconstruct_in_chunks;
 use mechid_analysis::{
-    AnalysisError, Channels, FrfSettings, Identify, Machine, Measurement, Reading, Reconstruct,
-    RecordPlan, ResponseQuantity, Segmentation, SweepSettings, Window, frf, identify, reconstruct,
-    sweep_record,
+    AnalysisError, Channels, FrfSettings, Identify, Machine, Measurement, ModesSettings, Reading,
+    Reconstruct, RecordPlan, ResponseQuantity, Segmentation, SweepSettings, Window, frf,
+    frf_of_records, identify, modes, reconstruct, sweep_record,
 };
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
@@ -221,6 +221,36 @@ fn what_does_not_fit_together_is_refused_by_name() {
     let elsewhere = Reconstruct::auto().forced([2]);
     let refused = reconstruct(&displacement_test(), &known, &elsewhere);
     assert!(matches!(refused, Err(AnalysisError::Forced { dof: 2, dofs: 1 })));
+}
+
+/// Two tests never have the same noise; a record given twice would halve all variances.
+#[test]
+fn a_record_given_twice_is_refused() {
+    let (force, [x, ..]) = steady_state();
+    let test = |response: &Record, name: &str| {
+        let responses = [(ResponseQuantity::Displacement, response)];
+        Measurement::from_records(&force, &responses).unwrap().named(name)
+    };
+    let periods = |test: Measurement| test.period(PERIOD).unwrap();
+    let repeated = [test(&x, "a"), test(&x, "b")];
+    let refused = |error: AnalysisError| {
+        let named = matches!(&error, AnalysisError::RepeatedRecord { first, second }
+            if first == "a" && second == "b");
+        assert!(named, "{error}");
+    };
+    let pair = repeated.clone().map(periods);
+    refused(identify(&pair, &Identify::default()).unwrap_err());
+    refused(frf_of_records(&pair, &FrfSettings::default()).unwrap_err());
+    refused(modes(&repeated, &ModesSettings::default()).unwrap_err());
+
+    // Other samples, and another part of the same record, are other tests.
+    let noisy = noise::add_white(&x, NoiseLevel::FractionOfRms(1e-9), 1).unwrap();
+    identify(&[test(&x, "a"), test(&noisy, "b")].map(periods), &Identify::default()).unwrap();
+    let part = |start: usize| {
+        let window = Window { start, period: Some(PERIOD), periods: Some(1) };
+        test(&noisy, "a").window(window).unwrap()
+    };
+    identify(&[part(1), part(1 + PERIOD)], &Identify::default()).unwrap();
 }
 
 #[test]

@@ -337,7 +337,8 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let folder = rig(NAMES, f64::INFINITY, 1e-3);
     let other = rig(NAMES, f64::INFINITY, 4e-2);
     fs::copy(other.path().join("rig.csv"), folder.path().join("noisy.csv")).unwrap();
-    fs::copy(folder.path().join("rig.csv"), folder.path().join("again.csv")).unwrap();
+    let again = rig(NAMES, f64::INFINITY, 1.1e-3);
+    fs::copy(again.path().join("rig.csv"), folder.path().join("again.csv")).unwrap();
     let arguments = [&USUAL[..], &["again.csv", "--validate", "noisy.csv"]].concat();
     mechid(folder.path(), &arguments);
     let closed = closed(&page(folder.path()));
