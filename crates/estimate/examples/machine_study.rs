@@ -23,7 +23,14 @@ mod rotor;
 use std::time::Instant;
 
 use judge::{Judged, judge};
+use mechid_estimate::likelihood::machine::identify_machine;
 use mechid_estimate::likelihood::{LikelihoodEstimate, NoiseSource, Settings};
+use mechid_model::elements::{Coefficient, Element, FreeCoefficient, Input};
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_problems::RandomTest;
+use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use mechid_spectra::LineData;
+use nalgebra::DMatrix;
 
 /// True values by name, and one experiment for each seed.
 type Study = (
@@ -114,6 +121,54 @@ fn time_of_large_rotor() {
     );
 }
 
+/// Searches of the chain in open records of 8,192 samples with five forces and two sensors, from springs and
+/// dampers that are wrong by a common factor.
+fn search_row(factor: f64, seeds: u64) {
+    let mass = DMatrix::from_diagonal(&chain::MASSES.to_vec().into());
+    let [damping, stiffness] = [&chain::DAMPINGS, &chain::STIFFNESSES].map(chain::chain);
+    let rig = RandomTest {
+        system: SecondOrderSystem::new(mass, damping, stiffness).expect("a machine"),
+        sampling: Sampling::new(1.0 / 256.0, 8192).expect("a time axis"),
+        quantity: ResponseQuantity::Displacement,
+        force: 10.0,
+    };
+    let mut machine = chain::machine();
+    for (_, element) in &mut machine.elements {
+        let Element::Link { stiffness, damping, .. } = element else { continue };
+        for coefficient in [stiffness, damping] {
+            if let Coefficient::Free(FreeCoefficient { start: Some(start), .. }) = coefficient {
+                *start *= factor;
+            }
+        }
+    }
+    let mut instruments = chain::instruments();
+    instruments.inputs = machine.dofs.iter().map(|dof| Input::force(dof)).collect();
+    let (mut right, mut searches, mut seconds) = (0, 0, 0.0);
+    for seed in 0..seeds {
+        let [force, response] = rig.measure(seed).expect("a record");
+        let columns = response.data().select_columns(&[0, 4]);
+        let response = Record::new(response.sampling(), columns).expect("two channels");
+        let level = NoiseLevel::FractionOfRms(0.005);
+        let response = noise::add_white(&response, level, seed + 100_000).expect("noise");
+        let data = LineData::from_open_record(Some(&force), &response, [1.0, 60.0]).expect("lines");
+        let start = Instant::now();
+        let result = identify_machine(&data, &machine, &instruments, &Settings::default());
+        seconds += start.elapsed().as_secs_f64();
+        let Ok(estimate) = result.map(|result| result.likelihood) else { continue };
+        let is_near = |(name, truth): (String, f64)| {
+            estimate.parameter(&name).is_some_and(|p| (p.value / truth - 1.0).abs() < 0.1)
+        };
+        right += u64::from(chain::truth().into_iter().all(is_near));
+        searches += estimate.searches;
+    }
+    let each = |sum: f64| sum / seeds as f64;
+    println!(
+        "search, start times {factor}: right in {right} of {seeds}, {:.1} searches, {:.2} s",
+        each(searches as f64),
+        each(seconds)
+    );
+}
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let seeds = words.iter().find_map(|word| word.parse().ok()).unwrap_or(20);
@@ -125,6 +180,9 @@ fn main() {
     );
     if is_wanted("time") {
         time_of_large_rotor();
+    }
+    if is_wanted("search") {
+        [0.1, 0.25, 0.5, 0.75, 1.5, 2.0, 4.0].into_iter().for_each(|by| search_row(by, seeds));
     }
     for (name, truth, experiment) in studies().into_iter().filter(|study| is_wanted(study.0)) {
         let start = Instant::now();

@@ -26,6 +26,7 @@
 
 mod covariance;
 pub mod derivatives;
+mod elimination;
 mod equation_of_motion;
 mod error;
 mod estimate;

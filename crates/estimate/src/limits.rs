@@ -62,8 +62,8 @@ pub(crate) const GRAM_RIDGE: f64 = 1e-7;
 /// Number of lines whose products are in memory at a time, on each thread.
 pub(crate) const GRAM_LINES: usize = 256;
 
-/// Minimum number of lines that one thread computes at a time: with fewer, sharing them costs more
-/// than it saves.
+/// Number of lines that one thread computes at a time: with fewer, sharing them costs more than it
+/// saves. It also fixes the order of sums over the lines.
 pub(crate) const LINES_AT_ONCE: usize = 64;
 
 /// Maximum number of Lanczos steps; after this number, an extreme eigenvalue is accurate to many

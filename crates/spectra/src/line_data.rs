@@ -166,6 +166,11 @@ impl LineData {
     /// `None` if it accepts none.
     pub fn retained(&self, keep: impl Fn(f64) -> bool) -> Option<Self> {
         let rows: Vec<usize> = (0..self.len()).filter(|row| keep(self.omega[*row])).collect();
+        self.rows(&rows)
+    }
+
+    /// Returns some of the lines, by their indices in ascending order; `None` without any.
+    pub fn rows(&self, rows: &[usize]) -> Option<Self> {
         if rows.is_empty() {
             return None;
         }
@@ -179,10 +184,10 @@ impl LineData {
         }
         Some(Self {
             omega: rows.iter().map(|row| self.omega[*row]).collect(),
-            inputs: self.inputs.select_rows(&rows),
-            outputs: self.outputs.select_rows(&rows),
+            inputs: self.inputs.select_rows(rows),
+            outputs: self.outputs.select_rows(rows),
             records,
-            noise: self.noise.as_ref().map(|noise| noise.rows(&rows)),
+            noise: self.noise.as_ref().map(|noise| noise.rows(rows)),
         })
     }
 

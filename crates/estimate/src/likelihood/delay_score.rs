@@ -3,16 +3,15 @@
 //! # Source
 //! Rao (1948), Proceedings of the Cambridge Philosophical Society 44, 50–57 (score test).
 
-use std::f64::consts::SQRT_2;
-
 use mechid_numerics::linear_algebra::svd;
 use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::fit::Fit;
 use super::limits::{DETERMINED_DELAY, RANK};
-use super::residual::{Linearisation, real_rows};
+use super::residual::real_rows;
 use super::response_model::{LineResponse, ResponseModel};
+use super::search::Linearisation;
 
 /// Delay that explains most of a residual, of one output or of all.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,35 +133,34 @@ impl Sums {
             products: DVector::zeros(p),
             explained: DMatrix::zeros(basis.ncols(), p),
         };
-        fit.residual().for_each_record(&fit.minimum.parameters, |rows, record| {
-            let mut of_transient = record.basis.map(|basis| DMatrix::zeros(basis.ncols(), p));
-            for (at, (line, weighted)) in record.lines.iter().enumerate() {
-                let row = rows.start + at;
-                let (in_record, in_data) = (2 * p * at, 2 * p * row);
-                let of_line = white.rows(in_data, 2 * p);
-                let pairs = of_line.as_slice().chunks_exact(2);
-                let pairs = pairs.map(|pair| Complex::new(pair[0], pair[1]) / SQRT_2);
-                let errors = DVector::from_iterator(p, pairs);
-                // The modelled outputs are the measured ones without their errors: with the
-                // transient, and with the most likely inputs.
-                let input = data.inputs().row(row).transpose();
-                let likely = weighted.likely_input(input.clone(), &errors);
-                let mut modelled = data.outputs().row(row).transpose();
-                modelled += line.receptance() * (likely - input) - &weighted.lower * errors;
-                let turn = Complex::new(0.0, data.omega()[row]);
-                let mut late = DMatrix::from_diagonal(&(modelled * turn));
-                weighted.lower.solve_lower_triangular_mut(&mut late).then_some(())?;
-                let derivative = real_rows(&late);
-                sums.squares += derivative.tr_mul(&derivative);
-                sums.products += derivative.tr_mul(&of_line);
-                sums.explained += basis.rows(in_data, 2 * p).tr_mul(&derivative);
-                if let Some((sum, basis)) = of_transient.as_mut().zip(record.basis) {
-                    *sum += basis.rows(in_record, 2 * p).tr_mul(&derivative);
+        fit.residual().for_each_record(&fit.minimum.parameters, |record| {
+            let bases = record.transient.as_ref().map(|(basis, _)| &basis.blocks);
+            let rank = bases.and_then(|blocks| blocks.first()).map_or(0, DMatrix::ncols);
+            let mut of_transient = DMatrix::zeros(rank, p);
+            for (index, block) in record.blocks.iter().enumerate() {
+                for (at, (line, weighted)) in block.lines.iter().enumerate() {
+                    let row = block.first + at;
+                    let errors = block.white(at, p);
+                    // The modelled outputs are the measured ones without their errors: with the
+                    // transient, and with the most likely inputs.
+                    let input = data.inputs().row(row).transpose();
+                    let likely = weighted.likely_input(input.clone(), &errors);
+                    let mut modelled = data.outputs().row(row).transpose();
+                    modelled += line.receptance() * (likely - input) - &weighted.lower * errors;
+                    let turn = Complex::new(0.0, data.omega()[row]);
+                    let mut late = DMatrix::from_diagonal(&(modelled * turn));
+                    weighted.lower.solve_lower_triangular_mut(&mut late).then_some(())?;
+                    let derivative = real_rows(&late);
+                    sums.squares += derivative.tr_mul(&derivative);
+                    sums.products += derivative.tr_mul(&white.rows(2 * p * row, 2 * p));
+                    sums.explained += basis.rows(2 * p * row, 2 * p).tr_mul(&derivative);
+                    if let Some(blocks) = bases {
+                        let rows = blocks[index].rows(2 * p * at, 2 * p);
+                        of_transient += rows.tr_mul(&derivative);
+                    }
                 }
             }
-            if let Some(of_transient) = of_transient {
-                sums.squares -= of_transient.tr_mul(&of_transient);
-            }
+            sums.squares -= of_transient.tr_mul(&of_transient);
             Some(())
         })?;
         Some(sums)

@@ -13,6 +13,7 @@ use super::multi_start::{self, Minima, starts};
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
 use super::search::{Bounds, Minimum};
+use super::thinned::Thinned;
 use super::unknown_noise::{UnknownNoise, WeightedMinimum};
 use super::weights::Weights;
 use super::{LikelihoodError, NoiseSource, Settings};
@@ -227,8 +228,11 @@ fn searched<M: ResponseModel>(
     settings: &Settings,
     agreeing: impl Fn(f64) -> usize,
 ) -> Result<Minima, LikelihoodError> {
-    let relative = residual.weights.with_relative(residual.data, FIRST_RELATIVE_NOISE);
-    let rough = Residual { weights: &relative, ..*residual };
+    let model = Thinned::new(residual);
+    let data = model.lines(residual.data);
+    let data = data.ok_or(LikelihoodError::TooFewLines { numbers: 0, unknowns: 1 })?;
+    let weights = residual.weights.rows(&model.rows).with_relative(&data, FIRST_RELATIVE_NOISE);
+    let rough = Residual { model: &model, data: &data, weights: &weights, priors: residual.priors };
     let starts =
         starts(&space.start, &space.bounds, settings.starts.max(1), settings.spread, settings.seed);
     multi_start::search(&rough, residual, &space.bounds, &starts, agreeing)

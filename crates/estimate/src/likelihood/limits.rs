@@ -26,8 +26,25 @@ pub(super) const WEAK: f64 = 0.3;
 /// the response, so that a resonance at a wrong frequency does not dominate all other lines.
 pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 
-/// Maximum number of steps with relative weights.
-pub(super) const FIRST_STEPS: usize = 40;
+/// Rise of the sum of squares after the first steps over that of the search with the lowest
+/// minimum, in units of the noise, above which a search ends. With the noise of
+/// [`FIRST_RELATIVE_NOISE`], which is more than that of most measurements, its end is less likely
+/// by a factor e²⁵.
+pub(super) const HOPELESS_RISE: f64 = 50.0;
+
+/// Numbers (real and imaginary parts of the lines) per unknown in the first steps of every search:
+/// enough for their minimum to be near that of all lines, with which the search continues. With a
+/// fifth of them the resonances of a long record can lie between the lines.
+pub(super) const SEARCH_NUMBERS: usize = 100;
+
+/// Damping of a step, relative to the unit diagonal of the Gram matrix, above which the curvature
+/// of the residual is not worth an evaluation: weakly determined directions, along which the
+/// residual is curved, hardly change.
+pub(super) const SHORT_STEP: f64 = 1.0;
+
+/// Maximum number of receptances between state loads, over all lines, that are kept from a residual
+/// to its derivative, 64 MiB; more are computed again for each record.
+pub(super) const KEPT_RESPONSES: usize = 1 << 22;
 
 /// Maximum number of steps of a search.
 pub(super) const STEPS: usize = 200;
@@ -52,6 +69,10 @@ pub(super) const PROFILE_TOLERANCE: f64 = 1e-3;
 
 /// Maximum relative difference of the sums of squares of two searches with the same minimum.
 pub(super) const SAME_MINIMUM: f64 = 1e-6;
+
+/// Maximum relative difference of a parameter after the first steps of two searches with the same
+/// minimum; a parameter that the lines of these steps do not determine differs by more.
+pub(super) const SAME_PARAMETER: f64 = 1e-3;
 
 /// Maximum excess of the misfit of a correct model over its expectation, in standard deviations.
 pub(super) const PLAUSIBLE: f64 = 6.0;

@@ -18,6 +18,7 @@ mod residual;
 mod response_model;
 mod search;
 mod settings;
+mod thinned;
 mod transient;
 mod unknown_noise;
 mod weight_uncertainty;

@@ -4,21 +4,23 @@ use mechid_signal::{Sampling, noise};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::LikelihoodError;
-use super::limits::{FIRST_STEPS, SAME_MINIMUM, STEPS};
-use super::search::{Bounds, LeastSquaresProblem, Minimum, minimise};
+use super::limits::{HOPELESS_RISE, SAME_MINIMUM, SAME_PARAMETER, STEPS};
+use super::search::{Bounds, Effort, LeastSquaresProblem, Minimum, minimise};
 
 /// A minimum with the number of searches that ended there.
 #[derive(Debug, Clone)]
 pub(super) struct SearchEnd {
     pub(super) minimum: Minimum,
     pub(super) searches: usize,
+    /// Ends of the first steps of these searches, if they converged.
+    near: Vec<Minimum>,
 }
 
 /// Minima of all searches, the lowest first.
 #[derive(Debug, Clone)]
 pub(super) struct Minima {
     pub(super) ends: Vec<SearchEnd>,
-    /// Number of searches, including those that did not converge.
+    /// Number of searches, including those that did not converge or were not continued.
     pub(super) searches: usize,
 }
 
@@ -52,9 +54,11 @@ pub(super) fn starts(
     starts
 }
 
-/// Searches from one initial estimate after another, first with weights relative to the response,
-/// then with the weights of the noise. It stops when enough searches have ended at the lowest
-/// minimum; `agreeing` returns this number for a sum of squares.
+/// Searches from one initial estimate after another: first with weights relative to the response,
+/// then with the weights of the noise. A search whose first steps end far above those of the lowest
+/// minimum, or where those of another search did, ends with them. No further search begins when
+/// enough of them have ended at the lowest minimum; `agreeing` returns this number for a sum of
+/// squares.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search converges.
@@ -68,42 +72,86 @@ pub(super) fn search(
     let mut minima = Minima { ends: Vec::new(), searches: 0 };
     for start in starts {
         minima.searches += 1;
-        let near = minimise(rough, bounds, start, FIRST_STEPS);
-        let from = near.map_or_else(|| start.clone(), |near| near.parameters);
-        if let Some(minimum) = minimise(problem, bounds, &from, STEPS).filter(|m| m.converged) {
-            log::debug!("search {} ended at {:.6e}", minima.searches, minimum.cost);
-            minima.push(minimum);
+        let near = minimise(rough, bounds, start, Effort::ROUGH);
+        let from = near.as_ref().map_or_else(|| start.clone(), |near| near.parameters.clone());
+        let near = near.filter(|near| near.converged);
+        let is_done =
+            near.as_ref().is_some_and(|near| minima.is_hopeless(near) || minima.count_again(near));
+        if !is_done {
+            let minimum = minimise(problem, bounds, &from, Effort::ROUGH);
+            if let Some(minimum) = minimum.filter(|minimum| minimum.converged) {
+                log::debug!("search {} ended at {:.6e}", minima.searches, minimum.cost);
+                minima.push(minimum, near);
+            }
         }
         let agreed = |best: &SearchEnd| best.searches >= agreeing(best.minimum.cost);
         if minima.ends.first().is_some_and(agreed) {
             break;
         }
     }
-    if minima.ends.is_empty() {
+    let Some(best) = minima.ends.first_mut() else {
         return Err(LikelihoodError::NotConverged { searches: minima.searches, steps: STEPS });
+    };
+    let refined = minimise(problem, bounds, &best.minimum.parameters, Effort::FINAL);
+    match refined.filter(|minimum| minimum.converged) {
+        Some(refined) => {
+            let steps = best.minimum.steps + refined.steps;
+            best.minimum = Minimum { steps, ..refined };
+        }
+        None => log::debug!("the lowest minimum is known to {:.0e}", Effort::ROUGH.tolerance),
     }
     Ok(minima)
 }
 
 impl Minima {
-    fn push(&mut self, minimum: Minimum) {
-        let same = |end: &&mut SearchEnd| {
-            let (a, b) = (minimum.cost, end.minimum.cost);
-            (a - b).abs() <= SAME_MINIMUM * a.max(b) + f64::MIN_POSITIVE
-        };
-        if let Some(end) = self.ends.iter_mut().find(same) {
+    /// Counts a search whose first steps end where those of an earlier search did: it would end at
+    /// the same minimum. Returns `false` if there is no such search.
+    fn count_again(&mut self, near: &Minimum) -> bool {
+        let is_known =
+            |end: &&mut SearchEnd| end.near.iter().any(|before| is_same_point(before, near));
+        let known = self.ends.iter_mut().find(is_known);
+        known.map(|end| end.searches += 1).is_some()
+    }
+
+    /// Returns whether the first steps of a search end so far above those of the lowest minimum
+    /// that it is very unlikely to end lower. The rise is relative to the misfit of that minimum if
+    /// it is larger than the noise.
+    fn is_hopeless(&self, near: &Minimum) -> bool {
+        let best = self.ends.first().and_then(|end| end.near.first());
+        best.is_some_and(|best| {
+            let misfit = (best.cost / best.numbers as f64).max(1.0);
+            near.cost > best.cost + HOPELESS_RISE * misfit
+        })
+    }
+
+    fn push(&mut self, minimum: Minimum, near: Option<Minimum>) {
+        let is_same = |end: &&mut SearchEnd| is_same_minimum(minimum.cost, end.minimum.cost);
+        if let Some(end) = self.ends.iter_mut().find(is_same) {
             end.searches += 1;
+            end.near.extend(near);
             if minimum.cost < end.minimum.cost {
                 end.minimum = minimum;
             }
             return;
         }
         let rank = self.ends.partition_point(|end| end.minimum.cost < minimum.cost);
-        self.ends.insert(rank, SearchEnd { minimum, searches: 1 });
+        self.ends
+            .insert(rank, SearchEnd { minimum, searches: 1, near: near.into_iter().collect() });
     }
 
     /// Returns the lowest minimum.
     pub(super) fn best(&self) -> &SearchEnd {
         &self.ends[0]
     }
+}
+
+/// Returns whether two sums of squares are those of the same minimum.
+fn is_same_minimum(a: f64, b: f64) -> bool {
+    (a - b).abs() <= SAME_MINIMUM * a.max(b) + f64::MIN_POSITIVE
+}
+
+/// Returns whether two searches ended at the same parameters.
+fn is_same_point(a: &Minimum, b: &Minimum) -> bool {
+    let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME_PARAMETER * a.abs().max(b.abs());
+    is_same_minimum(a.cost, b.cost) && a.parameters.iter().zip(&b.parameters).all(is_near)
 }

@@ -2,10 +2,10 @@
 
 use super::fit::Fit;
 use super::limits::{
-    PROFILE_FACTORS, PROFILE_MARGIN, PROFILE_SECANTS, PROFILE_STEPS, PROFILE_TOLERANCE, STEPS,
+    PROFILE_FACTORS, PROFILE_MARGIN, PROFILE_SECANTS, PROFILE_STEPS, PROFILE_TOLERANCE,
 };
 use super::response_model::ResponseModel;
-use super::search::{Bounds, minimise};
+use super::search::{Bounds, Effort, minimise};
 
 /// Returns the limit of an interval of a parameter below (`direction` −1) or above (+1) its
 /// estimate: the value with a sum of squares, minimised over all other parameters, that is larger
@@ -73,7 +73,8 @@ impl<M: ResponseModel> Profile<'_, '_, M> {
         let mut fixed: Bounds = self.fit.space.bounds.clone();
         (fixed.min[self.parameter], fixed.max[self.parameter]) = (value, value);
         self.from[self.parameter] = value;
-        let Some(minimum) = minimise(&self.fit.residual(), &fixed, &self.from, STEPS) else {
+        let Some(minimum) = minimise(&self.fit.residual(), &fixed, &self.from, Effort::FINAL)
+        else {
             return Point { value, root: f64::INFINITY };
         };
         self.from = minimum.parameters;

@@ -4,12 +4,13 @@ use std::f64::consts::SQRT_2;
 use std::ops::Range;
 
 use mechid_spectra::{LineData, Transient};
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Dyn, QR};
 use rayon::prelude::*;
 
+use super::limits::KEPT_RESPONSES;
 use super::response_model::{LineResponse, ResponseModel};
-use super::search::LeastSquaresProblem;
-use super::transient::{self, Eliminated};
+use super::search::{LeastSquaresProblem, Linearisation};
+use super::transient::{self, TransientBasis, TransientColumns};
 use super::weights::{WeightedLine, Weights};
 use crate::limits::LINES_AT_ONCE;
 
@@ -32,6 +33,8 @@ pub(super) struct PriorRow {
 /// each open record is eliminated, too: residual and derivative are projected onto the orthogonal
 /// complement of its columns A.
 ///
+/// Row 2(p·line + output) is a real part, the next row the imaginary part; then the priors.
+///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
 /// chapter 9 (errors in variables) and section 6.3 (transients); Kaufman (1975), BIT 15, 49–57
@@ -43,15 +46,6 @@ pub(super) struct Residual<'a, M> {
     pub(super) priors: &'a [PriorRow],
 }
 
-/// Residual and Jacobian at one set of parameters.
-pub(super) struct Linearisation {
-    /// Residual √2·L⁻¹e: row 2(p·line + output) is a real part, the next row the imaginary part;
-    /// then the priors.
-    pub(super) residual: DVector<f64>,
-    /// Derivative of the residual, one column per parameter.
-    pub(super) jacobian: DMatrix<f64>,
-}
-
 /// Errors of the outputs at every line.
 pub(super) struct LineErrors {
     /// Errors y − G u − G_own − A τ, lines × p.
@@ -60,19 +54,33 @@ pub(super) struct LineErrors {
     pub(super) receptances: Vec<DMatrix<Complex<f64>>>,
 }
 
-/// Responses and weights of the lines of one record.
-pub(super) struct RecordLines<'r, L> {
-    pub(super) lines: &'r [(L, WeightedLine)],
-    /// Orthonormal basis of the weighted columns of the transient of an open record.
-    pub(super) basis: Option<&'r DMatrix<f64>>,
+/// Lines that are computed together: a block of rows of the residual of one record.
+pub(super) struct Block<L> {
+    /// Index of the first line in the data.
+    pub(super) first: usize,
+    /// Responses of the lines with their weights.
+    pub(super) lines: Vec<(L, WeightedLine)>,
+    /// Rows of the residual, one column.
+    residual: DMatrix<f64>,
+    /// Factors of the weighted columns of the transient, until the basis is known.
+    columns: Option<QR<f64, Dyn, Dyn>>,
 }
 
 /// Residual of the lines of one record.
-struct RecordResidual<L> {
-    lines: Vec<(L, WeightedLine)>,
-    residual: DVector<f64>,
-    eliminated: Option<Eliminated>,
+pub(super) struct RecordResidual<L> {
+    pub(super) blocks: Vec<Block<L>>,
+    /// Weighted columns of the transient of an open record, and its unknowns.
+    pub(super) transient: Option<(TransientBasis, DVector<f64>)>,
+    /// Reference frequency of the transient.
     reference: f64,
+}
+
+/// Residual at one set of parameters, and what its derivative needs.
+pub(super) struct Evaluation<L> {
+    /// Responses of the lines; `None` if they are many, and computed again for the derivative.
+    pub(super) records: Option<Vec<RecordResidual<L>>>,
+    /// Residual of all records, then of the priors.
+    pub(super) residual: DVector<f64>,
 }
 
 impl<'a, M: ResponseModel> Residual<'a, M> {
@@ -99,39 +107,56 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         rows: &Range<usize>,
         kind: Transient,
     ) -> Option<RecordResidual<M::Line<'a>>> {
-        let (p, states) = (self.outputs(), self.model.dimensions().states);
-        let unknowns = transient::len(kind, p, states);
+        let unknowns = transient::len(kind, self.outputs(), self.model.dimensions().states);
         let reference = transient::reference(self.data, rows.clone());
-        let mut residual = DVector::zeros(2 * p * rows.len());
-        let mut columns = DMatrix::zeros(if unknowns > 0 { residual.len() } else { 0 }, unknowns);
-        let of_rows = rows.clone().into_par_iter().with_min_len(LINES_AT_ONCE);
-        let whitened: Option<Vec<_>> = of_rows.map(|row| self.whitened(parameters, row)).collect();
+        let firsts: Vec<usize> = rows.clone().step_by(LINES_AT_ONCE).collect();
+        let block = |first: usize| {
+            let lines = first..rows.end.min(first + LINES_AT_ONCE);
+            self.block(parameters, lines, (unknowns > 0).then_some((reference, unknowns)))
+        };
+        let blocks: Option<Vec<_>> = firsts.into_par_iter().map(block).collect();
+        let mut blocks = blocks?;
+        let mut transient = None;
+        if unknowns > 0 && !blocks.is_empty() {
+            let factors = blocks.iter_mut().filter_map(|block| block.columns.take());
+            let basis = TransientBasis::new(factors.collect())?;
+            let residuals = blocks.iter_mut().map(|block| &mut block.residual);
+            let components = basis.remove_from(&mut residuals.collect::<Vec<_>>());
+            let fitted = basis.unknowns(&components)?;
+            transient = Some((basis, fitted));
+        }
+        let finite = |block: &Block<_>| block.residual.iter().all(|value| value.is_finite());
+        blocks.iter().all(finite).then_some(RecordResidual { blocks, transient, reference })
+    }
+
+    /// Returns the residual of some lines of a record, with the transient still in it. A
+    /// `transient` is given by its reference frequency and the number of its unknowns.
+    fn block(
+        &self,
+        parameters: &[f64],
+        rows: Range<usize>,
+        transient: Option<(f64, usize)>,
+    ) -> Option<Block<M::Line<'a>>> {
+        let (p, first) = (self.outputs(), rows.start);
+        let mut residual = DMatrix::zeros(2 * p * rows.len(), 1);
+        let mut columns =
+            DMatrix::zeros(residual.len(), transient.map_or(0, |(_, unknowns)| unknowns));
         let mut lines = Vec::with_capacity(rows.len());
-        for (at, (line, weighted, white)) in whitened?.into_iter().enumerate() {
-            let part = 2 * p * at..2 * p * (at + 1);
-            write_real(white.iter(), &mut residual.as_mut_slice()[part.clone()]);
-            if unknowns > 0 {
-                let omega = self.data.omega()[rows.start + at];
-                let mut of_line = transient::columns(omega, reference, p, line.state_response());
-                weighted.lower.solve_lower_triangular_mut(&mut of_line).then_some(())?;
-                for (column, mut to) in of_line.column_iter().zip(columns.column_iter_mut()) {
-                    write_real(column.iter(), &mut to.as_mut_slice()[part.clone()]);
-                }
+        for row in rows.clone() {
+            let (line, weighted, white) = self.whitened(parameters, row)?;
+            let part = 2 * p * (row - first)..2 * p * (row - first + 1);
+            write_real(white.iter().copied(), &mut residual.as_mut_slice()[part.clone()]);
+            if let Some((reference, _)) = transient {
+                let of_line = weighted_columns(&line, &weighted.lower)?;
+                of_line.for_each(self.data.omega()[row], reference, |at, column| {
+                    write_real(column, &mut columns.column_mut(at).as_mut_slice()[part.clone()]);
+                });
             }
             lines.push((line, weighted));
         }
-        let mut eliminated = None;
-        if unknowns > 0 {
-            let fitted = Eliminated::new(columns, &residual)?;
-            residual -= &fitted.basis * fitted.basis.tr_mul(&residual);
-            eliminated = Some(fitted);
-        }
-        residual.iter().all(|value| value.is_finite()).then_some(RecordResidual {
-            lines,
-            residual,
-            eliminated,
-            reference,
-        })
+        let is_finite = columns.iter().all(|value| value.is_finite());
+        let columns = transient.map(|_| columns.qr());
+        is_finite.then_some(Block { first, lines, residual, columns })
     }
 
     /// Returns the response at a line, its weights, and L⁻¹e without a transient.
@@ -153,44 +178,54 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         exists.then_some((line, weighted, white))
     }
 
-    /// Returns the Jacobian of the residual of one record.
+    /// Returns the Jacobian of the residual of one record, as blocks of rows.
     fn derivative(
         &self,
         parameters: &[f64],
-        rows: &Range<usize>,
-        record: &RecordResidual<M::Line<'a>>,
+        record: RecordResidual<M::Line<'a>>,
+    ) -> Option<Vec<DMatrix<f64>>> {
+        let RecordResidual { blocks, transient, reference } = record;
+        let unknowns = transient.as_ref().map(|(_, unknowns)| unknowns);
+        let derivative = |block| self.block_derivative(parameters, block, unknowns, reference);
+        let jacobian: Option<Vec<_>> = blocks.into_par_iter().map(derivative).collect();
+        let mut jacobian = jacobian?;
+        if let Some((basis, _)) = &transient {
+            basis.remove_from(&mut jacobian.iter_mut().collect::<Vec<_>>());
+        }
+        let finite = |block: &DMatrix<f64>| block.iter().all(|value| value.is_finite());
+        jacobian.iter().all(finite).then_some(jacobian)
+    }
+
+    /// Returns the Jacobian of some lines, given the `unknowns` of the transient.
+    fn block_derivative(
+        &self,
+        parameters: &[f64],
+        block: Block<M::Line<'a>>,
+        unknowns: Option<&DVector<f64>>,
+        reference: f64,
     ) -> Option<DMatrix<f64>> {
         let (p, dimensions) = (self.outputs(), self.model.dimensions());
-        let mut jacobian = DMatrix::zeros(record.residual.len(), dimensions.parameters);
+        let mut jacobian = DMatrix::zeros(block.residual.len(), dimensions.parameters);
         let mut sensitivity = DMatrix::zeros(p, dimensions.parameters);
-        for (at, (line, weighted)) in record.lines.iter().enumerate() {
-            let row = rows.start + at;
+        let no_states = DVector::zeros(0);
+        for (at, (line, weighted)) in block.lines.iter().enumerate() {
+            let row = block.first + at;
             let part = 2 * p * at..2 * p * (at + 1);
-            let pairs = record.residual.as_slice()[part.clone()].chunks_exact(2);
-            let white = pairs.map(|pair| Complex::new(pair[0], pair[1]) / SQRT_2);
-            let white = DVector::from_iterator(p, white);
             let input = self.data.inputs().row(row).transpose();
-            let likely = weighted.likely_input(input, &white);
-            let states = match &record.eliminated {
-                Some(fitted) if dimensions.states > 0 => transient::state_loads(
-                    self.data.omega()[row],
-                    record.reference,
-                    dimensions.states,
-                    &fitted.unknowns,
-                ),
-                _ => DVector::zeros(0),
-            };
-            line.sensitivity(parameters, &likely, &states, &mut sensitivity);
+            let likely = weighted.likely_input(input, &block.white(at, p));
+            let loads = unknowns.filter(|_| dimensions.states > 0).map(|unknowns| {
+                let omega = self.data.omega()[row];
+                transient::state_loads(omega, reference, dimensions.states, unknowns)
+            });
+            let loads = loads.as_ref().unwrap_or(&no_states);
+            line.sensitivity(parameters, &likely, loads, &mut sensitivity);
             weighted.lower.solve_lower_triangular_mut(&mut sensitivity).then_some(())?;
             for (column, mut to) in sensitivity.column_iter().zip(jacobian.column_iter_mut()) {
-                write_real(column.iter(), &mut to.as_mut_slice()[part.clone()]);
+                write_real(column.iter().copied(), &mut to.as_mut_slice()[part.clone()]);
             }
         }
         jacobian.neg_mut();
-        if let Some(fitted) = &record.eliminated {
-            jacobian -= &fitted.basis * fitted.basis.tr_mul(&jacobian);
-        }
-        jacobian.iter().all(|value| value.is_finite()).then_some(jacobian)
+        Some(jacobian)
     }
 
     /// Visits the lines of each record with their responses and the factors L of their covariance,
@@ -199,12 +234,10 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
     pub(super) fn for_each_record(
         &self,
         parameters: &[f64],
-        mut visit: impl FnMut(&Range<usize>, RecordLines<'_, M::Line<'a>>) -> Option<()>,
+        mut visit: impl FnMut(&RecordResidual<M::Line<'a>>) -> Option<()>,
     ) -> Option<()> {
         for (rows, kind) in self.data.records() {
-            let record = self.record(parameters, rows, *kind)?;
-            let basis = record.eliminated.as_ref().map(|fitted| &fitted.basis);
-            visit(rows, RecordLines { lines: &record.lines, basis })?;
+            visit(&self.record(parameters, rows, *kind)?)?;
         }
         Some(())
     }
@@ -217,23 +250,7 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
 
     /// Returns residual and Jacobian at `parameters`; `None` if the response does not exist.
     pub(super) fn linearise(&self, parameters: &[f64]) -> Option<Linearisation> {
-        let (size, count) = (self.len() + self.priors.len(), parameters.len());
-        let mut residual = DVector::zeros(size);
-        let mut jacobian = DMatrix::zeros(size, count);
-        let p = self.outputs();
-        for (rows, kind) in self.data.records() {
-            let record = self.record(parameters, rows, *kind)?;
-            let first = 2 * p * rows.start;
-            residual.rows_mut(first, record.residual.len()).copy_from(&record.residual);
-            let derivative = self.derivative(parameters, rows, &record)?;
-            jacobian.rows_mut(first, derivative.nrows()).copy_from(&derivative);
-        }
-        for (at, value) in self.prior_rows(parameters).into_iter().enumerate() {
-            residual[self.len() + at] = value;
-            let prior = self.priors[at];
-            jacobian[(self.len() + at, prior.parameter)] = prior.deviation.recip();
-        }
-        Some(Linearisation { residual, jacobian })
+        self.linearised(parameters, self.evaluate(parameters)?)
     }
 
     /// Returns errors and receptances of every line at `parameters`; `None` if the response does
@@ -242,51 +259,105 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         let p = self.outputs();
         let mut errors = DMatrix::zeros(self.data.len(), p);
         let mut receptances = Vec::with_capacity(self.data.len());
-        for (rows, kind) in self.data.records() {
-            let record = self.record(parameters, rows, *kind)?;
-            for (at, (line, weighted)) in record.lines.iter().enumerate() {
-                let pairs =
-                    record.residual.as_slice()[2 * p * at..2 * p * (at + 1)].chunks_exact(2);
-                let white = pairs.map(|pair| Complex::new(pair[0], pair[1]) / SQRT_2);
-                let error = &weighted.lower * DVector::from_iterator(p, white);
-                errors.row_mut(rows.start + at).copy_from(&error.transpose());
-                receptances.push(line.receptance().clone());
+        self.for_each_record(parameters, |record| {
+            for block in &record.blocks {
+                for (at, (line, weighted)) in block.lines.iter().enumerate() {
+                    let error = &weighted.lower * block.white(at, p);
+                    errors.row_mut(block.first + at).copy_from(&error.transpose());
+                    receptances.push(line.receptance().clone());
+                }
             }
-        }
+            Some(())
+        })?;
         Some(LineErrors { errors, receptances })
     }
 }
 
-impl<M: ResponseModel> LeastSquaresProblem for Residual<'_, M> {
-    fn residual(&self, parameters: &[f64]) -> Option<DVector<f64>> {
+impl<L> Block<L> {
+    /// Returns L⁻¹e of a line of the block, with p entries.
+    pub(super) fn white(&self, at: usize, p: usize) -> DVector<Complex<f64>> {
+        let pairs = self.residual.as_slice()[2 * p * at..2 * p * (at + 1)].chunks_exact(2);
+        let white = pairs.map(|pair| Complex::new(pair[0], pair[1]) / SQRT_2);
+        DVector::from_iterator(p, white)
+    }
+}
+
+impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
+    type Evaluation = Evaluation<M::Line<'a>>;
+
+    fn evaluate(&self, parameters: &[f64]) -> Option<Self::Evaluation> {
         let mut residual = DVector::zeros(self.len() + self.priors.len());
-        let p = self.outputs();
+        let states = self.model.dimensions().states;
+        let mut records = (self.data.len() * states.pow(2) <= KEPT_RESPONSES).then(Vec::new);
         for (rows, kind) in self.data.records() {
             let record = self.record(parameters, rows, *kind)?;
-            let first = 2 * p * rows.start;
-            residual.rows_mut(first, record.residual.len()).copy_from(&record.residual);
+            for block in &record.blocks {
+                let first = 2 * self.outputs() * block.first;
+                residual.rows_mut(first, block.residual.len()).copy_from(&block.residual);
+            }
+            if let Some(records) = &mut records {
+                records.push(record);
+            }
         }
         let priors = DVector::from_vec(self.prior_rows(parameters));
         residual.rows_mut(self.len(), priors.len()).copy_from(&priors);
-        Some(residual)
+        Some(Evaluation { records, residual })
     }
 
-    fn linearise(&self, parameters: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let Linearisation { residual, jacobian } = Residual::linearise(self, parameters)?;
-        Some((residual, jacobian))
+    fn residual<'e>(&self, evaluation: &'e Self::Evaluation) -> &'e DVector<f64> {
+        &evaluation.residual
     }
+
+    fn linearised(
+        &self,
+        parameters: &[f64],
+        evaluation: Self::Evaluation,
+    ) -> Option<Linearisation> {
+        let Evaluation { records, residual } = evaluation;
+        let mut jacobian = DMatrix::zeros(residual.len(), parameters.len());
+        let mut kept = records.map(Vec::into_iter);
+        for (rows, kind) in self.data.records() {
+            let record = match &mut kept {
+                Some(kept) => kept.next(),
+                None => self.record(parameters, rows, *kind),
+            }?;
+            let mut first = 2 * self.outputs() * rows.start;
+            for block in self.derivative(parameters, record)? {
+                jacobian.rows_mut(first, block.nrows()).copy_from(&block);
+                first += block.nrows();
+            }
+        }
+        for (at, prior) in self.priors.iter().enumerate() {
+            jacobian[(self.len() + at, prior.parameter)] = prior.deviation.recip();
+        }
+        Some(Linearisation { residual, jacobian })
+    }
+}
+
+/// Returns the responses of a line to what its transient consists of, weighted by L⁻¹.
+fn weighted_columns(
+    line: &impl LineResponse,
+    lower: &DMatrix<Complex<f64>>,
+) -> Option<TransientColumns> {
+    let mut states = line.state_response().cloned();
+    if let Some(states) = &mut states {
+        lower.solve_lower_triangular_mut(states).then_some(())?;
+    }
+    let mut outputs = DMatrix::identity(lower.nrows(), lower.nrows());
+    lower.solve_lower_triangular_mut(&mut outputs).then_some(())?;
+    Some(TransientColumns { states, outputs })
 }
 
 /// Returns √2 times the real and imaginary parts of complex rows, each pair of rows together.
 pub(super) fn real_rows(white: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
     let mut rows = DMatrix::zeros(2 * white.nrows(), white.ncols());
     for (column, mut to) in white.column_iter().zip(rows.column_iter_mut()) {
-        write_real(column.iter(), to.as_mut_slice());
+        write_real(column.iter().copied(), to.as_mut_slice());
     }
     rows
 }
 
-fn write_real<'c>(white: impl Iterator<Item = &'c Complex<f64>>, part: &mut [f64]) {
+fn write_real(white: impl Iterator<Item = Complex<f64>>, part: &mut [f64]) {
     for (z, pair) in white.zip(part.chunks_exact_mut(2)) {
         pair[0] = SQRT_2 * z.re;
         pair[1] = SQRT_2 * z.im;

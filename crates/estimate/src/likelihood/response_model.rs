@@ -38,10 +38,10 @@ pub trait ResponseModel: Sync {
     /// Adds the uncertainty of the model itself to the covariance of the outputs (p × p, in the
     /// products of their units), at a line with the response `line` under `input` (q, in the units
     /// of the inputs); an exact model has none.
-    fn add_covariance(
-        &self,
+    fn add_covariance<'l>(
+        &'l self,
         _row: usize,
-        _line: &Self::Line<'_>,
+        _line: &Self::Line<'l>,
         _input: &DVector<Complex<f64>>,
         _covariance: &mut DMatrix<Complex<f64>>,
     ) {

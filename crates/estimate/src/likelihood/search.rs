@@ -2,13 +2,30 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::limits::{SAME_MINIMUM, SHORT_STEP, STEPS};
+
 /// A sum of squares with its derivative.
 pub(super) trait LeastSquaresProblem {
-    /// Returns the residual, `None` if it does not exist.
-    fn residual(&self, parameters: &[f64]) -> Option<DVector<f64>>;
+    /// Residual at one set of parameters, and what its derivative needs.
+    type Evaluation;
 
-    /// Returns the residual and its Jacobian, `None` if one of them does not exist.
-    fn linearise(&self, parameters: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)>;
+    /// Computes the residual, `None` if it does not exist.
+    fn evaluate(&self, parameters: &[f64]) -> Option<Self::Evaluation>;
+
+    /// Returns the residual of an evaluation.
+    fn residual<'e>(&self, evaluation: &'e Self::Evaluation) -> &'e DVector<f64>;
+
+    /// Returns the residual of an evaluation at `parameters` with its Jacobian, `None` if that does
+    /// not exist.
+    fn linearised(&self, parameters: &[f64], evaluation: Self::Evaluation)
+    -> Option<Linearisation>;
+}
+
+/// Residual and Jacobian at one set of parameters.
+pub(super) struct Linearisation {
+    pub(super) residual: DVector<f64>,
+    /// Derivative of the residual, one column per parameter.
+    pub(super) jacobian: DMatrix<f64>,
 }
 
 /// Bounds of the parameters; a parameter without a bound has an infinite one.
@@ -38,15 +55,14 @@ impl Bounds {
 pub(super) struct Minimum {
     pub(super) parameters: Vec<f64>,
     pub(super) cost: f64,
+    /// Number of entries of the residual.
+    pub(super) numbers: usize,
     pub(super) steps: usize,
     pub(super) converged: bool,
     /// Flag of each parameter at a bound that the sum of squares would decrease across.
     pub(super) at_bound: Vec<bool>,
 }
 
-/// Predicted decrease, relative to the cost, that ends a search: about 10⁻⁶·√(residuals) standard
-/// errors.
-const COST_TOLERANCE: f64 = 1e-12;
 /// Ratio of the length of a step to the length of the parameters, both scaled by the columns of the
 /// Jacobian, that also ends a search; it decides for data without noise.
 const STEP_TOLERANCE: f64 = 1e-12;
@@ -63,8 +79,7 @@ const CURVATURE_STEP: f64 = 0.1;
 
 /// Normal equations for the parameters that no bound blocks, with columns of unit length.
 struct Local<'a> {
-    residual: &'a DVector<f64>,
-    jacobian: &'a DMatrix<f64>,
+    linearisation: &'a Linearisation,
     free: Vec<usize>,
     /// Lengths of the free columns.
     scale: DVector<f64>,
@@ -73,12 +88,8 @@ struct Local<'a> {
 }
 
 impl<'a> Local<'a> {
-    fn new(
-        residual: &'a DVector<f64>,
-        jacobian: &'a DMatrix<f64>,
-        parameters: &[f64],
-        bounds: &Bounds,
-    ) -> Self {
+    fn new(linearisation: &'a Linearisation, parameters: &[f64], bounds: &Bounds) -> Self {
+        let Linearisation { residual, jacobian } = linearisation;
         let half_gradient = jacobian.tr_mul(residual);
         let free = |at: &usize| !bounds.blocks(*at, parameters[*at], half_gradient[*at]);
         let free: Vec<usize> = (0..parameters.len()).filter(free).collect();
@@ -93,7 +104,7 @@ impl<'a> Local<'a> {
         }
         let gram = columns.tr_mul(&columns);
         let gradient = columns.tr_mul(residual);
-        Self { residual, jacobian, free, scale, gram, gradient }
+        Self { linearisation, free, scale, gram, gradient }
     }
 
     fn factor(&self, damping: f64) -> Option<Cholesky<f64, Dyn>> {
@@ -115,13 +126,32 @@ impl<'a> Local<'a> {
 
     /// Returns the decrease of the sum of squares that the linearisation predicts for a change.
     fn promise(&self, change: &DVector<f64>) -> f64 {
-        let moved = self.jacobian * change;
-        -(2.0 * self.residual.dot(&moved) + moved.norm_squared())
+        let moved = &self.linearisation.jacobian * change;
+        -(2.0 * self.linearisation.residual.dot(&moved) + moved.norm_squared())
     }
 }
 
-/// Searches for a local minimum within `bounds` from `start` in at most `max_steps`; `None` if the
-/// residual does not exist.
+/// Effort of a search.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effort {
+    /// Maximum number of steps.
+    pub(super) steps: usize,
+    /// Predicted decrease, relative to the sum of squares, that ends the search.
+    pub(super) tolerance: f64,
+}
+
+impl Effort {
+    /// Effort for the final estimate: within about 10⁻⁶·√(residuals) standard errors of the
+    /// minimum.
+    pub(super) const FINAL: Self = Self { steps: STEPS, tolerance: 1e-12 };
+    /// Effort to distinguish minima, whose sums of squares differ by more than [`SAME_MINIMUM`].
+    /// The smaller tolerance of the final estimate would cost many steps near a wrong minimum,
+    /// where the residual is large and the steps converge only linearly.
+    pub(super) const ROUGH: Self = Self { steps: STEPS, tolerance: 1e-2 * SAME_MINIMUM };
+}
+
+/// Searches for a local minimum within `bounds` from `start`; `None` if the residual does not
+/// exist.
 ///
 /// A step v and its correction a for the curvature r″ of the residual along v solve (JᵀJ + λI) v =
 /// −Jᵀr and (JᵀJ + λI) a = −½ Jᵀr″(v) for the parameters that no bound blocks; the step is
@@ -135,42 +165,44 @@ pub(super) fn minimise(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,
     start: &[f64],
-    max_steps: usize,
+    effort: Effort,
 ) -> Option<Minimum> {
     let mut parameters = start.to_vec();
     bounds.clamp(&mut parameters);
     let mut damping = 0.0_f64;
-    let (mut residual, mut jacobian) = problem.linearise(&parameters)?;
-    let mut cost = residual.norm_squared();
-    for steps in 0..max_steps {
-        let local = Local::new(&residual, &jacobian, &parameters, bounds);
+    let mut at = problem.linearised(&parameters, problem.evaluate(&parameters)?)?;
+    let mut cost = at.residual.norm_squared();
+    for steps in 0..effort.steps {
+        let local = Local::new(&at, &parameters, bounds);
         let newton = local.factor(damping.max(LEAST_DAMPING)).map(|f| f.solve(&-&local.gradient));
         if let Some(newton) = &newton {
             let size = local.free.iter().zip(local.scale.iter());
             let size =
                 size.map(|(at, scale)| (parameters[*at] * scale).powi(2)).sum::<f64>().sqrt();
             let small = newton.norm() <= STEP_TOLERANCE * size;
-            let full = -local.gradient.dot(newton) <= COST_TOLERANCE * cost;
+            let full = -local.gradient.dot(newton) <= effort.tolerance * cost;
             if local.free.is_empty() || ((small || full) && damping <= FIRST_DAMPING) {
                 let end = Minimum { steps, converged: true, ..ended(&local, &parameters, cost) };
                 return Some(polished(problem, bounds, &local, newton, end));
             }
         }
-        let Some(next) = descend(problem, bounds, &local, &parameters, cost, &mut damping) else {
+        let next = descend(problem, bounds, &local, &parameters, cost, &mut damping);
+        let Some((next, evaluation)) = next else {
             // No damped step descends: this is a minimum to rounding.
             return Some(Minimum { steps, converged: true, ..ended(&local, &parameters, cost) });
         };
         parameters = next;
-        (residual, jacobian) = problem.linearise(&parameters)?;
-        cost = residual.norm_squared();
+        at = problem.linearised(&parameters, evaluation)?;
+        cost = at.residual.norm_squared();
     }
-    let local = Local::new(&residual, &jacobian, &parameters, bounds);
-    Some(Minimum { steps: max_steps, ..ended(&local, &parameters, cost) })
+    let local = Local::new(&at, &parameters, bounds);
+    Some(Minimum { steps: effort.steps, ..ended(&local, &parameters, cost) })
 }
 
 fn ended(local: &Local<'_>, parameters: &[f64], cost: f64) -> Minimum {
     let at_bound = (0..parameters.len()).map(|at| !local.free.contains(&at)).collect();
-    Minimum { parameters: parameters.to_vec(), cost, steps: 0, converged: false, at_bound }
+    let numbers = local.linearisation.residual.len();
+    Minimum { parameters: parameters.to_vec(), cost, numbers, steps: 0, converged: false, at_bound }
 }
 
 /// Takes the last step, which is too small to matter for the sum of squares, if it does not
@@ -186,21 +218,27 @@ fn polished(
     let mut next: Vec<f64> =
         end.parameters.iter().zip(change.iter()).map(|(value, by)| value + by).collect();
     bounds.clamp(&mut next);
-    match problem.residual(&next).map(|residual| residual.norm_squared()) {
+    match cost_at(problem, &next) {
         Some(cost) if cost <= end.cost => Minimum { parameters: next, cost, ..end },
         _ => end,
     }
 }
 
-/// Returns the next parameters, with a lower sum of squares; `None` if no damping gives a decrease.
-fn descend(
-    problem: &impl LeastSquaresProblem,
+/// Returns the sum of squares at `parameters`, `None` if the residual does not exist.
+fn cost_at(problem: &impl LeastSquaresProblem, parameters: &[f64]) -> Option<f64> {
+    problem.evaluate(parameters).map(|evaluation| problem.residual(&evaluation).norm_squared())
+}
+
+/// Returns the next parameters, with a lower sum of squares, and their residual; `None` if no
+/// damping gives a decrease.
+fn descend<P: LeastSquaresProblem>(
+    problem: &P,
     bounds: &Bounds,
     local: &Local<'_>,
     parameters: &[f64],
     cost: f64,
     damping: &mut f64,
-) -> Option<Vec<f64>> {
+) -> Option<(Vec<f64>, P::Evaluation)> {
     let mut growth = 2.0;
     loop {
         if let Some(step) = step(problem, local, parameters, *damping) {
@@ -209,12 +247,14 @@ fn descend(
             bounds.clamp(&mut next);
             let change = DVector::from_fn(next.len(), |at, _| next[at] - parameters[at]);
             let promise = local.promise(&change);
-            let lower = problem.residual(&next).map(|residual| residual.norm_squared());
-            if let Some(lower) = lower.filter(|lower| *lower < cost) {
+            let lower = problem
+                .evaluate(&next)
+                .map(|evaluation| (problem.residual(&evaluation).norm_squared(), evaluation));
+            if let Some((lower, evaluation)) = lower.filter(|(lower, _)| *lower < cost) {
                 let gain = if promise > 0.0 { (cost - lower) / promise } else { 0.0 };
                 *damping *= f64::max(0.1, 1.0 - (2.0 * gain - 1.0).powi(3));
                 *damping = if *damping < LEAST_DAMPING { 0.0 } else { *damping };
-                return Some(next);
+                return Some((next, evaluation));
             }
         }
         *damping = f64::max(growth * *damping, FIRST_DAMPING);
@@ -238,12 +278,16 @@ fn step(
         return None;
     }
     let change = local.change(&scaled, parameters.len());
+    if damping > SHORT_STEP {
+        return Some(change);
+    }
     let ahead: Vec<f64> =
         parameters.iter().zip(change.iter()).map(|(v, by)| v + CURVATURE_STEP * by).collect();
-    let Some(moved) = problem.residual(&ahead) else { return Some(change) };
-    let slope = (moved - local.residual) / CURVATURE_STEP;
-    let curvature = (slope - local.jacobian * &change) * (2.0 / CURVATURE_STEP);
-    let mut projected = local.jacobian.select_columns(&local.free).tr_mul(&curvature);
+    let Some(ahead) = problem.evaluate(&ahead) else { return Some(change) };
+    let Linearisation { residual, jacobian } = local.linearisation;
+    let slope = (problem.residual(&ahead) - residual) / CURVATURE_STEP;
+    let curvature = (slope - jacobian * &change) * (2.0 / CURVATURE_STEP);
+    let mut projected = jacobian.select_columns(&local.free).tr_mul(&curvature);
     projected.component_div_assign(&local.scale);
     let correction = factor.solve(&projected) * -0.5;
     let bounded = correction.norm() <= MAX_CORRECTION * scaled.norm();
@@ -258,12 +302,19 @@ mod tests {
     struct Valley;
 
     impl LeastSquaresProblem for Valley {
-        fn residual(&self, p: &[f64]) -> Option<DVector<f64>> {
+        type Evaluation = DVector<f64>;
+
+        fn evaluate(&self, p: &[f64]) -> Option<DVector<f64>> {
             Some(nalgebra::dvector![10.0 * (p[1] - p[0] * p[0]), 1.0 - p[0]])
         }
 
-        fn linearise(&self, p: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
-            Some((self.residual(p)?, nalgebra::dmatrix![-20.0 * p[0], 10.0; -1.0, 0.0]))
+        fn residual<'e>(&self, evaluation: &'e DVector<f64>) -> &'e DVector<f64> {
+            evaluation
+        }
+
+        fn linearised(&self, p: &[f64], residual: DVector<f64>) -> Option<Linearisation> {
+            let jacobian = nalgebra::dmatrix![-20.0 * p[0], 10.0; -1.0, 0.0];
+            Some(Linearisation { residual, jacobian })
         }
     }
 
@@ -274,7 +325,7 @@ mod tests {
     #[test]
     fn the_valley_is_followed_to_its_end() {
         let free = bounds([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
-        let minimum = minimise(&Valley, &free, &[-1.2, 1.0], 60).unwrap();
+        let minimum = minimise(&Valley, &free, &[-1.2, 1.0], Effort::FINAL).unwrap();
         assert!(minimum.converged, "{minimum:?}");
         assert!(minimum.parameters.iter().all(|value| (value - 1.0).abs() < 1e-10));
         assert_eq!(minimum.at_bound, [false, false]);
@@ -284,7 +335,7 @@ mod tests {
     #[test]
     fn a_bound_holds_and_is_reported() {
         let half = bounds([f64::NEG_INFINITY; 2], [0.5, f64::INFINITY]);
-        let minimum = minimise(&Valley, &half, &[-1.2, 1.0], 60).unwrap();
+        let minimum = minimise(&Valley, &half, &[-1.2, 1.0], Effort::FINAL).unwrap();
         assert!(minimum.converged, "{minimum:?}");
         assert_eq!(minimum.parameters[0], 0.5);
         assert!((minimum.parameters[1] - 0.25).abs() < 1e-9);

@@ -1,7 +1,8 @@
 //! Transients of open records: linear unknowns, eliminated record by record.
 
 use mechid_spectra::{LineData, Transient};
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Dyn, PermutationSequence, QR};
+use rayon::prelude::*;
 
 use super::limits::{TRANSIENT_ORDER, TRANSIENT_RANK};
 
@@ -23,31 +24,34 @@ pub(super) fn reference(data: &LineData, rows: std::ops::Range<usize>) -> f64 {
     data.omega()[rows].iter().copied().fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// Returns the columns of the transient at a line, p × unknowns: the response to the state loads in
-/// powers of s/ω₀, then a polynomial in s/ω₀ for every output, which describes aliasing.
-pub(super) fn columns(
-    omega: f64,
-    reference: f64,
-    outputs: usize,
-    state_response: Option<&DMatrix<Complex<f64>>>,
-) -> DMatrix<Complex<f64>> {
-    let s = Complex::new(0.0, omega / reference);
-    let states = state_response.map_or(0, DMatrix::ncols);
-    let count = STATE_ORDERS * states + (TRANSIENT_ORDER + 1) * outputs;
-    let mut columns = DMatrix::zeros(outputs, count);
-    if let Some(response) = state_response {
-        for order in 0..STATE_ORDERS {
-            let weighted = response * s.powu(order as u32);
-            columns.columns_mut(order * states, states).copy_from(&weighted);
+/// Weighted responses of a line to what its transient consists of.
+pub(super) struct TransientColumns {
+    /// L⁻¹ times the response to the state loads, p × states.
+    pub(super) states: Option<DMatrix<Complex<f64>>>,
+    /// L⁻¹, p × p: the weighted polynomial of every output.
+    pub(super) outputs: DMatrix<Complex<f64>>,
+}
+
+impl TransientColumns {
+    /// Passes the weighted columns of the transient to `write` with their indices, p entries each:
+    /// the response to the state loads in powers of s/ω₀, then a polynomial in s/ω₀ for every
+    /// output, which describes aliasing.
+    pub(super) fn for_each(
+        &self,
+        omega: f64,
+        reference: f64,
+        mut write: impl FnMut(usize, &mut dyn Iterator<Item = Complex<f64>>),
+    ) {
+        let s = Complex::new(0.0, omega / reference);
+        let states = self.states.iter().flat_map(DMatrix::column_iter);
+        let orders = (0..STATE_ORDERS).flat_map(|order| states.clone().map(move |c| (order, c)));
+        let outputs = (0..=TRANSIENT_ORDER)
+            .flat_map(|order| self.outputs.column_iter().map(move |column| (order, column)));
+        for (at, (order, column)) in orders.chain(outputs).enumerate() {
+            let power = s.powu(order as u32);
+            write(at, &mut column.iter().map(|z| z * power));
         }
     }
-    for order in 0..=TRANSIENT_ORDER {
-        for output in 0..outputs {
-            let at = STATE_ORDERS * states + order * outputs + output;
-            columns[(output, at)] = s.powu(order as u32);
-        }
-    }
-    columns
 }
 
 /// Returns the amplitudes of the state loads at a line from the unknowns of a transient.
@@ -63,45 +67,87 @@ pub(super) fn state_loads(
     })
 }
 
-/// Orthonormal basis of the weighted columns of a transient, and its fit to a residual.
-pub(super) struct Eliminated {
-    pub(super) basis: DMatrix<f64>,
-    /// Unknowns of the transient that fit the residual.
-    pub(super) unknowns: DVector<f64>,
+/// Orthonormal basis Q of the weighted columns A of a transient, by blocks of rows: A P = Q R after
+/// scaling, with a permutation P.
+pub(super) struct TransientBasis {
+    /// Rows of Q.
+    pub(super) blocks: Vec<DMatrix<f64>>,
+    /// Factor R of the independent columns.
+    triangle: DMatrix<f64>,
+    permutation: PermutationSequence<Dyn>,
+    /// Lengths of the columns of A.
+    lengths: Vec<f64>,
 }
 
-impl Eliminated {
-    /// Fits weighted columns to a weighted residual; the coefficients of linearly dependent columns
-    /// are 0.
+impl TransientBasis {
+    /// Combines the factors of the blocks of rows of A; `None` if they are not finite or
+    /// there is no block.
+    ///
+    /// # Source
+    /// Demmel, Grigori, Hoemmen & Langou (2012), SIAM J. Scientific Computing 34, A206–A239 (QR
+    /// factorisation of blocks of rows).
+    pub(super) fn new(factors: Vec<QR<f64, Dyn, Dyn>>) -> Option<Self> {
+        let triangles: Vec<DMatrix<f64>> = factors.iter().map(QR::r).collect();
+        let rows = triangles.iter().map(DMatrix::nrows).sum();
+        let mut stacked = DMatrix::zeros(rows, triangles.first()?.ncols());
+        let mut firsts = Vec::with_capacity(triangles.len());
+        let mut first = 0;
+        for triangle in &triangles {
+            stacked.rows_mut(first, triangle.nrows()).copy_from(triangle);
+            firsts.push(first);
+            first += triangle.nrows();
+        }
+        let lengths: Vec<f64> = stacked.column_iter().map(|column| column.norm()).collect();
+        for (mut column, length) in stacked.column_iter_mut().zip(&lengths) {
+            if *length > 0.0 {
+                column.unscale_mut(*length);
+            }
+        }
+        if stacked.iter().any(|value| !value.is_finite()) {
+            return None;
+        }
+        let top = stacked.col_piv_qr();
+        let triangle = top.r();
+        let rank = triangle.diagonal().iter().take_while(|d| d.abs() > TRANSIENT_RANK).count();
+        let q = top.q().columns(0, rank).into_owned();
+        let block = |(factors, first): (&QR<f64, Dyn, Dyn>, &usize)| {
+            let of_block = factors.q();
+            &of_block * q.rows(*first, of_block.ncols())
+        };
+        let blocks = factors.par_iter().zip(&firsts).map(block).collect();
+        let triangle = triangle.view((0, 0), (rank, rank)).into_owned();
+        Some(Self { blocks, triangle, permutation: top.p().clone(), lengths })
+    }
+
+    /// Removes the components of vectors in the space of the basis from their blocks of rows, and
+    /// returns the components, one column per vector.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM J. Numerical Analysis 10, 413–432 (variable projection).
-    pub(super) fn new(mut columns: DMatrix<f64>, residual: &DVector<f64>) -> Option<Self> {
-        let scale: Vec<f64> = columns
-            .column_iter_mut()
-            .map(|mut column| {
-                let length = column.norm();
-                if length > 0.0 {
-                    column.unscale_mut(length);
-                    length
-                } else {
-                    1.0
-                }
-            })
-            .collect();
-        if columns.iter().any(|value| !value.is_finite()) {
-            return None;
+    pub(super) fn remove_from(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
+        let rank = self.triangle.ncols();
+        let vectors = parts.first().map_or(0, |part| part.ncols());
+        let each = self.blocks.par_iter().zip(parts.par_iter());
+        let each: Vec<_> = each.map(|(basis, part)| basis.tr_mul(&**part)).collect();
+        let components =
+            each.iter().fold(DMatrix::zeros(rank, vectors), |sum, of_block| sum + of_block);
+        let each = self.blocks.par_iter().zip(parts.par_iter_mut());
+        each.for_each(|(basis, part)| part.gemm(-1.0, basis, &components, 1.0));
+        components
+    }
+
+    /// Returns the unknowns of the transient from the components of a residual; the coefficients of
+    /// linearly dependent columns are 0. `None` if R is singular.
+    pub(super) fn unknowns(&self, components: &DMatrix<f64>) -> Option<DVector<f64>> {
+        let mut leading = components.column(0).into_owned();
+        self.triangle.solve_upper_triangular_mut(&mut leading).then_some(())?;
+        let mut unknowns = leading.resize_vertically(self.lengths.len(), 0.0);
+        self.permutation.inv_permute_rows(&mut unknowns);
+        for (value, length) in unknowns.iter_mut().zip(&self.lengths) {
+            if *length > 0.0 {
+                *value /= length;
+            }
         }
-        let count = columns.ncols();
-        let factors = columns.col_piv_qr();
-        let r = factors.r();
-        let rank = r.diagonal().iter().take_while(|d| d.abs() > TRANSIENT_RANK).count();
-        let basis = factors.q().columns(0, rank).into_owned();
-        let mut leading = basis.tr_mul(residual);
-        r.view((0, 0), (rank, rank)).solve_upper_triangular_mut(&mut leading).then_some(())?;
-        let mut unknowns = leading.resize_vertically(count, 0.0);
-        factors.p().inv_permute_rows(&mut unknowns);
-        unknowns.iter_mut().zip(scale).for_each(|(value, scale)| *value /= scale);
-        Some(Self { basis, unknowns })
+        Some(unknowns)
     }
 }

@@ -10,7 +10,7 @@ use super::limits::{
 };
 use super::residual::{LineErrors, PriorRow, Residual};
 use super::response_model::ResponseModel;
-use super::search::{Bounds, Minimum, minimise};
+use super::search::{Bounds, Effort, Minimum, minimise};
 use super::weights::Weights;
 use mechid_spectra::noise::level::motion_level;
 use mechid_spectra::noise::smooth;
@@ -52,7 +52,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
 
     fn minimise(&self, weights: &Weights, from: &[f64]) -> Option<Minimum> {
         let residual = self.residual(weights);
-        minimise(&residual, self.bounds, from, STEPS).filter(|minimum| minimum.converged)
+        minimise(&residual, self.bounds, from, Effort::FINAL).filter(|minimum| minimum.converged)
     }
 
     /// Alternates between the most likely levels of white noise and the parameters. A level is

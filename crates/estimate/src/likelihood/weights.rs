@@ -50,6 +50,12 @@ impl Weights {
         Self::new(covariance.collect(), outputs)
     }
 
+    /// Returns the weights of some lines.
+    pub(super) fn rows(&self, rows: &[usize]) -> Self {
+        let covariance = rows.iter().map(|row| self.covariance[*row].clone()).collect();
+        Self { covariance, ..*self }
+    }
+
     /// Adds noise relative to the response: an amplitude `share` of every output.
     pub(super) fn with_relative(&self, data: &LineData, share: f64) -> Self {
         let mut covariance = self.covariance.clone();

@@ -8,6 +8,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::nominal::{NominalLine, Places, is_coupled, nominal_coefficient, prepare};
 use super::{LikelihoodError, MeasuredPart};
+use crate::elimination::solve_in_place;
 use crate::likelihood::{Dimensions, LineResponse, ResponseModel};
 
 /// A term of the dynamic stiffness between the joints (degrees of freedom of unknown terms); index
@@ -27,6 +28,27 @@ enum JointPattern {
     Dyad { left: Vec<(usize, f64)>, right: Vec<(usize, f64)> },
     Block { dofs: Vec<usize>, matrix: DMatrix<f64>, support: Vec<f64> },
 }
+
+/// Entries (row, column, value) of a change Δ of the dynamic stiffness at the joints, which may
+/// repeat.
+struct Change(Vec<(usize, usize, Complex<f64>)>);
+
+impl Change {
+    /// Adds Δ times a matrix, given by its entries, to `sum`.
+    fn add_product(
+        &self,
+        sum: &mut DMatrix<Complex<f64>>,
+        entry: impl Fn(usize, usize) -> Complex<f64>,
+    ) {
+        for (row, column, value) in &self.0 {
+            for at in 0..sum.ncols() {
+                sum[(*row, at)] += value * entry(*column, at);
+            }
+        }
+    }
+}
+
+const ONE: Complex<f64> = Complex::new(1.0, 0.0);
 
 /// The [`ResponseModel`] of a machine.
 ///
@@ -69,7 +91,7 @@ pub struct MachineLine<'a> {
     from_joints: DMatrix<Complex<f64>>,
     /// Motion of joints and support (j + 1) per unit of each input and load of the machine.
     joints: DMatrix<Complex<f64>>,
-    /// Receptance H between the joints, if there are state loads.
+    /// Transposed receptance Hᵀ between the joints, if there are state loads.
     internal: Option<DMatrix<Complex<f64>>>,
     /// Frequency factor of each term between the joints.
     factors: Vec<Complex<f64>>,
@@ -142,11 +164,11 @@ impl MachineModel {
         &self.assembly
     }
 
-    /// Returns Δ, j × (j + 1), and the frequency factors of its terms.
-    fn change(&self, parameters: &[f64], omega: f64) -> (DMatrix<Complex<f64>>, Vec<Complex<f64>>) {
+    /// Returns the entries of Δ, j × (j + 1), and the frequency factors of its terms.
+    fn change(&self, parameters: &[f64], omega: f64) -> (Change, Vec<Complex<f64>>) {
         let joints = self.places.joints;
         let speed = self.assembly.speed().at(omega);
-        let mut change = DMatrix::zeros(joints, joints + 1);
+        let mut change = Change(Vec::with_capacity(4 * self.terms.len()));
         let mut factors = Vec::with_capacity(self.terms.len());
         for term in &self.terms {
             let factor = term.power.factor(omega, speed);
@@ -157,16 +179,16 @@ impl MachineModel {
                 JointPattern::Dyad { left, right } => {
                     for (row, a) in left {
                         for (column, b) in right {
-                            change[(*row, *column)] += coefficient * (a * b);
+                            change.0.push((*row, *column, coefficient * (a * b)));
                         }
                     }
                 }
                 JointPattern::Block { dofs, matrix, support } => {
                     for (i, row) in dofs.iter().enumerate() {
                         for (j, column) in dofs.iter().enumerate() {
-                            change[(*row, *column)] += coefficient * matrix[(i, j)];
+                            change.0.push((*row, *column, coefficient * matrix[(i, j)]));
                         }
-                        change[(*row, joints)] += coefficient * support[i];
+                        change.0.push((*row, joints, coefficient * support[i]));
                     }
                 }
             }
@@ -174,28 +196,19 @@ impl MachineModel {
         (change, factors)
     }
 
-    /// Returns the readings of the sensors for motions of the `places`, r × m, and of the support.
+    /// Returns the readings of the sensors, with their `factors`, for the motions of `columns`
+    /// loads; a motion has the index of the place, r for the support, and that of the load.
     fn read(
         &self,
         factors: &[Complex<f64>],
-        places: &DMatrix<Complex<f64>>,
-        support: Option<&[Complex<f64>]>,
+        columns: usize,
+        motion: impl Fn(usize, usize) -> Complex<f64>,
     ) -> DMatrix<Complex<f64>> {
-        let mut readings = DMatrix::zeros(self.sensors.len(), places.ncols());
-        for (row, (entries, factor)) in self.sensors.iter().zip(factors).enumerate() {
-            for column in 0..places.ncols() {
-                let motion = entries.iter().map(|(index, weight)| {
-                    let motion = if *index < places.nrows() {
-                        places[(*index, column)]
-                    } else {
-                        support.map_or(Complex::default(), |support| support[column])
-                    };
-                    motion * *weight
-                });
-                readings[(row, column)] = factor * motion.sum::<Complex<f64>>();
-            }
-        }
-        readings
+        DMatrix::from_fn(self.sensors.len(), columns, |row, column| {
+            let entries = self.sensors[row].iter();
+            let sum = entries.map(|(index, weight)| motion(*index, column) * *weight);
+            factors[row] * sum.sum::<Complex<f64>>()
+        })
     }
 
     /// Returns S (I − H Δ) at the degrees of freedom of a measured part, and the forces f − Δ x on
@@ -203,14 +216,18 @@ impl MachineModel {
     fn part(
         &self,
         (omega, readings_of): (f64, &[Complex<f64>]),
-        change: &DMatrix<Complex<f64>>,
+        change: &Change,
         from_joints: &DMatrix<Complex<f64>>,
         joints: &DMatrix<Complex<f64>>,
     ) -> Option<[DMatrix<Complex<f64>>; 2]> {
         let part = self.measured.as_ref().filter(|part| part.variance.is_some())?;
         let (j, inputs) = (self.places.joints, self.assembly.inputs().len());
-        let coupled = from_joints * change.columns(0, j);
-        let reaction = change * joints.columns(0, inputs);
+        let mut coupled = DMatrix::zeros(self.sensors.len(), j);
+        for (row, column, value) in change.0.iter().filter(|entry| entry.1 < j) {
+            coupled.column_mut(*column).axpy(*value, &from_joints.column(*row), ONE);
+        }
+        let mut reaction = DMatrix::zeros(j, inputs);
+        change.add_product(&mut reaction, |row, load| joints[(row, load)]);
         let n = self.assembly.dof();
         let mut readings = DMatrix::zeros(self.sensors.len(), part.dofs.len());
         let mut forces = DMatrix::zeros(part.dofs.len(), inputs);
@@ -257,34 +274,46 @@ impl ResponseModel for MachineModel {
         let (j, inputs) = (self.places.joints, self.assembly.inputs().len());
         let (change, factors) = self.change(parameters, omega);
         let load_count = nominal.loads.ncols();
+        // `from_joints` is H₀ᵀ before the solution of (I + Δ H₀)ᵀ Hᵀ = H₀ᵀ, and Hᵀ after it.
         let mut from_joints = nominal.from_joints.clone();
         let mut loads = nominal.loads.clone();
         if j > 0 {
-            let within = change.columns(0, j) * nominal.from_joints.rows(0, j);
-            let coupled = (DMatrix::identity(j, j) + within).transpose();
-            from_joints = coupled.lu().solve(&nominal.from_joints.transpose())?.transpose();
-            let mut reaction = change.columns(0, j) * nominal.loads.rows(0, j);
-            for (mut column, motion) in reaction.column_iter_mut().zip(&nominal.support) {
-                column.axpy(*motion, &change.column(j), Complex::new(1.0, 0.0));
+            let mut coupled = DMatrix::identity(j, j);
+            for (row, column, value) in change.0.iter().filter(|entry| entry.1 < j) {
+                coupled.column_mut(*row).axpy(*value, &nominal.from_joints.column(*column), ONE);
             }
-            loads -= &from_joints * reaction;
+            solve_in_place(&mut coupled, &mut from_joints).then_some(())?;
+            let mut reaction = DMatrix::zeros(j, load_count);
+            change.add_product(&mut reaction, |row, load| {
+                if row < j { nominal.loads[(row, load)] } else { nominal.support[load] }
+            });
+            loads.gemm_tr(-ONE, &from_joints, &reaction, ONE);
         }
-        let mut joints = loads.rows(0, j).into_owned().insert_row(j, Complex::default());
-        joints.row_mut(j).iter_mut().zip(&nominal.support).for_each(|(to, from)| *to = *from);
+        let joints = DMatrix::from_fn(j + 1, load_count, |row, load| {
+            if row < j { loads[(row, load)] } else { nominal.support[load] }
+        });
         let sensors = self.assembly.sensors().iter();
         let of_sensors: Vec<Complex<f64>> =
             sensors.map(|sensor| sensor.factor(parameters, omega)).collect();
-        let responses = self.read(&of_sensors, &loads, Some(&nominal.support));
-        let internal = (self.states > 0).then(|| from_joints.rows(0, j).into_owned());
+        let places = loads.nrows();
+        let motion = |place: usize, load: usize| {
+            if place < places { loads[(place, load)] } else { nominal.support[load] }
+        };
+        let receptance = self.read(&of_sensors, inputs, motion);
+        receptance.iter().all(|z| z.is_finite()).then_some(())?;
         let own_loads = self.assembly.own_loads(omega);
         let value = |parameter: &Option<usize>| parameter.map_or(1.0, |at| parameters[at]);
         let own_values: Vec<f64> = own_loads.iter().map(|(of, _)| value(of)).collect();
-        let own_response = responses.columns(inputs, load_count - inputs).into_owned();
-        let values = DVector::from_iterator(own_values.len(), own_values.iter().map(|v| v.into()));
-        let own_sum = (!own_values.is_empty()).then(|| &own_response * values);
-        let from_joints = self.read(&of_sensors, &from_joints, None);
-        let receptance = responses.columns(0, inputs).into_owned();
-        receptance.iter().all(|z| z.is_finite()).then_some(())?;
+        let own_response =
+            self.read(&of_sensors, load_count - inputs, |place, load| motion(place, inputs + load));
+        let own_sum = (!own_values.is_empty()).then(|| {
+            let values = own_values.iter().map(|value| Complex::from(*value));
+            &own_response * DVector::from_iterator(own_values.len(), values)
+        });
+        let internal = (self.states > 0).then(|| from_joints.columns(0, j).into_owned());
+        let from_joints = self.read(&of_sensors, j, |place, joint| {
+            if place < places { from_joints[(joint, place)] } else { Complex::default() }
+        });
         let part = self.part((omega, &of_sensors), &change, &from_joints, &joints);
         Some(MachineLine {
             model: self,
@@ -303,10 +332,10 @@ impl ResponseModel for MachineModel {
 
     /// Adds the covariance of the outputs due to the errors of a measured receptance: Σ var_ij
     /// |g_j|² P_i P_iᴴ with the forces g on the part and the readings P of its motions.
-    fn add_covariance(
-        &self,
+    fn add_covariance<'l>(
+        &'l self,
         row: usize,
-        line: &MachineLine<'_>,
+        line: &MachineLine<'l>,
         input: &DVector<Complex<f64>>,
         covariance: &mut DMatrix<Complex<f64>>,
     ) {
@@ -351,8 +380,8 @@ impl LineResponse for MachineLine<'_> {
             motion.axpy(Complex::from(*value), &self.joints.column(column), Complex::new(1.0, 0.0));
         }
         if let Some(internal) = self.internal.as_ref().filter(|_| !states.is_empty()) {
-            let moved = internal * states;
-            motion.rows_mut(0, moved.len()).add_assign(&moved);
+            let count = internal.ncols();
+            motion.rows_mut(0, count).gemv_tr(ONE, internal, states, ONE);
         }
         let assembly = &self.model.assembly;
         for (term, factor) in self.model.terms.iter().zip(&self.factors) {

@@ -17,7 +17,7 @@ const NOMINAL_LOSS: f64 = 0.05;
 /// Response of the nominal machine at one frequency, for the degrees of freedom of [`Places`].
 #[derive(Debug, Clone)]
 pub(super) struct NominalLine {
-    /// Receptance H₀ from the joints to all degrees of freedom of [`Places`], r × j.
+    /// Transposed receptance H₀ᵀ from the joints to all degrees of freedom of [`Places`], j × r.
     pub(super) from_joints: DMatrix<Complex<f64>>,
     /// Response of the degrees of freedom of [`Places`] to a unit of each load, r × loads.
     pub(super) loads: DMatrix<Complex<f64>>,
@@ -215,7 +215,7 @@ impl Plan<'_> {
         });
         self.fill_measured(data_row, &loads, &mut response);
         Some(NominalLine {
-            from_joints: response.columns(0, joints).into_owned(),
+            from_joints: response.columns(0, joints).transpose(),
             loads: response.columns(joints, loads.len()).into_owned(),
             support: moved,
         })

@@ -5,9 +5,13 @@ use mechid_model::elements::{
     Assembly, Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine,
     MatrixElement, Sensor, Speed,
 };
+use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 
 use super::MachineModel;
+use crate::likelihood::residual::{Evaluation, Residual};
+use crate::likelihood::search::LeastSquaresProblem;
+use crate::likelihood::weights::Weights;
 use crate::likelihood::{LineResponse, ResponseModel};
 
 const OMEGA: [f64; 4] = [20.0, 61.0, 97.0, 160.0];
@@ -182,4 +186,33 @@ fn the_sensitivity_is_the_derivative_of_the_response() {
             }
         }
     }
+}
+
+/// The responses of many lines are not kept from the residual to its derivative.
+#[test]
+fn the_jacobian_does_not_depend_on_what_is_kept() {
+    let assembly = assembly(true);
+    let start = assembly.start();
+    let omega: Vec<f64> = (1..90).map(|line| 2.0 * f64::from(line)).collect();
+    let model = MachineModel::new(&assembly, &omega, None, true).unwrap();
+    let open = Transient::Open { sample_interval: 0.01 };
+    let random = |rows: usize, columns: usize| {
+        DMatrix::from_fn(rows, columns, |row, column| {
+            Complex::cis((7 * row * row + 3 * column + row * column) as f64)
+        })
+    };
+    let record = |from: usize, to: usize| {
+        let lines = to - from;
+        LineData::new(omega[from..to].to_vec(), random(lines, 3), random(lines, 3), open).unwrap()
+    };
+    let data = record(0, 70).followed_by(&record(70, 89)).unwrap();
+    let weights = Weights::from_variances(&data, &DMatrix::from_element(89, 3, 0.1));
+    let residual = Residual { model: &model, data: &data, weights: &weights, priors: &[] };
+    let kept = residual.evaluate(&start).unwrap();
+    assert!(kept.records.is_some());
+    let again = Evaluation { records: None, residual: kept.residual.clone() };
+    let [kept, again] =
+        [kept, again].map(|evaluation| residual.linearised(&start, evaluation).unwrap());
+    assert!(kept.jacobian.norm() > 0.0);
+    assert_eq!((kept.residual, kept.jacobian), (again.residual, again.jacobian));
 }

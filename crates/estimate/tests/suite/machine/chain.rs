@@ -15,9 +15,9 @@ use super::judge::judge;
 
 pub const MASSES: [f64; 5] = [2.0, 1.5, 1.8, 1.2, 1.0];
 pub const STIFFNESSES: [f64; 5] = [4e4, 3e4, 2.5e4, 3.5e4, 2e4];
-const DAMPINGS: [f64; 5] = [6.0, 4.0, 5.0, 3.0, 4.0];
+pub const DAMPINGS: [f64; 5] = [6.0, 4.0, 5.0, 3.0, 4.0];
 
-fn chain(values: &[f64; 5]) -> DMatrix<f64> {
+pub fn chain(values: &[f64; 5]) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(5, 5);
     for (at, value) in values.iter().enumerate() {
         matrix[(at, at)] += value;

@@ -1,0 +1,78 @@
+//! One of every n lines of the data, for the first steps of a search.
+
+use mechid_spectra::LineData;
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::limits::SEARCH_NUMBERS;
+use super::residual::Residual;
+use super::response_model::{Dimensions, ResponseModel};
+use super::transient;
+
+/// A model at some of its lines.
+pub(super) struct Thinned<'a, M> {
+    model: &'a M,
+    pub(super) rows: Vec<usize>,
+    omega: Vec<f64>,
+}
+
+/// Fraction of the golden ratio, whose multiples are spread evenly and without a period.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+impl<'a, M: ResponseModel> Thinned<'a, M> {
+    /// Takes one of every n lines of each record, so that about [`SEARCH_NUMBERS`] numbers per
+    /// unknown remain; all lines if there are fewer. The line within the n changes without a
+    /// period, because forces may act on every other line.
+    pub(super) fn new(residual: &Residual<'a, M>) -> Self {
+        let Residual { model, data, .. } = residual;
+        let dimensions = model.dimensions();
+        let unknowns = dimensions.parameters + residual.transient_unknowns();
+        let every = residual.len() / (SEARCH_NUMBERS * unknowns.max(1));
+        let mut rows = Vec::new();
+        for (range, kind) in data.records() {
+            // Each record keeps enough lines for its own transient.
+            let own = transient::len(*kind, dimensions.outputs, dimensions.states);
+            let least = (SEARCH_NUMBERS * own).div_ceil(2 * dimensions.outputs.max(1));
+            let every = every.min(range.len() / least.max(1)).max(1);
+            for (group, first) in range.clone().step_by(every).enumerate() {
+                let size = every.min(range.end - first);
+                rows.push(first + ((GOLDEN * group as f64).fract() * size as f64) as usize);
+            }
+        }
+        let omega = rows.iter().map(|row| data.omega()[*row]).collect();
+        Self { model, rows, omega }
+    }
+
+    /// Returns the data of these lines.
+    pub(super) fn lines(&self, data: &LineData) -> Option<LineData> {
+        data.rows(&self.rows)
+    }
+}
+
+impl<M: ResponseModel> ResponseModel for Thinned<'_, M> {
+    type Line<'l>
+        = M::Line<'l>
+    where
+        Self: 'l;
+
+    fn dimensions(&self) -> Dimensions {
+        self.model.dimensions()
+    }
+
+    fn omega(&self) -> &[f64] {
+        &self.omega
+    }
+
+    fn at(&self, parameters: &[f64], row: usize) -> Option<Self::Line<'_>> {
+        self.model.at(parameters, self.rows[row])
+    }
+
+    fn add_covariance<'l>(
+        &'l self,
+        row: usize,
+        line: &Self::Line<'l>,
+        input: &DVector<Complex<f64>>,
+        covariance: &mut DMatrix<Complex<f64>>,
+    ) {
+        self.model.add_covariance(self.rows[row], line, input, covariance);
+    }
+}
