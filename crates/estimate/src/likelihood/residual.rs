@@ -154,9 +154,9 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
             }
             lines.push((line, weighted));
         }
-        let is_finite = columns.iter().all(|value| value.is_finite());
+        columns.iter().all(|value| value.is_finite()).then_some(())?;
         let columns = transient.map(|_| columns.qr());
-        is_finite.then_some(Block { first, lines, residual, columns })
+        Some(Block { first, lines, residual, columns })
     }
 
     /// Returns the response at a line, its weights, and L⁻¹e without a transient.
@@ -315,10 +315,10 @@ impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
     ) -> Option<Linearisation> {
         let Evaluation { records, residual } = evaluation;
         let mut jacobian = DMatrix::zeros(residual.len(), parameters.len());
-        let mut kept = records.map(Vec::into_iter);
+        let mut records = records.map(Vec::into_iter);
         for (rows, kind) in self.data.records() {
-            let record = match &mut kept {
-                Some(kept) => kept.next(),
+            let record = match &mut records {
+                Some(records) => records.next(),
                 None => self.record(parameters, rows, *kind),
             }?;
             let mut first = 2 * self.outputs() * rows.start;

@@ -30,8 +30,8 @@ impl<'a, M: ResponseModel> Thinned<'a, M> {
         let mut rows = Vec::new();
         for (range, kind) in data.records() {
             // Each record keeps enough lines for its own transient.
-            let own = transient::len(*kind, dimensions.outputs, dimensions.states);
-            let least = (SEARCH_NUMBERS * own).div_ceil(2 * dimensions.outputs.max(1));
+            let of_transient = transient::len(*kind, dimensions.outputs, dimensions.states);
+            let least = (SEARCH_NUMBERS * of_transient).div_ceil(2 * dimensions.outputs.max(1));
             let every = every.min(range.len() / least.max(1)).max(1);
             for (group, first) in range.clone().step_by(every).enumerate() {
                 let size = every.min(range.end - first);

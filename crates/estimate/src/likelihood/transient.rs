@@ -127,12 +127,12 @@ impl TransientBasis {
     pub(super) fn remove_from(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
         let rank = self.triangle.ncols();
         let vectors = parts.first().map_or(0, |part| part.ncols());
-        let each = self.blocks.par_iter().zip(parts.par_iter());
-        let each: Vec<_> = each.map(|(basis, part)| basis.tr_mul(&**part)).collect();
+        let pairs = self.blocks.par_iter().zip(parts.par_iter());
+        let products: Vec<_> = pairs.map(|(basis, part)| basis.tr_mul(&**part)).collect();
         let components =
-            each.iter().fold(DMatrix::zeros(rank, vectors), |sum, of_block| sum + of_block);
-        let each = self.blocks.par_iter().zip(parts.par_iter_mut());
-        each.for_each(|(basis, part)| part.gemm(-1.0, basis, &components, 1.0));
+            products.iter().fold(DMatrix::zeros(rank, vectors), |sum, of_block| sum + of_block);
+        let pairs = self.blocks.par_iter().zip(parts.par_iter_mut());
+        pairs.for_each(|(basis, part)| part.gemm(-1.0, basis, &components, 1.0));
         components
     }
 

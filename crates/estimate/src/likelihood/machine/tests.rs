@@ -9,8 +9,10 @@ use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 
 use super::MachineModel;
+use crate::likelihood::limits::SEARCH_NUMBERS;
 use crate::likelihood::residual::{Evaluation, Residual};
 use crate::likelihood::search::LeastSquaresProblem;
+use crate::likelihood::thinned::Thinned;
 use crate::likelihood::weights::Weights;
 use crate::likelihood::{LineResponse, ResponseModel};
 
@@ -215,4 +217,34 @@ fn the_jacobian_does_not_depend_on_what_is_kept() {
         [kept, again].map(|evaluation| residual.linearised(&start, evaluation).unwrap());
     assert!(kept.jacobian.norm() > 0.0);
     assert_eq!((kept.residual, kept.jacobian), (again.residual, again.jacobian));
+}
+
+/// Forces on every other line are all among the lines of the first steps, and a short record
+/// keeps lines beside a long one.
+#[test]
+fn first_steps_have_lines_of_every_force_and_record() {
+    let assembly = assembly(false);
+    for thinning in 2..=6 {
+        // Six numbers a line.
+        let lines = (thinning * SEARCH_NUMBERS * assembly.parameters().len()).div_ceil(6);
+        let omega: Vec<f64> = (1..=lines).map(|line| line as f64).collect();
+        let model = MachineModel::new(&assembly, &omega, None, false).unwrap();
+        let part = |from: usize, to: usize| {
+            let zeros = DMatrix::zeros(to - from, 3);
+            let part = omega[from..to].to_vec();
+            LineData::new(part, zeros.clone(), zeros, Transient::None).unwrap()
+        };
+        let data = part(0, lines - 20).followed_by(&part(lines - 20, lines)).unwrap();
+        let weights = Weights::from_variances(&data, &DMatrix::from_element(lines, 3, 1.0));
+        let residual = Residual { model: &model, data: &data, weights: &weights, priors: &[] };
+        let rows = Thinned::new(&residual).rows;
+        assert!(rows.is_sorted_by(|a, b| a < b) && *rows.last().unwrap() < lines);
+        let expected = lines as f64 / thinning as f64;
+        assert!((rows.len() as f64 / expected - 1.0).abs() < 0.1, "{} of {lines}", rows.len());
+        for line_of_force in 0..2 {
+            let share = rows.iter().filter(|row| *row % 2 == line_of_force).count();
+            assert!(share * 10 > rows.len() * 4, "{share} of {}, every {thinning}", rows.len());
+        }
+        assert!(rows.iter().filter(|row| **row >= lines - 20).count() >= 20 / thinning);
+    }
 }
