@@ -199,8 +199,8 @@ fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
 pub(crate) struct HitNoise {
     /// Standard deviation between the hits, in N.
     pub deviation: f64,
-    /// Samples of the window from the first to the last with a force, counted from 0.
-    pub pulse: Range<usize>,
+    /// Samples of the window with a force, counted from 0, one range for each pulse.
+    pub pulses: Vec<Range<usize>>,
 }
 
 /// Windows of consecutive good hits without a gap.
@@ -252,9 +252,7 @@ pub(crate) fn cut(
         for (at, hits) in pieces(&found.all, windows).into_iter().enumerate() {
             let window = found.all[hits.start].window.start..found.all[hits.end - 1].window.end;
             let alone = found.pulses_alone(force, &found.all[hits.clone()]);
-            let first = alone.iter().position(|f| *f != 0.0).unwrap_or(0);
-            let last = alone.iter().rposition(|f| *f != 0.0).unwrap_or(first);
-            cut.noise.push(HitNoise { deviation: found.noise, pulse: first..last + 1 });
+            cut.noise.push(HitNoise { deviation: found.noise, pulses: runs(&alone) });
             let mut pulses = DMatrix::zeros(window.len(), buffered.force.channels());
             pulses.column_mut(dof).copy_from_slice(&alone);
             let sampling = buffered.force.sampling().with_len(window.len())?;
@@ -274,6 +272,17 @@ pub(crate) fn cut(
         cut.rows.extend(rows);
     }
     Ok(cut)
+}
+
+/// Returns the ranges of consecutive samples that are not 0.
+fn runs(force: &[f64]) -> Vec<Range<usize>> {
+    let mut next = 0;
+    let runs = force.chunk_by(|a, b| (*a == 0.0) == (*b == 0.0)).map(|run| {
+        let range = next..next + run.len();
+        next = range.end;
+        range
+    });
+    runs.filter(|range| force[range.start] != 0.0).collect()
 }
 
 /// Returns the ranges of good hits that make one record each.

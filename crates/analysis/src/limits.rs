@@ -147,3 +147,8 @@ pub const ACQUISITION_ROUNDS: usize = 8;
 /// Change of a parameter, in standard errors, that ends the fits with a force that is held or
 /// linear between its samples.
 pub const ACQUISITION_SETTLED: f64 = 0.02;
+
+/// Maximum number of effects of the noise of pulses that the fit of a machine holds for hits
+/// without a gap as one record, 256 MiB; with more, every hit is a record with its own transient,
+/// which costs up to half of the information about light damping.
+pub(crate) const PULSE_EFFECTS: usize = 1 << 25;

@@ -17,6 +17,8 @@ mod generator;
 mod joint;
 #[path = "../tests/suite/machine/judge.rs"]
 mod judge;
+#[path = "../tests/suite/machine/pulses.rs"]
+mod pulses;
 #[path = "../tests/suite/machine/rotor.rs"]
 mod rotor;
 
@@ -62,6 +64,11 @@ fn of_noise(noise: NoiseSource) -> impl Fn(u64) -> Option<LikelihoodEstimate> {
     move |seed| chain::fit(seed, &Settings { noise, ..Settings::default() })
 }
 
+/// Two masses under a hammer whose force has noise, which the fit knows or ignores.
+fn struck(is_known: bool) -> impl Fn(u64) -> Option<LikelihoodEstimate> {
+    move |seed| Some(pulses::experiment(0.1, is_known, seed)?.0)
+}
+
 fn studies() -> Vec<Study> {
     let known = |seed| chain::fit(seed, &Settings::default());
     let unbalance = |seed| rotor::fit_unbalance(&rotor::Rotor::new(13, 1.0), seed);
@@ -101,6 +108,8 @@ fn studies() -> Vec<Study> {
             Box::new(|seed| frame::fit([true; 2], seed)),
         ),
         ("joint of two measured beams", joint::truth(), Box::new(joint::fit)),
+        ("two masses, hammer, noise 0.1 % of the peak", pulses::truth(), Box::new(struck(true))),
+        ("the same, noise of the force ignored", pulses::truth(), Box::new(struck(false))),
     ]
 }
 

@@ -6,6 +6,7 @@ use std::ops::Range;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
+use crate::noise::pulse::{PulseErrors, PulseNoise};
 use crate::{LineNoise, SpectraError};
 
 /// Effect of the initial and final states of a record on its lines.
@@ -37,6 +38,7 @@ pub struct LineData {
     outputs: DMatrix<Complex<f64>>,
     records: Vec<(Range<usize>, Transient)>,
     noise: Option<LineNoise>,
+    pulse_errors: Vec<PulseErrors>,
 }
 
 impl LineData {
@@ -69,7 +71,7 @@ impl LineData {
             }
         }
         let records = vec![(0..omega.len(), transient)];
-        Ok(Self { omega, inputs, outputs, records, noise: None })
+        Ok(Self { omega, inputs, outputs, records, noise: None, pulse_errors: Vec::new() })
     }
 
     /// Reads the lines of an open record in `band_hz` (Hz), without a window, and without the lines
@@ -131,6 +133,34 @@ impl LineData {
         Ok(Self { noise: Some(noise), ..self })
     }
 
+    /// Returns the same lines with the noise of inputs that act only for a few samples. The rows of
+    /// a pulse are those of its record, and its channel is an input.
+    ///
+    /// # Errors
+    /// [`SpectraError::Size`] for an input that does not exist or rows that are not those of one
+    /// record, [`SpectraError::Numerics`] if the decomposition of the noise fails.
+    pub fn with_pulse_noise(self, pulses: &[PulseNoise]) -> Result<Self, SpectraError> {
+        let mut pulse_errors = Vec::new();
+        for pulse in pulses {
+            let (what, expected, got) = ("inputs", pulse.channel + 1, self.inputs.ncols());
+            if expected > got {
+                return Err(SpectraError::Size { what, expected, got });
+            }
+            if self.records.iter().all(|(rows, _)| *rows != pulse.rows) {
+                let (what, expected, got) = ("rows of a pulse", self.len(), pulse.rows.len());
+                return Err(SpectraError::Size { what, expected, got });
+            }
+            pulse_errors.extend(PulseErrors::new(pulse, &self.omega[pulse.rows.clone()])?);
+        }
+        Ok(Self { pulse_errors, ..self })
+    }
+
+    /// Returns the same lines without the noise of pulses.
+    #[must_use]
+    pub fn without_pulse_noise(self) -> Self {
+        Self { pulse_errors: Vec::new(), ..self }
+    }
+
     /// Returns these lines followed by the lines of further records; the noise is kept if it is
     /// known for both.
     ///
@@ -157,6 +187,11 @@ impl LineData {
             (rows.start + before..rows.end + before, *transient)
         };
         self.records.extend(other.records.iter().map(moved));
+        let moved = |pulse: &PulseErrors| {
+            let rows = pulse.rows();
+            pulse.with_rows(rows.start + before..rows.end + before)
+        };
+        self.pulse_errors.extend(other.pulse_errors.iter().map(moved));
         let noise = self.noise.take().zip(other.noise.as_ref());
         self.noise = noise.map(|(one, other)| one.followed_by(other));
         Ok(self)
@@ -175,19 +210,24 @@ impl LineData {
             return None;
         }
         let mut records = Vec::with_capacity(self.records.len());
+        let at = |row: usize| rows.partition_point(|kept| *kept < row);
         for (range, transient) in &self.records {
-            let at = |row: usize| rows.partition_point(|kept| *kept < row);
             let retained = at(range.start)..at(range.end);
             if !retained.is_empty() {
                 records.push((retained, *transient));
             }
         }
+        let moved = |pulse: &PulseErrors| {
+            let rows = at(pulse.rows().start)..at(pulse.rows().end);
+            (!rows.is_empty()).then(|| pulse.with_rows(rows))
+        };
         Some(Self {
             omega: rows.iter().map(|row| self.omega[*row]).collect(),
             inputs: self.inputs.select_rows(rows),
             outputs: self.outputs.select_rows(rows),
             records,
             noise: self.noise.as_ref().map(|noise| noise.rows(rows)),
+            pulse_errors: self.pulse_errors.iter().filter_map(moved).collect(),
         })
     }
 
@@ -219,6 +259,18 @@ impl LineData {
     /// Returns the covariance of the noise of outputs and inputs, if it is known.
     pub fn noise(&self) -> Option<&LineNoise> {
         self.noise.as_ref()
+    }
+
+    /// Returns the errors of the inputs by the noise of pulses.
+    pub fn pulse_errors(&self) -> &[PulseErrors] {
+        &self.pulse_errors
+    }
+
+    /// Returns the number of effects of the errors of pulses on all outputs: real and imaginary
+    /// parts of lines × patterns.
+    pub fn pulse_effects(&self) -> usize {
+        let patterns = |pulse: &PulseErrors| pulse.rows().len() * pulse.count();
+        2 * self.outputs.ncols() * self.pulse_errors.iter().map(patterns).sum::<usize>()
     }
 
     /// Returns the rows of each record and its transient.

@@ -2,17 +2,22 @@
 //! result.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use mechid_checks::{Finding, NoiseSource};
 use mechid_estimate::likelihood::machine::MeasuredReceptance;
-use mechid_spectra::{LineData, SpectraError};
+use mechid_model::elements::Input;
+use mechid_spectra::noise::pulse::PulseNoise;
+use mechid_spectra::{LineData, LineNoise, SpectraError};
+use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 
 use super::IdentifyElements;
 use crate::AnalysisError;
-use crate::hits::HitRow;
+use crate::hits::{HitNoise, HitRow};
+use crate::identify::ForceNoise;
 use crate::identify::rows::WindowRow;
-use crate::measurement::Channels;
+use crate::measurement::{Block, Channels};
 
 /// Spectral lines of all tests of a machine, with their noise if it is known.
 #[derive(Debug, Clone)]
@@ -25,6 +30,8 @@ pub struct ElementData {
     pub(super) source: Option<NoiseSource>,
     /// Description of the noise, in words.
     pub(super) noise: String,
+    /// Noise of the forces of open records and hits.
+    pub(super) force_noise: Vec<ForceNoise>,
     /// Findings on the channels, each with the index of its test.
     pub(super) findings: Vec<(usize, Finding)>,
     /// Names of the channels, for the findings.
@@ -83,6 +90,7 @@ impl ElementData {
             tests: vec![test],
             source: None,
             noise: String::new(),
+            force_noise: Vec::new(),
             findings: Vec::new(),
             channels,
             hits: Vec::new(),
@@ -101,11 +109,54 @@ impl ElementData {
         if !self.noise.contains(&other.noise) {
             self.noise = format!("{}; {}", self.noise, other.noise);
         }
+        self.force_noise.extend(other.force_noise);
         let moved = other.findings.into_iter().map(|(at, finding)| (at + before, finding));
         self.findings.extend(moved);
         self.hits.extend(other.hits);
         self.remarks.extend(other.remarks);
         Ok(self)
+    }
+
+    /// Returns the lines of one record of the `block` with the noise of its forces, of which those
+    /// on `driven` act: on the samples of the pulses of a `hit`, otherwise on all.
+    pub(super) fn with_force_noise(
+        self,
+        block: &Block,
+        driven: &[usize],
+        hit: Option<&HitNoise>,
+        how: &IdentifyElements,
+    ) -> Result<Self, AnalysisError> {
+        let inputs = how.machine.instruments.inputs.iter().enumerate();
+        let forces = inputs.filter(|(_, input)| matches!(input, Input::Force { .. }));
+        let channels: Vec<usize> = forces.map(|(channel, _)| channel).collect();
+        if channels.is_empty() {
+            how.refuse_force_noise("motions of the support")?;
+            return Ok(self);
+        }
+        let noise = ForceNoise::from_record(block, driven, how.force_noise.as_deref(), hit)?;
+        let noisy = || channels.iter().enumerate().filter(|(force, _)| noise.level(*force) > 0.0);
+        let lines = if let Some(pulses) = noise.pulses() {
+            let of_pulse = |(force, channel): (usize, &usize), samples: &Range<usize>| PulseNoise {
+                rows: 0..self.lines.len(),
+                sampling: block.force.sampling(),
+                channel: *channel,
+                deviation: noise.level(force),
+                samples: samples.clone(),
+            };
+            let of_force = |force| pulses.iter().map(move |samples| of_pulse(force, samples));
+            let pulses: Vec<PulseNoise> = noisy().flat_map(of_force).collect();
+            self.lines.with_pulse_noise(&pulses)?
+        } else {
+            // Without noise, too, because lines with and without known noise cannot be joined.
+            let (p, q) = (self.lines.outputs().ncols(), self.lines.inputs().ncols());
+            let mut covariance = DMatrix::zeros(p + q, p + q);
+            for (force, channel) in noisy() {
+                covariance[(p + channel, p + channel)] = Complex::from(noise.level(force).powi(2));
+            }
+            let known = LineNoise::new(vec![covariance; self.lines.len()])?;
+            self.lines.with_noise(known)?
+        };
+        Ok(Self { lines, force_noise: vec![noise], ..self })
     }
 
     /// Removes the lines that the settings exclude.

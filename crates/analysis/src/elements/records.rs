@@ -18,6 +18,7 @@ use crate::identify::checks;
 use crate::identify::left_out::LineRule;
 use crate::identify::rows::WindowRow;
 use crate::identify::{LeftOut, LineChoice};
+use crate::limits::PULSE_EFFECTS;
 use crate::measurement::{Block, Measurement, check_distinct};
 use crate::modes::driven_band;
 
@@ -50,7 +51,8 @@ impl ElementData {
     }
 }
 
-/// Reads the good hits of a record as open records with only the forces of their pulses.
+/// Reads the good hits of a record as open records with only the forces of their pulses. Hits
+/// without a gap are one record, unless the noise of so many pulses takes too much memory.
 fn from_hits(
     measurement: &Measurement,
     rule: &HitRule,
@@ -64,10 +66,24 @@ fn from_hits(
         let why = "a hammer test needs an input that is a force".into();
         return Err(AnalysisError::Setting { setting: "hits", why });
     }
-    let cut = hits::cut(&[measurement.hold_any()?], rule, Windows::Joined)?;
-    let tests = cut.hits.into_iter().map(|hit| {
+    let joined = from_windows(measurement, rule, how, Windows::Joined)?;
+    if joined.lines.pulse_effects() <= PULSE_EFFECTS {
+        return Ok(joined);
+    }
+    from_windows(measurement, rule, how, Windows::Separate)
+}
+
+fn from_windows(
+    measurement: &Measurement,
+    rule: &HitRule,
+    how: &IdentifyElements,
+    windows: Windows,
+) -> Result<ElementData, AnalysisError> {
+    let cut = hits::cut(&[measurement.hold_any()?], rule, windows)?;
+    let tests = cut.hits.into_iter().zip(&cut.noise).map(|(hit, noise)| {
         let block = hit.into_held();
-        let mut data = Signals::new(&block, how)?.open(&block, TestKind::Hit, how)?;
+        let data = Signals::new(&block, how)?.open(&block, TestKind::Hit, how)?;
+        let mut data = data.with_force_noise(&block, &block.driven, Some(noise), how)?;
         data.remarks = block.unit_notes();
         data.findings = sensor_findings(&block);
         Ok(data)
@@ -88,7 +104,9 @@ fn from_record(
     let mut data = if is_periodic {
         signals.periods(&block, how)?
     } else {
-        signals.open(&block, TestKind::Open, how)?
+        let forces: Vec<usize> = (0..block.force.channels()).collect();
+        let data = signals.open(&block, TestKind::Open, how)?;
+        data.with_force_noise(&block, &forces, None, how)?
     };
     data.remarks = block.unit_notes();
     data.findings = sensor_findings(&block);
@@ -150,6 +168,7 @@ impl Signals {
 
     /// Returns the mean of the periods with the noise from their scatter.
     fn periods(&self, block: &Block, how: &IdentifyElements) -> Result<ElementData, AnalysisError> {
+        how.refuse_force_noise("periods, which show it by their scatter")?;
         let choice = how.band.map_or(LineChoice::Driven, LineChoice::Band);
         let without = LeftOut { lines: None, frequencies: how.without_hz.clone() };
         let rule = LineRule { choice: &choice, without: &without };

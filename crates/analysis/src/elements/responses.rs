@@ -29,6 +29,7 @@ impl ElementData {
         how: &IdentifyElements,
     ) -> Result<Self, AnalysisError> {
         how.machine.assembly().map_err(AnalysisError::machine)?;
+        how.refuse_force_noise("frequency responses")?;
         joined(tables.iter().map(|table| from_table(table, how)))
     }
 

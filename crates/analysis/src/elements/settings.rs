@@ -37,6 +37,11 @@ pub struct IdentifyElements {
     /// Noise spectrum that weights the lines.
     #[serde(default)]
     pub noise: Pooling,
+    /// Standard deviation of the noise on the samples of the forces, in N: one value for all of
+    /// them or one for each, for open records and hits; `None`: estimated above the band that they
+    /// drive, or between the hits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_noise: Option<Vec<f64>>,
     /// Maximum number of searches: one from the given initial values, the others from random ones.
     #[serde(default = "usual_starts")]
     pub starts: usize,
@@ -65,6 +70,7 @@ impl IdentifyElements {
             without_hz: Vec::new(),
             hits: None,
             noise: Pooling::Automatic,
+            force_noise: None,
             starts: usual_starts(),
             seed: 0,
             confidence: usual_confidence(),
@@ -100,9 +106,20 @@ impl IdentifyElements {
         Ok(channels)
     }
 
+    /// Checks that no noise of the forces is stated for data that show it themselves.
+    pub(super) fn refuse_force_noise(&self, of: &str) -> Result<(), AnalysisError> {
+        match self.force_noise {
+            None => Ok(()),
+            Some(_) => {
+                let why = format!("it is for open records and hits, not for {of}");
+                Err(AnalysisError::Setting { setting: "force_noise", why })
+            }
+        }
+    }
+
     /// Returns the settings of the likelihood.
     pub(super) fn likelihood(&self, data: &ElementData) -> Settings {
-        let noise = match (data.lines.noise(), self.noise) {
+        let noise = match (data.source, self.noise) {
             (None, Pooling::AllLines) => NoiseSource::WhiteResidual,
             (None, _) => NoiseSource::SmoothResidual,
             (Some(_), _) => NoiseSource::Automatic,

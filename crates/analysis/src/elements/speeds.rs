@@ -38,6 +38,7 @@ impl ElementData {
     /// column, and if a column is not of numbers.
     pub fn from_speeds(tables: &[Table], how: &IdentifyElements) -> Result<Self, AnalysisError> {
         how.machine.assembly().map_err(AnalysisError::machine)?;
+        how.refuse_force_noise("synchronous responses")?;
         if how.machine.instruments.speed != Speed::Synchronous {
             let why = "a table over the speed needs \"speed\": \"synchronous\"".into();
             return Err(AnalysisError::Setting { setting: "machine", why });

@@ -20,6 +20,7 @@ use super::notes::ElementNote;
 use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
 use crate::hits::HitRow;
+use crate::identify::ForceNoise;
 use crate::identify::checks::{CheckRow, When};
 use crate::identify::rows::ModeRow;
 use crate::limits::{LISTED_MODES_DOF, PRIOR_SHARE};
@@ -46,6 +47,9 @@ pub struct ElementSummary {
     pub equations: usize,
     /// Noise of the weights of the lines, in words.
     pub noise: String,
+    /// Noise of the forces of open records and hits, one for each record.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub force_noise: Vec<ForceNoise>,
     /// Level of the intervals, a pure number such as 0.95.
     pub confidence: f64,
     /// Unknowns, in the order of the description.
@@ -154,7 +158,10 @@ impl ElementSummary {
         let (likelihood, lines) = (&estimate.likelihood, &data.lines);
         let equations = 2 * lines.outputs().len();
         let StatedMachine { system, covariance, notes } = machine::stated(estimate, equations)?;
-        let remarks = data.remarks.iter().map(|text| ElementNote::Read { text: text.clone() });
+        let of_forces =
+            (!data.force_noise.is_empty()).then(|| ForceNoise::remark(&data.force_noise));
+        let remarks = of_forces.into_iter().chain(data.remarks.iter().cloned());
+        let remarks = remarks.map(|text| ElementNote::Read { text });
         Ok(Self {
             tests: data.tests.clone(),
             hits: data.hits.clone(),
@@ -165,6 +172,7 @@ impl ElementSummary {
             band_hz: band_hz(lines.omega()),
             equations,
             noise: data.noise.clone(),
+            force_noise: data.force_noise.clone(),
             confidence: how.confidence,
             parameters: parameters(estimate),
             parameter_covariance: parameter_covariance(estimate, equations),

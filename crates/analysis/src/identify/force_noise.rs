@@ -23,9 +23,12 @@ pub struct ForceNoise {
     pub levels_n: Vec<Option<f64>>,
     /// Source of the levels.
     pub source: ForceNoiseSource,
-    /// Samples of the pulse of a hit, counted from 0; only these contain the force noise.
+    /// RMS of each force about its mean, in N; `None` if it does not act.
     #[serde(skip)]
-    pulse: Option<Range<usize>>,
+    rms: Vec<Option<f64>>,
+    /// Samples of the pulses of hits, counted from 0; only these contain the force noise.
+    #[serde(skip)]
+    pulses: Option<Vec<Range<usize>>>,
 }
 
 /// Source of the noise level of a force.
@@ -41,56 +44,53 @@ pub enum ForceNoiseSource {
 }
 
 impl ForceNoise {
-    /// Returns the noise of a record: the `stated` level if given, otherwise estimated between the
-    /// hits or above the band.
+    /// Returns the noise of a record in which the forces on `driven` act: the `stated` level if
+    /// given, otherwise estimated between the hits or above the band.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] unless one level is stated for all forces, or one for each.
-    pub(super) fn from_record(
+    pub(crate) fn from_record(
         held: &Block,
+        driven: &[usize],
         stated: Option<&[f64]>,
         hit: Option<&HitNoise>,
     ) -> Result<Self, AnalysisError> {
-        let pulse = hit.map(|hit| hit.pulse.clone());
-        let dofs = held.force.channels();
-        if let Some(stated) = stated {
-            let levels_n = Self::stated(held, stated)?;
-            return Ok(Self { levels_n, source: ForceNoiseSource::Stated, pulse });
-        }
-        let driven = |dof: &usize| held.driven.contains(dof);
-        if let Some(hit) = hit {
-            let level = |dof: usize| Some(if driven(&dof) { hit.deviation } else { 0.0 });
-            let levels_n = (0..dofs).map(level).collect();
-            return Ok(Self { levels_n, source: ForceNoiseSource::BetweenHits, pulse });
-        }
-        let mut levels_n = noise_above_band(&held.force)?;
-        for (dof, level) in levels_n.iter_mut().enumerate() {
-            if level.is_some_and(|level| level <= ROUNDING * rms(held, dof)) {
-                *level = Some(0.0);
+        let pulses = hit.map(|hit| hit.pulses.clone());
+        let forces = held.force.channels();
+        let rms_of = |force: usize| held.force.column(force).variance().sqrt();
+        let acting = |force: usize| driven.contains(&force);
+        let rms = (0..forces)
+            .map(|force| acting(force).then(|| rms_of(force).max(f64::MIN_POSITIVE)))
+            .collect();
+        let if_acting = |level: &dyn Fn(usize) -> f64| -> Vec<Option<f64>> {
+            (0..forces).map(|force| Some(if acting(force) { level(force) } else { 0.0 })).collect()
+        };
+        let (levels_n, source) = if let Some(stated) = stated {
+            check_stated(stated, forces)?;
+            let level = |force: usize| stated[if stated.len() == 1 { 0 } else { force }];
+            (if_acting(&level), ForceNoiseSource::Stated)
+        } else if let Some(hit) = hit {
+            (if_acting(&|_| hit.deviation), ForceNoiseSource::BetweenHits)
+        } else {
+            let mut levels_n = noise_above_band(&held.force)?;
+            for (force, level) in levels_n.iter_mut().enumerate() {
+                if level.is_some_and(|level| level <= ROUNDING * rms_of(force)) {
+                    *level = Some(0.0);
+                }
             }
-        }
-        Ok(Self { levels_n, source: ForceNoiseSource::AboveBand, pulse })
+            (levels_n, ForceNoiseSource::AboveBand)
+        };
+        Ok(Self { levels_n, source, rms, pulses })
     }
 
-    fn stated(held: &Block, stated: &[f64]) -> Result<Vec<Option<f64>>, AnalysisError> {
-        let dofs = held.force.channels();
-        let wrong = |why| AnalysisError::Setting { setting: "force_noise", why };
-        if let Some(value) = stated.iter().find(|value| !(**value >= 0.0 && value.is_finite())) {
-            return Err(wrong(format!("a standard deviation is zero or positive, got {value}")));
-        }
-        if stated.len() != 1 && stated.len() != dofs {
-            let got = stated.len();
-            return Err(wrong(format!(
-                "give one level, or one for each of {dofs} forces, not {got}"
-            )));
-        }
-        let level = |dof: usize| {
-            if !held.driven.contains(&dof) {
-                return 0.0;
-            }
-            stated[if stated.len() == 1 { 0 } else { dof }]
-        };
-        Ok((0..dofs).map(|dof| Some(level(dof))).collect())
+    /// Returns the standard deviation of the noise of a force, in N; 0 if it is not known.
+    pub(crate) fn level(&self, force: usize) -> f64 {
+        self.levels_n[force].unwrap_or(0.0)
+    }
+
+    /// Returns the samples of the pulses of hits; `None` for a record of another kind.
+    pub(crate) fn pulses(&self) -> Option<&[Range<usize>]> {
+        self.pulses.as_deref()
     }
 
     /// Returns the data of a record with this noise of its forces included.
@@ -99,23 +99,26 @@ impl ForceNoise {
         data: FrequencyData,
         held: &Block,
     ) -> Result<FrequencyData, AnalysisError> {
-        let levels: Vec<f64> = self.levels_n.iter().map(|level| level.unwrap_or(0.0)).collect();
+        let levels: Vec<f64> = (0..self.levels_n.len()).map(|force| self.level(force)).collect();
         let sampling = held.force.sampling();
-        Ok(match (&self.pulse, &held.driven[..]) {
-            (Some(pulse), [struck]) => {
-                data.with_pulse_noise(*struck, levels[*struck], pulse.clone(), sampling)?
+        let pulses = self.pulses().and_then(<[_]>::first).zip(self.pulses().and_then(<[_]>::last));
+        Ok(match (pulses, &held.driven[..]) {
+            (Some((first, last)), [struck]) => {
+                let pulse = first.start..last.end;
+                data.with_pulse_noise(*struck, levels[*struck], pulse, sampling)?
             }
             _ => data.with_force_noise(&levels, sampling.len())?,
         })
     }
 
     /// Returns the remark on the noise of all records.
-    pub(super) fn remark(records: &[(&Block, &Self)]) -> String {
-        let driven = |(held, noise): &(&Block, &Self)| -> Vec<(Option<f64>, f64)> {
-            held.driven.iter().map(|dof| (noise.levels_n[*dof], rms(held, *dof))).collect()
+    pub(crate) fn remark(records: &[Self]) -> String {
+        let acting = |noise: &Self| -> Vec<(Option<f64>, f64)> {
+            let forces = noise.levels_n.iter().zip(&noise.rms);
+            forces.filter_map(|(level, rms)| Some((*level, (*rms)?))).collect()
         };
-        let levels_and_rms: Vec<(Option<f64>, f64)> = records.iter().flat_map(driven).collect();
-        let source = records.first().map(|(_, noise)| noise.source);
+        let levels_and_rms: Vec<(Option<f64>, f64)> = records.iter().flat_map(acting).collect();
+        let source = records.first().map(|noise| noise.source);
         let Some(levels) =
             levels_and_rms.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>()
         else {
@@ -147,7 +150,17 @@ impl ForceNoise {
     }
 }
 
-/// Returns the RMS of a force about its mean, in N.
-fn rms(held: &Block, dof: usize) -> f64 {
-    held.force.column(dof).variance().sqrt().max(f64::MIN_POSITIVE)
+/// Checks stated levels of `forces` forces.
+fn check_stated(stated: &[f64], forces: usize) -> Result<(), AnalysisError> {
+    let wrong = |why| AnalysisError::Setting { setting: "force_noise", why };
+    if let Some(value) = stated.iter().find(|value| !(**value >= 0.0 && value.is_finite())) {
+        return Err(wrong(format!("a standard deviation is zero or positive, got {value}")));
+    }
+    if stated.len() != 1 && stated.len() != forces {
+        let got = stated.len();
+        return Err(wrong(format!(
+            "give one level, or one for each of {forces} forces, not {got}"
+        )));
+    }
+    Ok(())
 }

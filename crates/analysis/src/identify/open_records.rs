@@ -108,7 +108,7 @@ impl OpenSpectra {
                 Excitation::Lasting => None,
                 Excitation::Hits(noise) => noise.get(at),
             };
-            let force_noise = ForceNoise::from_record(held, force, hit)?;
+            let force_noise = ForceNoise::from_record(held, &held.driven, force, hit)?;
             let data = FrequencyData::read(&lines, &held.force, motion, kind)?
                 .as_open_record(held.force.sampling());
             let data = acquisition.uncoupled(force_noise.known_to(data, held)?, held)?;
@@ -322,11 +322,9 @@ fn remarks(
     let of_ends = format!(
         "{windows}: their transients were estimated together with the system, on all lines of the band"
     );
-    let known: Vec<(&Block, &ForceNoise)> =
-        records.iter().map(|record| &record.held).zip(force_noise).collect();
     one_motion_of(&records[0].held)
         .into_iter()
-        .chain([of_ends, noise_remark(1, false, &fit.noise), ForceNoise::remark(&known)])
+        .chain([of_ends, noise_remark(1, false, &fit.noise), ForceNoise::remark(force_noise)])
         .chain(SinusoidRow::remark(sinusoids))
         .collect()
 }

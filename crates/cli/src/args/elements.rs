@@ -20,7 +20,7 @@ pub struct ElementArgs {
     /// inputs. With --period the record is read as whole periods, with --hits as the hits of a
     /// hammer, otherwise as an open record (any part of a response)
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
-          "acceleration", "domain", "lines", "without_lines", "method", "force_noise", "extent",
+          "acceleration", "domain", "lines", "without_lines", "method", "extent",
           "between_samples", "ac_coupling", "mass", "structure", "struck", "nonlinear", "candidates",
           "derivatives", "refine", "from_frf", "segment", "validate", "fitted_lines", "more_starts", "quantity", "averages", "points"])]
     machine: Option<PathBuf>,
@@ -28,7 +28,7 @@ pub struct ElementArgs {
     /// speed_rpm (or speed_hz), and for each sensor and unbalance NAME_amplitude and
     /// NAME_phase_deg, or NAME_real and NAME_imaginary; in SI units, unbalance in kg·m
     #[arg(long, requires = "machine", conflicts_with_all = ["frf_table", "period", "start",
-          "sample_rate", "time", "detrend", "noise", "hits"])]
+          "sample_rate", "time", "detrend", "noise", "force_noise", "hits"])]
     speed_table: bool,
     /// Table of frequency responses of one part, measured while it was not connected to the other
     /// parts; its receptance replaces a model of the part; may be repeated
@@ -68,6 +68,7 @@ impl FitArgs {
             without_hz: self.lines.without_hz.clone(),
             hits: self.hits.rule(),
             noise: self.noise.unwrap_or_default(),
+            force_noise: self.force_noise(),
             starts: elements.starts.unwrap_or(usual.starts),
             seed: elements.seed.unwrap_or(usual.seed),
             confidence: elements.confidence.map_or(usual.confidence, |percent| percent / 100.0),

@@ -291,6 +291,11 @@ impl SegmentArgs {
 }
 
 impl FitArgs {
+    /// Returns the stated noise of the forces, in N.
+    pub(super) fn force_noise(&self) -> Option<Vec<f64>> {
+        Some(self.force_noise.clone()).filter(|levels| !levels.is_empty())
+    }
+
     /// Reads the records, identifies the machine, and predicts the validation record.
     pub fn identify(&self) -> Result<Identified, CliError> {
         let how = self.settings()?;
@@ -391,7 +396,7 @@ impl FitArgs {
             domain: self.domain,
             method: self.method,
             noise: self.noise,
-            force_noise: Some(self.force_noise.clone()).filter(|levels| !levels.is_empty()),
+            force_noise: self.force_noise(),
             extent: self.extent,
             lines: self.lines.lines.clone(),
             band_hz: self.lines.band_hz,

@@ -368,6 +368,11 @@ fn hits_of_a_hammer_and_the_page() {
     let used = |hits: &Value| hits.as_array().unwrap().iter().filter(|h| h["used"] == true).count();
     assert_eq!((report["hits"].as_array().unwrap().len(), used(&report["hits"])), (6, 5));
     assert_eq!(report["tests"][0]["kind"], "hit");
+    assert_eq!(report["force_noise"][0]["source"], "between_hits");
+    let stated = identified(at, &format!("{fit} --force-noise 0.02"));
+    assert_eq!(stated["force_noise"][0]["levels_n"], json!([0.02]));
+    let message = refused(at, &format!("identify {fit} --force-noise 1,2"));
+    assert!(message.contains("one for each of 1 forces, not 2"), "{message}");
     let text = mechid(at, &format!("report {fit} --output page.html"));
     assert!(text.contains("5 of 6 hits on degree of freedom 1 used"), "{text}");
     let page = fs::read_to_string(at.join("page.html")).unwrap();

@@ -137,6 +137,9 @@ impl Sums {
             let bases = record.transient.as_ref().map(|(basis, _)| &basis.blocks);
             let rank = bases.and_then(|blocks| blocks.first()).map_or(0, DMatrix::ncols);
             let mut of_transient = DMatrix::zeros(rank, p);
+            let effects = record.pulses.as_ref().map(|pulses| &pulses.effects);
+            let amplitudes = effects.and_then(|blocks| blocks.first()).map_or(0, DMatrix::ncols);
+            let mut of_pulses = DMatrix::zeros(amplitudes, p);
             for (index, block) in record.blocks.iter().enumerate() {
                 for (at, (line, weighted)) in block.lines.iter().enumerate() {
                     let row = block.first + at;
@@ -158,9 +161,16 @@ impl Sums {
                         let rows = blocks[index].rows(2 * p * at, 2 * p);
                         of_transient += rows.tr_mul(&derivative);
                     }
+                    if let Some(blocks) = effects {
+                        let rows = blocks[index].rows(2 * p * at, 2 * p);
+                        of_pulses += rows.tr_mul(&derivative);
+                    }
                 }
             }
             sums.squares -= of_transient.tr_mul(&of_transient);
+            if let Some(pulses) = &record.pulses {
+                sums.squares -= pulses.explained(&of_pulses);
+            }
             Some(())
         })?;
         Some(sums)

@@ -10,6 +10,7 @@ use super::limits::{
     CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE,
 };
 use super::multi_start::{self, Minima, starts};
+use super::pulses::PulseCovariance;
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
 use super::search::{Bounds, Minimum};
@@ -297,6 +298,11 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
             let roots: f64 = weighted.lower.diagonal().iter().map(|z| z.re.ln()).sum();
             log_determinant += 2.0 * roots + p * std::f64::consts::PI.ln();
         }
+        self.residual().for_each_record(&self.minimum.parameters, |record| {
+            let of_pulses = record.pulses.as_ref().map(PulseCovariance::log_determinant);
+            log_determinant += 0.5 * of_pulses.unwrap_or(0.0);
+            Some(())
+        })?;
         Some(-0.5 * self.minimum.cost - log_determinant)
     }
 

@@ -14,6 +14,7 @@ mod limits;
 pub mod machine;
 mod multi_start;
 mod profile;
+mod pulses;
 mod residual;
 mod response_model;
 mod search;

@@ -3,14 +3,16 @@
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
 
+use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::{LineData, Transient};
-use nalgebra::{Complex, DMatrix, DVector, Dyn, QR};
+use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::limits::KEPT_RESPONSES;
+use super::pulses::PulseCovariance;
 use super::response_model::{LineResponse, ResponseModel};
 use super::search::{LeastSquaresProblem, Linearisation};
-use super::transient::{self, TransientBasis, TransientColumns};
+use super::transient::{self, LineColumns, RecordUnknowns, TransientBasis};
 use super::weights::{WeightedLine, Weights};
 use crate::limits::LINES_AT_ONCE;
 
@@ -31,9 +33,11 @@ pub(super) struct PriorRow {
 /// eliminated. The derivative is taken at the most likely input û. Because û is a minimum, Jᵀr is
 /// half the gradient of the sum of squares, and JᵀJ is the Fisher information. The transient τ of
 /// each open record is eliminated, too: residual and derivative are projected onto the orthogonal
-/// complement of its columns A.
+/// complement of its columns A. Errors of pulses are common to all lines of a record: their
+/// amplitudes are unknowns of unit variance, each with a row of its own.
 ///
-/// Row 2(p·line + output) is a real part, the next row the imaginary part; then the priors.
+/// Row 2(p·line + output) is a real part, the next row the imaginary part; then the amplitudes of
+/// the errors of pulses, then the priors.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -48,38 +52,56 @@ pub(super) struct Residual<'a, M> {
 
 /// Errors of the outputs at every line.
 pub(super) struct LineErrors {
-    /// Errors y − G u − G_own − A τ, lines × p.
+    /// Errors y − G u − G_own − A τ, lines × p, without the effects of the errors of pulses.
     pub(super) errors: DMatrix<Complex<f64>>,
     /// Receptance G of each line.
     pub(super) receptances: Vec<DMatrix<Complex<f64>>>,
+    /// Number of amplitudes of pulses that the lines determine, each counted by the share of the
+    /// information about it that they have.
+    pub(super) determined_amplitudes: f64,
 }
 
-/// Lines that are computed together: a block of rows of the residual of one record.
+/// Lines that are computed together: a block of rows of the residual of one record. The last block
+/// of a record with pulses has no line but the rows of their amplitudes.
 pub(super) struct Block<L> {
+    /// Index of the first row in the residual.
+    pub(super) first_row: usize,
     /// Index of the first line in the data.
     pub(super) first: usize,
     /// Responses of the lines with their weights.
     pub(super) lines: Vec<(L, WeightedLine)>,
     /// Rows of the residual, one column.
     residual: DMatrix<f64>,
-    /// Factors of the weighted columns of the transient, until the basis is known.
-    columns: Option<QR<f64, Dyn, Dyn>>,
+    /// Weighted columns of the transient; empty once they are in its basis.
+    columns: DMatrix<f64>,
+    /// Weighted effects of the amplitudes of pulses; empty once they are in their covariance.
+    effects: DMatrix<f64>,
 }
 
 /// Residual of the lines of one record.
-pub(super) struct RecordResidual<L> {
+pub(super) struct RecordResidual<'a, L> {
     pub(super) blocks: Vec<Block<L>>,
     /// Weighted columns of the transient of an open record, and its unknowns.
     pub(super) transient: Option<(TransientBasis, DVector<f64>)>,
-    /// Reference frequency of the transient.
-    reference: f64,
+    /// Covariance of the errors of pulses.
+    pub(super) pulses: Option<PulseCovariance>,
+    unknowns: RecordUnknowns<'a>,
+}
+
+/// Values of the linear unknowns of a record.
+struct Fitted<'a> {
+    unknowns: &'a RecordUnknowns<'a>,
+    /// Unknowns of the transient.
+    transient: Option<&'a DVector<f64>>,
+    /// Amplitudes of the errors of pulses, one column.
+    amplitudes: Option<&'a DMatrix<f64>>,
 }
 
 /// Residual at one set of parameters, and what its derivative needs.
-pub(super) struct Evaluation<L> {
+pub(super) struct Evaluation<'a, L> {
     /// Responses of the lines; `None` if they are many, and computed again for the derivative.
-    pub(super) records: Option<Vec<RecordResidual<L>>>,
-    /// Residual of all records, then of the priors.
+    pub(super) records: Option<Vec<RecordResidual<'a, L>>>,
+    /// Residual of all records, then of the amplitudes of pulses and of the priors.
     pub(super) residual: DVector<f64>,
 }
 
@@ -100,63 +122,97 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         records.map(|(_, kind)| transient::len(*kind, self.outputs(), states)).sum()
     }
 
+    /// Number of amplitudes of the errors of all pulses.
+    pub(super) fn amplitudes(&self) -> usize {
+        self.data.pulse_errors().iter().map(PulseErrors::count).sum()
+    }
+
+    /// Index of the first row of the amplitudes of the record that begins at line `first`.
+    fn amplitude_rows(&self, first: usize) -> usize {
+        let before = self.data.pulse_errors().iter().filter(|pulse| pulse.rows().start < first);
+        self.len() + before.map(PulseErrors::count).sum::<usize>()
+    }
+
     /// Returns the residual of a record at `parameters`, without the priors.
     fn record(
         &self,
         parameters: &[f64],
         rows: &Range<usize>,
         kind: Transient,
-    ) -> Option<RecordResidual<M::Line<'a>>> {
-        let unknowns = transient::len(kind, self.outputs(), self.model.dimensions().states);
-        let reference = transient::reference(self.data, rows.clone());
+    ) -> Option<RecordResidual<'a, M::Line<'a>>> {
+        let transient = transient::len(kind, self.outputs(), self.model.dimensions().states);
+        let unknowns = RecordUnknowns::new(self.data, rows, transient);
         let firsts: Vec<usize> = rows.clone().step_by(LINES_AT_ONCE).collect();
         let block = |first: usize| {
             let lines = first..rows.end.min(first + LINES_AT_ONCE);
-            self.block(parameters, lines, (unknowns > 0).then_some((reference, unknowns)))
+            self.block(parameters, lines, &unknowns)
         };
         let blocks: Option<Vec<_>> = firsts.into_par_iter().map(block).collect();
         let mut blocks = blocks?;
+        let mut pulses = None;
+        if unknowns.amplitudes > 0 && !blocks.is_empty() {
+            let effects = blocks.iter_mut().map(|block| std::mem::take(&mut block.effects));
+            let covariance = PulseCovariance::new(effects.collect())?;
+            let residuals = blocks.iter_mut().map(|block| &mut block.residual);
+            let residual = covariance.whiten(&mut residuals.collect::<Vec<_>>());
+            let columns = blocks.iter_mut().map(|block| &mut block.columns);
+            let columns = covariance.whiten(&mut columns.collect::<Vec<_>>());
+            let (first_row, first) = (self.amplitude_rows(rows.start), rows.end);
+            let (lines, effects) = (Vec::new(), DMatrix::zeros(0, 0));
+            blocks.push(Block { first_row, first, lines, residual, columns, effects });
+            pulses = Some(covariance);
+        }
         let mut transient = None;
-        if unknowns > 0 && !blocks.is_empty() {
-            let factors = blocks.iter_mut().filter_map(|block| block.columns.take());
-            let basis = TransientBasis::new(factors.collect())?;
+        if unknowns.transient > 0 && !blocks.is_empty() {
+            let columns: Vec<_> =
+                blocks.iter_mut().map(|block| std::mem::take(&mut block.columns)).collect();
+            columns.iter().flatten().all(|value| value.is_finite()).then_some(())?;
+            let factors = columns.into_par_iter().map(DMatrix::qr).collect();
+            let basis = TransientBasis::new(factors)?;
             let residuals = blocks.iter_mut().map(|block| &mut block.residual);
             let components = basis.remove_from(&mut residuals.collect::<Vec<_>>());
             let fitted = basis.unknowns(&components)?;
             transient = Some((basis, fitted));
         }
         let finite = |block: &Block<_>| block.residual.iter().all(|value| value.is_finite());
-        blocks.iter().all(finite).then_some(RecordResidual { blocks, transient, reference })
+        let record = RecordResidual { blocks, transient, pulses, unknowns };
+        record.blocks.iter().all(finite).then_some(record)
     }
 
-    /// Returns the residual of some lines of a record, with the transient still in it. A
-    /// `transient` is given by its reference frequency and the number of its unknowns.
+    /// Returns the residual of some lines of a record, with the effects of its linear unknowns
+    /// still in it.
     fn block(
         &self,
         parameters: &[f64],
         rows: Range<usize>,
-        transient: Option<(f64, usize)>,
+        unknowns: &RecordUnknowns<'_>,
     ) -> Option<Block<M::Line<'a>>> {
         let (p, first) = (self.outputs(), rows.start);
         let mut residual = DMatrix::zeros(2 * p * rows.len(), 1);
-        let mut columns =
-            DMatrix::zeros(residual.len(), transient.map_or(0, |(_, unknowns)| unknowns));
+        let mut columns = DMatrix::zeros(residual.len(), unknowns.transient);
+        let mut effects = DMatrix::zeros(residual.len(), unknowns.amplitudes);
         let mut lines = Vec::with_capacity(rows.len());
         for row in rows.clone() {
             let (line, weighted, white) = self.whitened(parameters, row)?;
             let part = 2 * p * (row - first)..2 * p * (row - first + 1);
             write_real(white.iter().copied(), &mut residual.as_mut_slice()[part.clone()]);
-            if let Some((reference, _)) = transient {
+            if unknowns.transient + unknowns.amplitudes > 0 {
                 let of_line = weighted_columns(&line, &weighted.lower)?;
-                of_line.for_each(self.data.omega()[row], reference, |at, column| {
-                    write_real(column, &mut columns.column_mut(at).as_mut_slice()[part.clone()]);
+                let omega = self.data.omega()[row];
+                if unknowns.transient > 0 {
+                    of_line.of_transient(omega, unknowns, |at, column| {
+                        let mut to = columns.column_mut(at);
+                        write_real(column, &mut to.as_mut_slice()[part.clone()]);
+                    });
+                }
+                of_line.of_pulses(omega, unknowns, |at, effect| {
+                    let mut to = effects.column_mut(at);
+                    write_real(effect, &mut to.as_mut_slice()[part.clone()]);
                 });
             }
             lines.push((line, weighted));
         }
-        columns.iter().all(|value| value.is_finite()).then_some(())?;
-        let columns = transient.map(|_| columns.qr());
-        Some(Block { first, lines, residual, columns })
+        Some(Block { first_row: 2 * p * first, first, lines, residual, columns, effects })
     }
 
     /// Returns the response at a line, its weights, and L⁻¹e without a transient.
@@ -178,47 +234,59 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         exists.then_some((line, weighted, white))
     }
 
-    /// Returns the Jacobian of the residual of one record, as blocks of rows.
+    /// Returns the Jacobian of the residual of one record, as blocks of rows with the index of their
+    /// first row.
     fn derivative(
         &self,
         parameters: &[f64],
-        record: RecordResidual<M::Line<'a>>,
-    ) -> Option<Vec<DMatrix<f64>>> {
-        let RecordResidual { blocks, transient, reference } = record;
-        let unknowns = transient.as_ref().map(|(_, unknowns)| unknowns);
-        let derivative = |block| self.block_derivative(parameters, block, unknowns, reference);
+        record: RecordResidual<'a, M::Line<'a>>,
+    ) -> Option<Vec<(usize, DMatrix<f64>)>> {
+        let RecordResidual { mut blocks, transient, pulses, unknowns } = record;
+        let amplitudes = pulses.as_ref().and_then(|_| blocks.pop());
+        let mut firsts: Vec<usize> = blocks.iter().map(|block| block.first_row).collect();
+        let fitted = Fitted {
+            unknowns: &unknowns,
+            transient: transient.as_ref().map(|(_, values)| values),
+            amplitudes: amplitudes.as_ref().map(|block| &block.residual),
+        };
+        let derivative = |block| self.block_derivative(parameters, block, &fitted);
         let jacobian: Option<Vec<_>> = blocks.into_par_iter().map(derivative).collect();
         let mut jacobian = jacobian?;
+        if let Some((pulses, block)) = pulses.as_ref().zip(amplitudes.as_ref()) {
+            let of_amplitudes = pulses.whiten(&mut jacobian.iter_mut().collect::<Vec<_>>());
+            jacobian.push(of_amplitudes);
+            firsts.push(block.first_row);
+        }
         if let Some((basis, _)) = &transient {
             basis.remove_from(&mut jacobian.iter_mut().collect::<Vec<_>>());
         }
         let finite = |block: &DMatrix<f64>| block.iter().all(|value| value.is_finite());
-        jacobian.iter().all(finite).then_some(jacobian)
+        jacobian.iter().all(finite).then(|| firsts.into_iter().zip(jacobian).collect())
     }
 
-    /// Returns the Jacobian of some lines, given the `unknowns` of the transient.
+    /// Returns the Jacobian of some lines, given the values of the linear unknowns.
     fn block_derivative(
         &self,
         parameters: &[f64],
         block: Block<M::Line<'a>>,
-        unknowns: Option<&DVector<f64>>,
-        reference: f64,
+        fitted: &Fitted<'_>,
     ) -> Option<DMatrix<f64>> {
         let (p, dimensions) = (self.outputs(), self.model.dimensions());
         let mut jacobian = DMatrix::zeros(block.residual.len(), dimensions.parameters);
         let mut sensitivity = DMatrix::zeros(p, dimensions.parameters);
-        let no_states = DVector::zeros(0);
         for (at, (line, weighted)) in block.lines.iter().enumerate() {
-            let row = block.first + at;
+            let (row, omega) = (block.first + at, self.data.omega()[block.first + at]);
             let part = 2 * p * at..2 * p * (at + 1);
             let input = self.data.inputs().row(row).transpose();
-            let likely = weighted.likely_input(input, &block.white(at, p));
-            let loads = unknowns.filter(|_| dimensions.states > 0).map(|unknowns| {
-                let omega = self.data.omega()[row];
-                transient::state_loads(omega, reference, dimensions.states, unknowns)
-            });
-            let loads = loads.as_ref().unwrap_or(&no_states);
-            line.sensitivity(parameters, &likely, loads, &mut sensitivity);
+            let mut likely = weighted.likely_input(input, &block.white(at, p));
+            if let Some(amplitudes) = fitted.amplitudes {
+                fitted.unknowns.correct(omega, amplitudes, &mut likely);
+            }
+            let loads = fitted.transient.map_or_else(
+                || DVector::zeros(0),
+                |values| fitted.unknowns.state_loads(omega, dimensions.states, values),
+            );
+            line.sensitivity(parameters, &likely, &loads, &mut sensitivity);
             weighted.lower.solve_lower_triangular_mut(&mut sensitivity).then_some(())?;
             for (column, mut to) in sensitivity.column_iter().zip(jacobian.column_iter_mut()) {
                 write_real(column.iter().copied(), &mut to.as_mut_slice()[part.clone()]);
@@ -229,12 +297,12 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
     }
 
     /// Visits the lines of each record with their responses and the factors L of their covariance,
-    /// and the basis of the transient of an open record; `None` if a response does not exist or a
-    /// visit fails.
+    /// and what its linear unknowns consist of; `None` if a response does not exist or a visit
+    /// fails.
     pub(super) fn for_each_record(
         &self,
         parameters: &[f64],
-        mut visit: impl FnMut(&RecordResidual<M::Line<'a>>) -> Option<()>,
+        mut visit: impl FnMut(&RecordResidual<'a, M::Line<'a>>) -> Option<()>,
     ) -> Option<()> {
         for (rows, kind) in self.data.records() {
             visit(&self.record(parameters, rows, *kind)?)?;
@@ -259,7 +327,10 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         let p = self.outputs();
         let mut errors = DMatrix::zeros(self.data.len(), p);
         let mut receptances = Vec::with_capacity(self.data.len());
+        let mut determined_amplitudes = 0.0;
         self.for_each_record(parameters, |record| {
+            determined_amplitudes +=
+                record.pulses.as_ref().map_or(0.0, PulseCovariance::determined);
             for block in &record.blocks {
                 for (at, (line, weighted)) in block.lines.iter().enumerate() {
                     let error = &weighted.lower * block.white(at, p);
@@ -269,7 +340,7 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
             }
             Some(())
         })?;
-        Some(LineErrors { errors, receptances })
+        Some(LineErrors { errors, receptances, determined_amplitudes })
     }
 }
 
@@ -283,24 +354,25 @@ impl<L> Block<L> {
 }
 
 impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
-    type Evaluation = Evaluation<M::Line<'a>>;
+    type Evaluation = Evaluation<'a, M::Line<'a>>;
 
     fn evaluate(&self, parameters: &[f64]) -> Option<Self::Evaluation> {
-        let mut residual = DVector::zeros(self.len() + self.priors.len());
+        let first_prior = self.len() + self.amplitudes();
+        let mut residual = DVector::zeros(first_prior + self.priors.len());
         let states = self.model.dimensions().states;
         let mut records = (self.data.len() * states.pow(2) <= KEPT_RESPONSES).then(Vec::new);
         for (rows, kind) in self.data.records() {
             let record = self.record(parameters, rows, *kind)?;
             for block in &record.blocks {
-                let first = 2 * self.outputs() * block.first;
-                residual.rows_mut(first, block.residual.len()).copy_from(&block.residual);
+                let rows = block.residual.len();
+                residual.rows_mut(block.first_row, rows).copy_from(&block.residual);
             }
             if let Some(records) = &mut records {
                 records.push(record);
             }
         }
         let priors = DVector::from_vec(self.prior_rows(parameters));
-        residual.rows_mut(self.len(), priors.len()).copy_from(&priors);
+        residual.rows_mut(first_prior, priors.len()).copy_from(&priors);
         Some(Evaluation { records, residual })
     }
 
@@ -321,31 +393,31 @@ impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
                 Some(records) => records.next(),
                 None => self.record(parameters, rows, *kind),
             }?;
-            let mut first = 2 * self.outputs() * rows.start;
-            for block in self.derivative(parameters, record)? {
+            for (first, block) in self.derivative(parameters, record)? {
                 jacobian.rows_mut(first, block.nrows()).copy_from(&block);
-                first += block.nrows();
             }
         }
         for (at, prior) in self.priors.iter().enumerate() {
-            jacobian[(self.len() + at, prior.parameter)] = prior.deviation.recip();
+            let row = self.len() + self.amplitudes() + at;
+            jacobian[(row, prior.parameter)] = prior.deviation.recip();
         }
         Some(Linearisation { residual, jacobian })
     }
 }
 
-/// Returns the responses of a line to what its transient consists of, weighted by L⁻¹.
+/// Returns the responses of a line to the linear unknowns of its record, weighted by L⁻¹.
 fn weighted_columns(
     line: &impl LineResponse,
     lower: &DMatrix<Complex<f64>>,
-) -> Option<TransientColumns> {
+) -> Option<LineColumns> {
     let mut states = line.state_response().cloned();
     if let Some(states) = &mut states {
         lower.solve_lower_triangular_mut(states).then_some(())?;
     }
     let mut outputs = DMatrix::identity(lower.nrows(), lower.nrows());
     lower.solve_lower_triangular_mut(&mut outputs).then_some(())?;
-    Some(TransientColumns { states, outputs })
+    let inputs = &outputs * line.receptance();
+    Some(LineColumns { states, outputs, inputs })
 }
 
 /// Returns √2 times the real and imaginary parts of complex rows, each pair of rows together.

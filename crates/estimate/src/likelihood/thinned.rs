@@ -42,9 +42,9 @@ impl<'a, M: ResponseModel> Thinned<'a, M> {
         Self { model, rows, omega }
     }
 
-    /// Returns the data of these lines.
+    /// Returns the data of these lines; the first steps do without the errors of pulses.
     pub(super) fn lines(&self, data: &LineData) -> Option<LineData> {
-        data.rows(&self.rows)
+        data.rows(&self.rows).map(LineData::without_pulse_noise)
     }
 }
 

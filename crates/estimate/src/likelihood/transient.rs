@@ -1,5 +1,8 @@
-//! Transients of open records: linear unknowns, eliminated record by record.
+//! Transients of open records and errors of pulses: linear unknowns, eliminated record by record.
 
+use std::ops::Range;
+
+use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector, Dyn, PermutationSequence, QR};
 use rayon::prelude::*;
@@ -18,31 +21,89 @@ pub(super) fn len(transient: Transient, outputs: usize, states: usize) -> usize 
     }
 }
 
-/// Returns the reference frequency of the powers of s, the highest of the record, so that they are
-/// at most 1.
-pub(super) fn reference(data: &LineData, rows: std::ops::Range<usize>) -> f64 {
-    data.omega()[rows].iter().copied().fold(f64::MIN_POSITIVE, f64::max)
+/// Linear unknowns of a record: those of its transient and the amplitudes of its pulse errors.
+pub(super) struct RecordUnknowns<'a> {
+    /// Number of unknowns of the transient.
+    pub(super) transient: usize,
+    /// Reference frequency of the powers of s, the highest of the record, so that they are at most
+    /// 1.
+    reference: f64,
+    pulses: Vec<&'a PulseErrors>,
+    /// Number of amplitudes of all pulses.
+    pub(super) amplitudes: usize,
 }
 
-/// Weighted responses of a line to what its transient consists of.
-pub(super) struct TransientColumns {
+impl<'a> RecordUnknowns<'a> {
+    /// Returns the unknowns of the record with these rows.
+    pub(super) fn new(data: &'a LineData, rows: &Range<usize>, transient: usize) -> Self {
+        let omega = &data.omega()[rows.clone()];
+        let reference = omega.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let is_of_record = |pulse: &&PulseErrors| pulse.rows() == *rows;
+        let pulses: Vec<_> = data.pulse_errors().iter().filter(is_of_record).collect();
+        let amplitudes = pulses.iter().map(|pulse| pulse.count()).sum();
+        Self { transient, reference, pulses, amplitudes }
+    }
+
+    /// Returns the effects of the amplitudes on a line at `omega` (rad/s): an input and its error,
+    /// for a unit of each amplitude.
+    fn input_errors(&self, omega: f64) -> Vec<(usize, Complex<f64>)> {
+        let mut errors = Vec::with_capacity(self.amplitudes);
+        for pulse in &self.pulses {
+            errors.extend(pulse.at(omega).iter().map(|error| (pulse.input(), *error)));
+        }
+        errors
+    }
+
+    /// Subtracts the errors of the pulses from the measured `input` at a line at `omega` (rad/s).
+    pub(super) fn correct(
+        &self,
+        omega: f64,
+        amplitudes: &DMatrix<f64>,
+        input: &mut DVector<Complex<f64>>,
+    ) {
+        for ((at, error), amplitude) in self.input_errors(omega).into_iter().zip(amplitudes) {
+            input[at] -= error * *amplitude;
+        }
+    }
+
+    /// Returns the amplitudes of the state loads at a line at `omega` (rad/s), given the unknowns
+    /// of the transient.
+    pub(super) fn state_loads(
+        &self,
+        omega: f64,
+        states: usize,
+        unknowns: &DVector<f64>,
+    ) -> DVector<Complex<f64>> {
+        let s = Complex::new(0.0, omega / self.reference);
+        DVector::from_fn(states, |at, _| {
+            (0..STATE_ORDERS)
+                .map(|order| s.powu(order as u32) * unknowns[order * states + at])
+                .sum()
+        })
+    }
+}
+
+/// Weighted responses of a line to the linear unknowns of its record.
+pub(super) struct LineColumns {
     /// L⁻¹ times the response to the state loads, p × states.
     pub(super) states: Option<DMatrix<Complex<f64>>>,
     /// L⁻¹, p × p: the weighted polynomial of every output.
     pub(super) outputs: DMatrix<Complex<f64>>,
+    /// L⁻¹ G, p × q: the weighted receptance.
+    pub(super) inputs: DMatrix<Complex<f64>>,
 }
 
-impl TransientColumns {
+impl LineColumns {
     /// Passes the weighted columns of the transient to `write` with their indices, p entries each:
     /// the response to the state loads in powers of s/ω₀, then a polynomial in s/ω₀ for every
     /// output, which describes aliasing.
-    pub(super) fn for_each(
+    pub(super) fn of_transient(
         &self,
         omega: f64,
-        reference: f64,
+        unknowns: &RecordUnknowns<'_>,
         mut write: impl FnMut(usize, &mut dyn Iterator<Item = Complex<f64>>),
     ) {
-        let s = Complex::new(0.0, omega / reference);
+        let s = Complex::new(0.0, omega / unknowns.reference);
         let states = self.states.iter().flat_map(DMatrix::column_iter);
         let orders = (0..STATE_ORDERS).flat_map(|order| states.clone().map(move |c| (order, c)));
         let outputs = (0..=TRANSIENT_ORDER)
@@ -52,19 +113,20 @@ impl TransientColumns {
             write(at, &mut column.iter().map(|z| z * power));
         }
     }
-}
 
-/// Returns the amplitudes of the state loads at a line from the unknowns of a transient.
-pub(super) fn state_loads(
-    omega: f64,
-    reference: f64,
-    states: usize,
-    unknowns: &DVector<f64>,
-) -> DVector<Complex<f64>> {
-    let s = Complex::new(0.0, omega / reference);
-    DVector::from_fn(states, |at, _| {
-        (0..STATE_ORDERS).map(|order| s.powu(order as u32) * unknowns[order * states + at]).sum()
-    })
+    /// Passes the weighted effects of the amplitudes of the pulse errors on y − G u to `write` with
+    /// their indices, p entries each. They have a negative sign, because the measured inputs u
+    /// contain the errors.
+    pub(super) fn of_pulses(
+        &self,
+        omega: f64,
+        unknowns: &RecordUnknowns<'_>,
+        mut write: impl FnMut(usize, &mut dyn Iterator<Item = Complex<f64>>),
+    ) {
+        for (at, (input, error)) in unknowns.input_errors(omega).into_iter().enumerate() {
+            write(at, &mut self.inputs.column(input).iter().map(|z| -z * error));
+        }
+    }
 }
 
 /// Orthonormal basis Q of the weighted columns A of a transient, by blocks of rows: A P = Q R after

@@ -83,20 +83,21 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
     }
 
     /// Returns the number of residuals (real and imaginary parts) divided by their degrees of
-    /// freedom.
-    fn freedom_ratio(&self, minimum: &Minimum, residual: &Residual<'_, M>) -> f64 {
+    /// freedom; `amplitudes` is the number of determined amplitudes of pulses.
+    fn freedom_ratio(&self, minimum: &Minimum, amplitudes: f64, residual: &Residual<'_, M>) -> f64 {
         let free = minimum.at_bound.iter().filter(|at_bound| !**at_bound).count();
         let unknowns = (free + residual.transient_unknowns()).saturating_sub(self.priors.len());
-        residual.len() as f64 / residual.len().saturating_sub(unknowns).max(1) as f64
+        let spare = residual.len().saturating_sub(unknowns) as f64 - amplitudes;
+        residual.len() as f64 / spare.max(1.0)
     }
 
     /// Estimates the variance of the noise of each output.
     fn levels(&self, weights: &Weights, minimum: &Minimum) -> Result<Vec<f64>, LikelihoodError> {
         let residual = self.residual(weights);
         let failed = LikelihoodError::NoResponse { at: "a minimum of the search" };
-        let LineErrors { errors, receptances } =
+        let LineErrors { errors, receptances, determined_amplitudes } =
             residual.errors(&minimum.parameters).ok_or(failed)?;
-        let factor = self.freedom_ratio(minimum, &residual);
+        let factor = self.freedom_ratio(minimum, determined_amplitudes, &residual);
         let level = |output: usize| {
             let of_line = |row: usize| {
                 let by_inputs = weights.variance_by_inputs(row, output, &receptances[row]);
@@ -145,7 +146,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
     ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), LikelihoodError> {
         let residual = self.residual(&before.weights);
         let failed = || LikelihoodError::NoResponse { at: "a minimum of the search" };
-        let LineErrors { errors, receptances } =
+        let LineErrors { errors, receptances, .. } =
             residual.errors(&before.minimum.parameters).ok_or_else(failed)?;
         let residual_share = self.residual_share(before).ok_or_else(failed)?;
         let power = DMatrix::from_fn(errors.nrows(), errors.ncols(), |row, output| {

@@ -258,6 +258,7 @@ def identify_elements(
     without_hz: Sequence[float | Mapping[str, Any]] = (),
     hits: bool | str | Mapping[str, Any] = False,
     noise: str = "auto",
+    force_noise: float | Sequence[float] | None = None,
     starts: int | None = None,
     seed: int = 0,
     confidence: float = 0.95,
@@ -292,6 +293,9 @@ def identify_elements(
         Find the hits of a hammer test and use the good ones; those without a gap are one record.
     noise : str
         Noise spectrum that weights the lines, as in `identify`.
+    force_noise : float or sequence of float, optional
+        Standard deviation of the noise on the samples of the forces, in N, for open records and
+        hits. Default: estimated above the band that they drive, or between the hits.
     starts : int, optional
         Maximum number of searches. Default: 12.
     seed : int
@@ -339,6 +343,7 @@ def identify_elements(
         "without_hz": json.loads(_without(None, without_hz))["frequencies"],
         "hits": hits,
         "noise": noise,
+        "force_noise": _levels(force_noise),
         "seed": _index("seed", seed) if seed else 0,
         "confidence": float(confidence),
     }

@@ -5,6 +5,8 @@ use mechid_model::elements::{
     Assembly, Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine,
     MatrixElement, Sensor, Speed,
 };
+use mechid_signal::Sampling;
+use mechid_spectra::noise::pulse::PulseNoise;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 
@@ -217,6 +219,56 @@ fn the_jacobian_does_not_depend_on_what_is_kept() {
         [kept, again].map(|evaluation| residual.linearised(&start, evaluation).unwrap());
     assert!(kept.jacobian.norm() > 0.0);
     assert_eq!((kept.residual, kept.jacobian), (again.residual, again.jacobian));
+}
+
+/// With noise on two pulses of an input, Jᵀr is half the gradient of the sum of squares, and the sum
+/// is that of the residual without the pulses' columns but with their covariance.
+#[test]
+fn the_gradient_includes_the_errors_of_pulses() {
+    let assembly = assembly(true);
+    let at = moved(&assembly);
+    let omega: Vec<f64> = (1..60).map(|line| 2.0 * f64::from(line)).collect();
+    let model = MachineModel::new(&assembly, &omega, None, true).unwrap();
+    let open = Transient::Open { sample_interval: 0.01 };
+    let random = |rows: usize, columns: usize, scale: f64| {
+        DMatrix::from_fn(rows, columns, |row, column| {
+            Complex::cis((7 * row * row + 3 * column + row * column) as f64) * scale
+        })
+    };
+    let pulse = |samples: std::ops::Range<usize>| PulseNoise {
+        rows: 0..omega.len(),
+        sampling: Sampling::new(0.01, 400).unwrap(),
+        channel: 0,
+        deviation: 2.0,
+        samples,
+    };
+    let lines = omega.len();
+    let data =
+        LineData::new(omega.clone(), random(lines, 3, 1.0), random(lines, 3, 1e-4), open).unwrap();
+    let data = data.with_pulse_noise(&[pulse(10..16), pulse(200..207)]).unwrap();
+    let weights = Weights::from_variances(&data, &DMatrix::from_element(lines, 3, 1e-10));
+    let residual = Residual { model: &model, data: &data, weights: &weights, priors: &[] };
+    let linearised = residual.linearise(&at).unwrap();
+    assert_eq!(linearised.residual.len(), residual.len() + residual.amplitudes());
+    let gradient = linearised.jacobian.tr_mul(&linearised.residual) * 2.0;
+    let cost = |parameters: &[f64]| residual.evaluate(parameters).unwrap().residual.norm_squared();
+    let without = data.clone().without_pulse_noise();
+    let bare = Residual { model: &model, data: &without, weights: &weights, priors: &[] };
+    let of_bare = bare.evaluate(&at).unwrap().residual.norm_squared();
+    assert!(cost(&at) < 0.99 * of_bare, "{} {of_bare}", cost(&at));
+    for (index, name) in assembly.parameters().iter().map(|p| &p.name).enumerate() {
+        // Rounding of the sum of squares is some 10⁻¹⁰ of its change.
+        let length = linearised.jacobian.column(index).norm();
+        let step = 1e-5 * linearised.residual.norm() / length;
+        let moved = |by: f64| {
+            let mut parameters = at.clone();
+            parameters[index] += by;
+            cost(&parameters)
+        };
+        let difference = (moved(step) - moved(-step)) / (2.0 * step);
+        let scale = length * linearised.residual.norm();
+        assert!((difference - gradient[index]).abs() < 1e-5 * scale, "{name}: {difference}");
+    }
 }
 
 /// Forces on every other line are all among the lines of the first steps, and a short record

@@ -9,5 +9,6 @@ mod generator;
 mod joint;
 mod judge;
 mod open;
+mod pulses;
 mod rotor;
 mod structures;
