@@ -292,6 +292,7 @@ fn kind(model: &NoiseModel) -> &'static str {
         NoiseModel::Smooth { order: 0, .. } => "bands",
         NoiseModel::Smooth { .. } => "smooth with bands",
         NoiseModel::UnmeasuredForce { .. } => "unmeasured force",
+        NoiseModel::Proportional { .. } => "proportional",
         NoiseModel::Neighbours { .. } => "neighbours",
         NoiseModel::PerLine => "per line",
     }

@@ -186,6 +186,12 @@ impl CheckRow {
         self.verdict > Verdict::Good
     }
 
+    /// Returns whether the finding warns and names a delay, a fault of the acquisition or another
+    /// model that explains the residual.
+    pub(crate) fn is_explanation(&self) -> bool {
+        self.is_conspicuous() && matches!(self.finding, Finding::Delay(_) | Finding::Alternative(_))
+    }
+
     /// Returns whether the finding names a fault.
     pub fn is_bad(&self) -> bool {
         self.verdict == Verdict::Bad

@@ -9,7 +9,7 @@ use mechid_model::SecondOrderSystem;
 use mechid_nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_signal::{Record, message};
 use mechid_spectra::{FrequencyData, Lines, NoiseModel};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::checks::CheckRow;
 use super::coherence::ResponseCoherence;
@@ -43,6 +43,9 @@ pub struct Fitted {
     /// Mean square error that omitted terms add to the covariance of the parameters, in the product
     /// of the units of two parameters (parameters × parameters).
     pub omitted: Option<DMatrix<f64>>,
+    /// Square of the change of the parameters by another model that explains the residual (a delay,
+    /// a fault of the acquisition), in the product of the units of two parameters.
+    pub explained: Option<DMatrix<f64>>,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
     /// The spectra of a fit in the frequency domain, and the lines of the first record.
@@ -156,6 +159,7 @@ impl Fitted {
             nonlinear: None,
             error_scale: 1.0,
             omitted: None,
+            explained: None,
             equations: 0,
             frequency: None,
             scattered: None,
@@ -196,7 +200,8 @@ impl Fitted {
 
     /// Scales the standard errors if the checks show more disagreement of the data than noise: by
     /// the scatter of the parts, or the size of the residual. A significant omitted term adds its
-    /// effect. With nonlinear terms the errors remain.
+    /// effect, and a delay or a fault of the acquisition the change that it causes. With nonlinear
+    /// terms the errors remain.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle
@@ -210,6 +215,11 @@ impl Fitted {
         if let Some(beside) = beside.filter(|_| self.nonlinear.is_none()) {
             self.estimate = self.estimate.clone().with_mean_square(&beside)?;
             self.omitted = Some(beside);
+        }
+        let is_explained = checks.iter().any(CheckRow::is_explanation);
+        self.explained = self.explained.take().filter(|_| is_explained);
+        if let Some(square) = self.explained.as_ref().filter(|_| self.nonlinear.is_none()) {
+            self.estimate = self.estimate.clone().with_mean_square(square)?;
         }
         Ok(())
     }
@@ -238,6 +248,12 @@ impl Fitted {
         let mut names: Vec<String> = scaling.map(|check| check.subject.to_string()).collect();
         names.dedup();
         (self.error_scale > 1.0).then(|| scaled_errors(self.error_scale, &names.join(", ")))
+    }
+
+    /// Returns a remark on standard errors that include the change by a model that explains the
+    /// residual.
+    pub(super) fn counted_explanation(&self, checks: &[CheckRow]) -> Option<String> {
+        self.explained.as_ref().and_then(|_| counted_explanation(checks))
     }
 
     /// Returns a remark on standard errors that include the effect of an omitted term.
@@ -331,4 +347,23 @@ pub(super) fn unexplained_motion(
         }
     }
     Ok((all > 0.0).then(|| (unexplained / all).sqrt()))
+}
+
+/// Returns a remark on standard errors that include the change by a model that explains the
+/// residual, if the checks have one.
+pub(super) fn counted_explanation(checks: &[CheckRow]) -> Option<String> {
+    let explanation = checks.iter().find(|check| check.is_explanation())?;
+    Some(format!(
+        "standard errors and intervals include the change of the parameters by what explains the residual (see {})",
+        explanation.subject
+    ))
+}
+
+/// Returns the square of the change from one estimate to another, in the product of the units of
+/// two parameters.
+pub(super) fn squared_change(from: &Estimate, to: &Estimate) -> DMatrix<f64> {
+    let pairs = from.parameters().zip(to.parameters());
+    let change: Vec<f64> = pairs.map(|(from, to)| to.value - from.value).collect();
+    let change = DVector::from_vec(change);
+    &change * change.transpose()
 }

@@ -1,23 +1,24 @@
 //! Fits of the spectral lines of open records, such as those of random tests.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use mechid_checks::{
-    AfterSpectralFit, Finding, RowParts, SpectralResidual, Subject, Verdict, after_spectral_fit,
-    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition, fitted_band,
-    linearity_of_open_record,
+    AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, Subject, Verdict,
+    after_spectral_fit, before_spectral_fit, delay_of_lines, delay_of_open_records,
+    fault_of_acquisition, fitted_band, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
-use mechid_model::Discretisation;
+use mechid_model::{Discretisation, ResponseQuantity};
 use mechid_signal::Extent;
-use mechid_spectra::{FrequencyData, Lines};
+use mechid_spectra::{FrequencyData, Lines, Pooling};
 
 use super::acquisition::Acquisition;
 use super::compared::Compared;
-use super::fitted::{Fitted, Residual};
+use super::fitted::{Fitted, Residual, squared_change};
 use super::force_noise::ForceNoise;
 use super::keywords::Domain;
 use super::left_out::LineRule;
@@ -159,6 +160,11 @@ pub(super) fn fit(
     } else {
         fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?
     };
+    let likelier = likelier(late, fault);
+    let of_cause = likelier.as_ref().and_then(|finding| {
+        refitted_with(finding, &data, records[0].held.response().1, unknowns, noise.response)
+    });
+    let explained = of_cause.map(|other| squared_change(&fit.estimate, &other));
     let sinusoids = sinusoid_rows(records, &fit);
     let joint = joined(&closed)?;
     let prediction = Prediction::Sampled {
@@ -171,8 +177,9 @@ pub(super) fn fit(
         before: vec![Vec::new(); records.len()],
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
         frequency: lines.into_iter().next().map(|lines| (lines, joint)),
-        after_all: bias.into_iter().chain(likelier(late, fault)).chain(parts).collect(),
+        after_all: bias.into_iter().chain(likelier).chain(parts).collect(),
         omitted,
+        explained,
         residuals: residuals
             .into_iter()
             .map(|residual| Residual::Lines(Box::new(residual)))
@@ -269,6 +276,48 @@ fn likelier(one: Option<Finding>, other: Option<Finding>) -> Option<Finding> {
         _ => 1.0,
     };
     one.into_iter().chain(other).min_by(|a, b| remaining(a).total_cmp(&remaining(b)))
+}
+
+/// Returns the estimate with a delay or a fault of the acquisition that a finding names, for
+/// responses of the given quantity; `None` for another finding, or if the fit fails.
+fn refitted_with(
+    finding: &Finding,
+    records: &[FrequencyData],
+    quantity: ResponseQuantity,
+    unknowns: &Unknowns,
+    pooling: Pooling,
+) -> Option<Estimate> {
+    let fit = |records: &[FrequencyData]| {
+        output_error_pooling(&joined(records).ok()?, unknowns, pooling).ok()
+    };
+    let each = |change: &dyn Fn(&FrequencyData) -> FrequencyData| -> Vec<FrequencyData> {
+        records.iter().map(change).collect()
+    };
+    let cause = match finding {
+        Finding::Delay(delay) => &Cause::Delay { seconds: delay.seconds },
+        Finding::Alternative(alternative) => &alternative.cause,
+        _ => return None,
+    };
+    let refitted = match cause {
+        Cause::Delay { seconds } => fit(&each(&|data| data.with_later_force(*seconds)))?,
+        Cause::AcCoupling { channels, corner_hz } => {
+            let of = |wanted: Quantity| -> Vec<usize> {
+                let channels = channels.iter().filter(|channel| channel.quantity == wanted);
+                channels.map(|channel| channel.index).collect()
+            };
+            let (responses, forces) = (of(Quantity::Response(quantity)), of(Quantity::Force));
+            let corner = TAU * corner_hz;
+            fit(&each(&|data| data.with_high_pass_alike(&responses, &forces, corner)))?
+        }
+        Cause::BetweenSamples { between_samples } => {
+            let acquisition =
+                Acquisition { between_samples: Some(*between_samples), ..Acquisition::default() };
+            let dt = records[0].open_record(0)?.sampling.dt();
+            acquisition.refitted(fit(records)?, records, dt, unknowns, pooling).ok()?.0
+        }
+        _ => return None,
+    };
+    Some(refitted.estimate)
 }
 
 /// Returns the failure of a search, with a delay of the responses as its reason if there is one.

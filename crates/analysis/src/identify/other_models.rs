@@ -11,6 +11,7 @@ use mechid_model::ResponseQuantity;
 use mechid_spectra::{FrequencyData, Pooling};
 use nalgebra::{Complex, DMatrix};
 
+use super::fitted::squared_change;
 use super::response_settings::IdentifyResponses;
 use super::tables::joined;
 use super::tabulated::Tabulated;
@@ -24,45 +25,59 @@ const DECIBELS: f64 = 20.0 / std::f64::consts::LN_10;
 /// Largest level, in dB, that is converted to a magnitude; a larger number is not a level.
 const MAX_LEVEL: f64 = 400.0;
 
-/// Returns the model that explains the responses of tables far better than an `estimate` from their
+/// Returns the model that explains the responses of tables far better than the `result` from their
 /// `data`, if there is one: with a delay, with structural damping, of another quantity, or of
 /// magnitudes given as levels.
 pub(super) fn better_model_of(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
     data: &FrequencyData,
-    estimate: &Estimate,
-) -> Option<Finding> {
-    let likely = output_error_pooling(data, estimate.unknowns(), Pooling::AllLines).ok();
-    let estimate = likely.as_ref().map_or(estimate, |likely| &likely.estimate);
+    result: &Estimate,
+) -> Option<BetterModel> {
+    let likely = output_error_pooling(data, result.unknowns(), Pooling::AllLines).ok();
+    let estimate = likely.as_ref().map_or(result, |likely| &likely.estimate);
     let fitted = modelled(data, data, estimate)?;
     let (mut causes, mut models) = (Vec::new(), Vec::new());
-    let mut add = |cause, model| {
-        causes.push(cause);
+    let mut add = |cause, model, estimate: Option<Estimate>| {
+        causes.push((cause, estimate));
         models.push(model);
     };
-    if let Some((seconds, model)) = delayed(data, estimate) {
-        add(Cause::Delay { seconds }, model);
+    if let Some((seconds, fit)) = delayed(data, estimate) {
+        let model = modelled(data, &data.with_later_force(seconds), &fit);
+        model.into_iter().for_each(|model| {
+            add(Cause::Delay { seconds }, model, Some(fit.clone()));
+        });
     }
     if let Some(fit) = structural_damping(data, estimate.unknowns()) {
         let model = in_measured_quantity(data, &fit.displacement);
         let model = ModelledResponses { modelled: model, ..fitted.clone() };
-        add(Cause::StructuralDamping { loss_factor: fit.loss_factor }, model);
+        add(Cause::StructuralDamping { loss_factor: fit.loss_factor }, model, None);
     }
     if tables.iter().all(|table| table.added_decay.is_none()) {
         let stated = data.measured();
         for quantity in ResponseQuantity::ALL.into_iter().filter(|other| *other != stated) {
             let model = refitted(tables, how, quantity, estimate, &|z| z);
-            model.into_iter().for_each(|model| add(Cause::Quantity { quantity, stated }, model));
+            let cause = || Cause::Quantity { quantity, stated };
+            model.into_iter().for_each(|model| add(cause(), model, None));
         }
         for sign in [1.0, -1.0] {
             let model = level_responses(tables, how, stated, estimate, sign);
-            model.into_iter().for_each(|model| add(Cause::Decibels, model));
+            model.into_iter().for_each(|model| add(Cause::Decibels, model, None));
         }
     }
     let deviation = deviation(data);
     let (best, remaining) = better_model(data.omega(), deviation.as_ref(), &fitted, &models)?;
-    Some(Finding::Alternative(Alternative { cause: causes.swap_remove(best), remaining }))
+    let (cause, other) = causes.swap_remove(best);
+    let finding = Finding::Alternative(Alternative { cause, remaining });
+    Some(BetterModel { finding, change: other.map(|other| squared_change(result, &other)) })
+}
+
+/// A model that explains the responses far better.
+pub(super) struct BetterModel {
+    pub(super) finding: Finding,
+    /// Square of the change of the parameters by this model, in the product of the units of two
+    /// parameters; `None` if its parameters have another meaning.
+    pub(super) change: Option<DMatrix<f64>>,
 }
 
 /// Converts displacements to the measured quantity.
@@ -107,15 +122,15 @@ fn deviation(data: &FrequencyData) -> Option<DMatrix<f64>> {
     deviation.iter().all(|deviation| *deviation > 0.0).then_some(deviation)
 }
 
-/// Returns the delay of the best fit, in s, and the responses with it.
-fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, ModelledResponses)> {
+/// Returns the delay of the best fit, in s, and this fit.
+fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, Estimate)> {
     let (mut fit, mut seconds) = (estimate.clone(), 0.0);
     for _ in 0..DELAY_ROUNDS {
         seconds = delay_of_responses(data, estimate.unknowns(), &fit)?;
         let late = data.with_later_force(seconds);
         fit = output_error_pooling(&late, estimate.unknowns(), Pooling::AllLines).ok()?.estimate;
     }
-    Some((seconds, modelled(data, &data.with_later_force(seconds), &fit)?))
+    Some((seconds, fit))
 }
 
 /// Returns the responses of a fit to tables whose numbers are reinterpreted as another quantity.

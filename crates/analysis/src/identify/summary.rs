@@ -212,6 +212,7 @@ impl IdentificationSummary {
             .chain(fitted.few_equations())
             .chain(fitted.scaled_errors(&self.checks))
             .chain(fitted.counted_term())
+            .chain(fitted.counted_explanation(&self.checks))
             .chain(determined::modes_alone(fitted, modes))
             .chain(self.doubts())
             .chain(least_squares_remark(fitted, &self.checks))

@@ -7,16 +7,17 @@ use mechid_checks::{
     Finding, Subject, Verdict, adjust_p_values, before_spectral_fit, constant_phase, gain_symmetry,
     instability, mass_symmetry, negative_mass, unrelated_response,
 };
-use mechid_estimate::frequency_domain::{equation_error, output_error_pooling};
+use mechid_estimate::frequency_domain::{equation_error, output_error_of_table};
 use mechid_estimate::{Estimate, ResponseEstimate, Unknowns, output_error_of_responses};
 use mechid_io::{FrequencyResponses, ParameterCovariance, SystemMatrices};
 use mechid_model::SecondOrderSystem;
-use mechid_spectra::{FrequencyData, NoiseModel, Pooling};
+use mechid_spectra::{FrequencyData, NoiseModel};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::added_decay;
 use super::checks::{CheckRow, When};
-use super::fitted::{Misfit, unexplained_motion};
+use super::fitted::{Misfit, counted_explanation, unexplained_motion};
 use super::other_models::better_model_of;
 use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
@@ -39,8 +40,8 @@ use crate::text::{compact, paragraph, significant};
 /// together; each needs the response at every point where a force acts.
 ///
 /// Maximum likelihood weights every response by its variance: from its standard error if the table
-/// has one, otherwise from coherence and averages. Without either, the noise is assumed white, with
-/// the level of the residual.
+/// has one, otherwise from coherence and averages. Without either, the noise is white, in
+/// proportion to the response, or the sum of both, as the residual shows.
 ///
 /// # Errors
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoResponse`] if a response is missing,
@@ -80,11 +81,18 @@ pub fn identify_responses(
     let first = measured.first().ok_or(AnalysisError::NoRecord)?;
     let unexplained = unexplained_motion(&data, &fit.estimate.system()?)?;
     let fitted = OfFit { fit: &fit, of_machine: &of_machine, data: &data, unexplained };
-    let checks = fitted.checks(tables, &measured, how, before, unscaled.is_some())?;
-    let estimate = &of_machine;
-    let system = estimate.system()?;
+    let (checks, change) = fitted.checks(tables, &measured, how, before, unscaled.is_some())?;
+    // An exponential window changes damping and stiffness, so that the change is not theirs.
+    let change = change.filter(|_| added_decay.is_none() && unscaled.is_none());
     let mut remarks = remarks(tables, &measured, added_decay, &fit, &of_machine, unscaled.as_ref());
     remarks.extend(fitted.residual_remarks(&checks, tables, how));
+    remarks.extend(change.as_ref().and_then(|_| counted_explanation(&checks)));
+    let of_machine = match &change {
+        Some(square) => of_machine.with_mean_square(square)?,
+        None => of_machine,
+    };
+    let estimate = &of_machine;
+    let system = estimate.system()?;
     let summary = ResponseSummary {
         files: tables.iter().map(|table| table.file.clone()).collect(),
         estimator: fit.name,
@@ -137,7 +145,8 @@ impl OfFit<'_> {
         remarks
     }
 
-    /// Returns the checks of the tables before and after the fit.
+    /// Returns the checks of the tables before and after the fit, and the square of the change of the
+    /// parameters by a model that explains the responses far better.
     fn checks(
         &self,
         tables: &[FrequencyResponses],
@@ -145,7 +154,7 @@ impl OfFit<'_> {
         how: &IdentifyResponses,
         before: Vec<Finding>,
         is_unscaled: bool,
-    ) -> Result<Vec<CheckRow>, AnalysisError> {
+    ) -> Result<(Vec<CheckRow>, Option<DMatrix<f64>>), AnalysisError> {
         let mut findings: Vec<(When, Option<String>, Finding)> =
             before.into_iter().map(|finding| (When::Before, None, finding)).collect();
         let named = |table: &FrequencyResponses| (tables.len() > 1).then(|| table.file.clone());
@@ -168,9 +177,11 @@ impl OfFit<'_> {
         }
         let is_left =
             |finding: &Finding| finding.verdict() > Verdict::Good && is_of_residual(finding);
-        let mut after = Vec::new();
+        let (mut after, mut change) = (Vec::new(), None);
         if findings.iter().any(|(_, _, finding)| is_left(finding)) {
-            after.extend(better_model_of(tables, how, self.data, &fit.estimate));
+            let better = better_model_of(tables, how, self.data, &fit.estimate);
+            change = better.as_ref().and_then(|better| better.change.clone());
+            after.extend(better.map(|better| better.finding));
         }
         let unknowns = fit.estimate.unknowns();
         let of_one = unknowns.independent().div_ceil(unknowns.dof().max(1));
@@ -187,7 +198,7 @@ impl OfFit<'_> {
         let row = |(when, name, finding): (When, Option<String>, Finding)| {
             CheckRow::new(when, name, &finding, &Channels::default())
         };
-        Ok(findings.into_iter().map(row).collect())
+        Ok((findings.into_iter().map(row).collect(), change))
     }
 }
 
@@ -471,7 +482,7 @@ impl Fit {
         };
         let fit = match &averaged {
             Some(of_segments) => of_segments.fit.clone(),
-            None => output_error_pooling(data, unknowns, Pooling::AllLines)?,
+            None => output_error_of_table(data, unknowns)?,
         };
         let noise = measured[0].noise;
         let name = match noise {

@@ -155,6 +155,16 @@ fn a_late_response_is_told_by_its_delay() {
             );
         }
     }
+    // The intervals include the change of the parameters by the delay.
+    let found = identify(&[late(3.3, 0)], &Identify::default()).unwrap();
+    let system = rig().system;
+    let truth = [system.mass(), system.damping(), system.stiffness()];
+    let truth =
+        truth.iter().flat_map(|matrix| matrix.transpose().iter().copied().collect::<Vec<_>>());
+    let held = found.estimate().parameters().zip(truth);
+    let held = held.filter(|(p, exact)| (p.value - exact).abs() < 1.96 * p.standard_error);
+    let (held, all) = (held.count(), found.estimate().parameters().len());
+    assert!(10 * held >= 9 * all, "{held} of {all}: {found}");
     let both = told(&[late(0.5, 4), late(0.5, 5)]);
     assert!(matches!(both[..], [found] if (found - 0.5).abs() < 0.02), "{both:?}");
 }

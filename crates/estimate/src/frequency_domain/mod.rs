@@ -72,7 +72,9 @@ pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use output_error::in_units_of_noise;
-pub use output_error::{output_error, output_error_near, output_error_pooling};
+pub use output_error::{
+    output_error, output_error_near, output_error_of_table, output_error_pooling,
+};
 pub use output_error_fit::{EndLoads, OutputErrorFit};
 pub use parts::{
     Difference, OmittedTerm, OmittedTerms, Part, PartsComparison, PartsOfFit, Power, SampledRows,

@@ -14,7 +14,7 @@ use super::multi_start::search;
 use super::output_error_fit::{
     OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare, uncertain_weights,
 };
-use super::unknown_noise::with_unknown_noise;
+use super::unknown_noise::{with_response_noise, with_unknown_noise};
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -85,6 +85,25 @@ pub fn output_error_pooling(
     residual: Pooling,
 ) -> Result<OutputErrorFit, EstimateError> {
     search_near(data, unknowns, None, residual)
+}
+
+/// Estimates as [`output_error`] from frequency responses; where the data state no noise, that of
+/// each response is white, in proportion to the response, or the sum of both, as the residual shows.
+///
+/// # Errors
+/// As [`output_error`].
+///
+/// # Source
+/// As [`output_error`]; Schwarz (1978), Annals of Statistics 6, 461–464, for the choice.
+pub fn output_error_of_table(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+) -> Result<OutputErrorFit, EstimateError> {
+    equation_error(data, unknowns)?.check_determined()?;
+    match data.noise() {
+        Some(noise) => with_known_noise(data, unknowns, noise, None),
+        None => with_response_noise(data, unknowns),
+    }
 }
 
 fn search_near(

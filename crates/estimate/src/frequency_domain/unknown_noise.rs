@@ -6,7 +6,7 @@ use mechid_model::SecondOrderSystem;
 use mechid_numerics::NumericsError;
 use mechid_numerics::gauss_newton::SumOfSquares;
 use mechid_spectra::SpectraError;
-use mechid_spectra::noise::level::motion_level;
+use mechid_spectra::noise::level::{ResponseNoise, motion_level};
 use mechid_spectra::sinusoids;
 use mechid_spectra::sinusoids::Sinusoid;
 use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling};
@@ -57,12 +57,99 @@ pub(super) fn with_unknown_noise(
         _ if is_rounding => None,
         _ => with_coloured_noise(data, unknowns, &white, pooling)?,
     };
-    let is_white = coloured.is_none();
-    let Weighted { fit, noise } = coloured.unwrap_or(white);
+    let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
+    let weighted = coloured.map_or((white, true), |coloured| (coloured, false));
+    let fit = finished(data, unknowns, weighted, of_sinusoids)?;
+    Ok(OutputErrorFit { sinusoids, ..fit })
+}
+
+/// Estimates the parameters of responses whose noise is white, in proportion to the response, or
+/// the sum of both: as in tables of frequency responses, whose averages are often equally coherent
+/// on all lines.
+pub(super) fn with_response_noise(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+) -> Result<OutputErrorFit, EstimateError> {
+    let (white, is_rounding) = with_white_noise(data, unknowns, None, None)?;
+    let proportional =
+        if is_rounding { None } else { with_proportional_noise(data, unknowns, &white)? };
+    let weighted = proportional.map_or((white, true), |proportional| (proportional, false));
+    finished(data, unknowns, weighted, 0)
+}
+
+/// Fits with noise of the responses that is chosen from the residual of the previous fit; `None` if
+/// it is white.
+fn with_proportional_noise(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    white: &Weighted,
+) -> Result<Option<Weighted>, EstimateError> {
+    let mut last: Option<Weighted> = None;
+    for _ in 0..COLOURED_ROUNDS {
+        let before = last.as_ref().unwrap_or(white);
+        let Some(noise) = response_noise(data, unknowns, before)? else { return Ok(None) };
+        let mut misfit = Misfit::new(data, unknowns, &noise)?;
+        match before.fit.clone().followed(&mut misfit) {
+            Ok(fit) => last = Some(Weighted { fit, noise }),
+            // The result is the previous fit, with its weights.
+            Err(_) => break,
+        }
+    }
+    Ok(last)
+}
+
+/// Chooses the noise of each channel from the residual of a fit; `None` if all are white.
+fn response_noise(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    before: &Weighted,
+) -> Result<Option<NoiseSpectrum>, EstimateError> {
+    let mut misfit = Misfit::new(data, unknowns, &before.noise)?;
+    misfit.try_at(&before.fit.minimum.parameters).ok_or(NumericsError::Overflow)?;
+    misfit.accept();
+    let errors = misfit.errors();
+    let modelled = data.displacement() - &errors;
+    let scale = |row: usize| data.measured().per_displacement(data.omega()[row]).norm_sqr();
+    let power = |of: &DMatrix<Complex<f64>>, row: usize, channel: usize| {
+        scale(row) * of[(row, channel)].norm_sqr()
+    };
+    let of_channel = |channel: usize| {
+        let pairs = (0..data.len())
+            .map(|row| (power(&errors, row, channel), power(&modelled, row, channel)));
+        ResponseNoise::choose(&pairs.collect::<Vec<_>>())
+    };
+    let channels: Vec<ResponseNoise> = (0..data.dof()).map(of_channel).collect();
+    if channels.iter().all(|noise| noise.relative == 0.0) {
+        return Ok(None);
+    }
+    let n = data.dof();
+    let covariance = (0..data.len()).map(|row| {
+        DMatrix::from_fn(2 * n, 2 * n, |i, j| {
+            let is_output = i == j && i < n;
+            let variance = if is_output {
+                channels[i].variance(power(&modelled, row, i)) / scale(row)
+            } else {
+                0.0
+            };
+            Complex::from(variance)
+        })
+    });
+    let noise = NoiseSpectrum::new(data.omega().to_vec(), covariance.collect())?;
+    let with_white = channels.iter().any(|noise| noise.white > 0.0);
+    Ok(Some(noise.with_model(NoiseModel::Proportional { with_white })))
+}
+
+/// Returns the result of a fit in white or other noise, which the flag states, with the number of
+/// unknowns `of_sinusoids`.
+fn finished(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    (Weighted { fit, noise }, is_white): (Weighted, bool),
+    of_sinusoids: usize,
+) -> Result<OutputErrorFit, EstimateError> {
     let mut misfit = Misfit::new(data, unknowns, &noise)?;
     misfit.try_at(&fit.minimum.parameters).ok_or(NumericsError::Overflow)?;
     misfit.accept();
-    let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
     let free = spare(data, unknowns).saturating_sub(of_sinusoids);
     let level = fit.minimum.cost / free.max(1) as f64;
     let inflation = if is_white {
@@ -81,7 +168,7 @@ pub(super) fn with_unknown_noise(
         noise: if is_white { vec![NoiseModel::White] } else { noise.models().to_vec() },
         spectrum: noise.clone(),
     };
-    Ok(OutputErrorFit { sinusoids, ..finish(data, unknowns, &mut misfit, &fit, scale)? })
+    finish(data, unknowns, &mut misfit, &fit, scale)
 }
 
 /// A fit in white noise to open records without the sinusoids that its residual shows.

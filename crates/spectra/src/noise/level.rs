@@ -1,4 +1,4 @@
-//! Level of white noise in addition to known noise.
+//! Levels of noise: white in addition to known noise, and in proportion to a response.
 
 use crate::limits::{LEVEL_LEAST, LEVEL_ROUNDS, LEVEL_SETTLED};
 
@@ -32,11 +32,97 @@ pub fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
     variance.sqrt().max(f64::MIN_POSITIVE)
 }
 
+/// Noise of a response: the sum of a white part and of a part in proportion to the response.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResponseNoise {
+    /// Variance of the white part, in the square of the unit of the response.
+    pub white: f64,
+    /// Ratio of the variance of the other part to the squared magnitude of the response.
+    pub relative: f64,
+}
+
+impl ResponseNoise {
+    /// Chooses the most likely noise of residuals, which are circular Gaussian numbers: white, in
+    /// proportion to the response, or, if Schwarz's criterion accepts its second unknown, the sum of
+    /// both. Each residual is a pair of its squared magnitude and that of the response.
+    ///
+    /// # Source
+    /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring);
+    /// Schwarz (1978), Annals of Statistics 6, 461–464.
+    pub fn choose(residuals: &[(f64, f64)]) -> Self {
+        let count = residuals.len().max(1) as f64;
+        let white = residuals.iter().map(|(power, _)| power).sum::<f64>() / count;
+        let white = Self { white: white.max(f64::MIN_POSITIVE), relative: 0.0 };
+        let largest = residuals.iter().map(|(_, response)| *response).fold(0.0, f64::max);
+        let ratios = residuals.iter().map(|(power, response)| power / response);
+        let relative = Self { white: 0.0, relative: ratios.sum::<f64>() / count };
+        let one = if largest > 0.0 && relative.cost(residuals) < white.cost(residuals) {
+            relative
+        } else {
+            white
+        };
+        let both = Self { white: 0.5 * white.white, relative: 0.5 * white.white / largest };
+        let penalty = 0.5 * count.ln();
+        match both.scored(residuals) {
+            Some(both) if both.cost(residuals) + penalty < one.cost(residuals) => both,
+            _ => one,
+        }
+    }
+
+    /// Returns the variance of the noise of a response with this squared magnitude.
+    pub fn variance(&self, response: f64) -> f64 {
+        self.white + self.relative * response
+    }
+
+    /// Returns minus the log likelihood, up to a constant; infinite without a likelihood.
+    fn cost(&self, residuals: &[(f64, f64)]) -> f64 {
+        let term = |(power, response): &(f64, f64)| {
+            let variance = self.variance(*response);
+            variance.ln() + power / variance
+        };
+        let cost: f64 = residuals.iter().map(term).sum();
+        if cost.is_finite() { cost } else { f64::INFINITY }
+    }
+
+    /// Returns the most likely two parts; `None` if one of them is not positive.
+    fn scored(mut self, residuals: &[(f64, f64)]) -> Option<Self> {
+        for _ in 0..LEVEL_ROUNDS {
+            // Weighted normal equations of the powers v = s² + r² |x|².
+            let [mut ss, mut sr, mut rr, mut sp, mut rp] = [0.0; 5];
+            for (power, response) in residuals {
+                let weight = self.variance(*response).powi(-2);
+                ss += weight;
+                sr += weight * response;
+                rr += weight * response * response;
+                sp += weight * power;
+                rp += weight * response * power;
+            }
+            let determinant = ss * rr - sr * sr;
+            let white = (rr * sp - sr * rp) / determinant;
+            let relative = (ss * rp - sr * sp) / determinant;
+            if !(white.is_finite() && relative.is_finite()) {
+                return None;
+            }
+            let before = self;
+            // As in `motion_level`, the decrease per step is limited.
+            self = Self {
+                white: white.max(0.1 * before.white),
+                relative: relative.max(0.1 * before.relative),
+            };
+            let settled = |now: f64, before: f64| (now - before).abs() <= LEVEL_SETTLED * before;
+            if settled(self.white, before.white) && settled(self.relative, before.relative) {
+                return (white > 0.0 && relative > 0.0).then_some(self);
+            }
+        }
+        None
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use mechid_signal::{Sampling, noise};
 
-    use super::motion_level;
+    use super::{ResponseNoise, motion_level};
 
     /// Powers of lines with the variances s² + g.
     fn powers(level: f64, known: &[f64], seed: u64) -> Vec<(f64, f64)> {
@@ -74,5 +160,33 @@ mod tests {
         let residuals: Vec<(f64, f64)> = known.iter().map(|g| (0.5 * g, *g)).collect();
         let level = motion_level(residuals.into_iter());
         assert!((0.0..1e-4).contains(&level), "{level}");
+    }
+
+    /// Of 200 sets of 300 lines near a resonance the right form is chosen in nearly all, with the
+    /// right levels.
+    #[test]
+    fn noise_in_proportion_to_a_response_is_recognised() {
+        let response: Vec<f64> =
+            (0..300).map(|l| 1e4 / (1.0 + (0.1 * (f64::from(l) - 150.0)).powi(2))).collect();
+        for (white, relative) in [(1.0, 0.0), (0.0, 0.01), (2.0, 0.01)] {
+            let (mut right, mut sums) = (0, [0.0; 2]);
+            for seed in 0..200 {
+                let known: Vec<f64> = response.iter().map(|x| white + relative * x).collect();
+                let residuals: Vec<(f64, f64)> = powers(0.0, &known, seed)
+                    .into_iter()
+                    .zip(&response)
+                    .map(|((power, _), x)| (power, *x))
+                    .collect();
+                let got = ResponseNoise::choose(&residuals);
+                sums = [sums[0] + got.white / 200.0, sums[1] + got.relative / 200.0];
+                right += u32::from(
+                    (got.white > 0.0, got.relative > 0.0) == (white > 0.0, relative > 0.0),
+                );
+            }
+            // Schwarz's criterion adds a part that is not there in 1.7 % of large sets.
+            assert!(right >= 188, "{white} {relative}: {right}");
+            assert!((sums[0] - white).abs() < 0.05 * white + 0.02, "{sums:?}");
+            assert!((sums[1] - relative).abs() < 0.05 * relative + 1e-5, "{sums:?}");
+        }
     }
 }

@@ -107,6 +107,11 @@ pub enum NoiseModel {
         /// Bands in which the forces have other levels: lowest and highest line, in Hz.
         bands_hz: Vec<[f64; 2]>,
     },
+    /// Noise in proportion to the magnitude of the response.
+    Proportional {
+        /// `true` if white noise is added.
+        with_white: bool,
+    },
     /// Means over neighbouring lines.
     Neighbours {
         /// Number of lines to either side.
@@ -137,6 +142,10 @@ impl fmt::Display for NoiseModel {
                     0 => Ok(()),
                     more => write!(f, " and in {}", message::count(more, "more band")),
                 }
+            }
+            Self::Proportional { with_white } => {
+                f.write_str("in proportion to the response")?;
+                f.write_str(if *with_white { ", plus white noise" } else { "" })
             }
             Self::Neighbours { half_width } => {
                 write!(f, "averaged over {}", message::count(2 * half_width + 1, "line"))

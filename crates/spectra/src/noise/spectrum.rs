@@ -221,6 +221,12 @@ impl NoiseSpectrum {
         self.total_degrees_of_freedom
     }
 
+    /// Returns the same noise with the form that was chosen for it.
+    #[must_use]
+    pub fn with_model(self, model: NoiseModel) -> Self {
+        Self { models: vec![model], ..self }
+    }
+
     /// Returns the forms of the estimated spectra, one for each experiment; empty for known noise.
     pub fn models(&self) -> &[NoiseModel] {
         &self.models
