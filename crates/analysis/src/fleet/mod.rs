@@ -26,7 +26,7 @@ mod table;
 mod trends;
 mod worker;
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -100,10 +100,13 @@ impl Fleet {
             return Err(AnalysisError::Setting { setting: "part_records", why });
         }
         let folder = folder.as_ref();
-        let mut files = Vec::new();
+        let mut files: Vec<PathBuf> = Vec::new();
         for record in records {
             refuse_results(record, folder)?;
-            files.extend(files_of(record)?);
+            // Without `./`, because both spellings are one record.
+            let is_named = |part: &Component<'_>| *part != Component::CurDir;
+            let files_of = files_of(record)?.into_iter();
+            files.extend(files_of.map(|file| file.components().filter(is_named).collect()));
         }
         files.sort();
         files.dedup();

@@ -1,8 +1,10 @@
 //! Unit of work: a part of the records.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
-use mechid_io::{FileStamp, RecordRows, read_parquet_metadata, write_parquet};
+use mechid_io::{FileStamp, IoError, RecordRows, path_text, read_parquet_metadata, write_parquet};
 use serde::{Deserialize, Serialize};
 
 use super::failures::FailureCount;
@@ -57,7 +59,7 @@ type ComputeRows<'a> =
 pub struct PartDone {
     /// Name of its file in the folder of results.
     pub file_name: String,
-    /// Number of records and of rows.
+    /// Number of records; the part has one row for each.
     pub records: usize,
     /// Counts of records without a result, by the reason.
     pub failures: Vec<FailureCount>,
@@ -129,6 +131,11 @@ impl Part {
     ) -> Result<PartDone, AnalysisError> {
         let path = folder.join(&self.file_name);
         if let Some(done) = self.done(&path) {
+            // The rows of the last run count, also those that an earlier one had computed.
+            let touched = File::options().append(true).open(&path);
+            let touched = touched.and_then(|file| file.set_modified(SystemTime::now()));
+            let file = path_text(&path).into_owned();
+            touched.map_err(|source| IoError::Write { file, source })?;
             return Ok(done);
         }
         let mut rows = Vec::with_capacity(self.records.len());

@@ -219,7 +219,7 @@ impl Worker {
         let listener = thread::Builder::new().spawn(move || {
             let (mut said, mut errors) = (Vec::new(), errors);
             let _ = errors.by_ref().take(LONGEST_MESSAGE).read_to_end(&mut said);
-            // The rest is read, too, for a full pipe would stop the process.
+            // The rest is read, too, because a full pipe would block the process.
             let _ = io::copy(&mut errors, &mut io::sink());
             String::from_utf8_lossy(&said).into_owned()
         });

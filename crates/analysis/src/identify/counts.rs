@@ -25,7 +25,7 @@ pub(super) fn check(
     };
     let rows: usize = records.iter().map(samples).sum();
     let terms = match &how.source {
-        Source::Terms(fit) => fit.terms.terms.len(),
+        Source::Terms(fit) => fit.terms.terms.len() + fit.terms.candidates.len(),
         _ => 0,
     };
     // Some equation of motion has at least this number of unknowns.

@@ -31,6 +31,9 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
 
     let again: Value = serde_json::from_slice(&program(home.path(), run).stdout).unwrap();
     assert_eq!(again["computed_records"], 0);
+    let dotted = run.replace("fleet day", "fleet ./day ././day/a.csv");
+    let again: Value = serde_json::from_slice(&program(home.path(), &dotted).stdout).unwrap();
+    assert_eq!((&again["records"], &again["computed_records"]), (&3.into(), &0.into()));
 
     fs::write(home.path().join("day/d.csv"), "").unwrap();
     let failed = program(home.path(), run);
@@ -57,6 +60,23 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     assert!(home.path().join("trends.svg").exists());
     let refused = program(home.path(), "trends day");
     assert_eq!(refused.status.code(), Some(2));
+
+    // The rows of the last run count, also if an earlier one had computed them.
+    let of_other =
+        analysis.replace("\"window\"", "\"identify\": {\"method\": \"least-squares\"}, \"window\"");
+    fs::write(home.path().join("other.json"), of_other).unwrap();
+    let values = || {
+        let trends = program(home.path(), "trends out/more --json");
+        let trends: Value = serde_json::from_slice(&trends.stdout).unwrap();
+        trends["series"][0]["points"].clone()
+    };
+    let run = run.replace("out/results", "out/more");
+    program(home.path(), &run);
+    let of_first = values();
+    program(home.path(), &run.replace("analysis.json", "other.json"));
+    assert_ne!(values(), of_first);
+    let again: Value = serde_json::from_slice(&program(home.path(), &run).stdout).unwrap();
+    assert_eq!((&again["computed_records"], values()), (&0.into(), of_first));
 
     // An error in the settings is an error of the run, not of a record.
     fs::write(home.path().join("analysis.json"), "{}").unwrap();
