@@ -46,7 +46,7 @@ impl Check for CrossCorrelation {
             (_, false) => "; uncorrelated",
             (_, true) => {
                 "; the residual is correlated with the force: the model misses part of the \
-                 response; try another degree of freedom, or another level of the force"
+                 response; add a degree of freedom, or repeat the test at another force level"
             }
         })
     }

@@ -84,7 +84,7 @@ impl Check for Leakage {
         let Self { mode, frequency_hz, lines, samples_needed, settled } = self;
         write!(
             f,
-            "the resonance of mode {} ({frequency_hz:.4} Hz) is {} lines of a segment wide",
+            "the half-power width of the resonance of mode {} ({frequency_hz:.4} Hz) is {} line spacings of a segment",
             mode + 1,
             three_digits(*lines)
         )?;

@@ -276,7 +276,8 @@ pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
 /// takes some seconds.
 pub(crate) const FIT_PRODUCTS: usize = 1 << 32;
 
-/// Number of samples on either side of a run of equal ones that decide about a drop-out.
+/// Number of samples on either side of a run of equal samples that decide whether the run is a
+/// drop-out.
 pub const DROP_OUT_NEIGHBOURS: usize = 64;
 
 /// Minimum standard deviation of the samples on either side of a run of equal ones, in steps of the

@@ -18,7 +18,7 @@ pub struct Quantisation {
     pub channel: Channel,
     /// Number of distinct values.
     pub levels: usize,
-    /// Step between them, in the unit of the channel.
+    /// Step between neighbouring values, in the unit of the channel.
     pub step: f64,
 }
 

@@ -48,7 +48,7 @@ fn spike(x: &[f64]) -> Option<(usize, f64)> {
     let largest = (0..bend.len()).max_by(|a, b| bend[*a].total_cmp(&bend[*b]))?;
     let remaining = (0..bend.len()).filter(|at| at.abs_diff(largest) > 1).map(|at| bend[at]);
     let next = remaining.fold(0.0, f64::max);
-    // A jump, for example of an acceleration under an impact, does not return at the next sample.
+    // A jump, for example of an acceleration under an impact, is not reversed at the next sample.
     let returns = (x[largest + 2] - x[largest]).abs() < RETURN * bend[largest];
     let is_spike = next > 0.0 && bend[largest] > SPIKE * next && returns;
     is_spike.then(|| (largest + 1, bend[largest] / next))

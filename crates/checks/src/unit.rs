@@ -61,7 +61,7 @@ impl Check for Unit {
     }
 }
 
-/// Time column without a unit whose numbers are hardly seconds.
+/// Time column without a unit, whose numbers are probably not in seconds.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TimeUnit {

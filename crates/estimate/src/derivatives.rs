@@ -134,7 +134,7 @@ impl SavitzkyGolay {
         let mut data = DMatrix::zeros(len, record.channels());
         for k in 0..len {
             let start = k.saturating_sub(half).min(len - window);
-            // Near the ends each sample has another kernel, computed when it is needed.
+            // Near the ends each sample has a different kernel, computed when it is needed.
             let end = (k - start != half).then(|| self.kernel(k - start, times, scale));
             let kernel = end.as_ref().unwrap_or(&centre);
             for channel in 0..record.channels() {

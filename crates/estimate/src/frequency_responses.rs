@@ -31,9 +31,8 @@ pub struct ResponseEstimate {
 /// An average over segments smooths a response with |W|², the squared magnitude of the spectrum of
 /// their window. The bias is computed from the identified system and subtracted from the data, and
 /// the fit is repeated, until neither changes. The covariance allows for three things: the window
-/// correlates the errors of neighbouring lines, motions and forces have errors in common, and the
-/// weights are sampled from
-/// few segments.
+/// correlates the errors of neighbouring lines, responses and forces have errors in common, and the
+/// weights are estimated from few segments.
 ///
 /// # Errors
 /// As [`output_error`] and [`Frf::data`];

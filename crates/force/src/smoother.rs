@@ -235,7 +235,8 @@ impl Filter {
                 self.covariance[j * m + i] = p;
             }
         }
-        // The variances before the measurements of the last sample and of this one are compared.
+        // The filter is steady once the predicted variances of this sample and of the one before
+        // agree within the tolerance.
         self.settled = true;
         for (before, now) in self.before.iter_mut().zip(self.covariance.iter().step_by(m + 1)) {
             self.settled &= (now - *before).abs() <= self.tolerance * now.abs();

@@ -113,8 +113,8 @@ pub enum IoError {
         limit: Limit,
     },
     /// The file is JSON, which contains descriptions and reports but no record.
-    #[error("{}", Message(format_args!("{file} is JSON, not a table of samples: simulate, sweep and stability read the description of \
-         an experiment, force --system and modal read a machine or a report of identify")))]
+    #[error("{}", Message(format_args!("{file} is JSON, not a table of samples; simulate, sweep and stability read the description of an \
+         experiment, and modes, predict and force --system read a machine or a result of identify --json")))]
     JsonRecord {
         /// The file.
         file: String,

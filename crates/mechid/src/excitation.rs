@@ -76,7 +76,7 @@ pub enum ExcitationLevel {
 /// One input of one experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignedInput {
-    /// Name of its column.
+    /// Name of the column of this input.
     pub name: String,
     /// The multisine.
     pub multisine: Multisine,

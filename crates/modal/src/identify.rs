@@ -165,7 +165,7 @@ impl<'a> Identification<'a> {
         search.choose_modes();
         search.choose_powers(AKAIKE);
         search.apply_rules();
-        // A mode that is removed may have been all that needed the residual terms.
+        // A removed mode may have been the only reason for the residual terms.
         while search.remove_replaceable() {
             search.choose_powers(lines.schwarz());
             search.apply_rules();

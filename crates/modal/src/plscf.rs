@@ -90,8 +90,8 @@ pub struct ResponseTable {
 }
 
 impl ResponseTable {
-    /// Takes the angular frequencies (rad/s, rising) and the responses H (outputs × inputs) of each
-    /// line.
+    /// Creates a table from the angular frequencies (rad/s, rising) and the responses H (outputs ×
+    /// inputs) of each line.
     ///
     /// # Errors
     /// [`PlscfError::Size`], [`PlscfError::Value`].

@@ -57,12 +57,12 @@ pub struct StabilisationPole {
     pub order: usize,
     /// The pole.
     pub pole: Pole,
-    /// `true` if a pole of the order before is within [`STABLE_FREQUENCY`].
+    /// `true` if a pole of the previous order is within [`STABLE_FREQUENCY`].
     pub stable_frequency: bool,
-    /// `true` if a pole of the order before has a stable frequency and agrees within
+    /// `true` if a pole of the previous order has a stable frequency and agrees within
     /// [`STABLE_DAMPING`].
     pub stable_damping: bool,
-    /// `true` if participation or shape of the nearest pole of the order before agrees within
+    /// `true` if participation or shape of the nearest pole of the previous order agrees within
     /// [`STABLE_VECTOR`].
     pub stable_vector: bool,
 }

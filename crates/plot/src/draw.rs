@@ -35,7 +35,7 @@ fn panel(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {
     sheet.open_clip(layout.corner, layout.size);
     references(panel, layout, sheet);
     let styles = panel.styles();
-    // Bands are drawn below all lines, independent of their order.
+    // Bands are drawn below all lines, regardless of their order.
     let (bands, lines): (Vec<_>, Vec<_>) =
         panel.curves.iter().zip(styles).partition(|(curve, _)| curve.kind == Kind::Band);
     for (curve, style) in bands.into_iter().chain(lines) {

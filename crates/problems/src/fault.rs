@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::error::ProblemError;
 
-/// A fault of the sensors of one kind, with all of their channels.
+/// A fault of a measuring chain that affects all channels of a record.
 ///
 /// A level is a fraction of the RMS value of a channel unless stated otherwise, so that one fault
 /// suits a force and a displacement.

@@ -19,7 +19,7 @@ pub enum SignalError {
     #[error("a record needs at least one sample")]
     Empty,
     /// The data have another number of samples than the sampling.
-    #[error("channel {} has {} where the sampling has {expected}", channel.saturating_add(1), message::count(*got, "sample"))]
+    #[error("channel {} has {}, but the time axis has {expected}", channel.saturating_add(1), message::count(*got, "sample"))]
     Length {
         /// Channel, counted from 0.
         channel: usize,

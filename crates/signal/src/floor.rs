@@ -59,8 +59,8 @@ pub fn noise_above_band(record: &Record) -> Result<Vec<Option<f64>>, SignalError
         let powers: Vec<f64> =
             (1..samples.div_ceil(2)).map(|n| spectrum.line(n, channel).norm_sqr()).collect();
         let deviation = |level: f64| (level * samples as f64 / (4.0 * HANN)).sqrt();
-        // White noise is at most as strong as the lowest average; a spectrum that is uneven at such
-        // a level shows leakage.
+        // The lowest average is an upper bound of white noise. If it is negligible, it is the
+        // result even for a spectrum that is not flat: at this level leakage makes it uneven.
         let rms = record.column(channel).variance().sqrt();
         let lowest = levels(&powers).into_iter().map(deviation).reduce(f64::min);
         let none = lowest.filter(|lowest| *lowest <= limits::NEGLIGIBLE_NOISE * rms);

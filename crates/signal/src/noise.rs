@@ -74,11 +74,11 @@ pub fn white(
     coloured(sampling, channels, standard_deviation, Colour::White, seed)
 }
 
-/// Returns Gaussian noise of a given standard deviation, in the unit of the record, and colour,
+/// Returns Gaussian noise of the given colour and standard deviation (in the unit of the record),
 /// independent between channels.
 ///
-/// The deviation is that of the process; a single record scatters about it, more with fewer
-/// independent values.
+/// The standard deviation is that of the process. The RMS of one record differs from it, more so if
+/// it has fewer independent values.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the deviation, [`SignalError::Range`] for the exponent,

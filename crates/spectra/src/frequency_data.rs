@@ -155,7 +155,7 @@ impl FrequencyData {
             size("columns of a frequency response matrix", force_dof.len(), shape.1)?;
         }
         if let Some(&got) = force_dof.iter().find(|dof| **dof >= n) {
-            let what = "driven degree of freedom, at most";
+            let what = "index of the degree of freedom of a force, at most";
             return Err(NumericsError::Size { what, expected: n.saturating_sub(1), got }.into());
         }
         let mut combined: Option<Self> = None;

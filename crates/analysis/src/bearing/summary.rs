@@ -329,7 +329,7 @@ impl BearingSummary {
             self.lines,
             match self.left_out_hz.len() {
                 0 => String::new(),
-                count => format!(", {count} at multiples of the rotation left out"),
+                count => format!(", {count} excluded at multiples of the rotation frequency"),
             }
         );
         let table = |what: &str, rows: &[CoefficientRow]| {
@@ -398,7 +398,7 @@ impl BearingSummary {
                 significant(*statistic, 3),
                 significant(*p_value, 2)
             );
-            rows.push(vec!["likelihood ratio of the inertia".into(), cell]);
+            rows.push(vec!["likelihood-ratio test of the inertia".into(), cell]);
         }
         if let Some(amplitude) = &self.amplitude {
             let part = amplitude.over_clearance.map_or(String::new(), |part| {

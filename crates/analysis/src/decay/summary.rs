@@ -94,7 +94,8 @@ pub struct DecayChannelRow {
     pub noise_order: usize,
     /// Constant, in the unit of the response.
     pub offset: f64,
-    /// Probability of a less white residual, adjusted for the number of tests.
+    /// Probability that white noise gives a residual that departs from white at least as much,
+    /// adjusted for the number of tests.
     pub whiteness_p_value: f64,
     /// Ratio of the mean square residuals of the first samples and of the others.
     pub onset_ratio: f64,

@@ -114,7 +114,7 @@ impl Acquisition {
             let equivalent =
                 records.iter().map(|record| equivalent_force(record, &system, dt, between));
             let Some(equivalent) = equivalent.collect::<Option<Vec<_>>>() else {
-                let why = "the identified system has no response to such a force".to_owned();
+                let why = "the response of the identified system to a force that is held or linear between its samples cannot be computed: leave this setting out, or check the fit".to_owned();
                 return Err(AnalysisError::Setting { setting: "between_samples", why });
             };
             let fit = output_error_pooling(&joined(&equivalent)?, unknowns, pooling)?;

@@ -18,7 +18,7 @@ use crate::frf::{Estimator, Responses, Segmentation, average_of_hits};
 pub struct ResponseCoherence {
     /// Frequencies, in Hz, one per row of `values`.
     pub frequency_hz: Vec<f64>,
-    /// Values of frequencies × motions, a ratio from 0 to 1 each.
+    /// Coherences, frequencies × responses, each a ratio from 0 to 1.
     pub values: DMatrix<f64>,
     /// Number of averages in words, such as `6 hits`.
     pub averages: String,

@@ -157,7 +157,7 @@ impl SampleFit {
         let measured = responses.iter().zip(prepared).map(|(response, p)| (response, &p.force));
         let before_all = before_equation_of_motion(&Vec::from_iter(measured), unknowns)?;
         let estimate = rows.solve(unknowns)?;
-        // Refuses undetermined parameters first.
+        // Undetermined parameters are refused before the residuals are computed.
         estimate.system()?;
         let span = self.noise_span();
         let residuals = prepared.iter().filter_map(|p| equation_residual(p, &estimate, span));
@@ -277,7 +277,7 @@ impl SampleFit {
                     .into(),
             );
         } else if self.derivatives.is_some() {
-            remarks.push("two of the three motions are derivatives, not measured".into());
+            remarks.push("two of displacement, velocity and acceleration are computed derivatives, not measured".into());
         }
         let residual = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
         if self.derivatives == Some(Derivatives::Spectral) && residual > CONSPICUOUS {

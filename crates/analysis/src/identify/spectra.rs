@@ -212,8 +212,8 @@ fn agreement(
         splits.push((Split::Rows(halves), RowParts::Halves));
     }
     let parts = PartsOfFit::new(&joint, estimate, None, spectrum);
-    // Least squares of several periods ignores their noise: its residual is at no optimum of the
-    // likelihood that the score test assumes.
+    // Least squares of several periods ignores their noise: its estimate does not maximise the
+    // likelihood, as the score test assumes.
     let is_one = spectra.iter().all(|(periods, _)| periods.count() == 1);
     let sampled = (spectrum.is_some() || is_one).then_some(&sampled[..]);
     Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, sampled, estimate)))

@@ -200,7 +200,9 @@ impl IdentificationSummary {
         let looked_at = records.iter().filter_map(|record| {
             let (first, last) = (record.first_sample, record.held_to()?);
             let file = &record.file;
-            Some(format!("checks of single samples used samples {first} to {last} of {file} only"))
+            Some(format!(
+                "{file}: the checks that look at single samples cover only samples {first} to {last}"
+            ))
         });
         let of_units = records.iter().flat_map(|record| record.unit_remarks.iter().cloned());
         let of_scale = self.unscaled.as_ref().map(Unscaled::to_string);

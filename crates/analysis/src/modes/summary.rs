@@ -334,7 +334,7 @@ impl ModesSummary {
         }
         if !outside.is_empty() {
             text += &format!(
-                "left out: {} outside of the band or too damped for a mode\n",
+                "left out: {} outside of the band or too heavily damped for a mode\n",
                 message::count(outside.len(), "candidate")
             );
         }

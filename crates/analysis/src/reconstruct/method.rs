@@ -221,7 +221,7 @@ fn motion_noise(
 }
 
 impl How {
-    /// Describes the method of [`equation`].
+    /// Describes the reconstruction by the equation of motion, [`equation`].
     pub fn from_equation(
         method: Method,
         why: String,

@@ -48,7 +48,8 @@ impl Step {
             Assembly::new(film, position, &unknown);
         let (rows, nodes) = (film.rows(), load_pressure.len());
         let (free, sides) = (unknown.len(), unknown.len() + SIDES);
-        // The pressure at the fronts is zero: these nodes have the equations of the fronts.
+        // The pressure at the fronts is known to be zero, so that the equations of these nodes
+        // determine the positions of the fronts.
         let inner = rows..nodes - rows;
         matrix.solve(inner.clone(), &mut right, sides)?;
 

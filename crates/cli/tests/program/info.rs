@@ -206,8 +206,8 @@ fn a_channel_that_is_cut_off_is_told() {
     close(&cut["level"], -0.8, 1e-15);
     assert!(cut["samples"].as_u64().unwrap() > 10, "{cut}");
     let text = mechid(folder.path(), "info a.csv");
-    assert_eq!(text.matches(" is cut off at ").count(), 1, "{text}");
-    assert!(text.contains("\ncolumn 3 cut is cut off at -0.80000: "), "{text}");
+    assert_eq!(text.matches(" is clipped at ").count(), 1, "{text}");
+    assert!(text.contains("\ncolumn 3 cut is clipped at -0.80000: "), "{text}");
 }
 
 /// If the last line of a file has no line break, its last number may be cut short, so a remark

@@ -72,7 +72,7 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     assert_eq!(report["window"]["periods"], PERIODS);
     assert_eq!(report["window"]["last_sample"], samples);
     let remarks = report["remarks"].as_array().unwrap();
-    let part = "checks of single samples used samples 1 to 262000 of rec only";
+    let part = "rec: the checks that look at single samples cover only samples 1 to 262000";
     assert!(remarks.iter().any(|r| r == part), "{remarks:?}");
     // The part not in memory counts, too: 8 of 270 periods have a hundred times the noise.
     let beginning = both("identify --period 1000 --periods 262 --method maximum-likelihood");

@@ -16,7 +16,7 @@ use super::search::Linearisation;
 /// Delay that explains most of a residual, of one output or of all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayScore {
-    /// The late output; `None`: all outputs are late by the same time.
+    /// Output that is late; `None` if all outputs are late by the same time.
     pub output: Option<usize>,
     /// Delay of the output, in s, to first order.
     pub delay: f64,

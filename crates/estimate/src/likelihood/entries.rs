@@ -48,7 +48,7 @@ pub fn identify_entries(
 ) -> Result<LikelihoodEstimate, LikelihoodError> {
     if near.dof() != unknowns.dof() {
         let (expected, got) = (unknowns.dof(), near.dof());
-        let what = "degrees of freedom of the system near which to start";
+        let what = "degrees of freedom of the initial system";
         return Err(LikelihoodError::Size { what, expected, got });
     }
     let assembly = assembly(unknowns, near, channels)?;

@@ -9,8 +9,8 @@ use crate::modes::inverse::dynamic_stiffness;
 use crate::sparse::GeneralLu;
 use crate::stepping::selected_dofs::SelectedDofs;
 
-/// Computes the response of a sparse system that repeats with a force on some degrees of freedom,
-/// at some degrees of freedom. The force is band-limited between its samples and has samples ×
+/// Computes the periodic response of a sparse system to a periodic force. The force acts on
+/// `dofs.forced`; the response is returned at `dofs.observed`. The force is band-limited between its samples and has samples ×
 /// `dofs.forced` (N); the response has samples × `dofs.observed`.
 ///
 /// ```

@@ -17,9 +17,9 @@ pub struct Convention {
     pub choice: &'static str,
 }
 
-/// An integration scheme with its parameters and conventions: a value.
+/// Integration scheme with its parameters and conventions.
 ///
-/// A table of results, a command line and a test suite are loops over `[&dyn Scheme]`.
+/// It is object-safe: code that compares schemes loops over `[&dyn Scheme]`.
 pub trait Scheme: fmt::Debug + Send + Sync {
     /// Returns the scheme and its parameters, such as `Newmark (β = 0.25, γ = 0.5)`.
     fn name(&self) -> String;

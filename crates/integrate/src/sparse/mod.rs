@@ -82,7 +82,7 @@ impl SparseLu {
         let diagonals = ordering.diagonals(matrix.pattern());
         if diagonals > limits::NARROW_BAND_DIAGONALS
             && let Some(plan) = CholeskyPlan::new(matrix, sizes)
-            // An entry that is found by an index takes about as long as two entries of a band.
+            // An entry that is addressed by an index costs about as much time as two of a band.
             && (diagonals > limits::BAND_DIAGONALS || 2 * plan.work() < diagonals * matrix.nrows())
             && let Some(factors) = plan.factor(limit)?
         {

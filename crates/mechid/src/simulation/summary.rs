@@ -47,7 +47,7 @@ pub struct SimulationSummary {
     pub nonlinear: Option<SimulatedTerms>,
 }
 
-/// Choice of a scheme among several conventions in the literature.
+/// Convention that a scheme uses where the literature has several.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SchemeConvention {
     /// Subject of the convention.

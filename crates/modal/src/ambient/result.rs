@@ -259,7 +259,7 @@ impl AmbientMode {
 #[derive(Clone, Copy)]
 pub(super) struct RecordScale<'a> {
     pub span: Span,
-    /// Unit of each output of the fit.
+    /// Factor from each output of the fit to the unit of its channel.
     pub scale: &'a [f64],
 }
 

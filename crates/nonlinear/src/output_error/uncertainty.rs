@@ -141,8 +141,8 @@ impl Problem<'_> {
         let (len, periods) = (record.response.len(), noise.len());
         for line in 0..residual.nrows() {
             let (weight, is_real) = product_weight(line, len);
-            // Noise on a force reaches all channels, so that their powers are added and count as
-            // one observation.
+            // Noise on a force reaches all channels, so their powers are added and count as one
+            // observation.
             let power = |lines: &DMatrix<Complex<f64>>| {
                 let of = |(dof, level): (usize, &f64)| (lines[(line, dof)] / *level).norm_sqr();
                 weight * self.levels.iter().enumerate().map(of).sum::<f64>()

@@ -11,8 +11,8 @@ use crate::ReportError;
 /// Maximum number of points of a curve; a panel cannot show more.
 const SHOWN: usize = 4000;
 
-/// Draws the root of the sum over all responses, each divided by its RMS in the band: measured,
-/// explained, and the difference; below it the stabilisation diagram and the mode indicator.
+/// Draws the root of the sum of squares of all responses, each divided by its RMS in the band:
+/// measured, explained by the modes, and the difference; below it the stabilisation diagram and the mode indicator.
 ///
 /// # Errors
 /// [`ReportError`] if the diagrams cannot be computed or drawn.
@@ -36,7 +36,7 @@ pub fn figure(modes: &Modes) -> Result<Figure, ReportError> {
 /// Draws the stabilisation diagram and the mode indicator of a saved result; `None` without poles
 /// and indicator. Behind the poles is the sum of the responses, if the indicator was saved.
 pub fn diagrams(title: &str, diagrams: &Diagrams) -> Option<Figure> {
-    // The squares of the singular values have the sum of the squares of all responses.
+    // The sum of the squared singular values is that of the squares of all responses.
     let sum = |indicator: &ModeIndicator| -> Vec<f64> {
         let square = |at: usize| indicator.singular_values.iter().map(move |v| v[at].powi(2));
         (0..indicator.frequency_hz.len()).map(|at| square(at).sum::<f64>().sqrt()).collect()

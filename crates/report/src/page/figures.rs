@@ -191,7 +191,7 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
     let coherence = measured.coherence.as_ref();
     let below = match coherence {
         Some(coherence) => format!(
-            " Below, the part of the response's power that is linear in the forces, from {}.",
+            " Below, the part of the response power that is linearly related to the forces (coherence), from {}.",
             coherence.averages
         ),
         None => String::new(),

@@ -203,7 +203,7 @@ fn amplitude(modes: &SavedModes) -> Result<Option<Markup>, ReportError> {
             (backbone::of_decay("", row, unit), header.map(String::from).to_vec(), cells.collect())
         }
     };
-    let caption = "Frequency over amplitude (backbone), with confidence intervals.";
+    let caption = "Frequency against amplitude (backbone), with confidence intervals.";
     let drawn = drawn("backbone".into(), curves, caption.into())?;
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let caption = "Values over amplitude";

@@ -439,7 +439,7 @@ pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, ReportE
         (records)
         p.note {
             "The machine was fitted to the same record, so agreement shows that the fit is consistent, not that \
-             another record would be predicted as well."
+             the model would predict another record equally well."
         }
     }))
 }

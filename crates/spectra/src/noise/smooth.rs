@@ -58,7 +58,7 @@ impl Form {
         let mut columns = DMatrix::from_element(omega.len(), self.terms(), 1.0);
         for (line, omega) in omega.iter().enumerate() {
             let t = (2.0 * (omega / least).ln() / span - 1.0).clamp(-1.0, 1.0);
-            // The columns of the polynomial are Chebyshev polynomials.
+            // The first columns are Chebyshev polynomials in the logarithm of the frequency.
             let (mut before, mut polynomial) = (t, 1.0);
             for column in 0..=self.order {
                 columns[(line, column)] = polynomial;

@@ -102,7 +102,7 @@ fn leakage(
         passed: settled && lines >= RESONANCE_LINES,
         value: lines,
         text: format!(
-            "{}: the resonance at {:.4} Hz is {} lines of {why}",
+            "{}: the half-power width of the resonance at {:.4} Hz is {} line spacings of {why}",
             table.file,
             narrowest.natural_frequency_hz.value,
             significant(lines, 2)

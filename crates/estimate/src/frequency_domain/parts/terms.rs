@@ -27,7 +27,8 @@ pub enum OmittedTerm {
     HiddenMass,
     /// Displacement that falls with the square of the frequency: modes below the band.
     ResidualMass,
-    /// Damping force in phase with the velocity that does not grow with the frequency.
+    /// Damping force in phase with the velocity, whose size relative to the displacement does not
+    /// grow with the frequency.
     StructuralDamping,
     /// Another value of an entry of M, C or K that is known, such as a zero of the structure.
     KnownEntry {
