@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 
 import numpy as np
 import pandas as pd
@@ -61,6 +62,50 @@ def test_units_of_attributes_and_of_the_call_are_used():
 )
 def test_the_time_of_a_table_gives_its_rate(frame):
     assert mechid.Measurement.from_table(frame, force="force", acceleration="acc").fs == pytest.approx(FS)
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [
+        (1e3 * T, "time [ms]"),
+        (1e3 * T, "t_ms"),
+        (T / 60, "Zeit (min)"),
+        (T, "elapsed [s]"),
+        (1e3 * T, "since start (ms)"),
+        (T + 7.5, None),
+        (np.arange(200) / FS, "TIME"),
+    ],
+)
+def test_an_index_with_the_name_or_a_unit_of_time_is_time(values, name):
+    frame = pd.DataFrame({"force": FORCE, "acc": ACC}, index=pd.Index(values, name=name))
+    assert mechid.Measurement.from_table(frame, force="force", acceleration="acc").fs == pytest.approx(FS)
+
+
+@pytest.mark.parametrize("name", ["Distance [m]", "angle [deg]", "Frequency [Hz]", "depth", "sample", "time [mm]", 7])
+def test_another_index_is_not_time(name):
+    frame = pd.DataFrame({"force": FORCE, "acc": ACC}, index=pd.Index(T, name=name))
+    channels = {"force": "force", "acceleration": "acc"}
+    with pytest.raises(TypeError, match=re.escape(f"the index '{name}' is not called time") + ".*`fs`.*`time`"):
+        mechid.Measurement.from_table(frame, **channels)
+    assert mechid.Measurement.from_table(frame, **channels, fs=50.0).fs == 50.0
+
+
+def test_a_call_may_say_that_the_index_is_time():
+    frame = pd.DataFrame({"force": FORCE, "acc": ACC}, index=pd.Index(1e3 * T, name="depth"))
+    channels = {"force": "force", "acceleration": "acc"}
+    assert mechid.Measurement.from_table(frame, **channels, time="depth").fs == pytest.approx(FS / 1e3)
+    assert mechid.Measurement.from_table(frame, **channels, unit={"depth": "ms"}).fs == pytest.approx(FS)
+    frame.attrs["units"] = {"depth": "ms"}
+    assert mechid.Measurement.from_table(frame, **channels).fs == pytest.approx(FS)
+    with pytest.raises(mechid.MechidError, match="no column"):
+        mechid.Measurement.from_table(frame, **channels, time="dept")
+
+
+@pytest.mark.parametrize("first", [0, 1, 50])
+def test_positions_of_samples_are_not_time(first):
+    frame = pd.DataFrame({"force": FORCE, "acc": ACC}, index=np.arange(200.0) + first)
+    with pytest.raises(TypeError, match="a table needs its sampling rate"):
+        mechid.Measurement.from_table(frame, force="force", acceleration="acc")
 
 
 def test_a_table_without_time_is_asked_for_its_rate():

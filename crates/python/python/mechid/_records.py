@@ -52,6 +52,7 @@ _OF_FILES = (
     "scale",
     "memory_gb",
 )
+_IN_BRACKETS = re.compile(r"[\[({<]([^\])}>]+)[\])}>]")
 _NAME_BYTES = 4096
 """Maximum length of the name of a column or record, in bytes."""
 
@@ -258,10 +259,11 @@ class Measurement:
             Names of columns, with their units or without, one per degree of freedom; ``"0"`` if no
             force acts.
         fs : float, optional
-            Sampling rate, in Hz. Default: that of the time column, of the index (numbers in s, or
-            dates) or of SEP 5 channels (``fs`` or ``time``).
+            Sampling rate, in Hz. Default: that of the time column, of the index or of SEP 5 channels
+            (``fs`` or ``time``). The index is time if it contains dates, is called time or has a
+            unit of time; without a name, numbers whose steps are not all 1 are time in s.
         time : str, optional
-            The time column.
+            The time column, or the name of the index.
         unit : mapping of str to str, optional
             Units of columns, with priority over their names: ``{"acc": "g"}``.
         scale : mapping of str to float, optional
@@ -531,6 +533,10 @@ class _Frame:
         self._table = table
         # The name of each column in messages, and the key that finds it.
         self._names = {str(name): name for name in table.keys()}  # type: ignore[attr-defined]
+        # A dataset of xarray may have a variable of this name.
+        self._index: Any = getattr(table, "index", None) if hasattr(table, "columns") else None
+        named = getattr(self._index, "name", None)
+        self._index_name = None if named is None else str(named)
         self._unit = {self._find(name): text for name, text in (unit or {}).items()}
         self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
 
@@ -539,6 +545,8 @@ class _Frame:
             return wanted
         names = list(self._names)
         at = None if wanted.isdigit() else _mechid.find_column(names, wanted)
+        if at is None and wanted == self._index_name:
+            return wanted
         if at is None:
             try:
                 # The table may have columns that its keys do not list, such as a coordinate.
@@ -550,6 +558,9 @@ class _Frame:
 
     def __getitem__(self, wanted: str) -> ArrayLike:
         name = self._find(wanted)
+        if name not in self._names and name == self._index_name:
+            values: ArrayLike = self._index
+            return values
         return self._table[self._names.get(name, name)]
 
     def label(self, wanted: str, kind: str) -> tuple[str, float]:
@@ -588,17 +599,36 @@ class _Frame:
             for key in ("fs", "sample_rate", "sampling_rate", "sample_rate_hz"):
                 if isinstance(shared.get(key), (int, float)):
                     return float(shared[key])
-        index = getattr(self._table, "index", None)
-        instants = _instants(index) if index is not None and not callable(index) else None
-        named = getattr(index, "name", None)
-        is_time = named is not None and _mechid.time_column([str(named)]) is not None
-        if instants is not None and (instants.dtype.kind in "mMf" or is_time):
-            return _rate_of(str(named) if is_time else "time", instants)
-        return None
+        return None if self._index is None else self._rate_of_index(self._index)
+
+    def _rate_of_index(self, index: Any) -> float | None:
+        """Return the sampling rate from an index of time; None if the index counts the samples."""
+        instants, name = _instants(index), self._index_name
+        if instants.dtype.kind in "mM":
+            return _rate_of("time", instants)
+        if instants.dtype.kind not in "fiuO":
+            return None
+        if name is None:
+            # Steps of exactly 1 are positions of samples, also after a part of the rows was chosen.
+            is_time = instants.dtype.kind == "f" and bool((np.diff(instants) != 1).any())
+            return _rate_of("time", instants) if is_time else None
+        unit = self._unit.get(name) or self._stated(name)
+        if _mechid.time_column([name]) is not None or _has_unit_of_time(name, unit):
+            return self._rate(name)
+        raise TypeError(
+            f"the index {name!r} is not called time and has no unit of time, so it gives no sampling rate: "
+            f"give `fs`, in Hz, or a time column (`time`; `time={name!r}` if the index is time in s)"
+        )
 
     def _rate(self, name: str) -> float:
         unit = self._unit.get(name) or self._stated(name)
         return _rate_of(f"[{unit}] {name}" if unit else name, self[name])
+
+
+def _has_unit_of_time(name: str, unit: str | None) -> bool:
+    """Return whether a unit, or else the texts in brackets of a name, is a unit of time."""
+    units = [unit] if unit else _IN_BRACKETS.findall(name)
+    return any(_mechid.time_column([f"time [{text}]"]) is not None for text in units)
 
 
 def _instants(values: object) -> NDArray[Any]:
@@ -901,7 +931,7 @@ def _series_unit(values: object) -> str | None:
         units = units.get(name)
     if isinstance(units, str):
         return units
-    in_brackets = re.findall(r"[\[({<]([^\])}>]+)[\])}>]", name) if isinstance(name, str) else []
+    in_brackets = _IN_BRACKETS.findall(name) if isinstance(name, str) else []
     return "; ".join(in_brackets) or None
 
 
