@@ -171,6 +171,35 @@ def test_dates_with_a_time_zone_are_instants():
     assert mechid.Measurement.from_table(frame, force="force", acceleration="acc").fs == pytest.approx(FS)
 
 
+DATES = pd.Timestamp("2024-03-31T01:59:59") + pd.to_timedelta(T, "s")
+ISO = [date.isoformat(timespec="nanoseconds") for date in DATES]
+# The clock is put forward one second after the beginning; the instants are equally spaced.
+ZONED = [date.isoformat() for date in DATES.tz_localize("UTC").tz_convert("Europe/Berlin") - pd.Timedelta(3600, "s")]
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        pd.DataFrame({"time": ISO, "force": FORCE, "acc": ACC}),
+        pd.DataFrame({"time": np.array(ISO, dtype=object), "force": FORCE, "acc": ACC}),
+        pd.DataFrame({"force": FORCE, "acc": ACC}, index=pd.Index(ISO, name="time")),
+        {"time": ISO, "force": FORCE, "acc": ACC},
+        {"time": [text.replace("T", " ").replace(".", ",") + "000Z" for text in ISO], "force": FORCE, "acc": ACC},
+        {"time": ZONED, "force": FORCE, "acc": ACC},
+    ],
+)
+def test_instants_may_be_text(table):
+    assert mechid.Measurement.from_table(table, force="force", acceleration="acc").fs == pytest.approx(FS)
+
+
+@pytest.mark.parametrize("wrong", ["14.03.2023 09:26", "0.01", "2024-02-30T00:00:00", None])
+def test_text_that_is_no_instant_is_named(wrong):
+    texts = np.array([*ISO[:2], wrong, *ISO[3:]], dtype=object)
+    for table in ({"time": texts, "force": FORCE, "acc": ACC}, pd.DataFrame({"time": texts, "force": FORCE, "acc": ACC})):
+        with pytest.raises(TypeError, match="`time` holds .* in row 3: .*2023-03-14T09:26:53.5"):
+            mechid.Measurement.from_table(table, force="force", acceleration="acc")
+
+
 def test_a_series_is_converted_from_the_unit_that_it_states():
     frame = pd.DataFrame({"Force [kN]": FORCE / 1e3, "acc [g]": ACC / 9.80665})
     found = mechid.identify(frame["Force [kN]"], acceleration=frame["acc [g]"], fs=FS, **PERIOD)

@@ -53,6 +53,11 @@ _OF_FILES = (
     "memory_gb",
 )
 _IN_BRACKETS = re.compile(r"[\[({<]([^\])}>]+)[\])}>]")
+# Digits after the ninth, which dates in nanoseconds cannot have, are not part of the clock.
+_ISO_INSTANT = re.compile(
+    r"(?P<date>\d{4}-\d\d-\d\d)[Tt ](?P<clock>\d\d:\d\d(:\d\d([.,]\d{1,9})?)?)\d*"
+    r"\s*([Zz]|UTC|(?P<sign>[+-])(?P<hours>\d\d):?(?P<minutes>\d\d)?)?"
+)
 _NAME_BYTES = 4096
 """Maximum length of the name of a column or record, in bytes."""
 
@@ -632,12 +637,52 @@ def _has_unit_of_time(name: str, unit: str | None) -> bool:
 
 
 def _instants(values: object) -> NDArray[Any]:
-    """Return instants as an array: dates with a time zone are converted to UTC."""
-    if np.asarray(values).dtype.kind == "O":
-        convert = getattr(getattr(values, "dt", values), "tz_convert", None)
+    """Return instants as an array: texts become dates, and dates with a time zone are converted to
+    UTC."""
+    array = np.asarray(values)
+    if array.dtype.kind == "O":
+        # A series has a method `tz_convert`, too, which converts its index.
+        dates = getattr(values, "dt", None if hasattr(values, "index") else values)
+        convert = getattr(dates, "tz_convert", None)
         if convert is not None:
             return np.asarray(convert(None))
-    return np.asarray(values)
+    is_text = array.dtype.kind in "UT" or (array.dtype.kind == "O" and isinstance(next(array.flat, None), str))
+    return _dates_of_text(array.tolist()) if is_text and array.ndim == 1 else array
+
+
+def _dates_of_text(texts: list[object]) -> NDArray[np.datetime64]:
+    """Return instants in the form of ISO 8601 as dates, in UTC if they state their time zones."""
+    clocks: list[str] = []
+    zones: list[int] = []
+    for row, text in enumerate(texts, 1):
+        parts = _ISO_INSTANT.fullmatch(text.strip()) if isinstance(text, str) else None
+        if parts is None:
+            raise _not_iso(row, text)
+        sign, hours, minutes = parts["sign"], int(parts["hours"] or 0), int(parts["minutes"] or 0)
+        clocks.append(f"{parts['date']}T{parts['clock'].replace(',', '.')}")
+        zones.append((60 * hours + minutes) * (-1 if sign == "-" else 1))
+    try:
+        local = np.array(clocks, dtype="datetime64[ns]")
+    except ValueError:
+        row = next(row for row, clock in enumerate(clocks) if not _is_date(clock))
+        raise _not_iso(row + 1, texts[row]) from None
+    dates: NDArray[np.datetime64] = local - np.array(zones, dtype="timedelta64[m]")
+    return dates
+
+
+def _is_date(clock: str) -> bool:
+    try:
+        np.datetime64(clock, "ns")
+    except ValueError:
+        return False
+    return True
+
+
+def _not_iso(row: int, text: object) -> TypeError:
+    return TypeError(
+        f"`time` holds {text!r} in row {row}: instants are numbers, dates, or texts such as "
+        "2023-03-14T09:26:53.5 (ISO 8601); convert the column first"
+    )
 
 
 def _rate_of(name: str, instants: object) -> float:
