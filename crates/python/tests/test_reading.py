@@ -126,6 +126,25 @@ def test_a_misspelt_keyword_is_named():
         mechid.identify({"force": FORCE}, force="force", acceleratoin="acc", fs=FS)
 
 
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda file: mechid.inspect(file, column="force"), "inspect() got .*'column'; did you mean `columns`"),
+        (lambda file: mechid.inspect(file, sample_rate=1.0), "inspect() got .*'sample_rate'; did you mean `fs`"),
+        (lambda file: mechid.inspect(file, units={}), r"inspect() got .*'units'$"),
+        (lambda file: mechid.Measurement.open(file, forces="force"), "Measurement.open() got .*'forces'; did you mean `force`"),
+        (lambda file: mechid.Measurement.open(file, force="force").window(periode=9), "Measurement.window() got .*`period`"),
+        (lambda file: mechid.Measurement.from_arrays(FORCE, ACC, fs=FS, perid=20), "Measurement.from_arrays() got .*`period`"),
+        (lambda file: mechid.Measurement.from_arrays(FORCE, disp=ACC, fs=FS), "Measurement.from_arrays() got .*`displacement`"),
+        (lambda file: mechid.Measurement.from_table({}, acc="acc"), "Measurement.from_table() got .*`acceleration`"),
+        (lambda file: mechid.simulate("examples/machine.json").measurement(starts=2), "Simulation.measurement() got .*`start`"),
+    ],
+)
+def test_every_function_of_records_names_a_misspelt_keyword(call, said):
+    with pytest.raises(TypeError, match=said.replace("()", r"\(\)")):
+        call("examples/machine.csv")
+
+
 def test_results_are_copied_and_pickled():
     frame = pd.DataFrame({"force": FORCE, "acc": ACC})
     record = mechid.Measurement.from_table(frame, force="force", acceleration="acc", fs=FS, **PERIOD)

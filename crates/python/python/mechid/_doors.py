@@ -21,6 +21,7 @@ from ._records import (
     _index,
     matrix,
     measurements,
+    only_window,
     plan_of,
     reading_of,
 )
@@ -974,6 +975,7 @@ def inspect(
     MechidError
         If the file cannot be read or has no such columns or samples.
     """
+    only_window("inspect", window)
     reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, memory_gb)
     plan = json.dumps(plan_of(path, {}, reading, window))
     settings = json.dumps({"columns": list(columns), "curves": curves})

@@ -179,6 +179,7 @@ class Measurement:
         MechidError
             If the file cannot be read or has no such columns or samples.
         """
+        only_window("Measurement.open", window)
         columns = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
         channels = {kind: _names(kind, given) for kind, given in columns.items()}
         reading = reading_of(
@@ -221,6 +222,7 @@ class Measurement:
         MechidError
             If arrays differ in length, contain NaN or infinity, or are shorter than the window.
         """
+        only_window("Measurement.from_arrays", window)
         columns: list[NDArray[np.float64]] = []
         counts: list[int] = []
         arrays = (force, displacement, velocity, acceleration)
@@ -283,6 +285,7 @@ class Measurement:
         MechidError
             If there is no such column, or as `from_arrays`.
         """
+        only_window("Measurement.from_table", window)
         channels: dict[str, list[str]] = {}
         columns: list[tuple[str, NDArray[np.float64]]] = []
         given = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
@@ -351,6 +354,7 @@ class Measurement:
         MechidError
             If the record does not contain all of these samples.
         """
+        only_window("Measurement.window", window)
         return Measurement(self._inner.window(_window_json(window)))
 
     @property
@@ -747,18 +751,29 @@ _SYNONYMS = {
 """Keywords of other packages, with the keyword of this package."""
 
 
+def only_window(function: str, window: Window) -> None:
+    """Refuse keywords of a function that are neither its parameters nor settings of a window."""
+    for name in window:
+        if name not in Window.__annotations__:
+            raise _unexpected(function, name, Window.__annotations__)
+
+
 def _unexpected(function: str, name: str, known: Iterable[str]) -> TypeError:
-    """Return the error for an unknown keyword."""
+    """Return the error for an unknown keyword of a function or method of the package."""
     import difflib
     import inspect
 
     import mechid
 
-    signature = inspect.signature(getattr(mechid, function, lambda: None))
-    others = [p.name for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
-    close = difflib.get_close_matches(name, [*known, *others], n=1, cutoff=0.6)
-    meant = _SYNONYMS.get(name.lower()) or (close[0] if close else None)
-    hint = f"; did you mean `{meant}`?" if meant else ""
+    called: Any = mechid
+    for part in function.split("."):
+        called = getattr(called, part, lambda: None)
+    by_name = (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    parameters = inspect.signature(called).parameters.values()
+    accepted = [*known, *(p.name for p in parameters if p.kind in by_name and p.name != "self")]
+    synonym = _SYNONYMS.get(name.lower())
+    close = [synonym] if synonym in accepted else difflib.get_close_matches(name, accepted, n=1, cutoff=0.6)
+    hint = f"; did you mean `{close[0]}`?" if close else ""
     return TypeError(f"{function}() got an unexpected keyword argument '{name}'{hint}")
 
 
@@ -1016,8 +1031,6 @@ def _window_of(options: RecordOptions) -> Window:
 def _window(window: Window) -> dict[str, int | None]:
     kept: dict[str, int | None] = {"start": 1}
     for name, value in window.items():
-        if name not in Window.__annotations__:
-            raise TypeError(f"there is no setting `{name}` of a window")
         kept[name] = _count(name, value)
     return kept
 

@@ -16,7 +16,7 @@ import numpy as np
 from . import _mechid
 from ._errors import MechidError
 from ._figures import Figure, MatrixFigure, read_page
-from ._records import Measurement, RecordOptions, Window, measurements
+from ._records import Measurement, RecordOptions, Window, measurements, only_window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -1759,6 +1759,7 @@ class Simulation:
 
     def measurement(self, *quantities: str, **window: Unpack[Window]) -> Measurement:
         """Return force and the requested responses (default: the displacement) as a record."""
+        only_window("Simulation.measurement", window)
         chosen: dict[str, Any] = {name: getattr(self, name) for name in quantities or ("displacement",)}
         return Measurement.from_arrays(self.force, fs=self.fs, **chosen, **window)
 
