@@ -72,6 +72,9 @@ def test_failures_have_codes(call: Callable[[], Any], code: str) -> None:
         (lambda: mechid.identify(ONE, ONE, fs=1, period=0), ValueError, "counted from 1"),
         (lambda: mechid.identify(ONE, ONE, fs=1, period=2.5), TypeError, "whole number"),
         (lambda: mechid.identify(ONE, ONE, fs=1, skip_lines=2), TypeError, "belongs to files"),
+        (lambda: mechid.identify({"f": ONE, "x": ONE}, fs=1, skip_lines=2), TypeError, "belongs to files"),
+        (lambda: mechid.identify(ONE, ONE, fs=1, unit={"force": "kN"}), TypeError, "`unit` belongs to files and tables"),
+        (lambda: mechid.identify(ONE, ONE, time="t"), TypeError, "`time` belongs to files and tables"),
         (lambda: mechid.identify(ONE, ONE, fs=1, derivatives="spectral"), mechid.MechidError, "domain` time"),
         (lambda: mechid.identify(ONE, ONE, fs=1, segment=8), mechid.MechidError, "from_frf"),
         (

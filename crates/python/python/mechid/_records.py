@@ -42,16 +42,8 @@ Names: TypeAlias = str | Sequence[str]
 """Columns, one per degree of freedom: names separated by commas, or a sequence of names."""
 
 _KINDS = ("force", "displacement", "velocity", "acceleration")
-_OF_FILES = (
-    "time",
-    "skip_lines",
-    "detrend",
-    "record_column",
-    "record_id",
-    "unit",
-    "scale",
-    "memory_gb",
-)
+_OF_TABLES = ("time", "unit", "scale")
+_OF_FILES = ("skip_lines", "detrend", "record_column", "record_id", "memory_gb")
 _IN_BRACKETS = re.compile(r"[\[({<]([^\])}>]+)[\])}>]")
 # Digits after the ninth, which dates in nanoseconds cannot have, are not part of the clock.
 _ISO_INSTANT = re.compile(
@@ -716,13 +708,16 @@ def measurements(
             raise _unexpected(threads_of, name, known_options)
     if sources and all(isinstance(source, Measurement) for source in sources):
         known = [source for source in sources if isinstance(source, Measurement)]
-        given = [name for name in ("fs", *_OF_FILES, *_KINDS) if name in options]
+        given = [name for name in ("fs", *_OF_TABLES, *_OF_FILES, *_KINDS) if name in options]
         if given:
             raise TypeError(f"a Measurement knows its `{given[0]}`: leave it out")
         window = _window_of(options)
         return [record.window(**window) for record in known] if window else known
     if sources and all(isinstance(source, (str, os.PathLike)) for source in sources):
         return [Measurement.open(source, **options) for source in sources]  # type: ignore[arg-type]
+    for name in _OF_FILES:
+        if name in options:
+            raise TypeError(f"`{name}` belongs to files")
     if sources and all(_is_table(source) for source in sources):
         return [Measurement.from_table(source, **options) for source in sources]  # type: ignore[arg-type, misc]
     if len(sources) > 2:
@@ -732,11 +727,14 @@ def measurements(
         if kind in arrays:
             raise TypeError(f"`{kind}` is given twice")
         arrays[kind] = values
+    for name in _OF_TABLES:
+        if name in arrays:
+            raise TypeError(
+                f"`{name}` belongs to files and tables, which have columns: give the arrays in N, m, m/s and "
+                "m/s², or a mapping of names to arrays"
+            )
     if arrays.get("fs") is None:
         raise TypeError("arrays need their sampling rate: give `fs`, in Hz")
-    for name in _OF_FILES:
-        if name in arrays:
-            raise TypeError(f"`{name}` belongs to files")
     return [Measurement.from_arrays(**arrays)]  # type: ignore[arg-type]
 
 
