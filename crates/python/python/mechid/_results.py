@@ -237,6 +237,9 @@ class Result:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Remarks to read before using the numbers."""
+        return self._remarks()
+
+    def _remarks(self) -> tuple[str, ...]:
         return tuple(self._told["remarks"])
 
     @property
@@ -661,7 +664,7 @@ class Identified(Shaped, Estimated):
     @property
     def nonlinear(self) -> Mapping[str, Any] | None:
         """Nonlinear terms with their coefficients and standard errors; None for a linear system."""
-        told = self.to_dict()["nonlinear"]
+        told = self.to_dict().get("nonlinear")
         return None if told is None else MappingProxyType(told)
 
     @property
@@ -1365,6 +1368,9 @@ class Modes(Shaped):
         """Remarks to read before using the numbers."""
         return tuple(self._told["notes"])
 
+    def _remarks(self) -> tuple[str, ...]:
+        return self.notes
+
     @property
     def checks(self) -> tuple[Mapping[str, Any], ...]:
         """Checks of data and modes: ``code``, ``passed``, ``value`` and ``text`` of each."""
@@ -1493,6 +1499,11 @@ class IdentifiedElements(Drawn):
     def notes(self) -> tuple[Mapping[str, Any], ...]:
         """Remarks to read before using the numbers: ``kind`` and the numbers of each."""
         return tuple(MappingProxyType(row) for row in self._told["notes"])
+
+    def _remarks(self) -> tuple[str, ...]:
+        # The JSON has the numbers of each note; the text has its sentence.
+        lines = str(self).splitlines()
+        return tuple(line.removeprefix("note: ") for line in lines if line.startswith("note: "))
 
     def machine(self) -> Machine:
         """Return M, C and K with the covariance of their entries.
