@@ -6,13 +6,13 @@ import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
 import numpy as np
 
 from . import _mechid
 from ._errors import careful
+from ._mapping import ReadOnly
 from ._records import (
     Measurement,
     RecordOptions,
@@ -1196,7 +1196,7 @@ def integrate(
         "response": {"from": given} if given else response,
         "allow_unstable": allow_unstable,
     }
-    return MappingProxyType(dict(_mechid.integrate(json.dumps(described), forces, float(fs))))
+    return ReadOnly(dict(_mechid.integrate(json.dumps(described), forces, float(fs))))
 
 
 @careful
@@ -1254,7 +1254,7 @@ def predict(
         json.dumps(extent),
         start,  # type: ignore[arg-type]
     )
-    return MappingProxyType(dict(found))
+    return ReadOnly(dict(found))
 
 
 @careful

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from functools import cached_property, wraps
-from types import MappingProxyType
 from typing import ParamSpec, TypeVar
+
+from ._mapping import ReadOnly
 
 _TOKEN = re.compile(
     r"""\s*(?:
@@ -52,7 +53,7 @@ class MechidError(ValueError):
     @property
     def fields(self) -> Mapping[str, object]:
         """Numbers and names of the message."""
-        return MappingProxyType(self._parts[1])
+        return ReadOnly(self._parts[1])
 
     def __reduce__(self) -> tuple[type[MechidError], tuple[str, str]]:
         return type(self), (str(self), self._variant)

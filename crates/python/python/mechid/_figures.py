@@ -16,10 +16,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
+
+from ._mapping import ReadOnly
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -360,7 +361,7 @@ def read_page(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
             shapes = next((one for one in found.values() if isinstance(one, ShapeFigure)), None)
             values = _shades(content) if shapes is None else assurance(_rows(shapes))
             found[name] = MatrixFigure(name, caption, ("",), values)
-    return MappingProxyType(found)
+    return ReadOnly(found)
 
 
 def assurance(shapes: NDArray[np.complex128]) -> Values:

@@ -7,7 +7,6 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from types import MappingProxyType
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -25,6 +24,7 @@ import numpy as np
 
 from . import _mechid
 from ._errors import careful
+from ._mapping import ReadOnly
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -367,7 +367,7 @@ class Measurement:
     @property
     def channels(self) -> Mapping[str, Sequence[str]]:
         """Columns of each quantity."""
-        return MappingProxyType(json.loads(self._inner.channels))
+        return ReadOnly(json.loads(self._inner.channels))
 
     @property
     def plan(self) -> dict[str, object] | None:
@@ -383,7 +383,7 @@ class Measurement:
     @property
     def responses(self) -> Mapping[str, NDArray[np.float64]]:
         """Responses of the window by quantity, each (samples, degrees of freedom), in SI units."""
-        return MappingProxyType(dict(self._inner.responses()))
+        return ReadOnly(dict(self._inner.responses()))
 
     def __copy__(self) -> Measurement:
         return self

@@ -6,9 +6,8 @@ import html
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, Protocol, Unpack, final
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from . import _mechid
 from ._errors import MechidError
 from ._figures import Figure, MatrixFigure, read_page
+from ._mapping import ReadOnly
 from ._records import Measurement, RecordOptions, Window, measurements, only_window
 
 if TYPE_CHECKING:
@@ -92,10 +92,22 @@ class Parameter:
     row: int
     column: int
     known: bool
-    _found: _mechid.Identified | _mechid.IdentifiedResponses
+    _found: _mechid.Identified | _mechid.IdentifiedResponses = field(repr=False, compare=False)
 
     def __float__(self) -> float:
         return self.value
+
+    def __copy__(self) -> Parameter:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Parameter:
+        return self
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        from ._stored import stored_intervals
+
+        numbers = (self.name, self.value, self.std_error, self.unit, self.matrix, self.row, self.column, self.known)
+        return type(self), (*numbers, stored_intervals(self._found, [self.name]))
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Return the confidence interval at a level between 0 and 1, by Student's t.
@@ -197,7 +209,7 @@ class Validation:
             )
             for channel in channels
         }
-        return cls(MappingProxyType(fit), MappingProxyType(told))
+        return cls(ReadOnly(fit), ReadOnly(told))
 
 
 class Result:
@@ -537,7 +549,7 @@ class Estimated(Drawn):
         Entries of equations of motion whose scale is not known are omitted; see `unscaled`.
         """
         rows = self._told["parameters"]
-        return MappingProxyType({row["name"]: self._parameter(row) for row in rows})
+        return ReadOnly({row["name"]: self._parameter(row) for row in rows})
 
     @property
     def unscaled(self) -> Mapping[str, Any] | None:
@@ -547,7 +559,7 @@ class Estimated(Drawn):
         otherwise the data determine only the modes.
         """
         told = self._told.get("unscaled")
-        return None if told is None else MappingProxyType(told)
+        return None if told is None else ReadOnly(told)
 
     def to_frame(self) -> DataFrame:
         """Return the parameters as a pandas data frame, one row each: value, standard error, interval, unit.
@@ -631,7 +643,7 @@ class Estimated(Drawn):
     @property
     def fit(self) -> Mapping[str, Any]:
         """Quality of the fit: ``nrmse``, ``unexplained_motion``, ``condition_number`` …"""
-        return MappingProxyType(self._told["fit"])
+        return ReadOnly(self._told["fit"])
 
     def machine(self) -> Machine:
         """Return M, C and K with the covariance of their entries.
@@ -665,7 +677,7 @@ class Identified(Shaped, Estimated):
     def nonlinear(self) -> Mapping[str, Any] | None:
         """Nonlinear terms with their coefficients and standard errors; None for a linear system."""
         told = self.to_dict().get("nonlinear")
-        return None if told is None else MappingProxyType(told)
+        return None if told is None else ReadOnly(told)
 
     @property
     def validation(self) -> Validation | None:
@@ -701,7 +713,7 @@ class Identified(Shaped, Estimated):
     @property
     def compared(self) -> Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Measured and predicted response of the first record by quantity, in SI units."""
-        return MappingProxyType({kind: (m, p) for kind, m, p in self._inner.compared()})
+        return ReadOnly({kind: (m, p) for kind, m, p in self._inner.compared()})
 
     @property
     def residual(self) -> Mapping[str, NDArray[np.float64]]:
@@ -709,7 +721,7 @@ class Identified(Shaped, Estimated):
 
         Shape (samples, degrees of freedom); the means are subtracted if a steady state was fitted.
         """
-        return MappingProxyType({kind: m - p for kind, m, p in self._inner.compared()})
+        return ReadOnly({kind: m - p for kind, m, p in self._inner.compared()})
 
     @cached_property
     def frf(self) -> Receptances:
@@ -834,7 +846,7 @@ class IdentifiedBearing(Drawn):
     @cached_property
     def coefficients(self) -> Mapping[str, Uncertain]:
         """Eight or twelve coefficients by name, ``"kxx"`` to ``"myy"``, in N/m, N·s/m and kg."""
-        return MappingProxyType({row["name"]: _uncertain(row) for row in self._told["coefficients"]})
+        return ReadOnly({row["name"]: _uncertain(row) for row in self._told["coefficients"]})
 
     @property
     def stiffness(self) -> NDArray[np.float64]:
@@ -868,7 +880,7 @@ class IdentifiedBearing(Drawn):
         told = self._told["dimensionless"]
         if told is None:
             return None
-        return MappingProxyType({row["name"]: _uncertain(row) for row in told["coefficients"]})
+        return ReadOnly({row["name"]: _uncertain(row) for row in told["coefficients"]})
 
     @property
     def whirl_frequency_ratio(self) -> Uncertain | None:
@@ -934,7 +946,7 @@ class BearingTable(Bare, Drawn):
     def rows(self) -> tuple[Mapping[str, Uncertain], ...]:
         """Coefficients of each row by name, ``"kxx"`` to ``"myy"``, in N/m, N·s/m and kg."""
         return tuple(
-            MappingProxyType({one["name"]: _uncertain(one) for one in row["coefficients"]})
+            ReadOnly({one["name"]: _uncertain(one) for one in row["coefficients"]})
             for row in self._told["rows"]
         )
 
@@ -1262,7 +1274,7 @@ class Inspected(Drawn):
     @property
     def channels(self) -> tuple[Mapping[str, Any], ...]:
         """Levels, strongest lines and period of each column."""
-        return tuple(MappingProxyType(row) for row in self._told["channels"])
+        return tuple(ReadOnly(row) for row in self._told["channels"])
 
     @property
     def fs(self) -> float | None:
@@ -1361,7 +1373,7 @@ class Modes(Shaped):
     def dropped(self) -> tuple[Mapping[str, Any], ...]:
         """Candidates that are not modes: ``frequency_hz``, ``damping_ratio`` and ``reason`` of
         each."""
-        return tuple(MappingProxyType(row) for row in self._told["dropped"])
+        return tuple(ReadOnly(row) for row in self._told["dropped"])
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -1374,13 +1386,13 @@ class Modes(Shaped):
     @property
     def checks(self) -> tuple[Mapping[str, Any], ...]:
         """Checks of data and modes: ``code``, ``passed``, ``value`` and ``text`` of each."""
-        return tuple(MappingProxyType(row) for row in self._told["checks"])
+        return tuple(ReadOnly(row) for row in self._told["checks"])
 
     @property
     def diagrams(self) -> Mapping[str, Any] | None:
         """Stabilisation diagram and mode indicator, if they were requested."""
         told = self._told.get("diagrams")
-        return None if told is None else MappingProxyType(told)
+        return None if told is None else ReadOnly(told)
 
     def predict(
         self, *sources: object, settle: int | None = None, **record: Unpack[RecordOptions]
@@ -1449,13 +1461,13 @@ class IdentifiedElements(Drawn):
         The standard error is None for an unknown at its bound, and for one that the data do not
         determine.
         """
-        return MappingProxyType({row["name"]: _unknown(row) for row in self._told["parameters"]})
+        return ReadOnly({row["name"]: _unknown(row) for row in self._told["parameters"]})
 
     @property
     def priors(self) -> Mapping[str, Mapping[str, Any]]:
         """Priors by name: ``mean``, ``standard_deviation``, ``share`` of the information, ``p_value``."""
         rows = [row for row in self._told["parameters"] if row["prior"] is not None]
-        return MappingProxyType({row["name"]: MappingProxyType(row["prior"]) for row in rows})
+        return ReadOnly({row["name"]: ReadOnly(row["prior"]) for row in rows})
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -1471,12 +1483,12 @@ class IdentifiedElements(Drawn):
     @property
     def minima(self) -> tuple[Mapping[str, Any], ...]:
         """Minima at which the searches ended, the lowest first."""
-        return tuple(MappingProxyType(row) for row in self._told["minima"])
+        return tuple(ReadOnly(row) for row in self._told["minima"])
 
     @property
     def candidates(self) -> tuple[Mapping[str, Any], ...]:
         """Possible additional measurements, the best first."""
-        return tuple(MappingProxyType(row) for row in self._told.get("candidates", ()))
+        return tuple(ReadOnly(row) for row in self._told.get("candidates", ()))
 
     @property
     def covariance(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
@@ -1498,7 +1510,7 @@ class IdentifiedElements(Drawn):
     @property
     def notes(self) -> tuple[Mapping[str, Any], ...]:
         """Remarks to read before using the numbers: ``kind`` and the numbers of each."""
-        return tuple(MappingProxyType(row) for row in self._told["notes"])
+        return tuple(ReadOnly(row) for row in self._told["notes"])
 
     def _remarks(self) -> tuple[str, ...]:
         # The JSON has the numbers of each note; the text has its sentence.
@@ -1533,7 +1545,7 @@ class ModeComparison(Bare, Plotted):
     def pairs(self) -> tuple[Mapping[str, Any], ...]:
         """Corresponding modes: their numbers, frequencies, damping ratios, MAC and
         probabilities."""
-        return tuple(MappingProxyType(row) for row in self._told["pairs"])
+        return tuple(ReadOnly(row) for row in self._told["pairs"])
 
     @property
     def only_first(self) -> tuple[int, ...]:
@@ -1559,7 +1571,7 @@ class ModeComparison(Bare, Plotted):
     def figures(self) -> Mapping[str, Figure]:
         """Figure of the modal assurance criterion, ``"assurance"``, to draw with Matplotlib."""
         caption = "Likeness of the mode shapes: rows are the modes of the first set, columns those of the second."
-        return MappingProxyType({"assurance": MatrixFigure("assurance", caption, ("",), self.mac)})
+        return ReadOnly({"assurance": MatrixFigure("assurance", caption, ("",), self.mac)})
 
     def to_json(self) -> str:
         """Return the JSON that ``mechid modes --compare FILE --json`` prints."""
@@ -1600,7 +1612,7 @@ class Sweep(Drawn):
     @property
     def points(self) -> tuple[Mapping[str, Any], ...]:
         """All values at each setting."""
-        return tuple(MappingProxyType(point) for point in self._told["points"])
+        return tuple(ReadOnly(point) for point in self._told["points"])
 
     def to_xarray(self) -> Dataset:
         """Return error and estimates at each setting, as an xarray dataset with units.
@@ -1684,7 +1696,7 @@ class Predicted(Result):
         Without measured responses, those of a machine are its displacements, called ``"displacement
         1"`` …; those of modes have the names in the record of the test.
         """
-        return MappingProxyType(dict(self._inner.columns()))
+        return ReadOnly(dict(self._inner.columns()))
 
     def _responses(self, quantity: str) -> NDArray[np.float64]:
         for name, values in self._inner.responses():
@@ -1710,7 +1722,7 @@ class Predicted(Result):
     @property
     def channels(self) -> tuple[Mapping[str, Any], ...]:
         """Error of each measured channel: ``quantity``, ``degree_of_freedom``, ``rmse``, ``nrmse`` …"""
-        return tuple(MappingProxyType(row) for row in self.to_dict()["channels"])
+        return tuple(ReadOnly(row) for row in self.to_dict()["channels"])
 
     def to_json(self) -> str:
         """Return the JSON that the program prints with ``--json``."""
@@ -1751,7 +1763,7 @@ class Simulation:
         kinds = dict(measured)
         self.displacement, self.velocity = kinds["displacement"], kinds["velocity"]
         self.acceleration = kinds["acceleration"]
-        self.truth: Mapping[str, NDArray[np.float64]] = MappingProxyType(
+        self.truth: Mapping[str, NDArray[np.float64]] = ReadOnly(
             {"force": true_force, **dict(truth)}
         )
 
@@ -1915,7 +1927,7 @@ def _finding(row: dict[str, Any]) -> Finding:
         verdict=row["verdict"],
         value=row["value"],
         text=row["text"],
-        numbers=MappingProxyType(row["finding"]),
+        numbers=ReadOnly(row["finding"]),
     )
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from ._errors import MechidError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
 # Methods without arguments and properties of the compiled results, by their names.
 _ANSWERS = (
@@ -31,11 +33,23 @@ _ANSWERS = (
 )
 
 
+# Level of the intervals that are stored, the default of `Parameter.interval`.
+_LEVEL = 0.95
+
+
 class Stored:
     """Answers of a compiled result at the time at which it was pickled."""
 
     def __init__(self, answers: Mapping[str, tuple[bool, Any]]) -> None:
         self._answers = dict(answers)
+
+    def interval(self, name: str, level: float) -> list[float]:
+        """Return the interval of a parameter at the level at which it was stored."""
+        _, intervals = self._answers.get("intervals", (False, {}))
+        if level != _LEVEL or name not in intervals:
+            _refuse("interval")
+        bounds: list[float] = intervals[name]
+        return bounds
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -52,6 +66,15 @@ def _refuse(name: str) -> NoReturn:
         f"this result was pickled, which keeps only its numbers: call `{name}` before pickling",
         "Python(Pickled {})",
     )
+
+
+def stored_intervals(inner: Any, names: Iterable[str]) -> Stored:
+    """Return the intervals of some parameters of a result, without those that have none."""
+    intervals: dict[str, list[float]] = {}
+    for name in names:
+        with suppress(MechidError):
+            intervals[name] = inner.interval(name, _LEVEL)
+    return Stored({"intervals": (False, intervals)})
 
 
 def stored(held: Mapping[str, Any]) -> dict[str, Any]:
@@ -72,6 +95,9 @@ def stored(held: Mapping[str, Any]) -> dict[str, Any]:
             except (MechidError, TypeError):
                 # A method that needs arguments is not stored.
                 continue
+        if hasattr(inner, "interval"):
+            names = [row["name"] for row in json.loads(inner.to_json())["parameters"]]
+            answers |= stored_intervals(inner, names)._answers
         kept["_inner"] = answers
     return kept
 

@@ -21,7 +21,6 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_complete
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -29,6 +28,7 @@ import numpy as np
 from . import _mechid
 from ._errors import MechidError, careful
 from ._figures import Figure, read_page
+from ._mapping import ReadOnly
 from ._records import no_column
 from ._results import Plotted, description_of, framed
 
@@ -97,7 +97,7 @@ class Trends(Plotted):
     def figures(self) -> Mapping[str, Figure]:
         """Figures of the page by the names of the quantities, to draw with Matplotlib."""
         names = (series["name"] for series in self.fields["series"])
-        return MappingProxyType(dict(zip(names, read_page(self.page).values(), strict=True)))
+        return ReadOnly(dict(zip(names, read_page(self.page).values(), strict=True)))
 
     def _repr_html_(self) -> str:
         return framed(self.page, self.text)
