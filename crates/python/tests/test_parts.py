@@ -117,7 +117,13 @@ def test_parts_come_back_from_other_processes() -> None:
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         there = pool.apply_async(sent).get(timeout=60)
     assert repr(there) == repr(sent())
+    np.testing.assert_array_equal(there[4].model, sent()[4].model)
     assert there[0]["m"].interval() == identified().parameters["m"].interval()
+
+
+def test_receptances_are_short_when_printed() -> None:
+    table = identified().frf
+    assert repr(table) == f"<Receptances: {len(table.frequency_hz)} frequencies, responses: 1, forces: 1>"
 
 
 def test_mappings_of_results_are_read_only() -> None:

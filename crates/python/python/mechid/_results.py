@@ -536,6 +536,10 @@ class Receptances:
     measured: NDArray[np.complex128]
     model: NDArray[np.complex128]
 
+    def __repr__(self) -> str:
+        frequencies, responses, forces = self.measured.shape
+        return f"<Receptances: {frequencies} frequencies, responses: {responses}, forces: {forces}>"
+
 
 class Estimated(Drawn):
     """A machine with the uncertainty of its parameters, and the checks of the identification."""
