@@ -875,11 +875,17 @@ class ResponseTable:
     ) -> None:
         self._made: tuple[Any, ...]
         hz = _finite("frequency_hz", np.asarray(frequency_hz, dtype=np.float64))
-        values = _finite("response", np.asarray(response, dtype=np.complex128))
+        given = np.asarray(response)
+        values = _finite("response", given.astype(np.complex128, copy=False))
         if hz.ndim != 1 or values.ndim not in (1, 3) or len(values) != len(hz):
             raise ValueError(
                 f"`response` of shape {values.shape} has not one entry, or one matrix, for each frequency "
                 f"of `frequency_hz` of shape {hz.shape}"
+            )
+        if given.dtype.kind in "biuf":
+            raise ValueError(
+                f"`response` holds {given.dtype}, one part or the magnitude of a frequency response: give complex "
+                "numbers, with real and imaginary parts (`np.asarray(response, complex)` if the imaginary parts are 0)"
             )
         values = values.reshape(len(hz), *(values.shape[1:] or (1, 1)))
         _, motions, columns = values.shape
