@@ -239,6 +239,66 @@ def test_channels_of_sep_5_are_found_without_their_unit_and_take_another():
     assert mass(channels, scale={"acc": 9.80665}) == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("F [N]", "kN"), ("F [kN]", "N"), ("F (mm)", "N"), ("F_lbf", "N"), ("F_kN", "lbf"), ("F/N", "kN")],
+)
+def test_a_name_and_attributes_with_different_units_are_refused(name, unit):
+    said = re.escape(f"column {name!r} states one unit in its name and another, {unit!r}")
+    frame = pd.DataFrame({name: FORCE, "acc": ACC})
+    frame.attrs["units"] = {name: unit}
+    how = {"force": name, "acceleration": "acc", "fs": FS}
+    with pytest.raises(ValueError, match=said):
+        mechid.Measurement.from_table(frame, **how)
+    record = mechid.Measurement.from_table(frame, **how, unit={name: "kN"})
+    np.testing.assert_allclose(record.force[:, 0], 1e3 * FORCE)
+    array = xr.DataArray(FORCE, dims="time", name=name, attrs={"units": unit})
+    for call in (
+        lambda: mechid.Measurement.from_table(xr.Dataset({name: array, "acc": ("time", ACC)}), **how),
+        lambda: mechid.Measurement.from_arrays(array, acceleration=ACC, fs=FS),
+        lambda: mechid.Measurement.from_table(
+            [{"name": name, "data": FORCE, "unit_str": unit, "fs": FS}, {"name": "acc", "data": ACC, "fs": FS}],
+            force=name, acceleration="acc",
+        ),
+    ):
+        with pytest.raises(ValueError, match=said):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "factor"),
+    [
+        ("acc", "g", 9.80665),
+        ("acc [g]", "g", 9.80665),
+        ("acc [m/s^2]", "m/s²", 1.0),
+        ("acc [m/s^2]", "m s-2", 1.0),
+        ("acc [ch 1]", "g", 9.80665),
+        ("acc [V]", "g", 9.80665),
+        ("a_g", "g", 9.80665),
+        ("acc_mg", "mg", 9.80665e-3),
+        ("acc (m/s², 100 mV/g)", "m/s^2", 1.0),
+        ("acc [g]", "V", 9.80665),
+    ],
+)
+def test_a_name_and_attributes_that_agree_are_read(name, unit, factor):
+    frame = pd.DataFrame({"force": FORCE, name: ACC})
+    frame.attrs["units"] = {name: unit}
+    record = mechid.Measurement.from_table(frame, force="force", acceleration=[name], fs=FS)
+    np.testing.assert_allclose(record.responses["acceleration"][:, 0], factor * ACC)
+
+
+def test_the_units_of_time_are_compared_too():
+    for name, unit in [("time [s]", "ms"), ("time_ms", "s")]:
+        frame = pd.DataFrame({name: T, "force": FORCE, "acc": ACC})
+        frame.attrs["units"] = {name: unit}
+        with pytest.raises(ValueError, match="states one unit in its name"):
+            mechid.Measurement.from_table(frame, force="force", acceleration="acc")
+    for name, unit in [("time", "ms"), ("time [ms]", "ms"), ("time_ms", "ms")]:
+        frame = pd.DataFrame({name: 1e3 * T, "force": FORCE, "acc": ACC})
+        frame.attrs["units"] = {name: unit}
+        assert mechid.Measurement.from_table(frame, force="force", acceleration="acc").fs == pytest.approx(FS)
+
+
 def test_keywords_of_other_packages_are_named():
     for wrong, right in [("sample_rate", "fs"), ("disp", "displacement"), ("perod", "period")]:
         with pytest.raises(TypeError, match=f"'{wrong}'; did you mean `{right}`"):

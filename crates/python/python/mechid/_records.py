@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +24,7 @@ from typing import (
 import numpy as np
 
 from . import _mechid
-from ._errors import careful
+from ._errors import MechidError, careful
 from ._mapping import ReadOnly
 
 if TYPE_CHECKING:
@@ -224,7 +225,7 @@ class Measurement:
             counts.append(len(found))
             columns += found
         names, channels = _named(tuple(counts))
-        units = [_series_unit(given) for given in arrays]
+        units = [_series_unit(kind, given) for kind, given in zip(_KINDS, arrays, strict=True)]
         if any(units):
             names, channels = _with_units(names, units, channels)
         return cls._of(name, fs, list(zip(names, columns, strict=True)), channels, window)
@@ -456,6 +457,8 @@ class _Sep5:
         if name in self._unit:
             return f"[{self._unit[name]}] {name}", 1.0
         unit = self._channels[name].get("unit_str")
+        if unit:
+            _only_one_unit(name, str(unit), kind, "`unit_str`")
         return (f"{name} [{unit}]" if unit else name), 1.0
 
     def check_starts(self, names: Sequence[str]) -> None:
@@ -572,6 +575,8 @@ class _Frame:
         if name in self._unit:
             return f"[{self._unit[name]}] {name}", 1.0
         unit = self._stated(name)
+        if unit:
+            _only_one_unit(name, unit, kind, "`attrs`")
         return (f"{name} [{unit}]" if unit else name), 1.0
 
     def _stated(self, name: str) -> str | None:
@@ -622,8 +627,50 @@ class _Frame:
         )
 
     def _rate(self, name: str) -> float:
-        unit = self._unit.get(name) or self._stated(name)
+        unit = self._unit.get(name)
+        if unit is None:
+            unit = self._stated(name)
+            if unit:
+                _only_one_unit(name, unit, "time", "`attrs`")
         return _rate_of(f"[{unit}] {name}" if unit else name, self[name])
+
+
+def _only_one_unit(name: str, unit: str, kind: str, source: str) -> None:
+    """Refuse a column whose name states another unit than its source, such as its attributes."""
+    # A unit in brackets counts before one in words, and the first one in brackets before the others.
+    first, last, alone = (_factor(label, kind) for label in (f"[{unit}] {name}", f"{name} [{unit}]", name))
+    # A name with a unit is refused as a column of another quantity.
+    is_stated = alone != 1.0 or _factor(name, "velocity" if kind == "force" else "force") is None
+    if _differ(first, last) or (is_stated and _differ(alone, last)):
+        raise ValueError(
+            f"column {name!r} states one unit in its name and another, {unit!r}, in its {source}: correct one "
+            "of them, or state the unit in the call (`unit`)"
+        )
+
+
+def _differ(first: float | None, second: float | None) -> bool:
+    if first is None or second is None:
+        return first is not second
+    return not math.isclose(first, second, rel_tol=1e-9)
+
+
+@lru_cache(maxsize=64)
+def _factor(label: str, kind: str) -> float | None:
+    """Return the factor that converts a column to SI units; None if it has a unit of another
+    quantity."""
+    ones = np.ones(2)
+    other = "displacement" if kind == "force" else "force"
+    channels = {**dict.fromkeys(_KINDS, ()), kind: (label,), other: ("-",)}
+    try:
+        if kind == "time":
+            return 1 / _mechid.rate_of(label, np.arange(4.0))
+        record = _mechid.Measurement.from_columns(
+            "units", 1.0, [(label, ones), ("-", ones)], json.dumps(channels), _window_json({})
+        )
+    except MechidError:
+        return None
+    values = record.force() if kind == "force" else dict(record.responses())[kind]
+    return float(values[0, 0])
 
 
 def _has_unit_of_time(name: str, unit: str | None) -> bool:
@@ -987,13 +1034,15 @@ def _finite(name: str, values: _Numbers) -> _Numbers:
     return values
 
 
-def _series_unit(values: object) -> str | None:
+def _series_unit(kind: str, values: object) -> str | None:
     """Return the unit that a series of pandas or xarray states, in an attribute or in brackets."""
     attrs, name = getattr(values, "attrs", None), getattr(values, "name", None)
     units = attrs.get("units", attrs.get("unit")) if isinstance(attrs, Mapping) else None
     if isinstance(units, Mapping):
         units = units.get(name)
     if isinstance(units, str):
+        if isinstance(name, str):
+            _only_one_unit(name, units, kind, "`attrs`")
         return units
     in_brackets = _IN_BRACKETS.findall(name) if isinstance(name, str) else []
     return "; ".join(in_brackets) or None
@@ -1085,8 +1134,6 @@ def _names(kind: str, given: object) -> list[str]:
 
 
 def no_column(name: str, known: object) -> Exception:
-    from ._errors import MechidError
-
     available = ", ".join(str(column) for column in known)  # type: ignore[attr-defined]
     quoted = json.dumps(name), json.dumps(available)
     return MechidError(
