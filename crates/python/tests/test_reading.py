@@ -299,6 +299,13 @@ def test_the_units_of_time_are_compared_too():
         assert mechid.Measurement.from_table(frame, force="force", acceleration="acc").fs == pytest.approx(FS)
 
 
+def test_a_factor_of_the_time_is_used():
+    frame = pd.DataFrame({"time": 1e3 * T, "force": FORCE, "acc": ACC})
+    for table, name in [(frame, "time"), (frame.set_index("time"), "time"), (frame.set_index("time").rename_axis("n"), "n")]:
+        record = mechid.Measurement.from_table(table, force="force", acceleration="acc", scale={name: 1e-3})
+        assert record.fs == pytest.approx(FS)
+
+
 def test_keywords_of_other_packages_are_named():
     for wrong, right in [("sample_rate", "fs"), ("disp", "displacement"), ("perod", "period")]:
         with pytest.raises(TypeError, match=f"'{wrong}'; did you mean `{right}`"):

@@ -618,7 +618,7 @@ class _Frame:
             # Steps of exactly 1 are positions of samples, also after a part of the rows was chosen.
             is_time = instants.dtype.kind == "f" and bool((np.diff(instants) != 1).any())
             return _rate_of("time", instants) if is_time else None
-        unit = self._unit.get(name) or self._stated(name)
+        unit = "s" if name in self._scale else self._unit.get(name) or self._stated(name)
         if _mechid.time_column([name]) is not None or _has_unit_of_time(name, unit):
             return self._rate(name)
         raise TypeError(
@@ -627,6 +627,8 @@ class _Frame:
         )
 
     def _rate(self, name: str) -> float:
+        if name in self._scale:
+            return _rate_of("time [s]", np.asarray(self[name]) * self._scale[name])
         unit = self._unit.get(name)
         if unit is None:
             unit = self._stated(name)
