@@ -188,12 +188,17 @@ impl Fitted {
         // Relative standard deviation of the root mean square of `spare` values.
         let error = 1.0 / (2.0 * spare as f64).sqrt();
         (error > UNCERTAIN_ERROR).then(|| {
+            let how_few = match spare {
+                0 => "no equation is left that shows the errors".to_owned(),
+                _ => format!(
+                    "the standard errors themselves are known to {} % only",
+                    significant(100.0 * error, 2)
+                ),
+            };
             format!(
-                "{} for {}: the standard errors themselves are known to {} % only, and the checks can hardly fail; \
-                 use a longer record",
+                "{} for {}: {how_few}, and the checks can hardly fail; use a longer record",
                 message::count(self.equations, "equation"),
-                message::count(of_one, "unknown"),
-                significant(100.0 * error, 2)
+                message::count(of_one, "unknown")
             )
         })
     }
