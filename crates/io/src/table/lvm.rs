@@ -82,27 +82,27 @@ impl LvmHeader {
         } else {
             b'\t'
         };
-        let (mut starts, mut steps) = (Vec::new(), Vec::new());
+        let mut rows = ChannelRows::default();
         for line in start[..bytes].split(|b| *b == terminator) {
             let mut fields =
                 line.split(|b| *b == separator).map(|field| text_of(field.trim_ascii()));
             let key = fields.next().unwrap_or_default();
-            let number = |text: String| text.replace(',', ".").parse::<f64>().unwrap_or(f64::NAN);
-            match key.as_str() {
-                "X_Columns" => {
-                    header.instants = match fields.next().unwrap_or_default().as_str() {
-                        "No" => Instants::No,
-                        "Multi" => Instants::Each,
-                        _ => Instants::One,
-                    };
-                }
-                "Y_Unit_Label" => header.units = fields.collect(),
-                "X0" => starts = fields.map(number).collect(),
-                "Delta_X" => steps = fields.map(number).collect(),
-                _ => {}
+            if key == "X_Columns" {
+                header.instants = match fields.next().unwrap_or_default().as_str() {
+                    "No" => Instants::No,
+                    "Multi" => Instants::Each,
+                    _ => Instants::One,
+                };
+            } else {
+                rows.add(&key, fields.collect());
             }
         }
-        header.axes = starts.into_iter().zip(steps).collect();
+        header.units = rows.of_channels(&rows.units, header.instants);
+        let number = |text: String| text.replace(',', ".").parse::<f64>().unwrap_or(f64::NAN);
+        let numbers = |fields: &[String]| {
+            rows.of_channels(fields, header.instants).into_iter().map(number).collect::<Vec<_>>()
+        };
+        header.axes = numbers(&rows.starts).into_iter().zip(numbers(&rows.steps)).collect();
         Some(header)
     }
 
@@ -113,4 +113,45 @@ impl LvmHeader {
             Instants::Each => 2 * channel + 1,
         }
     }
+}
+
+/// Rows of a header with one field per channel, without their keys.
+#[derive(Debug, Default)]
+struct ChannelRows {
+    units: Vec<String>,
+    starts: Vec<String>,
+    steps: Vec<String>,
+    /// `true` if a field that no channel lacks follows the field of another channel directly.
+    are_packed: bool,
+}
+
+impl ChannelRows {
+    /// Adds a row; a row with another key is ignored.
+    fn add(&mut self, key: &str, fields: Vec<String>) {
+        self.are_packed |= match key {
+            "Samples" | "X_Dimension" | "X0" | "Delta_X" => is_packed(&fields),
+            _ => false,
+        };
+        match key {
+            "Y_Unit_Label" => self.units = fields,
+            "X0" => self.starts = fields,
+            "Delta_X" => self.steps = fields,
+            _ => {}
+        }
+    }
+
+    /// Returns the fields of a row, one per channel.
+    ///
+    /// If each channel has a column of instants, most programs write the field of a channel above
+    /// its values, with an empty field above the next instants. Others write no empty fields.
+    fn of_channels(&self, fields: &[String], instants: Instants) -> Vec<String> {
+        let is_packed = self.are_packed || is_packed(fields);
+        let step = if instants == Instants::Each && !is_packed { 2 } else { 1 };
+        fields.iter().step_by(step).cloned().collect()
+    }
+}
+
+/// Returns whether a field has text where a row with one field per column has none: above instants.
+fn is_packed(fields: &[String]) -> bool {
+    fields.iter().skip(1).step_by(2).any(|field| !field.is_empty())
 }

@@ -202,3 +202,34 @@ fn channels_of_different_rates_in_a_labview_file_are_refused_together() {
     assert!(error.contains("same time axis"), "{error}");
     assert_eq!(table.sampling(&TimeAxis::OfFile, &["Acc"]).unwrap().dt(), 0.25);
 }
+
+/// In files with a column of instants for each channel, LabVIEW leaves the field above the instants
+/// empty. The third channel has no unit, so its field is empty, too.
+#[test]
+fn channels_with_their_own_instants_have_their_own_units() {
+    let above = "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tMulti\n***End_of_Header***\t\n\t\n\
+                 Channels\t4\n";
+    let names = "X_Value\tForce\tX_Value\tAcc\tX_Value\tState\tX_Value\tDisp\tComment";
+    let row = |t: f64| format!("{t}\t1\t{t}\t2\t{t}\t3\t{t}\t4\n");
+    let rows: String = (0..4).map(|k| row(0.5 * f64::from(k))).collect();
+    let aligned = "Samples\t4\t\t4\t\t4\t\t4\nY_Unit_Label\tkN\t\tg\t\t\t\tmm\nX0\t0\t\t0\t\t0\t\t0\n\
+                   Delta_X\t0.5\t\t0.5\t\t0.5\t\t0.5\n";
+    let packed = "Samples\t4\t4\t4\t4\nY_Unit_Label\tkN\tg\t\tmm\nX0\t0\t0\t0\t0\n\
+                  Delta_X\t0.5\t0.5\t0.5\t0.5\n";
+    let only_units_packed = aligned.replace("kN\t\tg\t\t\t\tmm", "kN\tg\t\tmm");
+    for header in [aligned, packed, &only_units_packed] {
+        let end = "***End_of_Header***\t\t\t";
+        let table = table(&format!("{above}{header}{end}\n{names}\n{rows}"));
+        for (name, quantity, factor) in [
+            ("Force", Quantity::Force, 1e3),
+            ("Acc", Quantity::ACCELERATION, 9.80665),
+            ("Disp", Quantity::DISPLACEMENT, 1e-3),
+        ] {
+            let at = table.find(name).unwrap();
+            let si = table.to_si(at, quantity).unwrap();
+            assert!((si / factor - 1.0).abs() < 1e-12, "{header}{name}: {si}");
+        }
+        assert_eq!(table.unit(table.find("State").unwrap()), None, "{header}");
+        assert_eq!(table.sampling(&TimeAxis::OfFile, &["Force", "Disp"]).unwrap().dt(), 0.5);
+    }
+}
