@@ -1,10 +1,10 @@
 //! Names and units above a table: in several rows, below channel numbers, or in comments.
 
-use super::delimiter::{Delimiter, is_comment};
+use super::comments::{Comments, units_of};
 use super::dialect::is_data;
 use super::fields::{Fields, Layout, Row, RowIter};
 use super::rows::text_of;
-use crate::units::Unit;
+use crate::units::{Unit, is_named_quantity};
 
 /// Maximum number of rows in which the beginning of the table is searched for.
 const ROWS: usize = 24;
@@ -12,8 +12,17 @@ const ROWS: usize = 24;
 /// Minimum number of consecutive rows of numbers in a table.
 const MIN_NUMBERS: usize = 2;
 
-/// Names and units above the rows of numbers, if they are not just in the first row and perhaps the
-/// second.
+/// Texts above the rows of numbers.
+#[derive(Debug, Default)]
+pub(super) struct Above {
+    /// Names and units, if they are not just in the first row and perhaps the second.
+    pub heading: Option<Heading>,
+    /// Further units of the columns, in comments and in other rows: one text per column in each,
+    /// empty for a column without a unit.
+    pub further_units: Vec<Vec<String>>,
+}
+
+/// Names and units above the rows of numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heading {
     /// One name per column.
@@ -69,67 +78,149 @@ impl Filled {
         let first = if has_comment && is_uniform { usual } else { first };
         Self { first, usual, is_uniform }
     }
+
+    /// Returns whether a row has one field more than the rows of numbers.
+    fn is_longer(&self, row: &Beginning<'_>) -> bool {
+        self.is_uniform && row.fields.filled() == self.usual + 1
+    }
 }
 
-impl Heading {
-    /// Detects names and units above the numbers; `None` if the first row names the columns,
-    /// perhaps with units in the second row, or if no row does.
-    pub fn find(text: &[u8], rows: &[Beginning<'_>], layout: Layout) -> Option<Self> {
+impl Above {
+    /// Reads the rows and the comments above the numbers. There is no heading if the first row
+    /// names the columns, perhaps with units in the second row, or if no row does.
+    pub fn new(text: &[u8], rows: &[Beginning<'_>], layout: Layout) -> Self {
         let is_numbers = |row: &Beginning<'_>| 2 * numbers(row, layout) >= row.fields.filled();
         let begin = rows.iter().rposition(|row| !is_numbers(row)).map_or(0, |last| last + 1);
         let table = &rows[begin..];
         if table.len() < MIN_NUMBERS && begin > 0 || table.is_empty() {
-            return None;
+            return Self::default();
         }
         let (above, width) = (&rows[..begin], table[0].fields.len());
-        let Filled { first: filled, usual, is_uniform } = Filled::new(above, table);
-        let is_longer = |row: &Beginning<'_>| is_uniform && row.fields.filled() == usual + 1;
+        let filled = Filled::new(above, table);
         let is_alike = |row: &Beginning<'_>| {
             let count = row.fields.filled();
-            count == filled || is_longer(row) || row.fields.len() == width
+            count == filled.first || filled.is_longer(row) || row.fields.len() == width
         };
         // A row of numbers only is a row of data, unless it numbers the channels.
         let is_data_row = |(at, row): (usize, &Beginning<'_>)| {
             numbers(row, layout) == row.fields.filled() && !(at == 0 && is_numbering(row))
         };
         if !above.iter().all(is_alike) || above.iter().enumerate().any(is_data_row) {
-            return None;
+            return Self::default();
         }
-        let heading = |names: Vec<String>, units: Vec<String>, names_row: Option<usize>| {
-            Some(Self { names, units, begin, names_row, filled })
+        let widths = filled.first.min(width)..=width;
+        let comments = Comments::new(&text[..table[0].row.at], widths, layout);
+        let are_numeric = table.iter().all(|row| numbers(row, layout) == row.fields.filled());
+        let names = Names::find(above, &comments, &filled, layout)
+            .filter(|_| are_numeric || !above.is_empty());
+        let comment = names.as_ref().and_then(|names| names.comment);
+        let mut further_units: Vec<Vec<String>> = comments.units(comment).collect();
+        let heading = names.map(|Names { names, units, row, further_units: of_rows, .. }| {
+            further_units.extend(of_rows);
+            Heading { names, units, begin, names_row: row, filled: filled.first }
+        });
+        Self { heading, further_units }
+    }
+}
+
+/// Names of the columns, with their units.
+#[derive(Debug, Default)]
+struct Names {
+    names: Vec<String>,
+    units: Vec<String>,
+    /// Row of the names; `None` if they are in a comment.
+    row: Option<usize>,
+    /// Index of the comment with the names.
+    comment: Option<usize>,
+    /// Units in further rows.
+    further_units: Vec<Vec<String>>,
+}
+
+impl Names {
+    /// Detects names in the rows above the numbers or in comments; `None` if they are in the first
+    /// row, perhaps with units in the second, or if there are none.
+    fn find(
+        above: &[Beginning<'_>],
+        comments: &Comments,
+        filled: &Filled,
+        layout: Layout,
+    ) -> Option<Self> {
+        let of_comment = |line: usize| Self {
+            names: comments.fields(line),
+            comment: Some(line),
+            ..Self::default()
         };
-        let comment = || names_in_comments(&text[..rows[0].row.at], width, layout);
         match above {
-            [] => {
-                let are_numeric =
-                    table.iter().all(|row| numbers(row, layout) == row.fields.filled());
-                let (names, units) = comment().filter(|_| are_numeric)?;
-                heading(names, units, None)
-            }
+            [] => comments.names_line().or(comments.units_line()).map(of_comment),
             [units] if is_units(units, layout) => {
-                let (names, _) = comment()?;
-                heading(names, texts(units), Some(0))
+                let names = of_comment(comments.names_line()?);
+                Some(Self { units: texts(units), row: Some(0), ..names })
             }
-            [names] if is_longer(names) && usual == filled && numbers(names, layout) == 0 => {
-                heading(texts(names), Vec::new(), Some(0))
+            _ => {
+                let rows = NamesAndUnits::find(above, filled, layout)?;
+                Some(Self {
+                    names: texts(&above[rows.names]),
+                    units: rows.units.map_or(Vec::new(), |at| texts(&above[at])),
+                    row: Some(rows.names),
+                    comment: None,
+                    further_units: rows.further_units(above, layout),
+                })
             }
-            [first, second] if !is_channels(first, layout) || is_units(second, layout) => {
-                let longer = is_longer(first) && is_units(second, layout);
-                longer.then(|| heading(texts(first), texts(second), Some(0)))?
+        }
+    }
+}
+
+/// Indices of the rows with the names and with the units.
+struct NamesAndUnits {
+    names: usize,
+    units: Option<usize>,
+}
+
+impl NamesAndUnits {
+    /// Detects the rows above a table that have names and units; `None` if they are the first and
+    /// the second row.
+    fn find(above: &[Beginning<'_>], filled: &Filled, layout: Layout) -> Option<Self> {
+        match above {
+            [names] => {
+                let is_longer = filled.is_longer(names) && filled.usual == filled.first;
+                (is_longer && numbers(names, layout) == 0).then_some(Self { names: 0, units: None })
             }
-            [_, _, ..] => {
-                let (last, before) = (begin - 1, begin - 2);
-                let words = |at: usize| numbers(&rows[at], layout) == 0;
-                if is_units(&rows[last], layout) && words(before) {
-                    heading(texts(&rows[before]), texts(&rows[last]), Some(before))
-                } else if words(last) {
-                    heading(texts(&rows[last]), Vec::new(), Some(last))
-                } else {
-                    None
+            [first, second] if is_units(second, layout) || !is_channels(first, layout) => {
+                let is_swapped = is_units(first, layout) && !is_units(second, layout);
+                let is_longer = filled.is_longer(first) && is_units(second, layout);
+                match (is_swapped, is_longer) {
+                    (true, _) => Some(Self { names: 1, units: Some(0) }),
+                    (_, true) => Some(Self { names: 0, units: Some(1) }),
+                    _ => None,
                 }
             }
-            _ => None,
+            _ => Self::in_several_rows(above, layout),
         }
+    }
+
+    /// Detects the names and units in rows that may also number or describe the channels.
+    fn in_several_rows(above: &[Beginning<'_>], layout: Layout) -> Option<Self> {
+        let units = above.iter().rposition(|row| is_units(row, layout));
+        let is_names = |at: &usize| {
+            let row = &above[*at];
+            Some(*at) != units && numbers(row, layout) == 0 && !is_channels(row, layout)
+        };
+        let before = units.and_then(|units| (0..units).rev().find(is_names));
+        let quantities =
+            |at: &usize| texts(&above[*at]).iter().filter(|text| is_named_quantity(text)).count();
+        // Without units, most names are in the row that states most quantities.
+        let most_quantities = || (0..above.len()).filter(is_names).max_by_key(quantities);
+        let names = before
+            .or_else(most_quantities)
+            .or_else(|| above.iter().rposition(|row| numbers(row, layout) == 0))?;
+        Some(Self { names, units: units.filter(|units| *units != names) })
+    }
+
+    /// Returns the units in the other rows.
+    fn further_units(&self, above: &[Beginning<'_>], layout: Layout) -> Vec<Vec<String>> {
+        let is_other = |at: &usize| *at != self.names && Some(*at) != self.units;
+        let others = (0..above.len()).filter(is_other).map(|at| &above[at]);
+        others.map(|row| units_of(&texts(row), is_units(row, layout))).collect()
     }
 }
 
@@ -147,7 +238,8 @@ fn is_units(row: &Beginning<'_>, layout: Layout) -> bool {
     numbers(row, layout) == 0 && are_units(&texts(row))
 }
 
-fn are_units(texts: &[String]) -> bool {
+/// Returns whether most of the texts are units.
+pub(super) fn are_units(texts: &[String]) -> bool {
     let is_unit = |text: &&String| {
         let bare = text.trim_matches(['[', ']', '(', ')', '{', '}', '<', '>', ' ']);
         Unit::parse(text).or_else(|| Unit::parse(bare)).is_some()
@@ -175,68 +267,4 @@ fn is_channels(row: &Beginning<'_>, layout: Layout) -> bool {
         let is_number = is_data(text.as_bytes(), layout.delimiter);
         is_number || stem.len() < text.len() && WORDS.contains(&stem.as_str())
     })
-}
-
-/// Returns names, and perhaps units, in the comments directly above a table of `width` columns.
-fn names_in_comments(
-    above: &[u8],
-    width: usize,
-    layout: Layout,
-) -> Option<(Vec<String>, Vec<String>)> {
-    let mut lines = above.split(|b| *b == layout.terminator).rev().map(<[u8]>::trim_ascii_end);
-    // The text ends with a terminator, after which there is no line.
-    lines.next();
-    let mut next = || {
-        let line = lines.next().filter(|line| is_comment(line, layout.delimiter))?;
-        fields_of(&text_of(line.trim_ascii()), width, layout)
-    };
-    let last = next()?;
-    if !are_units(&last) {
-        return Some((last, Vec::new()));
-    }
-    Some(match next() {
-        Some(names) => (names, last),
-        None => (last, Vec::new()),
-    })
-}
-
-/// Returns the fields of a comment, if there is one per column and none is a number.
-fn fields_of(comment: &str, width: usize, layout: Layout) -> Option<Vec<String>> {
-    let text = comment.trim_start_matches(['#', '%', '!', ';', ' ']);
-    let split = |delimiter: Delimiter| -> Vec<String> {
-        let mut fields = Fields::default();
-        fields.split(text.as_bytes(), delimiter);
-        fields.iter().map(text_of).collect()
-    };
-    let by_wide_blanks = || -> Vec<String> {
-        let parts = text.split("  ").map(str::trim).filter(|part| !part.is_empty());
-        parts.map(str::to_owned).collect()
-    };
-    let candidates = [
-        split(layout.delimiter),
-        split(Delimiter::Byte(b',')),
-        split(Delimiter::Byte(b';')),
-        split(Delimiter::Byte(b'\t')),
-        by_wide_blanks(),
-        with_brackets_joined(split(Delimiter::Blanks)),
-        split(Delimiter::Blanks),
-    ];
-    let is_name =
-        |field: &String| !field.is_empty() && !is_data(field.as_bytes(), layout.delimiter);
-    candidates.into_iter().find(|fields| fields.len() == width && fields.iter().all(is_name))
-}
-
-/// Joins words in brackets with the word before them: `time [s] acc [m/s^2]`.
-fn with_brackets_joined(words: Vec<String>) -> Vec<String> {
-    let mut joined: Vec<String> = Vec::new();
-    for word in words {
-        match joined.last_mut() {
-            Some(last) if word.starts_with(['[', '(', '{']) => {
-                last.push(' ');
-                last.push_str(&word);
-            }
-            _ => joined.push(word),
-        }
-    }
-    joined
 }

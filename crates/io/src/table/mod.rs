@@ -2,6 +2,7 @@
 
 mod batch;
 mod blocks;
+mod comments;
 mod delimiter;
 mod dialect;
 mod fields;

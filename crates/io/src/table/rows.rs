@@ -6,7 +6,7 @@ use super::batch::{BadRow, Batch, Plan};
 use super::blocks::Block;
 use super::dialect::{is_data, is_number};
 use super::fields::{Fields, Layout, RowIter};
-use super::heading::{self, Heading};
+use super::heading::{self, Above};
 use super::instant::Instant;
 use super::lvm::{self, LvmHeader};
 use super::source::Stored;
@@ -36,6 +36,8 @@ pub(super) struct Rows {
     lines: Lines,
     /// Header of a LabVIEW measurement file.
     lvm: Option<LvmHeader>,
+    /// Units of the columns in comments and further rows, until the columns have them.
+    further_units: Vec<Vec<String>>,
     /// Reference days of the instants of columns, by column.
     origins: BTreeMap<usize, i64>,
     /// Line and number of fields of rows of empty fields that no other row has followed yet. At the
@@ -78,6 +80,7 @@ impl Rows {
             samples: 0,
             lines: Lines::default(),
             lvm: None,
+            further_units: Vec::new(),
             origins: BTreeMap::new(),
             empty: Vec::new(),
         }
@@ -184,7 +187,9 @@ impl Rows {
         if rows.iter().any(|row| row.row.text.len() > self.limits.row_bytes) {
             return Ok(None);
         }
-        let Some(heading) = Heading::find(&block.text, &rows, self.layout) else { return Ok(None) };
+        let Above { heading, further_units } = Above::new(&block.text, &rows, self.layout);
+        self.further_units = further_units;
+        let Some(heading) = heading else { return Ok(None) };
         let begin = &rows[heading.begin];
         let line = block.line + rows[heading.names_row.unwrap_or(heading.begin)].row.line;
         let width = begin.fields.len().max(heading.names.len());
@@ -215,7 +220,22 @@ impl Rows {
             }
         }
         self.apply_lvm();
+        self.add_further_units();
         self.has_samples = true;
+    }
+
+    /// Adds the units in comments and further rows to those of the columns, after a semicolon.
+    fn add_further_units(&mut self) {
+        for units in std::mem::take(&mut self.further_units) {
+            for (column, unit) in self.columns.iter_mut().zip(units) {
+                if unit.is_empty() || column.unit.split("; ").any(|known| known == unit) {
+                    continue;
+                }
+                let separator = if column.unit.is_empty() { "" } else { "; " };
+                column.unit = format!("{}{separator}{unit}", column.unit);
+                column.about.clone_from(&column.unit);
+            }
+        }
     }
 
     /// Assigns the units and the time axes of a LabVIEW header to the columns.

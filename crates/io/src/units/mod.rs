@@ -123,6 +123,22 @@ pub fn name_without_unit(name: &str) -> String {
     without_unit(name)
 }
 
+/// Returns the text of the unit that a text above a column states, clearly or not. It is empty if
+/// there is none, and for a number with a unit, which is a sensitivity or a range.
+pub(crate) fn unit_text(text: &str) -> String {
+    let stated = stated(text, "", None).filter(|_| number_and_rest(text).is_none());
+    stated.map_or(String::new(), |stated| stated.text)
+}
+
+/// Returns whether a text above a column states a unit or has a word that means a quantity.
+pub(crate) fn is_named_quantity(text: &str) -> bool {
+    let has_quantity = || {
+        let words = words::split_words(text);
+        words.into_iter().any(|word| words::quantity_word(&text[word]).is_some())
+    };
+    !unit_text(text).is_empty() || has_quantity()
+}
+
 /// Unit of a frequency response: a response over a force, or the inverse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ResponseUnit {

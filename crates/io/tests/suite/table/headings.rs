@@ -1,6 +1,6 @@
 //! Names, units and instants as measuring programs write them above and beside the numbers.
 
-use mechid_io::{Quantity, Table, TimeAxis};
+use mechid_io::{Evidence, Quantity, Table, TimeAxis};
 
 use super::table;
 
@@ -43,6 +43,61 @@ fn a_comment_above_the_table_names_its_columns() {
     // Comments that are not names: they have another number of words, or numbers.
     for text in [format!("# rig 4\n{ROWS}"), format!("# 1,2,3\n{ROWS}")] {
         assert_eq!(three(&text).names(), ["", "", ""], "{text}");
+    }
+}
+
+/// Judge: the definitions of the units; with its unit, the force of the first row is 1 kN.
+#[test]
+fn names_and_units_above_other_lines_are_read() {
+    let blanks = ROWS.replace(',', " ");
+    let mut texts = vec![
+        "# time,force [kN],acc [g]\n# 512 rows\n".to_owned(),
+        "# time,force [kN],acc [g]\n# -----------\n".into(),
+        "# time,force [kN],acc [g]\n#\n".into(),
+        "# time,force [kN],acc [g]\n\n".into(),
+        "# time,force [kN],acc [g]\n# run by Hans\n".into(),
+        "# time,force [kN],acc [g]\n# Halle,left,raw\n".into(),
+        "# Columns: time, force [kN], acc [g]\n".into(),
+        "# units: s, kN, g\ntime,force,acc\n".into(),
+        "# Unit = s, kN, g\n# recorded at night\ntime,force,acc\n".into(),
+        "# time, force, acc\n# s, kN, g\n# sampled in s\n".into(),
+        "time,force,acc\n# s,kN,g\n".into(),
+        "# time,force [kN],acc [g]\ntime,force,acc\n".into(),
+        "s,kN,g\ntime,force,acc\n".into(),
+    ];
+    for row in ["CH1,CH2,CH3", "Clock,Shaker head,Top plate", "Zeit,Kraft,Deckel"] {
+        for units in ["s,kN,g", "[s],[kN],[g]"] {
+            texts.push(format!("time,force,acc\n{units}\n{row}\n"));
+        }
+        texts.push(format!("time,force [kN],acc [g]\n{row}\nCH1,CH2,CH3\n"));
+    }
+    let mut texts: Vec<String> = texts.iter().map(|above| format!("{above}{ROWS}")).collect();
+    texts.push(format!("# time force acc\n# (s) (kN) (g)\n# ---- ---- ---\n{blanks}"));
+    texts.push(format!("# time, force [kN], acc [g]\n# end\n{blanks}"));
+    for text in texts {
+        let table = three(&text);
+        assert!(table.time_column().is_some_and(|name| name.starts_with("time")), "{text}");
+        let [force, acc] = ["force", "acc"].map(|name| table.find(name).unwrap());
+        assert_eq!(table.to_si(force, Quantity::Force).unwrap(), 1e3, "{text}");
+        let si = table.to_si(acc, Quantity::ACCELERATION).unwrap();
+        assert!((si - 9.80665).abs() < 1e-12, "{text}");
+    }
+}
+
+/// A unit that is not understood is not lost in a comment or a further row.
+#[test]
+fn units_that_are_not_understood_above_other_lines_are_reported() {
+    for above in [
+        "# time,force [V],acc [g]\n# 512 rows\n",
+        "# units: s, V, g\ntime,force,acc\n",
+        "time,force,acc\ns,kN/V,g\nClock,Shaker,Plate\n",
+        "time,force,acc\nClock,Shaker [V],Plate\nCH1,CH2,CH3\n",
+    ] {
+        let table = three(&format!("{above}{ROWS}"));
+        let stated = table.stated_unit(1, Some(Quantity::Force));
+        let stated = stated.unwrap_or_else(|| panic!("{above}"));
+        assert_eq!(stated.evidence, Evidence::Unused, "{above}");
+        assert!(stated.text.contains('V'), "{above}{stated:?}");
     }
 }
 

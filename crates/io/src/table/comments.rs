@@ -1,0 +1,167 @@
+//! Names and units of columns in the comment lines above the numbers of a table.
+
+use std::ops::RangeInclusive;
+
+use super::delimiter::{Delimiter, is_comment};
+use super::dialect::is_data;
+use super::fields::{Fields, Layout};
+use super::heading::are_units;
+use super::rows::text_of;
+use crate::units::{is_named_quantity, unit_text};
+
+/// Maximum number of lines above a table that are searched for names and units; names further up
+/// are not read.
+const MOST_LINES: usize = 64;
+
+/// Words, in lower case, before the names in a comment; a colon or an equals sign follows them.
+const NAMES: [&str; 6] = ["columns", "column names", "channels", "fields", "names", "spalten"];
+
+/// Words, in lower case, before the units in a comment; a colon or an equals sign follows them.
+const UNITS: [&str; 6] = ["units", "unit", "einheiten", "einheit", "unités", "unidades"];
+
+/// Comment lines above a table that have one field per column, the nearest first.
+#[derive(Debug, Default)]
+pub(super) struct Comments {
+    lines: Vec<CommentLine>,
+}
+
+/// Comment line with one field per column.
+#[derive(Debug)]
+struct CommentLine {
+    fields: Vec<String>,
+    /// `true` if the fields are units.
+    are_units: bool,
+    /// `true` if no other comment is between it and the table, except units and lines without
+    /// words.
+    is_adjacent: bool,
+}
+
+impl Comments {
+    /// Reads the comments in the text above a table with this number of columns.
+    pub fn new(above: &[u8], widths: RangeInclusive<usize>, layout: Layout) -> Self {
+        let mut lines = above.split(|b| *b == layout.terminator).rev().map(<[u8]>::trim_ascii_end);
+        // The text ends with a terminator, after which there is no line.
+        lines.next();
+        let (mut comments, mut is_adjacent) = (Self::default(), true);
+        for line in lines.take(MOST_LINES).filter(|line| is_comment(line, layout.delimiter)) {
+            let text = text_of(line.trim_ascii());
+            if !text.contains(char::is_alphanumeric) {
+                continue;
+            }
+            let fitting = CommentLine::new(&text, &widths, layout, is_adjacent);
+            is_adjacent &= fitting.as_ref().is_some_and(|line| line.are_units);
+            comments.lines.extend(fitting);
+        }
+        comments
+    }
+
+    /// Returns the index of the line with the names: the line in which most fields name a quantity
+    /// or a unit, otherwise the line directly above the table or above its units.
+    pub fn names_line(&self) -> Option<usize> {
+        let lines = || self.lines.iter().enumerate().filter(|(_, line)| !line.are_units);
+        let quantities = |line: &CommentLine| {
+            line.fields.iter().filter(|field| is_named_quantity(field)).count()
+        };
+        let best = lines().rev().max_by_key(|(_, line)| quantities(line));
+        best.filter(|(_, line)| quantities(line) > 0)
+            .or_else(|| lines().find(|(_, line)| line.is_adjacent))
+            .map(|(at, _)| at)
+    }
+
+    /// Returns the fields of a line, by its index.
+    pub fn fields(&self, line: usize) -> Vec<String> {
+        self.lines[line].fields.clone()
+    }
+
+    /// Returns the units of the columns, one text for each line with units except the line `names`.
+    pub fn units(&self, names: Option<usize>) -> impl Iterator<Item = Vec<String>> {
+        let others = self.lines.iter().enumerate().filter(move |(at, _)| Some(*at) != names);
+        others.map(|(_, line)| units_of(&line.fields, line.are_units))
+    }
+
+    /// Returns the index of the nearest line of units.
+    pub fn units_line(&self) -> Option<usize> {
+        self.lines.iter().position(|line| line.are_units)
+    }
+}
+
+/// Returns the texts for units in the fields of a line or row; empty for a field without a unit.
+pub(super) fn units_of(fields: &[String], are_units: bool) -> Vec<String> {
+    let unit = |field: &String| if are_units { field.clone() } else { unit_text(field) };
+    fields.iter().map(unit).collect()
+}
+
+impl CommentLine {
+    fn new(
+        comment: &str,
+        widths: &RangeInclusive<usize>,
+        layout: Layout,
+        is_adjacent: bool,
+    ) -> Option<Self> {
+        let text = comment.trim_start_matches(['#', '%', '!', ';', ' ', '\t']);
+        let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
+        let (fields, by_blanks) = fields_of(names.or(units).unwrap_or(text), widths, layout)?;
+        // Words of a sentence may be units, too: `sampled in s`.
+        let are_all_units = || fields.iter().all(|field| are_units(std::slice::from_ref(field)));
+        let seem_units = are_units(&fields) && (is_adjacent || !by_blanks || are_all_units());
+        Some(Self { are_units: units.is_some() || seem_units, fields, is_adjacent })
+    }
+}
+
+/// Returns the text after one of the words and a colon or an equals sign.
+fn after_word<'a>(text: &'a str, words: &[&str]) -> Option<&'a str> {
+    let (word, rest) = text.split_once([':', '='])?;
+    words.contains(&word.trim().to_lowercase().as_str()).then(|| rest.trim())
+}
+
+/// Returns the fields of a comment, if there is one per column and none is a number, and whether
+/// single blanks separate them.
+fn fields_of(
+    text: &str,
+    widths: &RangeInclusive<usize>,
+    layout: Layout,
+) -> Option<(Vec<String>, bool)> {
+    let split = |delimiter: Delimiter| -> Vec<String> {
+        let mut fields = Fields::default();
+        fields.split(text.as_bytes(), delimiter);
+        fields.iter().map(text_of).collect()
+    };
+    let by_wide_blanks = || -> Vec<String> {
+        let parts = text.split("  ").map(str::trim).filter(|part| !part.is_empty());
+        parts.map(str::to_owned).collect()
+    };
+    let of_table = match layout.delimiter {
+        Delimiter::Byte(byte) => split(Delimiter::Byte(byte)),
+        Delimiter::Blanks => Vec::new(),
+    };
+    let candidates = [
+        (of_table, false),
+        (split(Delimiter::Byte(b',')), false),
+        (split(Delimiter::Byte(b';')), false),
+        (split(Delimiter::Byte(b'\t')), false),
+        (by_wide_blanks(), false),
+        (with_brackets_joined(split(Delimiter::Blanks)), true),
+        (split(Delimiter::Blanks), true),
+    ];
+    let is_word = |field: &String| !is_data(field.as_bytes(), layout.delimiter);
+    candidates.into_iter().find(|(fields, _)| {
+        widths.contains(&fields.len())
+            && fields.iter().all(is_word)
+            && fields.iter().any(|field| !field.is_empty())
+    })
+}
+
+/// Joins words in brackets with the word before them: `time [s] acc [m/s^2]`.
+fn with_brackets_joined(words: Vec<String>) -> Vec<String> {
+    let mut joined: Vec<String> = Vec::new();
+    for word in words {
+        match joined.last_mut() {
+            Some(last) if word.starts_with(['[', '(', '{']) => {
+                last.push(' ');
+                last.push_str(&word);
+            }
+            _ => joined.push(word),
+        }
+    }
+    joined
+}
