@@ -99,9 +99,9 @@ impl Parser<'_> {
             '/' => (-1, chars.as_str()),
             '*' | '·' | '⋅' | '×' | '.' | '-' => (1, chars.as_str()),
             ')' => return None,
-            _ if is_apart => match trimmed.strip_prefix("per ") {
-                Some(rest) => (-1, rest),
-                None => (1, trimmed),
+            _ if is_apart => match trimmed.split_at_checked("per ".len()) {
+                Some((per, rest)) if per.eq_ignore_ascii_case("per ") => (-1, rest),
+                _ => (1, trimmed),
             },
             _ => return None,
         };
@@ -239,6 +239,8 @@ mod tests {
             ("gal", acceleration, 0.01),
             ("mm/s", [1, -1, 0], 1e-3),
             ("inches per second", [1, -1, 0], 0.0254),
+            ("MM PER S", [1, -1, 0], 1e-3),
+            ("MM PER S2", acceleration, 1e-3),
             ("ips", [1, -1, 0], 0.0254),
             ("km/h", [1, -1, 0], 1.0 / 3.6),
             ("in.", [1, 0, 0], 0.0254),

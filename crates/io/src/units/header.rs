@@ -56,10 +56,15 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
     let brackets = brackets(name);
     let outside = without_spans(name, brackets.iter().map(|one| one.span.clone()));
     let notes = brackets.iter().flat_map(|one| notes_of(&name[one.inner.clone()]));
-    let in_brackets = unit_in_notes(&notes.collect::<Vec<_>>(), wanted);
+    let notes: Vec<&str> = notes.collect();
+    let in_brackets = unit_in_notes(&notes, wanted);
     let stated = first_stated(in_brackets, &outside, &unit, wanted);
     // A factor in a name does not say whether the numbers include it or still need it.
-    match multiplier(&outside).filter(|_| wanted.is_some()) {
+    let factor = multiplier(&outside).or_else(|| {
+        let mut notes = notes.iter().copied().chain(notes_of(&unit));
+        notes.find(|note| multiplier(note) == Some(*note))
+    });
+    match factor.filter(|_| wanted.is_some()) {
         Some(factor) => {
             let unit = stated.and_then(|stated| stated.used().cloned());
             let evidence = if unit.is_some() { Evidence::Likely } else { Evidence::Unused };

@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use super::expression::Expression;
 use super::header::{Evidence, StatedUnit};
-use super::plain::{number_and_rest, with_restored_signs, without_treatment};
+use super::plain::{
+    begins_with_treatment, may_be_factor, number_and_rest, with_restored_signs, without_treatment,
+};
 use super::vocabulary::{Dimension, G};
 use super::words::{is_label, joined_unit};
 use super::{Quantity, Unit};
@@ -166,8 +168,13 @@ fn without_unit_word(note: &str) -> &str {
     });
     let Some((word, rest)) = word_and_rest else { return note };
     let marked = rest.trim_start().strip_prefix([':', '=']).map(str::trim_start);
-    // The word `in` of `in mm` is a preposition and not an inch.
-    let unmarked = rest.strip_prefix(' ').filter(|rest| Unit::parse(rest).is_some());
+    // The word `in` of `in mm` is a preposition and not an inch, except before words that cannot be
+    // a unit: `in peak`, `in left`.
+    let is_of_inches = |rest: &str| {
+        let first = rest.split_whitespace().next().unwrap_or_default();
+        begins_with_treatment(first) || is_label(rest) && Unit::parse(first).is_none()
+    };
+    let unmarked = rest.strip_prefix(' ').filter(|rest| !is_of_inches(rest));
     marked.filter(|_| word.len() > 2).or(unmarked).unwrap_or(note).trim()
 }
 
@@ -189,6 +196,9 @@ pub(super) fn read_note(note: &str, wanted: Option<Quantity>) -> Note {
     if let Some(unit) = with_number(note) {
         return Note::Unclear(Some(unit));
     }
+    if is_sign(note) {
+        return Note::Unclear(None);
+    }
     if note.is_empty() || is_label(note) {
         return Note::Label;
     }
@@ -201,16 +211,28 @@ pub(super) fn read_note(note: &str, wanted: Option<Quantity>) -> Note {
     }
     for count in (1..words.len()).rev() {
         let (first, last) = (words[..count].join(" "), words[count..].join(" "));
-        let [at_start, at_end] = [(&first, &last), (&last, &first)].map(|(unit, rest)| {
+        let parts = [(&first, &last, true), (&last, &first, false)];
+        let [at_start, at_end] = parts.map(|(unit, rest, is_after_unit)| {
             let unit = Unit::parse(unit)?;
+            if may_be_factor(rest, is_after_unit) {
+                return Some(Note::Unclear(None));
+            }
             Some(if is_label(rest) { Note::Unit(unit) } else { Note::Qualified(unit) })
         });
-        if let Some(note) = at_start.or(at_end.filter(|note| matches!(note, Note::Unit(_)))) {
+        let is_clear = |note: &Note| matches!(note, Note::Unit(_) | Note::Unclear(_));
+        if let Some(note) = at_start.or(at_end.filter(is_clear)) {
             return note;
         }
     }
     let restored = with_restored_signs(note).find_map(|note| Unit::parse(&note));
     Note::Unclear(restored.filter(|unit| wanted.is_none_or(|wanted| unit.quantity == wanted)))
+}
+
+/// Returns whether a note has a percent sign, or only signs that may mean a unit: `?`, `#`.
+fn is_sign(note: &str) -> bool {
+    let is_empty_sign = |c: char| "+-–—./_ ".contains(c);
+    let is_only_signs = !note.contains(char::is_alphanumeric) && !note.chars().all(is_empty_sign);
+    note.contains(['%', '‰']) || is_only_signs
 }
 
 /// Reads a mass as the force of its weight: a load cell in kg measures kilograms-force.
@@ -223,7 +245,8 @@ pub(super) fn weight(text: &str, wanted: Quantity) -> Option<Unit> {
     })
 }
 
-/// Reads a unit with a factor or a range: `±50 g`, `0.1 mm`, `x10 N`, `N x 10^3`, `×g`.
+/// Reads a unit with a factor or a range: `±50 g`, `0.1 mm`, `1/1000 in`, `% of g`, `x10 N`,
+/// `N x 10^3`, `×g`.
 fn with_number(note: &str) -> Option<Unit> {
     const SIGNS: [char; 5] = ['*', '×', '·', 'x', 'X'];
     let scaled = |number: f64, unit: &str| {
@@ -233,7 +256,15 @@ fn with_number(note: &str) -> Option<Unit> {
     };
     let unsigned = note.trim_start_matches(['±', '+', '-', '~', '<', '>', '≤', '*', '×', ' ']);
     let bare = unsigned.strip_prefix('x').unwrap_or(unsigned);
+    if let Some(rest) = note.strip_prefix('%') {
+        let rest = rest.trim_start();
+        return scaled(0.01, rest.strip_prefix("of ").unwrap_or(rest).trim_start());
+    }
     let first = match number_and_rest(bare) {
+        Some((above, rest)) if rest.starts_with('/') => {
+            let (below, rest) = number_and_rest(rest[1..].trim_start())?;
+            scaled(above / below, rest)
+        }
         Some((number, rest)) => scaled(number, rest.trim_start_matches(SIGNS).trim_start()),
         None if unsigned.len() < note.len() => scaled(1.0, unsigned),
         None => None,

@@ -72,23 +72,58 @@ fn exponent(text: &str) -> Option<(i32, &str)> {
     Some((text[..end].parse().ok().filter(|_| len > 0)?, &text[end..]))
 }
 
-/// Returns the factor beside a name: `*1000`, `x 1000`, `×10`; `x10` may be a place.
+/// Returns the factor beside a name: `*1000`, `x 1000`, `×10`, `/1000`; `x10` may be a place.
 pub(super) fn multiplier(name: &str) -> Option<&str> {
-    let starts = name.char_indices().filter(|(_, c)| "*×xX".contains(*c));
+    let starts = name.char_indices().filter(|(_, c)| "*×xX/÷".contains(*c));
     starts.into_iter().find_map(|(at, sign)| {
         let before = name[..at].chars().next_back();
         let after = &name[at + sign.len_utf8()..];
-        let (number, _) = number_and_rest(after.trim_start())?;
-        let is_letter = "xX".contains(sign);
-        let is_word = !before.is_some_and(char::is_alphanumeric);
-        // A number behind a letter is a factor only if it cannot be the number of a point.
-        let is_factor = if is_letter {
-            is_word && number >= 100.0 && number.log10().fract() == 0.0
-        } else {
-            number != 1.0
+        let (number, rest) = number_and_rest(after.trim_start())?;
+        let is_power_of_ten = number.log10().fract() == 0.0;
+        let is_factor = match sign {
+            // A number behind a letter is a factor only if it cannot be the number of a point.
+            'x' | 'X' => {
+                let is_word = !before.is_some_and(char::is_alphanumeric);
+                is_word && number >= 100.0 && is_power_of_ten
+            }
+            // The number of a channel or of a point follows a stroke, too: `rig/10`, `12+Z/1-X`.
+            '/' => {
+                let is_apart = before.is_none_or(char::is_whitespace);
+                let least = if is_apart { 10.0 } else { 1000.0 };
+                number >= least && is_power_of_ten && rest.is_empty()
+            }
+            _ => number != 1.0,
         };
         is_factor.then(|| name[at..].trim())
     })
+}
+
+/// Returns whether a text beside a unit begins with a factor: `1/1000`, `%`, `x1000`, `0.1`. A
+/// number after the unit is one only if it is a power of ten from 10; others count channels.
+pub(super) fn may_be_factor(text: &str, is_after_unit: bool) -> bool {
+    let number = |word: &str| match number_and_rest(word) {
+        Some((number, "")) => Some(number),
+        _ => None,
+    };
+    let is_fraction = |word: &str| {
+        let parts = word.split_once(['/', '÷']);
+        parts.is_some_and(|(_, below)| number(below).is_some_and(|number| number != 1.0))
+    };
+    let is_number = |word: &str| {
+        let is_power_of_ten = |number: f64| number >= 10.0 && number.log10().fract() == 0.0;
+        number(word).is_some_and(|number| !is_after_unit || is_power_of_ten(number))
+    };
+    let is_factor = |word: &str| {
+        let inner = word.trim_matches(['(', ')', '[', ']', '{', '}']);
+        inner.contains(['%', '‰']) || is_fraction(inner) || is_number(inner)
+    };
+    text.split_whitespace().next().is_some_and(is_factor) || multiplier(text).is_some()
+}
+
+/// Returns whether a text begins with a word for peaks, effective values or the like.
+pub(super) fn begins_with_treatment(text: &str) -> bool {
+    let lower = text.trim_start_matches(['(', '[', '{']).to_lowercase();
+    TREATMENTS.into_iter().any(|word| lower.starts_with(word))
 }
 
 #[cfg(test)]
@@ -115,10 +150,14 @@ mod tests {
 
     #[test]
     fn a_factor_beside_a_name_is_not_the_number_of_a_point() {
-        for name in ["Force *1000", "Force x1000", "Force x 1e3", "F × 10"] {
+        for name in
+            ["Force *1000", "Force x1000", "Force x 1e3", "F × 10", "F /1000", "F / 10", "F ÷ 2"]
+        {
             assert!(multiplier(name).is_some(), "{name}");
         }
-        for name in ["acc x10", "x 3", "Max 1000", "force", "x", "a*b"] {
+        for name in
+            ["acc x10", "x 3", "Max 1000", "force", "x", "a*b", "12+Z/10-X", "Dev1/ai0", "rig/10"]
+        {
             assert_eq!(multiplier(name), None, "{name}");
         }
     }

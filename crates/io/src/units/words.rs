@@ -355,8 +355,12 @@ pub(super) fn joined_unit(words: &[&str]) -> Option<Unit> {
         ["lb" | "lbs" | "Lb", "f" | "force"] => Unit::parse("lbf"),
         ["kg", "f" | "force"] => Unit::parse("kgf"),
         ["g", "force"] | ["G", "Force" | "force"] => Unit::parse("gforce"),
-        [length, "per", time] => Unit::parse(&format!("{length}/{time}")),
-        [length, "per", time, "2" | "squared"] => Unit::parse(&format!("{length}/{time}^2")),
+        [length, per, time] if per.eq_ignore_ascii_case("per") => {
+            Unit::parse(&format!("{length}/{time}"))
+        }
+        [length, per, time, "2" | "squared"] if per.eq_ignore_ascii_case("per") => {
+            Unit::parse(&format!("{length}/{time}^2"))
+        }
         ["rad" | "radians", "s" | "sec"] => Unit::parse("rad/s"),
         [length, time @ ("s" | "sec" | "s2" | "sec2" | "s^2" | "s²")] => {
             Unit::parse(&format!("{length}/{time}"))

@@ -362,3 +362,70 @@ fn factors_and_lost_signs_are_reported_with_what_they_would_make() {
         assert_ne!(stated.evidence, Evidence::Stated, "{name}");
     }
 }
+
+/// Judge: the definitions of the units. A factor beside a unit is not applied; the finding has it.
+#[test]
+fn fractions_of_a_unit_are_reported() {
+    for (name, quantity, factor) in [
+        ("x [1/1000 in]", Quantity::DISPLACEMENT, Some(25.4e-6)),
+        ("x [1/10 mm]", Quantity::DISPLACEMENT, Some(1e-4)),
+        ("F [1/10 N]", Quantity::Force, Some(0.1)),
+        ("a [1/100 g]", Quantity::ACCELERATION, Some(0.01 * G)),
+        ("a [% g]", Quantity::ACCELERATION, Some(0.01 * G)),
+        ("a [%g]", Quantity::ACCELERATION, Some(0.01 * G)),
+        ("a (% of g)", Quantity::ACCELERATION, Some(0.01 * G)),
+        ("a [%]", Quantity::ACCELERATION, None),
+        ("x [% load]", Quantity::DISPLACEMENT, None),
+        ("F [?]", Quantity::Force, None),
+        ("F [#]", Quantity::Force, None),
+        ("F [N 1000]", Quantity::Force, None),
+        ("F [N (x1000)]", Quantity::Force, None),
+        ("F (x1000)", Quantity::Force, None),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, Evidence::Unused, "{name}");
+        let unit = stated.unit.map(|unit| unit.in_si);
+        assert_eq!(unit.is_some(), factor.is_some(), "{name}: {unit:?}");
+        assert!(unit.zip(factor).is_none_or(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{name}");
+    }
+    for name in ["F [N] (x1000)", "F/1000 [N]", "F [N] /1000", "F [N] ÷ 10", "F [N] (/10)"] {
+        let stated = stated_unit(name, "", Some(Quantity::Force)).unwrap();
+        assert_eq!(stated.evidence, Evidence::Likely, "{name}");
+    }
+    for unit in ["1/10 N", "% of N", "N (x1000)"] {
+        let stated = stated_unit("F", unit, Some(Quantity::Force)).unwrap();
+        assert_eq!(stated.evidence, Evidence::Unused, "{unit}");
+    }
+    // Numbers of channels are no factors.
+    for name in ["F [Ch 3 N]", "F [N 2]", "F [AI10 N]", "F [N CH 10]", "F [-]", "rig/10 [N]"] {
+        let stated = stated_unit(name, "", Some(Quantity::Force));
+        assert!(stated.is_none_or(|stated| stated.evidence == Evidence::Stated), "{name}");
+    }
+}
+
+/// Judge: the definitions of the units.
+#[test]
+fn the_word_in_before_a_unit_is_no_inch() {
+    let (stated, likely) = (Evidence::Stated, Evidence::Likely);
+    for (name, quantity, factor, evidence) in [
+        ("F (in kN)", Quantity::Force, 1e3, stated),
+        ("F (in kN peak)", Quantity::Force, 1e3, likely),
+        ("x (in um p-p)", Quantity::DISPLACEMENT, 1e-6, likely),
+        ("a (in Grms)", Quantity::ACCELERATION, G, likely),
+        ("x (in)", Quantity::DISPLACEMENT, 0.0254, stated),
+        ("x (in peak)", Quantity::DISPLACEMENT, 0.0254, likely),
+        ("x (in p-p)", Quantity::DISPLACEMENT, 0.0254, likely),
+        ("v [MM PER S]", Quantity::VELOCITY, 1e-3, stated),
+        ("a [MM PER S2]", Quantity::ACCELERATION, 1e-3, stated),
+        ("v MM PER S", Quantity::VELOCITY, 1e-3, stated),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, evidence, "{name}");
+        let unit = stated.used().unwrap();
+        assert_eq!(unit.quantity, quantity, "{name}");
+        assert!((unit.in_si / factor - 1.0).abs() < 1e-12, "{name}");
+    }
+    // A unit that is not known.
+    let stated = stated_unit("F (in cN)", "", Some(Quantity::Force)).unwrap();
+    assert_eq!((stated.evidence, stated.unit), (Evidence::Unused, None));
+}
