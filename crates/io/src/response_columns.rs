@@ -5,7 +5,7 @@ use nalgebra::Complex;
 
 use crate::responses::{FrequencyResponses, ResponseFunction};
 use crate::units::{ResponseUnit, label_notes, name_without_brackets, number_and_rest};
-use crate::{Evidence, IoError, StatedUnit, Table};
+use crate::{Evidence, IoError, StatedUnit, Table, escaped};
 
 /// Name of the point in a table with a single response.
 const ALONE: &str = "1";
@@ -37,6 +37,10 @@ struct Heading {
     quantity: Option<ResponseQuantity>,
     /// `true` for a force per response: the inverse of a receptance, mobility or accelerance.
     is_inverse: bool,
+    /// Unit of the column and its text, if it is stated.
+    unit: Option<(ResponseUnit, String)>,
+    /// Text of a unit that contradicts the name or another unit, and what it contradicts.
+    contradiction: Option<[String; 2]>,
     /// Factor from the unit of the column to SI units.
     in_si: f64,
     /// Text that may be a unit but is not understood.
@@ -53,6 +57,8 @@ impl Heading {
             points: [ALONE, ALONE].map(String::from),
             quantity: None,
             is_inverse: false,
+            unit: None,
+            contradiction: None,
             in_si: 1.0,
             doubt: None,
         };
@@ -128,6 +134,15 @@ impl Heading {
 
     fn take_unit(&mut self, (number, text): (f64, &str)) -> bool {
         let Some(unit) = ResponseUnit::parse(text) else { return text.is_empty() };
+        let of_name = self.quantity.map(|quantity| (quantity, self.is_inverse));
+        let other = match &self.unit {
+            Some((known, known_text)) => (*known != unit).then(|| known_text.clone()),
+            None => of_name
+                .filter(|(quantity, _)| *quantity != unit.quantity)
+                .map(|(quantity, _)| format!("a {quantity} per force in the name")),
+        };
+        self.contradiction = self.contradiction.take().or(other.map(|other| [text.into(), other]));
+        self.unit = Some((unit, text.into()));
         self.quantity = Some(unit.quantity);
         self.is_inverse = unit.is_inverse;
         self.in_si = number * unit.in_si;
@@ -191,6 +206,14 @@ pub(crate) fn add_functions(
     let headings: Vec<Heading> =
         (0..table.width()).filter_map(|column| Heading::new(table, column)).collect();
     for first in &headings {
+        if let Some([text, other]) = &first.contradiction {
+            let column = table.label(first.column);
+            let (text, other) = (escaped(text), escaped(other));
+            return Err(IoError::Description {
+                file: table.file().into(),
+                what: format!("column {column} states {text} and {other}: state one unit"),
+            });
+        }
         if !matches!(first.part, Part::Real | Part::Magnitude | Part::Level) {
             continue;
         }
@@ -287,7 +310,10 @@ fn function<'a>(
 
 /// Replaces values by their inverses and carries their standard errors over; fails with the number
 /// of the first value that has no inverse, counted from 1.
-fn invert(values: &mut [Complex<f64>], mut errors: Option<&mut [f64]>) -> Result<(), usize> {
+pub(crate) fn invert(
+    values: &mut [Complex<f64>],
+    mut errors: Option<&mut [f64]>,
+) -> Result<(), usize> {
     for (at, value) in values.iter_mut().enumerate() {
         if let Some(errors) = &mut errors {
             errors[at] /= value.norm_sqr();

@@ -6,9 +6,9 @@ use super::expression::Expression;
 use super::notes::{
     Bracket, Note, bare_note, brackets, notes_of, read_note, unit_in_notes, without_spans,
 };
-use super::plain::{multiplier, with_plain_signs};
+use super::plain::{multiplier, number_and_rest, with_plain_signs};
 use super::unit_words::{unit_from_words, unit_words};
-use super::words::split_words;
+use super::words::{is_ambiguous, split_words};
 use super::{Quantity, Unit};
 
 /// Maximum number of words of a text for a unit; a longer one that is not a unit is a description.
@@ -59,6 +59,10 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
     let notes: Vec<&str> = notes.collect();
     let in_brackets = unit_in_notes(&notes, wanted);
     let stated = first_stated(in_brackets, &outside, &unit, wanted);
+    let stated = stated.map(|stated| {
+        let others = other_units(&notes, &outside, &unit, wanted);
+        with_contradiction(stated, others)
+    });
     // A factor in a name does not say whether the numbers include it or still need it.
     let factor = multiplier(&outside).or_else(|| {
         let mut notes = notes.iter().copied().chain(notes_of(&unit));
@@ -70,6 +74,58 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
             let evidence = if unit.is_some() { Evidence::Likely } else { Evidence::Unused };
             Some(StatedUnit::new(factor, unit, evidence))
         }
+        None => stated,
+    }
+}
+
+/// Maximum relative difference between two sizes of one unit, from the rounding of factors.
+const SAME_SIZE: f64 = 1e-9;
+
+/// Returns the texts in a header that state a unit clearly: in brackets, in the name outside of
+/// them and in a separate text; `None` for the output of an amplifier in the separate text.
+fn other_units(
+    notes: &[&str],
+    outside: &str,
+    text: &str,
+    wanted: Option<Quantity>,
+) -> Vec<(String, Option<Unit>)> {
+    let read = |note: &str| match read_note(note, wanted) {
+        Note::Unit(unit) | Note::Qualified(unit) => Some((note.to_owned(), Some(unit))),
+        _ => None,
+    };
+    let is_clear = |words: &StatedUnit| {
+        words.evidence == Evidence::Stated && !is_ambiguous(&words.text) && words.unit.is_some()
+    };
+    let words = unit_from_words(outside, wanted).filter(is_clear);
+    let words = unit_after_stroke(outside).filter(is_clear).or(words);
+    let texts: Vec<&str> = notes_of(text).collect();
+    // A sensitivity beside the unit of an amplifier states the unit of the numbers.
+    let is_sensitivity = |note: &&str| number_and_rest(note).is_some();
+    let is_electric =
+        |note: &str| Expression::parse(note).is_some_and(|unit| unit.dimension.is_electric());
+    let amplifier = texts.iter().copied().filter(|note| is_electric(note));
+    let amplifier = amplifier.filter(|_| !texts.iter().any(is_sensitivity));
+    let units = notes.iter().chain(&texts).filter_map(|note| read(note));
+    let of_words = words.map(|words| (words.text, words.unit));
+    units.chain(of_words).chain(amplifier.map(|note| (note.to_owned(), None))).collect()
+}
+
+/// Returns a statement as a doubtful one that also names another text of the header, if the units
+/// contradict each other.
+fn with_contradiction(stated: StatedUnit, others: Vec<(String, Option<Unit>)>) -> StatedUnit {
+    let Some(used) = stated.used() else { return stated };
+    let is_other = |unit: &Option<Unit>| {
+        unit.as_ref().is_none_or(|unit| {
+            let is_same_size = (unit.in_si / used.in_si - 1.0).abs() <= SAME_SIZE;
+            unit.quantity != used.quantity || !is_same_size
+        })
+    };
+    match others.into_iter().find(|(_, unit)| is_other(unit)) {
+        Some((text, _)) => StatedUnit {
+            text: format!("{} and {}", stated.text, text.trim()),
+            evidence: Evidence::Likely,
+            ..stated
+        },
         None => stated,
     }
 }

@@ -155,6 +155,14 @@ fn levels_orders_and_points_in_brackets() {
 fn broken_tables_are_refused() {
     for (text, message) in [
         ("frequency_hz,x\n1,2\n", "a.csv has no frequency response: name columns h_1_1_real and"),
+        (
+            "f,real [g/N],imag [g/N]\nHz,m/s²/N,g/N\n1,2,3\n2,3,4\n",
+            "a.csv: column 2 \"real [g/N]\" states m/s²/N and g/N: state one unit",
+        ),
+        (
+            "f,receptance real [g/N],receptance imag [g/N]\n1,2,3\n2,3,4\n",
+            "states g/N and a displacement per force in the name",
+        ),
         ("frequency_hz,real\n1,2\n", "a.csv: column 2 \"real\" has no imaginary part beside it"),
         ("frequency_hz,real,imag\n1,2,\n", "a.csv, line 2, column 3 \"imag\": the field is empty"),
         ("    -1\n   164\n         1\n    -1\n", "a.csv, line 4: the units"),

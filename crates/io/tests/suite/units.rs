@@ -429,3 +429,40 @@ fn the_word_in_before_a_unit_is_no_inch() {
     let stated = stated_unit("F (in cN)", "", Some(Quantity::Force)).unwrap();
     assert_eq!((stated.evidence, stated.unit), (Evidence::Unused, None));
 }
+
+/// A unit in the name and another one beside it, or two in the name: one is used, and the finding
+/// names both.
+#[test]
+fn units_that_contradict_each_other_are_reported() {
+    for (name, unit, quantity, texts) in [
+        ("force [N]", "kN", Quantity::Force, ["N", "kN"]),
+        ("Acc (m/s^2)", "g", Quantity::ACCELERATION, ["m/s^2", "g"]),
+        ("force_kN", "N", Quantity::Force, ["kN", "N"]),
+        ("F / kN", "N", Quantity::Force, ["kN", "N"]),
+        ("force [N]", "V", Quantity::Force, ["N", "V"]),
+        ("Force [N]", "mm", Quantity::Force, ["N", "mm"]),
+        ("force", "N; kN", Quantity::Force, ["N", "kN"]),
+        ("F (kN) [N]", "", Quantity::Force, ["kN", "N"]),
+        ("a (g) [m/s^2]", "", Quantity::ACCELERATION, ["g", "m/s^2"]),
+        ("x mm (in)", "", Quantity::DISPLACEMENT, ["mm", "in"]),
+        ("time [s]", "ms", Quantity::Time, ["s", "ms"]),
+    ] {
+        let stated = stated_unit(name, unit, Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, Evidence::Likely, "{name}, {unit}");
+        for text in texts {
+            let words: Vec<&str> = stated.text.split(" and ").collect();
+            assert!(words.contains(&text), "{name}, {unit}: {}", stated.text);
+        }
+    }
+    for (name, unit, quantity) in [
+        ("force [N]", "Newton", Quantity::Force),
+        ("force [kN]", "[kN]", Quantity::Force),
+        ("force [kN]", "Shaker head", Quantity::Force),
+        ("Acc [g] (0.5 s average)", "", Quantity::ACCELERATION),
+        ("Acc [g]", "V; 100 mV/g", Quantity::ACCELERATION),
+        ("acc_g [m/s²]", "m/s^2", Quantity::ACCELERATION),
+    ] {
+        let stated = stated_unit(name, unit, Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, Evidence::Stated, "{name}, {unit}: {stated:?}");
+    }
+}
