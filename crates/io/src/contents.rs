@@ -88,13 +88,15 @@ pub(crate) struct ComplexArray {
     /// Distance between neighbouring elements in `values`, along each dimension.
     pub strides: Vec<usize>,
     pub values: Vec<Complex<f64>>,
+    /// Text for its unit in an attribute or a field beside it; empty if there is none.
+    pub unit: String,
 }
 
 impl ComplexArray {
     /// Creates an array whose first index varies fastest, as MATLAB and Fortran store it.
     pub fn first_fastest(name: String, lengths: Vec<usize>, values: Vec<Complex<f64>>) -> Self {
         let strides = strides(lengths.iter());
-        Self { name, strides, lengths, values }
+        Self { name, strides, lengths, values, unit: String::new() }
     }
 
     /// Creates an array whose last index varies fastest, as C and Python store it.
@@ -102,7 +104,7 @@ impl ComplexArray {
     pub fn last_fastest(name: String, lengths: Vec<usize>, values: Vec<Complex<f64>>) -> Self {
         let mut strides = strides(lengths.iter().rev());
         strides.reverse();
-        Self { name, strides, lengths, values }
+        Self { name, strides, lengths, values, unit: String::new() }
     }
 }
 

@@ -30,5 +30,13 @@ pub(crate) fn with_labels(mut contents: Contents) -> Contents {
             (column.unit, column.about) = (unit.to_string(), about.to_string());
         }
     }
+    for array in &mut contents.complex {
+        let place = array.name.rsplit_once('.').map(|(place, _)| place);
+        if let Some([unit, _]) = place.and_then(|place| labels.get(place))
+            && array.unit.is_empty()
+        {
+            array.unit = unit.to_string();
+        }
+    }
     contents
 }

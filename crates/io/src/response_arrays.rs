@@ -5,9 +5,10 @@ use mechid_model::ResponseQuantity;
 use nalgebra::Complex;
 
 use crate::contents::ComplexArray;
-use crate::response_columns::points_of;
+use crate::response_columns::{invert, points_of};
 use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
-use crate::{IoError, Table, escaped};
+use crate::units::{ResponseUnit, is_unit, label_notes, name_without_brackets, unit_text};
+use crate::{Evidence, IoError, StatedUnit, Table, escaped};
 
 /// Words, in lower case, that identify an array of coherences by its name.
 const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
@@ -20,8 +21,8 @@ const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
 ///
 /// # Errors
 /// [`IoError::Description`] if no array has a dimension of the length of the frequencies, for an
-/// array with too many dimensions, for one that is not finite, and for two arrays with the same
-/// response.
+/// array with too many dimensions, for one that is not finite, for one whose units contradict each
+/// other, and for two arrays with the same response.
 pub(crate) fn add_functions(
     table: &Table,
     arrays: &[ComplexArray],
@@ -63,13 +64,8 @@ fn add_array(
     responses: &mut FrequencyResponses,
 ) -> Result<(), String> {
     let [points, references] = shape.points.map(|dimension| dimension.len);
-    let leaf = array.name.rsplit_once(['.', '/']).map_or(array.name.as_str(), |(_, leaf)| leaf);
-    let words: Vec<String> =
-        leaf.split('_').filter(|word| !word.is_empty()).map(String::from).collect();
-    // `H_2_1` and `H21` name points; `H` and `H1` name an estimator.
-    let has_points =
-        words.len() > 2 || leaf.len() > 2 && leaf.ends_with(|c: char| c.is_ascii_digit());
-    let named = points_of(words).filter(|_| has_points && points * references == 1);
+    let header = Header::new(array)?;
+    let named = header.points().filter(|_| points * references == 1);
     for response in 0..points {
         for reference in 0..references {
             let numbers = [response, reference].map(|index| (index + 1).to_string());
@@ -82,21 +78,139 @@ fn add_array(
                     escaped(&from)
                 ));
             }
+            let mut values = shape.values(array, [response, reference]);
+            header.convert(&mut values)?;
             responses.functions.push(ResponseFunction {
                 response: to,
                 reference: from,
-                quantity: quantity_of_name(leaf),
-                values: shape.values(array, [response, reference]),
+                quantity: header.quantity,
+                values,
                 standard_error: None,
             });
         }
     }
     responses.remarks.push(format!(
-        "{}: {points} by {references} responses (points of the response by points of the force) in SI units, because \
-         no units are stated",
-        escaped(&array.name)
+        "{}: {points} by {references} responses (points of the response by points of the force) {}",
+        header.name,
+        header.units_remark()
     ));
+    if let Some(text) = header.unclear_unit {
+        let quantity = header.quantity.unwrap_or(ResponseQuantity::Displacement);
+        let stated = StatedUnit { text, unit: None, evidence: Evidence::Unused };
+        responses.doubts.push((header.name, stated, quantity.into()));
+    }
     Ok(())
+}
+
+/// Information about the responses of an array in its name and its attributes.
+#[derive(Debug)]
+struct Header {
+    /// Name of the array, for messages.
+    name: String,
+    /// Words of the name, without its unit.
+    words: Vec<String>,
+    quantity: Option<ResponseQuantity>,
+    /// Unit and its text.
+    unit: Option<(ResponseUnit, String)>,
+    /// Text that may be a unit and is not understood.
+    unclear_unit: Option<String>,
+}
+
+impl Header {
+    /// Reads the name and the unit of an array; fails if its units contradict each other.
+    fn new(array: &ComplexArray) -> Result<Self, String> {
+        let leaf = leaf(&array.name);
+        let bare = name_without_brackets(leaf);
+        let words = bare.split('_').filter(|word| !word.is_empty());
+        let mut words: Vec<String> = words.map(String::from).collect();
+        let of_name = quantity_of_name(leaf);
+        let mut quantity = of_name;
+        let notes = label_notes(leaf).into_iter();
+        let mut texts: Vec<String> =
+            notes.filter(|note| !unit_text(&format!("[{note}]")).is_empty()).collect();
+        texts.extend(take_unit_words(&mut words, quantity.is_some()));
+        texts.push(array.unit.trim().to_owned());
+        let name = escaped(&array.name).into_owned();
+        let (mut unit, mut unclear_unit) = (None, None);
+        for text in texts.into_iter().filter(|text| !text.is_empty()) {
+            let Some(parsed) = ResponseUnit::parse(&text) else {
+                unclear_unit.get_or_insert(text);
+                continue;
+            };
+            let is_other_quantity =
+                of_name.is_some_and(|name| name != parsed.quantity || parsed.is_inverse);
+            if is_other_quantity || unit.as_ref().is_some_and(|(known, _)| *known != parsed) {
+                return Err(format!(
+                    "the unit {} of {name} contradicts its name or another unit: state one unit",
+                    escaped(&text)
+                ));
+            }
+            quantity = Some(parsed.quantity);
+            unit = Some((parsed, text));
+        }
+        let unclear_unit = unclear_unit.filter(|_| unit.is_none());
+        Ok(Self { name, words, quantity, unit, unclear_unit })
+    }
+
+    /// Returns the points of response and force in the name; `None` if it has none.
+    fn points(&self) -> Option<[String; 2]> {
+        // `H_2_1` and `H21` name points; `H` and `H1` name an estimator.
+        let stem = self.words.join("_");
+        let ends_with_number = stem.len() > 2 && stem.ends_with(|c: char| c.is_ascii_digit());
+        let has_points = self.words.len() > 2 || ends_with_number;
+        points_of(self.words.clone()).filter(|_| has_points)
+    }
+
+    /// Converts the values of a response to SI units.
+    fn convert(&self, values: &mut [Complex<f64>]) -> Result<(), String> {
+        let Some((unit, _)) = &self.unit else { return Ok(()) };
+        values.iter_mut().for_each(|value| *value *= unit.in_si);
+        if unit.is_inverse {
+            let inverted = invert(values, None);
+            inverted
+                .map_err(|at| format!("value {at} of {} is 0, so it has no inverse", self.name))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the end of the remark on the responses: their unit.
+    fn units_remark(&self) -> String {
+        match (&self.unit, &self.unclear_unit) {
+            (Some((unit, text)), _) => {
+                format!("in {}, multiplied by {} to get SI units", escaped(text), unit.in_si)
+            }
+            (None, Some(text)) => {
+                format!("in SI units, because their unit {} is not understood", escaped(text))
+            }
+            (None, None) => "in SI units, because no units are stated".into(),
+        }
+    }
+}
+
+/// Returns the last part of the name of an array, in a struct or a group.
+fn leaf(name: &str) -> &str {
+    // The stroke of a unit in brackets at the end separates no groups.
+    let open = [(']', '['), (')', '(')].into_iter().find(|(close, _)| name.ends_with(*close));
+    let end = open.and_then(|(_, open)| name.rfind(open)).unwrap_or(name.len());
+    let start = name[..end].rfind(['.', '/']).map_or(0, |at| at + 1);
+    &name[start..]
+}
+
+/// Removes a unit at the end of the words of a name and returns it: `g`, `N` as `g/N`, `mm`, `s2`,
+/// `N` as `mm/s2/N`. In the name of a `quantity`, the unit may also be one that is not understood.
+fn take_unit_words(words: &mut Vec<String>, has_quantity: bool) -> Option<String> {
+    let joined = |count: usize| {
+        let first = words.len().checked_sub(count).filter(|first| *first > 0)?;
+        let unit: Vec<&str> =
+            words[first..].iter().map(String::as_str).filter(|word| *word != "per").collect();
+        Some((first, unit.join("/")))
+    };
+    let candidates: Vec<(usize, String)> = (1..=4).rev().filter_map(joined).collect();
+    let response = candidates.iter().find(|(_, text)| ResponseUnit::parse(text).is_some());
+    let unclear = || candidates.iter().find(|(_, text)| has_quantity && is_unit(text));
+    let (first, text) = response.or_else(unclear)?.clone();
+    words.truncate(first);
+    Some(text)
 }
 
 /// Length and stride of a dimension of an array.
@@ -168,8 +282,7 @@ fn quantity_of_name(name: &str) -> Option<ResponseQuantity> {
 /// Adds columns of coherences, one for each point of the response.
 fn add_coherence(table: &Table, responses: &mut FrequencyResponses) {
     let is_coherence = |name: &String| {
-        let leaf = name.rsplit_once(['.', '/']).map_or(name.as_str(), |(_, leaf)| leaf);
-        let stem = leaf.split('[').next().unwrap_or_default().to_lowercase();
+        let stem = leaf(name).split('[').next().unwrap_or_default().to_lowercase();
         COHERENCE.contains(&stem.as_str())
     };
     let columns = (0..table.width()).filter(|at| is_coherence(&table.names()[*at]));

@@ -151,7 +151,8 @@ impl Reader {
                 } else {
                     ComplexArray::last_fastest(path.clone(), lengths, values)
                 };
-                self.contents.complex.push(array);
+                let unit = attributes.unit(0).or(of_group.unit(0)).unwrap_or_default();
+                self.contents.complex.push(ComplexArray { unit, ..array });
                 self.add_unusable(path, COMPLEX_NUMBERS.into());
             }
             Ok(Content::References(objects)) => {

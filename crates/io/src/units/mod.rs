@@ -123,6 +123,11 @@ pub fn name_without_unit(name: &str) -> String {
     without_unit(name)
 }
 
+/// Returns whether a text is a unit of any quantity, known to [`Quantity`] or not.
+pub(crate) fn is_unit(text: &str) -> bool {
+    Expression::parse(text).is_some()
+}
+
 /// Returns the text of the unit that a text above a column states, clearly or not. It is empty if
 /// there is none, and for a number with a unit, which is a sensitivity or a range.
 pub(crate) fn unit_text(text: &str) -> String {

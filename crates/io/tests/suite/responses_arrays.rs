@@ -2,7 +2,7 @@
 //! (`data/make_arrays.py`); each value contains its position: line + 1 + 10 point + 100 reference +
 //! i line.
 
-use mechid_io::{FrequencyResponses, IoError};
+use mechid_io::{Evidence, FrequencyResponses, IoError};
 use mechid_model::ResponseQuantity;
 use nalgebra::Complex;
 
@@ -127,4 +127,49 @@ fn what_is_missing_or_does_not_go_together_is_said() {
     let responses = FrequencyResponses::parse("a.mat", &file(&[f, h, analytic])).unwrap();
     assert_eq!(responses.functions.len(), 1);
     assert!(responses.remarks.iter().any(|r| r.contains("left out: z")), "{:?}", responses.remarks);
+}
+
+/// Judge: the definitions of the units; with g/N, 1 is 9.80665 m/s² per N.
+#[test]
+fn units_in_the_names_of_arrays_are_read() {
+    let three: &[f64] = &[1.0, 2.0, 3.0];
+    let f: Variable<'_> = ("f", &[3, 1], three, &[]);
+    let with = |name: &str| {
+        let bytes = file(&[f, (name, &[3, 1], three, &[1.0; 3])]);
+        FrequencyResponses::parse("a.mat", &bytes)
+    };
+    let (acceleration, displacement) =
+        (ResponseQuantity::Acceleration, ResponseQuantity::Displacement);
+    for (name, quantity, factor) in [
+        ("accelerance_g_N", acceleration, 9.80665),
+        ("accelerance_g_per_N", acceleration, 9.80665),
+        ("H_mm_s2_N", acceleration, 1e-3),
+        ("receptance_um_N", displacement, 1e-6),
+        ("H21_um_N", displacement, 1e-6),
+        ("H_2_1_um_N", displacement, 1e-6),
+    ] {
+        let responses = with(name).unwrap();
+        let function = &responses.functions[0];
+        let expected = Complex::new(2.0, 1.0) * factor;
+        assert!((function.values[1] - expected).norm() < 1e-12 * factor, "{name}");
+        assert_eq!(function.quantity, Some(quantity), "{name}");
+        let point = if name.contains('2') && !name.contains("s2") { "2" } else { "1" };
+        assert_eq!((function.response.as_str(), function.reference.as_str()), (point, "1"));
+        let remark = responses.remarks.join("; ");
+        assert!(remark.contains("multiplied by") && !remark.contains("no units"), "{remark}");
+        assert!(responses.doubts.is_empty(), "{name}");
+    }
+    // A dynamic stiffness in N/mm is inverted.
+    let stiffness = with("H_N_mm").unwrap();
+    let expected = Complex::new(2e3, 1e3).inv();
+    assert!((stiffness.functions[0].values[1] - expected).norm() < 1e-15);
+    for (name, text) in [("accelerance_mV_N", "mV/N"), ("accelerance_g", "g")] {
+        let responses = with(name).unwrap();
+        assert_eq!(responses.functions[0].values[1], Complex::new(2.0, 1.0), "{name}");
+        let (_, stated, _) = &responses.doubts[0];
+        assert_eq!((stated.text.as_str(), stated.evidence), (text, Evidence::Unused), "{name}");
+        assert!(responses.remarks.iter().all(|r| !r.contains("no units")), "{name}");
+    }
+    let error = with("accelerance_um_N").unwrap_err().to_string();
+    assert!(error.contains("um/N") && error.contains("contradicts its name"), "{error}");
 }
