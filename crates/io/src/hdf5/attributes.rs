@@ -4,8 +4,33 @@ use hdf5_pure::{AttrValue, Dataset, Group};
 
 /// Names, in lower case, of an attribute with a unit: in NeXus, SEP 5, netCDF and analyser
 /// programs.
-const UNITS: [&str; 9] =
-    ["units", "unit", "unit_str", "unit_string", "y_unit", "yunit", "unit_y", "y_unit_label", "eu"];
+const UNITS: [&str; 12] = [
+    "units",
+    "unit",
+    "unit_str",
+    "unit_string",
+    "y_unit",
+    "yunit",
+    "unit_y",
+    "y_unit_label",
+    "eu",
+    "engineering_units",
+    "engineering_unit",
+    "engineeringunits",
+];
+
+/// Names, in lower case, of an attribute that multiplies the stored numbers: in netCDF and in
+/// NeXus.
+const FACTORS: [&str; 2] = ["scale_factor", "scaling_factor"];
+
+/// Name, in lower case, of an attribute that is added to the numbers after the multiplication.
+///
+/// # Source
+/// *NetCDF Climate and Forecast (CF) Metadata Conventions*, version 1.11, section 8.1.
+const OFFSET: &str = "add_offset";
+
+/// Names, in lower case, of an offset that programs add before the multiplication or after it.
+const UNCLEAR_OFFSETS: [&str; 2] = ["offset", "scaling_offset"];
 
 /// Names, in lower case, of an attribute that describes a channel.
 const ABOUT: [&str; 6] = ["long_name", "name", "label", "description", "channel_name", "title"];
@@ -27,6 +52,8 @@ pub(super) struct Attributes(Vec<(String, Value)>);
 enum Value {
     Number(f64),
     Texts(Vec<String>),
+    /// Any other value.
+    Other,
 }
 
 impl Attributes {
@@ -41,7 +68,8 @@ impl Attributes {
     }
 
     fn new(all: std::collections::HashMap<String, AttrValue>) -> Self {
-        let values = all.into_iter().filter_map(|(name, value)| Some((name, read(value)?)));
+        let values =
+            all.into_iter().map(|(name, value)| (name, read(value).unwrap_or(Value::Other)));
         let mut values: Vec<(String, Value)> = values.take(MAX_ATTRIBUTES).collect();
         values.sort_by(|a, b| a.0.cmp(&b.0));
         Self(values)
@@ -65,7 +93,28 @@ impl Attributes {
         let named = self.0.iter().find(|(name, _)| name.eq_ignore_ascii_case(wanted))?;
         match &named.1 {
             Value::Texts(texts) => texts.first().map(String::as_str),
-            Value::Number(_) => None,
+            _ => None,
+        }
+    }
+
+    /// Returns the factor that multiplies the stored numbers, and the offset that is then added;
+    /// `None` without such attributes, and the reason if they are not clear.
+    pub fn scaling(&self) -> Result<Option<(f64, f64)>, String> {
+        let named = |names: &[&str]| {
+            self.0.iter().find(|(name, _)| names.contains(&name.to_lowercase().as_str()))
+        };
+        let number = |names: &[&str], default: f64| match named(names) {
+            None => Ok(default),
+            Some((_, Value::Number(number))) if *number != 0.0 || default == 0.0 => Ok(*number),
+            Some((name, _)) => Err(format!("numbers whose attribute {name} is not one factor")),
+        };
+        let (factor, offset) = (number(&FACTORS, 1.0)?, number(&[OFFSET], 0.0)?);
+        match named(&UNCLEAR_OFFSETS).filter(|_| named(&FACTORS).is_some()) {
+            Some((name, _)) => Err(format!(
+                "numbers with a factor and the attribute {name}, which is added before or after the \
+                 multiplication: store it as {OFFSET}, which is added after it"
+            )),
+            None => Ok(Some((factor, offset)).filter(|scaling| *scaling != (1.0, 0.0))),
         }
     }
 

@@ -14,7 +14,7 @@ use hdf5_pure::{Dataset, File, Group, Object};
 
 use self::attributes::Attributes;
 use self::objects::Objects;
-use self::values::{Array, Content};
+use self::values::{Array, Content, Trouble};
 use crate::IoError;
 use crate::contents::{Axis, Column, ComplexArray, Contents, Fault, Place};
 use crate::labels::with_labels;
@@ -102,9 +102,8 @@ impl Reader {
             let name = self.path(path, name);
             self.contents.scalars.push((name, value));
         }
-        let mut names = group.datasets().map_err(damaged)?;
-        names.sort_by_key(|a| natural(a));
-        for name in names {
+        let datasets = group.datasets().map_err(damaged)?;
+        for name in in_natural_order(datasets) {
             self.budget.take_column().map_err(|limit| Fault::too_large(0, limit))?;
             let at = self.path(path, &name);
             match group.dataset(&name) {
@@ -112,9 +111,8 @@ impl Reader {
                 Err(error) => self.add_unusable(at, format!("data that cannot be read ({error})")),
             }
         }
-        let mut names = group.groups().map_err(damaged)?;
-        names.sort_by_key(|a| natural(a));
-        for name in names.into_iter().filter(|name| !name.starts_with('#')) {
+        let groups = in_natural_order(group.groups().map_err(damaged)?).into_iter();
+        for name in groups.filter(|name| !name.starts_with('#')) {
             self.budget.take_column().map_err(|limit| Fault::too_large(0, limit))?;
             let at = self.path(path, &name);
             match group.group(&name) {
@@ -142,7 +140,7 @@ impl Reader {
         if attributes.has("MATLAB_object_decode") && self.add_timetable(dataset, &path, depth)? {
             return Ok(());
         }
-        match values::read(dataset, &attributes, self.len, &mut self.budget) {
+        match self.content(dataset, &attributes) {
             Ok(Content::Numbers(array)) => self.add_numbers(array, path, &attributes, of_group)?,
             Ok(Content::Complex { lengths, values }) => {
                 let array = if self.is_matlab {
@@ -159,16 +157,34 @@ impl Reader {
                 let is_cell = attributes.text("MATLAB_class") == Some("cell");
                 self.add_elements(objects, &path, is_cell, depth + 1)?;
             }
-            Err(values::Trouble::Unusable(what)) => {
+            Err(Trouble::Unusable(what)) => {
                 if attributes.text("MATLAB_class") == Some("char") {
                     let text = values::characters(dataset).map(|text| (path.clone(), text));
                     self.contents.texts.extend(text);
                 }
                 self.add_unusable(path, what);
             }
-            Err(values::Trouble::Fault(fault)) => return Err(fault),
+            Err(Trouble::Fault(fault)) => return Err(fault),
         }
         Ok(())
+    }
+
+    /// Reads the values of a data set and applies the factor and the offset of its attributes.
+    fn content(&mut self, dataset: &Dataset, attributes: &Attributes) -> Result<Content, Trouble> {
+        let scaling = attributes.scaling().map_err(Trouble::Unusable)?;
+        let mut content = values::read(dataset, attributes, self.len, &mut self.budget)?;
+        if let Some((factor, offset)) = scaling {
+            match &mut content {
+                Content::Numbers(array) => {
+                    array.values.iter_mut().for_each(|value| *value = *value * factor + offset);
+                }
+                Content::Complex { values, .. } => {
+                    values.iter_mut().for_each(|value| *value = *value * factor + offset);
+                }
+                Content::References(_) => {}
+            }
+        }
+        Ok(content)
     }
 
     /// Adds the elements of a cell array (`name{2}`), or the fields of an array of structs
@@ -235,6 +251,12 @@ impl Reader {
         }
         Ok(())
     }
+}
+
+/// Returns names in an order in which numbers at their ends rise.
+fn in_natural_order(mut names: Vec<String>) -> Vec<String> {
+    names.sort_by_key(|name| natural(name));
+    names
 }
 
 /// Returns a sort key that orders names with numbers at their ends by these numbers.

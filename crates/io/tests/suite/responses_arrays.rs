@@ -173,3 +173,26 @@ fn units_in_the_names_of_arrays_are_read() {
     let error = with("accelerance_um_N").unwrap_err().to_string();
     assert!(error.contains("um/N") && error.contains("contradicts its name"), "{error}");
 }
+
+/// Judge: the definitions of the units; the values are the frequencies + i.
+#[cfg(feature = "hdf5")]
+#[test]
+fn units_in_attributes_of_arrays_are_read() {
+    let responses = read(include_bytes!("../data/units.h5"));
+    let function = |point: &str| {
+        responses.functions.iter().find(|function| function.response == point).unwrap()
+    };
+    for (point, quantity, factor) in [
+        ("1", Some(ResponseQuantity::Acceleration), 9.80665),
+        ("2", Some(ResponseQuantity::Displacement), 1e-6),
+        ("3", None, 1.0),
+    ] {
+        let expected = Complex::new(HZ[1], 1.0) * factor;
+        assert!((function(point).values[1] - expected).norm() < 1e-12 * factor, "{point}");
+        assert_eq!(function(point).quantity, quantity, "{point}");
+    }
+    let texts: Vec<&str> =
+        responses.doubts.iter().map(|(_, stated, _)| stated.text.as_str()).collect();
+    assert_eq!(texts, ["mV/N"]);
+    assert!(responses.remarks.iter().all(|r| !r.contains("no units")), "{:?}", responses.remarks);
+}

@@ -9,6 +9,8 @@ use super::matlab::{FORCE, X};
 const GROUPS: &[u8] = include_bytes!("../../data/groups.h5");
 const MATLAB: &[u8] = include_bytes!("../../data/matlab73.mat");
 
+const UNITS: &[u8] = include_bytes!("../../data/units.h5");
+
 fn groups() -> Table {
     Table::parse("a.h5", GROUPS).unwrap()
 }
@@ -77,6 +79,25 @@ fn what_is_no_array_of_real_numbers_is_named() {
     ] {
         let error = table.column(column).unwrap_err().to_string();
         assert!(error.contains(what), "{column}: {error}");
+    }
+}
+
+/// Judge: the numbers −4 to 3, times the factor, plus the offset.
+#[test]
+fn factors_and_offsets_of_attributes_are_applied() {
+    let table = Table::parse("a.h5", UNITS).unwrap();
+    let numbers = |factor: f64, offset: f64| -> Vec<f64> {
+        (-4..4).map(|k| factor * f64::from(k) + offset).collect()
+    };
+    assert_eq!(table.column("packed").unwrap(), numbers(0.25, 1.0));
+    assert_eq!(table.column("scaled").unwrap(), numbers(0.5, 0.0));
+    assert_eq!(table.to_si(table.find("packed").unwrap(), Quantity::Force).unwrap(), 1e3);
+    let volts = table.find("volts").unwrap();
+    assert!((table.to_si(volts, Quantity::ACCELERATION).unwrap() - 9.80665).abs() < 1e-12);
+    for (column, what) in [("two_scales", "scale_factor"), ("doubtful_offset", "attribute offset")]
+    {
+        let error = table.column(column).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
     }
 }
 
