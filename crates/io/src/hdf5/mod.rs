@@ -16,7 +16,7 @@ use self::attributes::Attributes;
 use self::objects::Objects;
 use self::values::{Array, Content, Trouble};
 use crate::IoError;
-use crate::contents::{Axis, Column, ComplexArray, Contents, Fault, Place};
+use crate::contents::{Axis, Cause, Column, ComplexArray, Contents, Fault, Place};
 use crate::labels::with_labels;
 use crate::limits::{Budget, Limits};
 use crate::mat::COMPLEX_NUMBERS;
@@ -102,7 +102,14 @@ impl Reader {
             let name = self.path(path, name);
             self.contents.scalars.push((name, value));
         }
-        let datasets = group.datasets().map_err(damaged)?;
+        let (datasets, groups) = match (group.datasets(), group.groups()) {
+            (Ok(datasets), Ok(groups)) => (datasets, groups),
+            (Err(error), _) | (_, Err(error)) if depth == 0 => return Err(damaged(error)),
+            (Err(error), _) | (_, Err(error)) => {
+                self.add_unusable(path.into(), format!("a group that cannot be read ({error})"));
+                return Ok(());
+            }
+        };
         for name in in_natural_order(datasets) {
             self.budget.take_column().map_err(|limit| Fault::too_large(0, limit))?;
             let at = self.path(path, &name);
@@ -111,7 +118,7 @@ impl Reader {
                 Err(error) => self.add_unusable(at, format!("data that cannot be read ({error})")),
             }
         }
-        let groups = in_natural_order(group.groups().map_err(damaged)?).into_iter();
+        let groups = in_natural_order(groups).into_iter();
         for name in groups.filter(|name| !name.starts_with('#')) {
             self.budget.take_column().map_err(|limit| Fault::too_large(0, limit))?;
             let at = self.path(path, &name);
@@ -169,10 +176,19 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the values of a data set and applies the factor and the offset of its attributes.
+    /// Reads the values of a data set and applies the factor and the offset of its attributes. Only
+    /// a limit refuses the file: a data set that is not used may hold anything.
     fn content(&mut self, dataset: &Dataset, attributes: &Attributes) -> Result<Content, Trouble> {
         let scaling = attributes.scaling().map_err(Trouble::Unusable)?;
-        let mut content = values::read(dataset, attributes, self.len, &mut self.budget)?;
+        let (len, budget) = (self.len, &mut self.budget);
+        // A panic of the decoder concerns only this data set.
+        let read =
+            catch_unwind(AssertUnwindSafe(|| values::read(dataset, attributes, len, budget)));
+        let damaged = |_| Err(Trouble::Unusable("data that cannot be read (damaged)".into()));
+        let mut content = read.unwrap_or_else(damaged).map_err(|trouble| match trouble {
+            Trouble::Fault(Fault { cause: Cause::Malformed(what), .. }) => Trouble::Unusable(what),
+            other => other,
+        })?;
         if let Some((factor, offset)) = scaling {
             match &mut content {
                 Content::Numbers(array) => {

@@ -102,6 +102,21 @@ fn factors_and_offsets_of_attributes_are_applied() {
 }
 
 #[test]
+fn what_cannot_be_read_and_is_not_used_does_no_harm() {
+    let table = Table::parse("a.h5", include_bytes!("../../data/unreadable.h5")).unwrap();
+    let numbers: Vec<f64> = (-4..4).map(f64::from).collect();
+    assert_eq!(table.column("force").unwrap(), numbers);
+    for (column, what) in [
+        ("reserve", "more than the file"),
+        ("packed", "cannot be read"),
+        ("other", "cannot be read"),
+    ] {
+        let error = table.column(column).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    }
+}
+
+#[test]
 fn limits_hold() {
     let with = |limits| {
         let options = ReadOptions { limits, ..ReadOptions::default() };
