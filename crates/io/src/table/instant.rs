@@ -4,14 +4,20 @@
 /// Number of seconds in a day.
 const DAY_S: f64 = 86_400.0;
 
+/// Number of seconds in an hour.
+const HOUR_S: f64 = 3600.0;
+
 /// Maximum length of the text of an instant, in bytes.
 const MAX_BYTES: usize = 48;
 
-/// Instant: the day, counted from 1970-01-01, if there is a date, and the seconds of the day.
+/// Instant: the day, counted from 1970-01-01, if there is a date, and the seconds of the day, or of
+/// the hour if the clock has no hours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Instant {
     pub day: Option<i64>,
     pub seconds: f64,
+    /// `true` if the clock has hours.
+    pub has_hours: bool,
 }
 
 impl Instant {
@@ -22,20 +28,50 @@ impl Instant {
         }
         let text = std::str::from_utf8(field).ok()?.trim();
         if !text.contains(':') {
-            return Some(Self { day: Some(date(text)?), seconds: 0.0 });
+            return Some(Self { day: Some(date(text)?), seconds: 0.0, has_hours: true });
         }
         let (day, clock) =
             match text.split_once(['T', 't', ' ']).filter(|(day, _)| !day.contains(':')) {
                 Some((day, clock)) => (Some(date(day)?), clock),
                 None => (None, text),
             };
-        Some(Self { day, seconds: seconds(clock.trim())? })
+        let (seconds, has_hours) = seconds(clock.trim())?;
+        Some(Self { day, seconds, has_hours })
+    }
+
+    /// Returns the clock of a column that begins with this instant; `None` if it has a date.
+    pub fn clock(self) -> Option<Clock> {
+        let period_s = if self.has_hours { DAY_S } else { HOUR_S };
+        self.day.is_none().then_some(Clock { period_s, last_s: self.seconds, passed_s: 0.0 })
     }
 
     /// Returns the seconds since the beginning of the day `origin`, counted from 1970-01-01.
     pub fn since(self, origin: i64) -> f64 {
         let days = self.day.map_or(0, |day| day - origin);
         days as f64 * DAY_S + self.seconds
+    }
+}
+
+/// Clock without a date, which begins again after a day or an hour.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Clock {
+    /// Time after which it begins again, in s.
+    period_s: f64,
+    /// Last time of the clock, in s.
+    last_s: f64,
+    /// Sum of the days or hours that have passed, in s.
+    passed_s: f64,
+}
+
+impl Clock {
+    /// Returns the seconds since the beginning of the first day or hour. The clock has begun again
+    /// if it goes back by more than half of its period; a second record seldom begins so.
+    pub fn continued(&mut self, seconds: f64) -> f64 {
+        if self.last_s - seconds > 0.5 * self.period_s {
+            self.passed_s += self.period_s;
+        }
+        self.last_s = seconds;
+        self.passed_s + seconds
     }
 }
 
@@ -72,9 +108,9 @@ fn day_number(year: i64, month: i64, day: i64) -> i64 {
     era * 146_097 + year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year - 719_468
 }
 
-/// Reads a time of day, in s: `hh:mm`, `hh:mm:ss.fff`, `mm:ss.fff`, with AM or PM; a time zone at
-/// the end is ignored.
-fn seconds(text: &str) -> Option<f64> {
+/// Reads a time of day, in s, and whether it has hours: `hh:mm`, `hh:mm:ss.fff`, `mm:ss.fff`, with
+/// AM or PM; a time zone at the end is ignored.
+fn seconds(text: &str) -> Option<(f64, bool)> {
     let lower = text.to_lowercase();
     let (text, half) = match (lower.strip_suffix("am"), lower.strip_suffix("pm")) {
         (Some(text), _) => (text.trim_end(), Some(0.0)),
@@ -95,13 +131,15 @@ fn seconds(text: &str) -> Option<f64> {
         is_number.then(|| part.replace(',', ".").parse::<f64>().ok()).flatten()
     };
     let (hours, minutes, seconds) = match parts[..] {
-        [h, m, s] => (whole(h)?, whole(m)?, fraction(s)?),
-        [m, s] if s.contains(['.', ',']) => (0.0, whole(m)?, fraction(s)?),
-        [h, m] => (whole(h)?, whole(m)?, 0.0),
+        [h, m, s] => (Some(whole(h)?), whole(m)?, fraction(s)?),
+        [m, s] if s.contains(['.', ',']) => (None, whole(m)?, fraction(s)?),
+        [h, m] => (Some(whole(h)?), whole(m)?, 0.0),
         _ => return None,
     };
+    let (has_hours, hours) = (hours.is_some() || half.is_some(), hours.unwrap_or(0.0));
     let hours = half.map_or(hours, |half| hours % 12.0 + half);
-    (minutes < 60.0 && seconds < 61.0).then_some(3600.0 * hours + 60.0 * minutes + seconds)
+    let is_possible = minutes < 60.0 && seconds < 61.0;
+    is_possible.then_some((HOUR_S * hours + 60.0 * minutes + seconds, has_hours))
 }
 
 #[cfg(test)]
@@ -127,7 +165,7 @@ mod tests {
             assert_eq!(instant.day, day, "{text}");
             assert!((instant.seconds - seconds).abs() < 1e-9, "{text}");
         }
-        assert_eq!(Instant { day: Some(11), seconds: 1.0 }.since(10), 86_401.0);
+        assert_eq!(Instant { day: Some(11), seconds: 1.0, has_hours: true }.since(10), 86_401.0);
         for text in [
             "",
             "1.5",

@@ -7,7 +7,7 @@ use super::blocks::Block;
 use super::dialect::{is_data, is_number};
 use super::fields::{Fields, Layout, RowIter};
 use super::heading::{self, Above};
-use super::instant::Instant;
+use super::instant::{Clock, Instant};
 use super::lvm::{self, LvmHeader};
 use super::source::Stored;
 use crate::IoError;
@@ -40,6 +40,8 @@ pub(super) struct Rows {
     further_units: Vec<Vec<String>>,
     /// Reference days of the instants of columns, by column.
     origins: BTreeMap<usize, i64>,
+    /// Clocks without a date of columns, by column.
+    clocks: BTreeMap<usize, Clock>,
     /// Line and number of fields of rows of empty fields that no other row has followed yet. At the
     /// end of the file they are ignored.
     empty: Vec<(u64, usize)>,
@@ -82,6 +84,7 @@ impl Rows {
             lvm: None,
             further_units: Vec::new(),
             origins: BTreeMap::new(),
+            clocks: BTreeMap::new(),
             empty: Vec::new(),
         }
     }
@@ -217,6 +220,7 @@ impl Rows {
             if let Some(instant) = Instant::parse(field).filter(|_| !is_number) {
                 self.columns[column].has_instants = true;
                 self.origins.insert(column, instant.day.unwrap_or(0));
+                self.clocks.extend(instant.clock().map(|clock| (column, clock)));
             }
         }
         self.apply_lvm();
@@ -354,6 +358,10 @@ impl Rows {
             }
         }
         for (at, column) in plan.wanted.iter().enumerate() {
+            if let Some(clock) = self.clocks.get_mut(column) {
+                let times = batch.columns[at].iter_mut();
+                times.for_each(|seconds| *seconds = clock.continued(*seconds));
+            }
             let column = &mut self.columns[*column];
             match (&mut column.values, batch.unusable[at].take()) {
                 (Err(_), _) => {}

@@ -156,6 +156,9 @@ fn instants_of_dates_and_clocks_are_a_time_axis() {
             ],
         ),
         ("Time [hh:mm:ss]", ["09:26:53.0", "09:26:53.5", "09:26:54.0", "09:26:54.5"]),
+        ("time", ["23:59:59.0", "23:59:59.5", "00:00:00.0", "00:00:00.5"]),
+        ("time", ["11:59:59.5 PM", "12:00:00.0 AM", "12:00:00.5 AM", "12:00:01.0 AM"]),
+        ("time", ["59:59.0", "59:59.5", "00:00.0", "00:00.5"]),
         (
             "Timestamp",
             [
@@ -176,6 +179,9 @@ fn instants_of_dates_and_clocks_are_a_time_axis() {
             assert!(table.says_unit_of_time(0));
         }
     }
+    let back = table("time,x\n09:26:53.0,1\n09:26:53.5,2\n09:26:53.0,3\n09:26:53.5,4\n");
+    let error = back.sampling(&TimeAxis::Column("time"), &["x"]).unwrap_err().to_string();
+    assert!(error.contains("had been appended"), "{error}");
     let mixed = table("time,x\n2023-03-14T09:26:53,1\n0.5,2\n2023-03-14T09:26:54,3\n");
     let error = mixed.column("time").unwrap_err().to_string();
     assert!(error.contains("line 3") && error.contains("is not a number"), "{error}");
