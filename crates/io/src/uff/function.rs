@@ -3,9 +3,9 @@
 use super::header::Header;
 use super::lines::{Line, Lines};
 use super::values::{Binary, printed};
-use crate::Quantity;
-use crate::contents::{Axis, Column, Fault};
+use crate::contents::{Axis, Column, Contents, Fault};
 use crate::limits::Budget;
+use crate::{Quantity, Unit, escaped};
 
 /// Abscissa types other than time: frequency, and revolutions or orders of a shaft.
 const NOT_TIME: [u32; 3] = [18, 19, 20];
@@ -15,11 +15,11 @@ const NOT_TIME: [u32; 3] = [18, 19, 20];
 pub(super) fn read(
     lines: &mut Lines<'_>,
     id: &Line<'_>,
-    columns: &mut Vec<Column>,
+    contents: &mut Contents,
     budget: &mut Budget,
 ) -> Result<(), Fault> {
     let (header, values) = dataset(lines, id, budget)?;
-    add(header, values, columns);
+    add(header, values, contents);
     Ok(())
 }
 
@@ -46,7 +46,29 @@ pub(super) fn dataset(
     Ok((header, values))
 }
 
-fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
+/// Returns the size of the unit of the instants, in s, that the label of the abscissa states; a
+/// remark is added about another unit and about a label that is not a unit of time.
+fn time_unit(header: &Header, remarks: &mut Vec<String>) -> f64 {
+    let Some(stated) = header.abscissa_unit(Quantity::Time) else { return 1.0 };
+    let is_time = |unit: &&Unit| unit.quantity == Quantity::Time;
+    let in_s = stated.used().filter(is_time).map(|unit| unit.in_si);
+    let text = escaped(&stated.text);
+    let remark = match in_s {
+        Some(1.0) => return 1.0,
+        Some(in_s) => format!(
+            "the labels of the file state instants in {text}: they were multiplied by {in_s} to get s"
+        ),
+        None => {
+            format!("the label {text} of the instants is not a unit of time: they are read in s")
+        }
+    };
+    if !remarks.contains(&remark) {
+        remarks.push(remark);
+    }
+    in_s.unwrap_or(1.0)
+}
+
+fn add(header: Header, values: Vec<f64>, contents: &mut Contents) {
     let name = match (&header.reference, header.function) {
         (Some(reference), 2..) => format!("{}/{reference}", header.response),
         _ => header.response.clone(),
@@ -67,16 +89,18 @@ fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
     let in_time = header.function <= 1 && !NOT_TIME.contains(&header.abscissa);
     if !in_time || header.is_complex {
         let what = if in_time { "complex numbers".into() } else { header.kind() };
-        columns.push(Column { about, ..Column::unusable(name, what) });
+        contents.columns.push(Column { about, ..Column::unusable(name, what) });
         return;
     }
+    let in_s = time_unit(&header, &mut contents.remarks);
+    let columns = &mut contents.columns;
     if header.is_even {
-        let axis = Axis::Even { start: header.start, step: header.step };
+        let axis = Axis::Even { start: in_s * header.start, step: in_s * header.step };
         columns.push(Column { about, axis, unit, kind, ..Column::from_numbers(name, values) });
         return;
     }
     let (pairs, _) = values.as_chunks::<2>();
-    let (times, values) = pairs.iter().map(|[time, value]| (*time, *value)).unzip();
+    let (times, values) = pairs.iter().map(|[time, value]| (in_s * *time, *value)).unzip();
     // The column of instants is its own time axis, too.
     let axis = Axis::Column(columns.len());
     columns.push(Column { axis, ..Column::from_numbers(format!("{name} time"), times) });

@@ -3,6 +3,8 @@
 use super::lines::{Line, Lines, number};
 use crate::contents::Fault;
 use crate::responses::AveragedSegments;
+use crate::units::names_quantity;
+use crate::{Quantity, StatedUnit, stated_unit};
 
 /// Prefix of a second line of description that states the decay, in 1/s, that a window adds.
 pub(super) const ADDED_DECAY: &str = "ADDED DECAY 1/S ";
@@ -36,6 +38,8 @@ pub(crate) struct Header {
     pub step: f64,
     /// 17 is time, 18 frequency.
     pub abscissa: u32,
+    /// Labels of the abscissa and of its unit; empty without one.
+    pub abscissa_labels: [String; 2],
     /// Quantity, for messages; empty if the file does not state it.
     pub quantity: String,
     /// Labels of the units of the ordinate and of its denominator; empty without one.
@@ -89,6 +93,7 @@ impl Header {
             start: if is_even { real(&form, 30)? } else { 0.0 },
             step: if is_even { real(&form, 43)? } else { 0.0 },
             abscissa: whole(&abscissa, 0, 10)?,
+            abscissa_labels: [26, 47].map(|from| label(field(&abscissa, from, 20))),
             quantity: quantity(&ordinate)?,
             units: [&ordinate, &denominator].map(|line| label(field(line, 47, 20))),
             ordinate: [whole(&ordinate, 0, 10)?, whole(&denominator, 0, 10)?],
@@ -100,6 +105,18 @@ impl Header {
     pub fn numbers(&self) -> usize {
         let numbers_per_value = 1 + usize::from(self.is_complex) + usize::from(!self.is_even);
         self.count.saturating_mul(numbers_per_value)
+    }
+
+    /// Returns what the labels of the abscissa state about its unit, if it should have the quantity
+    /// `wanted`; `None` if they only name the quantity.
+    pub fn abscissa_unit(&self, wanted: Quantity) -> Option<StatedUnit> {
+        let [name, unit] = &self.abscissa_labels;
+        let named = |text: &str| {
+            let words = text.split(|c: char| !c.is_alphabetic()).filter(|word| !word.is_empty());
+            words.clone().count() > 0 && words.into_iter().all(|word| names_quantity(word, wanted))
+        };
+        let unit = if named(unit) { "" } else { unit };
+        stated_unit(name, unit, Some(wanted)).filter(|stated| !named(&stated.text))
     }
 
     /// Returns the kind of the function, for messages.

@@ -57,7 +57,7 @@ fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault
         let id = lines.required("a dataset begins here and has no number")?;
         let dataset = dataset_number(&id)?;
         match dataset {
-            58 => function::read(lines, &id, &mut contents.columns, &mut budget)?,
+            58 => function::read(lines, &id, &mut contents, &mut budget)?,
             164 => stated = Some(units(lines)?),
             _ => *skipped.entry(dataset).or_default() += 1,
         }

@@ -13,7 +13,7 @@ use crate::contents::{Fault, Place};
 use crate::limits::Budget;
 use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use crate::units::ResponseUnit;
-use crate::{IoError, Quantity, Unit};
+use crate::{Evidence, IoError, Quantity, StatedUnit, Unit, escaped};
 
 /// Abscissa type of a frequency.
 const FREQUENCY: u32 = 18;
@@ -103,7 +103,9 @@ fn add(
             header.kind()
         )));
     }
-    let (frequency_hz, numbers) = frequencies_and_values(header, values);
+    let (mut frequency_hz, numbers) = frequencies_and_values(header, values);
+    let in_hz = frequency_unit(responses, header);
+    frequency_hz.iter_mut().for_each(|frequency| *frequency *= in_hz);
     if let Some(at) = numbers.iter().position(|z| !z.is_finite()) {
         return Err(id.fault(format!("value {} of the function is not finite", at + 1)));
     }
@@ -143,7 +145,35 @@ fn add(
     Ok(())
 }
 
-/// Returns the frequencies (Hz) and the values of a function from the numbers of its data set.
+/// Returns the size of the unit of the frequencies, in Hz, that the label of the abscissa states; a
+/// label that is not a unit of a frequency is added to the doubts.
+fn frequency_unit(responses: &mut FrequencyResponses, header: &Header) -> f64 {
+    let Some(stated) = header.abscissa_unit(Quantity::Frequency) else { return 1.0 };
+    let is_frequency = |unit: &&Unit| unit.quantity == Quantity::Frequency;
+    let in_hz = stated.used().filter(is_frequency).map(|unit| unit.in_si);
+    let remark = format!(
+        "the labels of the file state frequencies in {}: they were multiplied by {} to get Hz",
+        escaped(&stated.text),
+        in_hz.unwrap_or(1.0)
+    );
+    if in_hz.is_some_and(|in_hz| in_hz != 1.0) && !responses.remarks.contains(&remark) {
+        responses.remarks.push(remark);
+    }
+    let stated = match in_hz {
+        Some(_) => stated,
+        None => StatedUnit { unit: None, evidence: Evidence::Unused, ..stated },
+    };
+    if stated.evidence != Evidence::Stated {
+        let doubt = ("of the frequencies".to_owned(), stated, Quantity::Frequency);
+        if !responses.doubts.contains(&doubt) {
+            responses.doubts.push(doubt);
+        }
+    }
+    in_hz.unwrap_or(1.0)
+}
+
+/// Returns the frequencies, in the unit of the file, and the values of a function from the numbers
+/// of its data set.
 fn frequencies_and_values(header: &Header, numbers: &[f64]) -> (Vec<f64>, Vec<Complex<f64>>) {
     let numbers_per_value = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
     let rows = numbers.chunks_exact(numbers_per_value);

@@ -123,6 +123,11 @@ pub fn name_without_unit(name: &str) -> String {
     without_unit(name)
 }
 
+/// Returns whether a word means a quantity: `time`, `Frequenz`.
+pub(crate) fn names_quantity(word: &str, quantity: Quantity) -> bool {
+    words::is_quantity_word(word, quantity)
+}
+
 /// Returns whether a text is a unit of any quantity, known to [`Quantity`] or not.
 pub(crate) fn is_unit(text: &str) -> bool {
     Expression::parse(text).is_some()

@@ -2,7 +2,8 @@
 //! `binary.unv` (`data/make.py`).
 
 use mechid_io::{
-    AveragedSegments, CoherenceFunction, FrequencyResponses, IoError, ResponseFunction,
+    AveragedSegments, CoherenceFunction, Evidence, FrequencyResponses, IoError, Quantity,
+    ResponseFunction,
 };
 use mechid_model::ResponseQuantity;
 use mechid_signal::Window;
@@ -116,6 +117,45 @@ fn stated_units_become_si_units() {
     let found = of(inch, one);
     assert!((found.functions[0].values[0].re - 0.0254).abs() < 1e-15);
     assert!(found.remarks[0].contains("multiplied by 0.0254"), "{:?}", found.remarks);
+}
+
+/// Judge: 2π rad per cycle, 60 s per minute. The numbers of the file are 1 and 2.
+#[test]
+fn labels_of_the_abscissa_state_the_unit_of_the_frequencies() {
+    let text = two_by_one(vec![1.0, 2.0]).to_universal_file().unwrap();
+    let label = format!("{:<20} {:<20}", "Frequency", "Hz");
+    assert!(text.contains(&label));
+    let with = |name: &str, unit: &str| {
+        let text = text.replace(&label, &format!("{name:<20} {unit:<20}"));
+        FrequencyResponses::parse("b.unv", text.as_bytes()).unwrap()
+    };
+    for (name, unit, in_hz) in [
+        ("Frequency", "rad/s", 0.5 / std::f64::consts::PI),
+        ("NONE", "rad/s", 0.5 / std::f64::consts::PI),
+        ("Frequency (rad/s)", "NONE", 0.5 / std::f64::consts::PI),
+        ("Frequency", "kHz", 1e3),
+        ("Speed", "RPM", 1.0 / 60.0),
+    ] {
+        let found = with(name, unit);
+        for (hz, number) in found.frequency_hz.iter().zip([1.0, 2.0]) {
+            assert!((hz / (number * in_hz) - 1.0).abs() < 1e-12, "{name}, {unit}: {hz}");
+        }
+        let remarks = found.remarks.join("; ");
+        assert!(remarks.contains("they were multiplied by"), "{remarks}");
+        assert!(found.doubts.is_empty(), "{name}, {unit}: {:?}", found.doubts);
+    }
+    for (name, unit) in [("NONE", "NONE"), ("Frequency", "FREQUENCY"), ("Frequency", "HERTZ")] {
+        let found = with(name, unit);
+        assert_eq!((found.frequency_hz.len(), found.frequency_hz[1]), (2, 2.0), "{name}, {unit}");
+        assert!(found.doubts.is_empty() && found.remarks.is_empty(), "{name}, {unit}");
+    }
+    for unit in ["orders", "ms"] {
+        let found = with("Frequency", unit);
+        assert_eq!(found.frequency_hz, [1.0, 2.0]);
+        let (_, stated, quantity) = &found.doubts[0];
+        assert_eq!((stated.text.as_str(), *quantity), (unit, Quantity::Frequency));
+        assert_eq!((stated.evidence, found.doubts.len()), (Evidence::Unused, 1));
+    }
 }
 
 #[test]

@@ -39,6 +39,33 @@ fn functions_of_time_are_columns_with_a_time_axis() {
     }
 }
 
+/// The steps of the file are 0.25.
+#[test]
+fn labels_of_the_abscissa_state_the_unit_of_the_instants() {
+    let with = |unit: &str| {
+        let text = String::from_utf8(PRINTED.to_vec()).unwrap();
+        let (before, after) = ("        17    0    0    0", format!("{:<20} {unit:<20}", "Time"));
+        let lines = text.split_inclusive('\n').map(|line| match line.starts_with(before) {
+            true => format!("{before} {after}\n"),
+            false => line.to_owned(),
+        });
+        Table::parse("a.unv", lines.collect::<String>().as_bytes()).unwrap()
+    };
+    for (unit, dt, remark) in [
+        ("s", 0.25, None),
+        ("NONE", 0.25, None),
+        ("ms", 0.25e-3, Some("they were multiplied by 0.001")),
+        ("samples", 0.25, Some("the label samples of the instants is not a unit of time")),
+    ] {
+        let table = with(unit);
+        let sampling = table.sampling(&TimeAxis::OfFile, &["1-X", "12+RX"]).unwrap();
+        assert!((sampling.dt() / dt - 1.0).abs() < 1e-12, "{unit}: {}", sampling.dt());
+        let remarks = table.remarks().join("; ");
+        assert_eq!(remarks.contains("instants"), remark.is_some(), "{remarks}");
+        assert!(remark.is_none_or(|remark| remarks.contains(remark)), "{remarks}");
+    }
+}
+
 #[test]
 fn single_precision_is_read_printed_and_binary() {
     let table = Table::parse("a.unv", SINGLE).unwrap();
