@@ -174,7 +174,7 @@ fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
 pub struct WrongPeriod {
     /// Claimed period, in samples.
     pub claimed: usize,
-    /// How the force contradicts the stated period.
+    /// Way in which the force contradicts the stated period.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub fault: PeriodFault,
 }

@@ -117,8 +117,8 @@ impl ElementData {
         Ok(self)
     }
 
-    /// Returns the lines of one record of the `block` with the noise of its forces, of which those
-    /// on `driven` act: on the samples of the pulses of a `hit`, otherwise on all.
+    /// Returns the lines of one record of the `block` with the noise of its forces on `driven`: on
+    /// the samples of the pulses of a `hit`, otherwise on all.
     pub(super) fn with_force_noise(
         self,
         block: &Block,

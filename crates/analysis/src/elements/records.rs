@@ -52,7 +52,7 @@ impl ElementData {
 }
 
 /// Reads the good hits of a record as open records with only the forces of their pulses. Hits
-/// without a gap are one record, unless the noise of so many pulses takes too much memory.
+/// without a gap are one record, unless the noise of their pulses takes too much memory.
 fn from_hits(
     measurement: &Measurement,
     rule: &HitRule,

@@ -145,8 +145,8 @@ impl OfFit<'_> {
         remarks
     }
 
-    /// Returns the checks of the tables before and after the fit, and the square of the change of the
-    /// parameters by a model that explains the responses far better.
+    /// Returns the checks of the tables before and after the fit, and the square of the change of
+    /// the parameters by a model that explains the responses far better.
     fn checks(
         &self,
         tables: &[FrequencyResponses],

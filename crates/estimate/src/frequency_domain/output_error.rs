@@ -88,7 +88,8 @@ pub fn output_error_pooling(
 }
 
 /// Estimates as [`output_error`] from frequency responses; where the data state no noise, that of
-/// each response is white, in proportion to the response, or the sum of both, as the residual shows.
+/// each response is white, in proportion to the response, or the sum of both, as the residual
+/// shows.
 ///
 /// # Errors
 /// As [`output_error`].

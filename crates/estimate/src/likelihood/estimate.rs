@@ -180,8 +180,8 @@ pub struct LikelihoodEstimate {
     pub searches: usize,
     /// Condition number of the Jacobian with columns of unit length, a pure number.
     pub condition: f64,
-    /// Sets of parameters that the data do not determine one by one, with the combinations that they
-    /// do determine.
+    /// Sets of parameters that the data do not determine one by one, with the combinations that
+    /// they do determine.
     pub combinations: Vec<Combination>,
     /// Degrees of freedom of the noise level; infinite for known noise.
     pub degrees_of_freedom: f64,

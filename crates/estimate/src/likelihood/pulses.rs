@@ -26,9 +26,9 @@ impl PulseCovariance {
         Some(Self { effects, factor: Cholesky::new(sum)? })
     }
 
-    /// Replaces the columns v of a matrix, in blocks of rows, by v − P b with (I + PᵀP) b = Pᵀv, and
-    /// returns b. With b as further rows, the products of two such columns are those of the columns
-    /// before with the inverse of the covariance.
+    /// Replaces the columns v of a matrix, in blocks of rows, by v − P b with (I + PᵀP) b = Pᵀv,
+    /// and returns b. With b as further rows, the products of two such columns are those of the
+    /// columns before with the inverse of the covariance.
     pub(super) fn whiten(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
         let columns = parts.first().map_or(0, |part| part.ncols());
         let pairs = self.effects.par_iter().zip(parts.par_iter());
@@ -41,7 +41,8 @@ impl PulseCovariance {
         amplitudes
     }
 
-    /// Returns Vᵀ(I + PᵀP)⁻¹V for V = Pᵀv: what the errors of the pulses take from the products vᵀv.
+    /// Returns Vᵀ(I + PᵀP)⁻¹V for V = Pᵀv, the part of the products vᵀv that the errors of the
+    /// pulses explain.
     pub(super) fn explained(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
         products.tr_mul(&self.factor.solve(products))
     }

@@ -234,8 +234,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         exists.then_some((line, weighted, white))
     }
 
-    /// Returns the Jacobian of the residual of one record, as blocks of rows with the index of their
-    /// first row.
+    /// Returns the Jacobian of the residual of one record, as blocks of rows with the index of
+    /// their first row.
     fn derivative(
         &self,
         parameters: &[f64],

@@ -49,8 +49,8 @@ impl Reach {
             ModeSearch::Lowest => {
                 search.distance(first) >= search.distance(self.shift) || gap <= 0.5 * self.radius
             }
-            // A mode that is not found yet may lie on the far side of the first mode, as far from it
-            // as the last one: the radius must include this distance.
+            // A mode that is not found yet may lie on the far side of the first mode, as far from
+            // it as the last one: the radius must include this distance.
             ModeSearch::NearOmega(_) => {
                 gap + (last - first).norm()
                     <= self.radius * (1.0 + limits::SAME_EIGENVALUE) + gap * limits::SAME_EIGENVALUE

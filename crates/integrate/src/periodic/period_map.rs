@@ -43,8 +43,8 @@ impl PeriodMap {
         };
         let steps = sampling.len();
         let over_period = -power_less_identity(&change, steps);
-        // Rounding is ε times the change of the matrix of a step for each step, and ε times the norm
-        // of the product for each product of matrices.
+        // Rounding is ε times the change of the matrix of a step for each step, and ε times the
+        // norm of the product for each product of matrices.
         let rounding = f64::EPSILON
             * (steps as f64 * change.norm() + f64::from(steps.ilog2() + 1) * over_period.norm());
         let size = over_period.norm().max(1.0);

@@ -10,8 +10,8 @@ use crate::sparse::GeneralLu;
 use crate::stepping::selected_dofs::SelectedDofs;
 
 /// Computes the periodic response of a sparse system to a periodic force. The force acts on
-/// `dofs.forced`; the response is returned at `dofs.observed`. The force is band-limited between its samples and has samples ×
-/// `dofs.forced` (N); the response has samples × `dofs.observed`.
+/// `dofs.forced`; the response is returned at `dofs.observed`. The force is band-limited between
+/// its samples and has samples × `dofs.forced` (N); the response has samples × `dofs.observed`.
 ///
 /// ```
 /// use mechid_integrate::{SelectedDofs, sparse_steady_state};

@@ -226,7 +226,7 @@ pub(super) fn directions(parameters: &Parameters) -> Vec<Direction> {
         Direction {
             index,
             pole: moves.then(pole),
-            // Modes whose γ does not depend on the parameter have no difference and are left out.
+            // Modes whose γ does not depend on the parameter have no difference and are omitted.
             covariances: columns.filter(|(_, change)| change.iter().any(|z| *z != zero)).collect(),
             direct_power: (above.direct_power - below.direct_power) * half,
         }

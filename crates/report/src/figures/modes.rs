@@ -12,7 +12,8 @@ use crate::ReportError;
 const SHOWN: usize = 4000;
 
 /// Draws the root of the sum of squares of all responses, each divided by its RMS in the band:
-/// measured, explained by the modes, and the difference; below it the stabilisation diagram and the mode indicator.
+/// measured, explained by the modes, and the difference; below it the stabilisation diagram and the
+/// mode indicator.
 ///
 /// # Errors
 /// [`ReportError`] if the diagrams cannot be computed or drawn.

@@ -43,8 +43,8 @@ pub struct ResponseNoise {
 
 impl ResponseNoise {
     /// Chooses the most likely noise of residuals, which are circular Gaussian numbers: white, in
-    /// proportion to the response, or, if Schwarz's criterion accepts its second unknown, the sum of
-    /// both. Each residual is a pair of its squared magnitude and that of the response.
+    /// proportion to the response, or, if Schwarz's criterion accepts its second unknown, the sum
+    /// of both. Each residual is a pair of its squared magnitude and that of the response.
     ///
     /// # Source
     /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring);
@@ -104,7 +104,7 @@ impl ResponseNoise {
                 return None;
             }
             let before = self;
-            // As in `motion_level`, the decrease per step is limited.
+            // The decrease per step is limited for the reason of `motion_level`.
             self = Self {
                 white: white.max(0.1 * before.white),
                 relative: relative.max(0.1 * before.relative),

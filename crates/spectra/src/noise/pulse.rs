@@ -51,7 +51,7 @@ pub struct PulseErrors {
 impl PulseErrors {
     /// Decomposes the noise of a pulse on the lines of its record at `omega` (rad/s), with the
     /// unitary amplitudes of [`LineData`](crate::LineData). Patterns with hardly any power on these
-    /// lines are left out; `None` without noise.
+    /// lines are omitted; `None` without noise.
     ///
     /// # Errors
     /// [`SpectraError::Numerics`] if the decomposition fails.
@@ -100,6 +100,10 @@ impl PulseErrors {
 
     /// Returns the values of the patterns on a line at `omega` (rad/s), in the unit of the
     /// amplitudes of the line.
+    ///
+    /// # Source
+    /// Slepian (1978), Bell System Technical Journal 57, 1371–1430 (short sequences with their power
+    /// in a band).
     pub fn at(&self, omega: f64) -> DVector<Complex<f64>> {
         let step = Complex::cis(-omega * self.sample_interval);
         let mut turn = Complex::cis(-omega * self.sample_interval * self.first_sample as f64);

@@ -85,15 +85,15 @@ fn leakage(
     let lines = width(narrowest);
     let why = match averaged {
         Some(_) if settled => {
-            "a segment wide: its damping follows from the bias of the window, and its intervals are not \
+            "a segment: its damping follows from the bias of the window, and its intervals are not \
              reliable; use longer segments, or fit the record itself"
         }
         Some(_) => {
-            "a segment wide: the bias of the window could not be separated from its damping, and its intervals \
+            "a segment: the bias of the window could not be separated from its damping, and its intervals \
              are not reliable; use longer segments, or fit the record itself"
         }
         None => {
-            "the table wide, and the table does not state its segments: if the responses are averages under a window, the \
+            "the table, which does not state its segments: if the responses are averages under a window, the \
              damping is that of the window; fit the record itself"
         }
     };
