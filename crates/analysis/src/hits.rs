@@ -252,7 +252,8 @@ pub(crate) fn cut(
         for (at, hits) in pieces(&found.all, windows).into_iter().enumerate() {
             let window = found.all[hits.start].window.start..found.all[hits.end - 1].window.end;
             let alone = found.pulses_alone(force, &found.all[hits.clone()]);
-            cut.noise.push(HitNoise { deviation: found.noise, pulses: runs(&alone) });
+            let pulses = pulses_of(&found.all[hits.clone()], &window);
+            cut.noise.push(HitNoise { deviation: found.noise, pulses });
             let mut pulses = DMatrix::zeros(window.len(), buffered.force.channels());
             pulses.column_mut(dof).copy_from_slice(&alone);
             let sampling = buffered.force.sampling().with_len(window.len())?;
@@ -274,15 +275,20 @@ pub(crate) fn cut(
     Ok(cut)
 }
 
-/// Returns the ranges of consecutive samples that are not 0.
-fn runs(force: &[f64]) -> Vec<Range<usize>> {
-    let mut next = 0;
-    let runs = force.chunk_by(|a, b| (*a == 0.0) == (*b == 0.0)).map(|run| {
-        let range = next..next + run.len();
-        next = range.end;
-        range
-    });
-    runs.filter(|range| force[range.start] != 0.0).collect()
+/// Returns the samples of a window with the force of hits, one range for each; hits whose contacts
+/// overlap have one range.
+fn pulses_of(hits: &[Hit], window: &Range<usize>) -> Vec<Range<usize>> {
+    let mut pulses: Vec<Range<usize>> = Vec::new();
+    for hit in hits {
+        let contact = hit.contact_with_margin();
+        let inside = contact.start.max(window.start)..contact.end.min(window.end);
+        let pulse = inside.start - window.start..inside.end.saturating_sub(window.start);
+        match pulses.last_mut() {
+            Some(last) if pulse.start <= last.end => last.end = last.end.max(pulse.end),
+            _ => pulses.push(pulse),
+        }
+    }
+    pulses
 }
 
 /// Returns the ranges of good hits that make one record each.

@@ -222,6 +222,10 @@ pub(crate) const SINUSOID_FREQUENCIES: usize = 20;
 /// Number of golden-section steps in the search for the frequency of a sinusoid.
 pub(crate) const SINUSOID_SECTIONS: usize = 40;
 
+/// Maximum number of samples of a pulse whose noise is decomposed into patterns together; a longer
+/// pulse is divided.
+pub(crate) const PULSE_SAMPLES: usize = 256;
+
 /// Minimum power of a pattern of the noise of a pulse on the lines, relative to the strongest
 /// pattern: weaker ones are outside of the band.
 pub(crate) const PULSE_PATTERN: f64 = 1e-4;

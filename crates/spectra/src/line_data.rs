@@ -6,6 +6,7 @@ use std::ops::Range;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
+use crate::limits::PULSE_SAMPLES;
 use crate::noise::pulse::{PulseErrors, PulseNoise};
 use crate::{LineNoise, SpectraError};
 
@@ -133,8 +134,9 @@ impl LineData {
         Ok(Self { noise: Some(noise), ..self })
     }
 
-    /// Returns the same lines with the noise of inputs that act only for a few samples. The rows of
-    /// a pulse are those of its record, and its channel is an input.
+    /// Returns the same lines with the noise of inputs that act only for a few samples, in place of
+    /// any such noise before. The rows of a pulse are those of its record, and its channel is an
+    /// input.
     ///
     /// # Errors
     /// [`SpectraError::Size`] for an input that does not exist or rows that are not those of one
@@ -150,7 +152,12 @@ impl LineData {
                 let (what, expected, got) = ("rows of a pulse", self.len(), pulse.rows.len());
                 return Err(SpectraError::Size { what, expected, got });
             }
-            pulse_errors.extend(PulseErrors::new(pulse, &self.omega[pulse.rows.clone()])?);
+            // Noise of parts of a pulse is independent; the decomposition takes the cube of a part.
+            for start in pulse.samples.clone().step_by(PULSE_SAMPLES) {
+                let samples = start..pulse.samples.end.min(start + PULSE_SAMPLES);
+                let part = PulseNoise { samples, ..pulse.clone() };
+                pulse_errors.extend(PulseErrors::new(&part, &self.omega[pulse.rows.clone()])?);
+            }
         }
         Ok(Self { pulse_errors, ..self })
     }

@@ -45,18 +45,20 @@ impl ElementData {
     ) -> Result<Self, AnalysisError> {
         check_distinct(measurements)?;
         joined(measurements.iter().map(|measurement| match &how.hits {
-            Some(rule) => from_hits(measurement, rule, how),
+            Some(rule) => from_hits(measurement, rule, how, measurements.len()),
             None => from_record(measurement, how),
         }))
     }
 }
 
 /// Reads the good hits of a record as open records with only the forces of their pulses. Hits
-/// without a gap are one record, unless the noise of their pulses takes too much memory.
+/// without a gap are one record, unless the noise of their pulses takes too much memory beside that
+/// of the other `records`.
 fn from_hits(
     measurement: &Measurement,
     rule: &HitRule,
     how: &IdentifyElements,
+    records: usize,
 ) -> Result<ElementData, AnalysisError> {
     if measurement.window_settings().period.is_some() {
         let why = "hits are not periods: leave out `period`".into();
@@ -67,10 +69,16 @@ fn from_hits(
         return Err(AnalysisError::Setting { setting: "hits", why });
     }
     let joined = from_windows(measurement, rule, how, Windows::Joined)?;
-    if joined.lines.pulse_effects() <= PULSE_EFFECTS {
+    if joined.lines.pulse_effects() <= PULSE_EFFECTS / records {
         return Ok(joined);
     }
-    from_windows(measurement, rule, how, Windows::Separate)
+    let mut separate = from_windows(measurement, rule, how, Windows::Separate)?;
+    separate.remarks.push(format!(
+        "{}: every hit was fitted with its own transient, because the noise of so many pulses in one record takes \
+         too much memory; a smaller band or fewer hits may give smaller errors",
+        separate.tests.first().map_or("", |test| &test.file)
+    ));
+    Ok(separate)
 }
 
 fn from_windows(
@@ -168,7 +176,7 @@ impl Signals {
 
     /// Returns the mean of the periods with the noise from their scatter.
     fn periods(&self, block: &Block, how: &IdentifyElements) -> Result<ElementData, AnalysisError> {
-        how.refuse_force_noise("periods, which show it by their scatter")?;
+        how.refuse_force_noise("whole periods")?;
         let choice = how.band.map_or(LineChoice::Driven, LineChoice::Band);
         let without = LeftOut { lines: None, frequencies: how.without_hz.clone() };
         let rule = LineRule { choice: &choice, without: &without };

@@ -1,6 +1,7 @@
 //! Unit of work: a part of the records.
 
 use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -65,6 +66,11 @@ pub struct PartDone {
     pub failures: Vec<FailureCount>,
     /// `true` if it was computed now, `false` if it existed before.
     pub computed: bool,
+}
+
+/// Returns whether a file cannot be changed because it is protected.
+fn is_read_only(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem)
 }
 
 impl Part {
@@ -134,8 +140,14 @@ impl Part {
             // The rows of the last run count, also those that an earlier one had computed.
             let touched = File::options().append(true).open(&path);
             let touched = touched.and_then(|file| file.set_modified(SystemTime::now()));
-            let file = path_text(&path).into_owned();
-            touched.map_err(|source| IoError::Write { file, source })?;
+            match touched {
+                // Nobody has written other rows into a folder that is read-only.
+                Err(error) if is_read_only(&error) => {}
+                touched => {
+                    let file = path_text(&path).into_owned();
+                    touched.map_err(|source| IoError::Write { file, source })?;
+                }
+            }
             return Ok(done);
         }
         let mut rows = Vec::with_capacity(self.records.len());

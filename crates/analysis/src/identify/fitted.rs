@@ -123,6 +123,13 @@ pub enum Residual {
     Lines(Box<SpectralResidual>),
 }
 
+impl Residual {
+    /// Returns the residuals of the lines of several records.
+    pub(super) fn of_lines(records: Vec<SpectralResidual>) -> Vec<Self> {
+        records.into_iter().map(|residual| Self::Lines(Box::new(residual))).collect()
+    }
+}
+
 /// Residual of a fit sample by sample.
 #[derive(Debug)]
 pub struct SampleResidual {
@@ -359,7 +366,7 @@ pub(super) fn unexplained_motion(
 pub(super) fn counted_explanation(checks: &[CheckRow]) -> Option<String> {
     let explanation = checks.iter().find(|check| check.is_explanation())?;
     Some(format!(
-        "standard errors and intervals include the change of the parameters by what explains the residual (see {})",
+        "standard errors and intervals include the change of the parameters by the model that explains the residual (see {})",
         explanation.subject
     ))
 }

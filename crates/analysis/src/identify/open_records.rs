@@ -154,17 +154,16 @@ pub(super) fn fit(
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let late = delay_of_open_records(&data, dt, unknowns, &fit, follows_force(&residuals));
     let Compared { parts, omitted } = agreement(&data, &fit, &residuals, excitation)?;
-    // The noise of a pulse correlates its lines, which the score test does not allow for.
-    let fault = if matches!(excitation, Excitation::Hits(_)) {
-        None
-    } else {
-        fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?
+    let fault = match excitation {
+        // The noise of a pulse correlates its lines, which the score test does not allow for.
+        Excitation::Hits(_) => None,
+        _ => fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?,
     };
     let likelier = likelier(late, fault);
-    let of_cause = likelier.as_ref().and_then(|finding| {
-        refitted_with(finding, &data, records[0].held.response().1, unknowns, noise.response)
-    });
-    let explained = of_cause.map(|other| squared_change(&fit.estimate, &other));
+    let quantity = records[0].held.response().1;
+    let refit = |finding| refitted_with(finding, &data, quantity, unknowns, noise.response);
+    let explained = likelier.as_ref().and_then(refit);
+    let explained = explained.map(|other| squared_change(&fit.estimate, &other));
     let sinusoids = sinusoid_rows(records, &fit);
     let joint = joined(&closed)?;
     let prediction = Prediction::Sampled {
@@ -180,10 +179,7 @@ pub(super) fn fit(
         after_all: bias.into_iter().chain(likelier).chain(parts).collect(),
         omitted,
         explained,
-        residuals: residuals
-            .into_iter()
-            .map(|residual| Residual::Lines(Box::new(residual)))
-            .collect(),
+        residuals: Residual::of_lines(residuals),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
         force_noise,

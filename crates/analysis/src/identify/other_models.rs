@@ -5,7 +5,9 @@ use mechid_checks::{
     Alternative, Cause, Finding, ModelledResponses, better_model, delay_of_responses,
 };
 use mechid_estimate::Estimate;
-use mechid_estimate::frequency_domain::{output_error_pooling, structural_damping};
+use mechid_estimate::frequency_domain::{
+    output_error_of_table, output_error_pooling, structural_damping,
+};
 use mechid_io::FrequencyResponses;
 use mechid_model::ResponseQuantity;
 use mechid_spectra::{FrequencyData, Pooling};
@@ -38,38 +40,45 @@ pub(super) fn better_model_of(
     let estimate = likely.as_ref().map_or(result, |likely| &likely.estimate);
     let fitted = modelled(data, data, estimate)?;
     let (mut causes, mut models) = (Vec::new(), Vec::new());
-    let mut add = |cause, model, estimate: Option<Estimate>| {
-        causes.push((cause, estimate));
+    let mut add = |cause, model| {
+        causes.push(cause);
         models.push(model);
     };
     if let Some((seconds, fit)) = delayed(data, estimate) {
         let model = modelled(data, &data.with_later_force(seconds), &fit);
-        model.into_iter().for_each(|model| {
-            add(Cause::Delay { seconds }, model, Some(fit.clone()));
-        });
+        model.into_iter().for_each(|model| add(Cause::Delay { seconds }, model));
     }
     if let Some(fit) = structural_damping(data, estimate.unknowns()) {
         let model = in_measured_quantity(data, &fit.displacement);
         let model = ModelledResponses { modelled: model, ..fitted.clone() };
-        add(Cause::StructuralDamping { loss_factor: fit.loss_factor }, model, None);
+        add(Cause::StructuralDamping { loss_factor: fit.loss_factor }, model);
     }
     if tables.iter().all(|table| table.added_decay.is_none()) {
         let stated = data.measured();
         for quantity in ResponseQuantity::ALL.into_iter().filter(|other| *other != stated) {
             let model = refitted(tables, how, quantity, estimate, &|z| z);
             let cause = || Cause::Quantity { quantity, stated };
-            model.into_iter().for_each(|model| add(cause(), model, None));
+            model.into_iter().for_each(|model| add(cause(), model));
         }
         for sign in [1.0, -1.0] {
             let model = level_responses(tables, how, stated, estimate, sign);
-            model.into_iter().for_each(|model| add(Cause::Decibels, model, None));
+            model.into_iter().for_each(|model| add(Cause::Decibels, model));
         }
     }
     let deviation = deviation(data);
     let (best, remaining) = better_model(data.omega(), deviation.as_ref(), &fitted, &models)?;
-    let (cause, other) = causes.swap_remove(best);
+    let cause = causes.swap_remove(best);
+    let other = match cause {
+        // The weights are those of the result, so that the change is that by the delay alone.
+        Cause::Delay { seconds } => {
+            let late = data.with_later_force(seconds);
+            output_error_of_table(&late, result.unknowns()).ok()
+        }
+        _ => None,
+    };
+    let change = other.map(|other| squared_change(result, &other.estimate));
     let finding = Finding::Alternative(Alternative { cause, remaining });
-    Some(BetterModel { finding, change: other.map(|other| squared_change(result, &other)) })
+    Some(BetterModel { finding, change })
 }
 
 /// A model that explains the responses far better.

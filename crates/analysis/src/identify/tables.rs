@@ -82,17 +82,12 @@ pub fn identify_responses(
     let unexplained = unexplained_motion(&data, &fit.estimate.system()?)?;
     let fitted = OfFit { fit: &fit, of_machine: &of_machine, data: &data, unexplained };
     let (checks, change) = fitted.checks(tables, &measured, how, before, unscaled.is_some())?;
-    // An exponential window changes damping and stiffness, so that the change is not theirs.
-    let change = change.filter(|_| added_decay.is_none() && unscaled.is_none());
     let mut remarks = remarks(tables, &measured, added_decay, &fit, &of_machine, unscaled.as_ref());
     remarks.extend(fitted.residual_remarks(&checks, tables, how));
-    remarks.extend(change.as_ref().and_then(|_| counted_explanation(&checks)));
-    let of_machine = match &change {
-        Some(square) => of_machine.with_mean_square(square)?,
-        None => of_machine,
-    };
-    let estimate = &of_machine;
-    let system = estimate.system()?;
+    let change = change.filter(|_| added_decay.is_none() && unscaled.is_none());
+    let (of_machine, remark) = with_change(of_machine, change, &checks)?;
+    remarks.extend(remark);
+    let (estimate, system) = (&of_machine, of_machine.system()?);
     let summary = ResponseSummary {
         files: tables.iter().map(|table| table.file.clone()).collect(),
         estimator: fit.name,
@@ -114,6 +109,19 @@ pub fn identify_responses(
         analysis: how.clone(),
     };
     Ok(IdentifiedResponses { estimate: of_machine, fitted: fit.estimate, data, summary })
+}
+
+/// Returns the estimate with the square of a change of its parameters in its covariance, and the
+/// remark on it. Under an exponential window the change would be that of other parameters.
+fn with_change(
+    estimate: Estimate,
+    change: Option<DMatrix<f64>>,
+    checks: &[CheckRow],
+) -> Result<(Estimate, Option<String>), AnalysisError> {
+    Ok(match change {
+        Some(square) => (estimate.with_mean_square(&square)?, counted_explanation(checks)),
+        None => (estimate, None),
+    })
 }
 
 /// A fit with its data.

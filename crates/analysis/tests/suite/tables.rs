@@ -138,7 +138,10 @@ fn intervals_of_late_responses_include_the_delay() {
         for (p, exact) in found.estimate().parameters().zip(entries(&system)) {
             assert!((p.value - exact).abs() < 1.96 * p.standard_error, "{p} {exact}: {found}");
         }
-        assert!(found.to_string().contains("what explains the residual (see delay)"), "{found}");
+        assert!(
+            found.to_string().contains("the model that explains the residual (see delay)"),
+            "{found}"
+        );
     }
 }
 

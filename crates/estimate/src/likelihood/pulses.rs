@@ -3,6 +3,9 @@
 use nalgebra::{Cholesky, DMatrix, Dyn};
 use rayon::prelude::*;
 
+/// Number of sums of PᵀP that are computed at a time, the same for any number of threads.
+const SUMS: usize = 8;
+
 /// Covariance I + P Pᵀ of the weighted errors of a record, with the weighted effects P of the
 /// amplitudes of its pulse errors in blocks of rows.
 ///
@@ -20,8 +23,16 @@ impl PulseCovariance {
     /// Factors I + PᵀP; `None` if an effect is not finite or there is no block.
     pub(super) fn new(effects: Vec<DMatrix<f64>>) -> Option<Self> {
         let count = effects.first()?.ncols();
-        let products: Vec<_> = effects.par_iter().map(|block| block.tr_mul(block)).collect();
-        let sum = products.iter().fold(DMatrix::identity(count, count), |sum, block| sum + block);
+        let products: Vec<_> = effects
+            .par_chunks(effects.len().div_ceil(SUMS))
+            .map(|blocks| {
+                blocks.iter().fold(DMatrix::zeros(count, count), |mut sum, block| {
+                    sum.gemm_tr(1.0, block, block, 1.0);
+                    sum
+                })
+            })
+            .collect();
+        let sum = products.iter().fold(DMatrix::identity(count, count), |sum, part| sum + part);
         sum.iter().all(|value| value.is_finite()).then_some(())?;
         Some(Self { effects, factor: Cholesky::new(sum)? })
     }
@@ -45,6 +56,16 @@ impl PulseCovariance {
     /// pulses explain.
     pub(super) fn explained(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
         products.tr_mul(&self.factor.solve(products))
+    }
+
+    /// Returns the blocks of rows of X with X Xᵀ = P (I + PᵀP)⁻¹Pᵀ, by which the covariance of v − P b
+    /// is less than that of independent errors of unit variance; `None` if a factor is singular.
+    pub(super) fn explained_columns(&self) -> Option<Vec<DMatrix<f64>>> {
+        let lower = self.factor.l();
+        let columns = |effects: &DMatrix<f64>| {
+            Some(lower.solve_lower_triangular(&effects.transpose())?.transpose())
+        };
+        self.effects.par_iter().map(columns).collect()
     }
 
     /// Returns the number of amplitudes that the lines determine, each counted by the share of the
@@ -79,6 +100,10 @@ mod tests {
         assert!((&whitened - &expected).norm() < 1e-12 * expected.norm());
         let explained = vectors.tr_mul(&vectors) - pulses.explained(&effects.tr_mul(&vectors));
         assert!((explained - &expected).norm() < 1e-12 * expected.norm());
+        let columns = pulses.explained_columns().unwrap();
+        let first = covariance.clone().lu().try_inverse().unwrap().view((0, 0), (7, 7))
+            - DMatrix::<f64>::identity(7, 7);
+        assert!((first + &columns[0] * columns[0].transpose()).norm() < 1e-12);
         let trace = 12.0 - covariance.clone().lu().try_inverse().unwrap().trace();
         assert!((pulses.determined() - trace).abs() < 1e-12);
         assert!((pulses.log_determinant() - covariance.determinant().ln()).abs() < 1e-10);

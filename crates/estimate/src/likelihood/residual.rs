@@ -310,6 +310,25 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(())
     }
 
+    /// Returns the columns over all rows of the lines by which the errors of pulses reduce the
+    /// covariance of the residual: it is the identity minus X Xᵀ. `None` if the response does not
+    /// exist.
+    pub(super) fn explained_by_pulses(&self, parameters: &[f64]) -> Option<DMatrix<f64>> {
+        let mut columns = DMatrix::zeros(self.len(), self.amplitudes());
+        let mut first = 0;
+        self.for_each_record(parameters, |record| {
+            let Some(pulses) = &record.pulses else { return Some(()) };
+            let count = record.unknowns.amplitudes;
+            for (block, part) in record.blocks.iter().zip(pulses.explained_columns()?) {
+                let at = (block.first_row, first);
+                columns.view_mut(at, (part.nrows(), count)).copy_from(&part);
+            }
+            first += count;
+            Some(())
+        })?;
+        Some(columns)
+    }
+
     /// Rows of the priors.
     fn prior_rows(&self, parameters: &[f64]) -> Vec<f64> {
         let row = |prior: &PriorRow| (parameters[prior.parameter] - prior.mean) / prior.deviation;

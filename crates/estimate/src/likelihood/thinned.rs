@@ -42,7 +42,7 @@ impl<'a, M: ResponseModel> Thinned<'a, M> {
         Self { model, rows, omega }
     }
 
-    /// Returns the data of these lines; the first steps do without the errors of pulses.
+    /// Returns the data of these lines, without the errors of pulses, which the first steps ignore.
     pub(super) fn lines(&self, data: &LineData) -> Option<LineData> {
         data.rows(&self.rows).map(LineData::without_pulse_noise)
     }

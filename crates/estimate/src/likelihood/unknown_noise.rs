@@ -176,7 +176,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok((variance, bases))
     }
 
-    /// Returns the share of the noise in the residual after the fit (1 − leverage), lines × p.
+    /// Returns the share of the noise in the residual after the fit (1 − leverage of the parameters
+    /// and of the errors of pulses), lines × p.
     fn residual_share(&self, before: &WeightedMinimum) -> Option<DMatrix<f64>> {
         let residual = self.residual(&before.weights);
         let linearisation = residual.linearise(&before.minimum.parameters)?;
@@ -190,10 +191,13 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
             }
         }
         let q = jacobian.qr().q();
+        let of_pulses = residual.explained_by_pulses(&before.minimum.parameters)?;
         let outputs = self.data.outputs().ncols();
         Some(DMatrix::from_fn(self.data.len(), outputs, |row, output| {
             let at = 2 * (outputs * row + output);
-            let leverage = 0.5 * (q.row(at).norm_squared() + q.row(at + 1).norm_squared());
+            let explained =
+                |row: usize| q.row(row).norm_squared() + of_pulses.row(row).norm_squared();
+            let leverage = 0.5 * (explained(at) + explained(at + 1));
             (1.0 - leverage).max(LEAST_KEPT)
         }))
     }

@@ -311,12 +311,7 @@ impl Hits {
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation.
     pub fn pulses_alone(&self, force: &[f64], hits: &[Hit]) -> Vec<f64> {
-        let contact = |hit: &Hit| {
-            let margin = hit.pulse.len();
-            let first = hit.pulse.start.saturating_sub(margin).min(hit.contact.start);
-            first..hit.contact.end.max(hit.pulse.end + margin)
-        };
-        let contacts: Vec<Range<usize>> = hits.iter().map(contact).collect();
+        let contacts: Vec<Range<usize>> = hits.iter().map(Hit::contact_with_margin).collect();
         let value = |k: usize| {
             let is_force = contacts.iter().any(|contact| contact.contains(&k));
             if is_force { force[k] - self.offset } else { 0.0 }
@@ -328,6 +323,14 @@ impl Hits {
 }
 
 impl Hit {
+    /// Returns the samples of the contact, counted from 0, with a margin of the length of the pulse
+    /// on either side; the range may reach beyond the end of the record.
+    pub fn contact_with_margin(&self) -> Range<usize> {
+        let margin = self.pulse.len();
+        let first = self.pulse.start.saturating_sub(margin).min(self.contact.start);
+        first..self.contact.end.max(self.pulse.end + margin)
+    }
+
     /// Returns the hit with its peak among some samples of an upward force.
     fn around(push: &[f64], range: Range<usize>, sign: f64) -> Self {
         let at = largest_of(push, range);

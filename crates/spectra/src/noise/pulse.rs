@@ -56,6 +56,9 @@ impl PulseErrors {
     /// # Errors
     /// [`SpectraError::Numerics`] if the decomposition fails.
     pub(crate) fn new(noise: &PulseNoise, omega: &[f64]) -> Result<Option<Self>, SpectraError> {
+        if noise.deviation == 0.0 {
+            return Ok(None);
+        }
         let (count, dt) = (noise.samples.len(), noise.sampling.dt());
         let correlation: Vec<f64> = (0..count)
             .map(|lag| omega.iter().map(|omega| (omega * lag as f64 * dt).cos()).sum())
@@ -65,7 +68,7 @@ impl PulseErrors {
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
         let kept: Vec<usize> =
             (0..count).filter(|at| eigen.eigenvalues[*at] > PULSE_PATTERN * largest).collect();
-        if kept.is_empty() || noise.deviation == 0.0 {
+        if kept.is_empty() {
             return Ok(None);
         }
         let scale = noise.deviation / (noise.sampling.len() as f64).sqrt();

@@ -33,13 +33,14 @@ pub struct MachineEstimate {
     /// Variance of the noise of each output, lines × p.
     pub(super) variance: DMatrix<f64>,
     /// Difference of measured and modelled outputs, lines × p, in the units of the outputs; the
-    /// transients of open records are subtracted.
+    /// transients of open records and the effects of the errors of pulses are subtracted.
     pub errors: DMatrix<Complex<f64>>,
-    /// Residual in units of the noise, of unit variance: row 2(p·line + output) is a real part, the
-    /// next row the imaginary part.
+    /// Residual in units of the noise: row 2(p·line + output) is a real part, the next row the
+    /// imaginary part.
     pub residual: DVector<f64>,
-    /// Orthonormal basis of the sensitivities of the residual (pure numbers), with the rows of
-    /// [`MachineEstimate::residual`].
+    /// Columns Q (pure numbers), with the rows of [`MachineEstimate::residual`], whose covariance is
+    /// the identity minus Q Qᵀ: an orthonormal basis of the sensitivities, then what the errors of
+    /// pulses explain.
     pub explained: DMatrix<f64>,
     /// Delay that explains most of the residual; `None` if the data do not determine any.
     pub delay: Option<DelayScore>,
@@ -182,7 +183,10 @@ fn identify(
     let known: Vec<bool> =
         assembly.sensors().iter().map(|sensor| sensor.delay_parameter.is_none()).collect();
     let delay = delay_score(&fit, &linearised, &known);
-    let explained = linearised.jacobian.rows(0, rows).into_owned().qr().q();
+    let of_parameters = linearised.jacobian.rows(0, rows).into_owned().qr().q();
+    let of_pulses = fit.residual().explained_by_pulses(parameters).ok_or_else(failed)?;
+    let columns = of_parameters.column_iter().chain(of_pulses.column_iter());
+    let explained = DMatrix::from_columns(&columns.collect::<Vec<_>>());
     let residual = linearised.residual.rows(0, rows).into_owned();
     Ok(MachineEstimate { likelihood, assembly, variance, errors, residual, explained, delay, part })
 }

@@ -221,8 +221,7 @@ fn the_jacobian_does_not_depend_on_what_is_kept() {
     assert_eq!((kept.residual, kept.jacobian), (again.residual, again.jacobian));
 }
 
-/// With noise on two pulses of an input, Jᵀr is half the gradient of the sum of squares, and the sum
-/// is that of the residual without the pulses' columns but with their covariance.
+/// With noise on two pulses of an input, Jᵀr is half the gradient of the sum of squares.
 #[test]
 fn the_gradient_includes_the_errors_of_pulses() {
     let assembly = assembly(true);
