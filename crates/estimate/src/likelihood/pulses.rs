@@ -3,8 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, Dyn};
 use rayon::prelude::*;
 
-/// Number of sums of PᵀP that are computed at a time, the same for any number of threads.
-const SUMS: usize = 8;
+use super::limits::PULSE_SUMS;
 
 /// Covariance I + P Pᵀ of the weighted errors of a record, with the weighted effects P of the
 /// amplitudes of its pulse errors in blocks of rows.
@@ -24,7 +23,7 @@ impl PulseCovariance {
     pub(super) fn new(effects: Vec<DMatrix<f64>>) -> Option<Self> {
         let count = effects.first()?.ncols();
         let products: Vec<_> = effects
-            .par_chunks(effects.len().div_ceil(SUMS))
+            .par_chunks(effects.len().div_ceil(PULSE_SUMS))
             .map(|blocks| {
                 blocks.iter().fold(DMatrix::zeros(count, count), |mut sum, block| {
                     sum.gemm_tr(1.0, block, block, 1.0);
@@ -58,8 +57,8 @@ impl PulseCovariance {
         products.tr_mul(&self.factor.solve(products))
     }
 
-    /// Returns the blocks of rows of X with X Xᵀ = P (I + PᵀP)⁻¹Pᵀ, by which the covariance of v − P b
-    /// is less than that of independent errors of unit variance; `None` if a factor is singular.
+    /// Returns the blocks of rows of X with X Xᵀ = P (I + PᵀP)⁻¹Pᵀ: for errors v the covariance of
+    /// v − P b is I − X Xᵀ. `None` if a factor is singular.
     pub(super) fn explained_columns(&self) -> Option<Vec<DMatrix<f64>>> {
         let lower = self.factor.l();
         let columns = |effects: &DMatrix<f64>| {

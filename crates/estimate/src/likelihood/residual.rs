@@ -310,9 +310,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(())
     }
 
-    /// Returns the columns over all rows of the lines by which the errors of pulses reduce the
-    /// covariance of the residual: it is the identity minus X Xᵀ. `None` if the response does not
-    /// exist.
+    /// Returns columns X over all rows of the lines: because of the errors of pulses the covariance
+    /// of the residual is the identity minus X Xᵀ. `None` if the response does not exist.
     pub(super) fn explained_by_pulses(&self, parameters: &[f64]) -> Option<DMatrix<f64>> {
         let mut columns = DMatrix::zeros(self.len(), self.amplitudes());
         let mut first = 0;

@@ -105,8 +105,8 @@ impl PulseErrors {
     /// amplitudes of the line.
     ///
     /// # Source
-    /// Slepian (1978), Bell System Technical Journal 57, 1371–1430 (short sequences with their power
-    /// in a band).
+    /// Slepian (1978), Bell System Technical Journal 57, 1371–1430 (short sequences with their
+    /// power in a band).
     pub fn at(&self, omega: f64) -> DVector<Complex<f64>> {
         let step = Complex::cis(-omega * self.sample_interval);
         let mut turn = Complex::cis(-omega * self.sample_interval * self.first_sample as f64);

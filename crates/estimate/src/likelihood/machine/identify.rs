@@ -38,9 +38,9 @@ pub struct MachineEstimate {
     /// Residual in units of the noise: row 2(p·line + output) is a real part, the next row the
     /// imaginary part.
     pub residual: DVector<f64>,
-    /// Columns Q (pure numbers), with the rows of [`MachineEstimate::residual`], whose covariance is
-    /// the identity minus Q Qᵀ: an orthonormal basis of the sensitivities, then what the errors of
-    /// pulses explain.
+    /// Columns Q (pure numbers), with the rows of [`MachineEstimate::residual`], whose covariance
+    /// is the identity minus Q Qᵀ: an orthonormal basis of the sensitivities, then what the errors
+    /// of pulses explain.
     pub explained: DMatrix<f64>,
     /// Delay that explains most of the residual; `None` if the data do not determine any.
     pub delay: Option<DelayScore>,

@@ -232,7 +232,7 @@ fn json_is_no_record() {
         let e = Table::parse("a.json", text.as_bytes()).unwrap_err();
         assert!(matches!(e, IoError::JsonRecord { .. }), "{text}: {e}");
         assert!(
-            e.to_string().starts_with("a.json is JSON, not a table of samples: simulate"),
+            e.to_string().starts_with("a.json is JSON, not a table of samples; simulate"),
             "{e}"
         );
     }
