@@ -197,7 +197,7 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
             let part = 2 * p * (row - first)..2 * p * (row - first + 1);
             write_real(white.iter().copied(), &mut residual.as_mut_slice()[part.clone()]);
             if unknowns.transient + unknowns.amplitudes > 0 {
-                let of_line = weighted_columns(&line, &weighted.lower)?;
+                let of_line = weighted_columns(&line, &weighted.lower, unknowns)?;
                 let omega = self.data.omega()[row];
                 if unknowns.transient > 0 {
                     of_line.of_transient(omega, unknowns, |at, column| {
@@ -427,14 +427,15 @@ impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
 fn weighted_columns(
     line: &impl LineResponse,
     lower: &DMatrix<Complex<f64>>,
+    unknowns: &RecordUnknowns<'_>,
 ) -> Option<LineColumns> {
-    let mut states = line.state_response().cloned();
+    let mut states = line.state_response().filter(|_| unknowns.transient > 0).cloned();
     if let Some(states) = &mut states {
         lower.solve_lower_triangular_mut(states).then_some(())?;
     }
     let mut outputs = DMatrix::identity(lower.nrows(), lower.nrows());
     lower.solve_lower_triangular_mut(&mut outputs).then_some(())?;
-    let inputs = &outputs * line.receptance();
+    let inputs = (unknowns.amplitudes > 0).then(|| &outputs * line.receptance());
     Some(LineColumns { states, outputs, inputs })
 }
 

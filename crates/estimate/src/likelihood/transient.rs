@@ -89,8 +89,8 @@ pub(super) struct LineColumns {
     pub(super) states: Option<DMatrix<Complex<f64>>>,
     /// L⁻¹, p × p: the weighted polynomial of every output.
     pub(super) outputs: DMatrix<Complex<f64>>,
-    /// L⁻¹ G, p × q: the weighted receptance.
-    pub(super) inputs: DMatrix<Complex<f64>>,
+    /// L⁻¹ G, p × q: the weighted receptance; `None` without pulses.
+    pub(super) inputs: Option<DMatrix<Complex<f64>>>,
 }
 
 impl LineColumns {
@@ -123,8 +123,9 @@ impl LineColumns {
         unknowns: &RecordUnknowns<'_>,
         mut write: impl FnMut(usize, &mut dyn Iterator<Item = Complex<f64>>),
     ) {
+        let Some(inputs) = &self.inputs else { return };
         for (at, (input, error)) in unknowns.input_errors(omega).into_iter().enumerate() {
-            write(at, &mut self.inputs.column(input).iter().map(|z| -z * error));
+            write(at, &mut inputs.column(input).iter().map(|z| -z * error));
         }
     }
 }
