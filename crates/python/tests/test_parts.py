@@ -14,21 +14,14 @@ import pytest
 
 import mechid
 
+from .test_elements import MACHINE as ELEMENTS
+
 FILE, EXPERIMENT = "examples/machine.csv", "examples/machine.json"
 COLUMNS: Any = {"force": "force", "displacement": "displacement"}
 RIG: Any = {
     "force": ["fx", "fy"], "acceleration": ["ax", "ay"], "displacement": ["dx", "dy"], "period": 256,
     "stator_mass": 20.0, "rotation_hz": 50.0,
 }  # fmt: skip
-ELEMENTS: Any = {
-    "dofs": ["displacement"],
-    "elements": [
-        {"name": "m", "at": "displacement", "m": {"start": 10.0, "min": 0}},
-        {"name": "foot", "at": "displacement", "k": {"start": 1e5, "min": 0}, "c": {"start": 50}},
-    ],
-    "sensors": [{"at": "displacement", "quantity": "displacement"}],
-    "inputs": [{"kind": "force", "name": "force", "at": "displacement"}],
-}
 HITS: Any = {"force": "force", "acceleration": ["a1", "a2"], "hits": True, "band_hz": (2, 100)}
 
 

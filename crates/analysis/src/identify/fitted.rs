@@ -125,7 +125,7 @@ pub enum Residual {
 
 impl Residual {
     /// Returns the residuals of the lines of several records.
-    pub(super) fn of_lines(records: Vec<SpectralResidual>) -> Vec<Self> {
+    pub(super) fn from_lines(records: Vec<SpectralResidual>) -> Vec<Self> {
         records.into_iter().map(|residual| Self::Lines(Box::new(residual))).collect()
     }
 }

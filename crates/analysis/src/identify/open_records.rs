@@ -179,7 +179,7 @@ pub(super) fn fit(
         after_all: bias.into_iter().chain(likelier).chain(parts).collect(),
         omitted,
         explained,
-        residuals: Residual::of_lines(residuals),
+        residuals: Residual::from_lines(residuals),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
         force_noise,
@@ -286,7 +286,7 @@ fn refitted_with(
     let fit = |records: &[FrequencyData]| {
         output_error_pooling(&joined(records).ok()?, unknowns, pooling).ok()
     };
-    let each = |change: &dyn Fn(&FrequencyData) -> FrequencyData| -> Vec<FrequencyData> {
+    let changed = |change: &dyn Fn(&FrequencyData) -> FrequencyData| -> Vec<FrequencyData> {
         records.iter().map(change).collect()
     };
     let cause = match finding {
@@ -295,7 +295,7 @@ fn refitted_with(
         _ => return None,
     };
     let refitted = match cause {
-        Cause::Delay { seconds } => fit(&each(&|data| data.with_later_force(*seconds)))?,
+        Cause::Delay { seconds } => fit(&changed(&|data| data.with_later_force(*seconds)))?,
         Cause::AcCoupling { channels, corner_hz } => {
             let of = |wanted: Quantity| -> Vec<usize> {
                 let channels = channels.iter().filter(|channel| channel.quantity == wanted);
@@ -303,7 +303,7 @@ fn refitted_with(
             };
             let (responses, forces) = (of(Quantity::Response(quantity)), of(Quantity::Force));
             let corner = TAU * corner_hz;
-            fit(&each(&|data| data.with_high_pass_alike(&responses, &forces, corner)))?
+            fit(&changed(&|data| data.with_high_pass_alike(&responses, &forces, corner)))?
         }
         Cause::BetweenSamples { between_samples } => {
             let acquisition =

@@ -68,7 +68,7 @@ pub(super) fn better_model_of(
     let deviation = deviation(data);
     let (best, remaining) = better_model(data.omega(), deviation.as_ref(), &fitted, &models)?;
     let cause = causes.swap_remove(best);
-    let other = match cause {
+    let refitted = match cause {
         // The weights are those of the result, so that the change is that by the delay alone.
         Cause::Delay { seconds } => {
             let late = data.with_later_force(seconds);
@@ -76,7 +76,7 @@ pub(super) fn better_model_of(
         }
         _ => None,
     };
-    let change = other.map(|other| squared_change(result, &other.estimate));
+    let change = refitted.map(|refitted| squared_change(result, &refitted.estimate));
     let finding = Finding::Alternative(Alternative { cause, remaining });
     Some(BetterModel { finding, change })
 }

@@ -108,7 +108,7 @@ pub(super) fn fit(
         after,
         after_all: bias.into_iter().chain(nonlinear).chain(parts).collect(),
         omitted,
-        residuals: Residual::of_lines(residuals),
+        residuals: Residual::from_lines(residuals),
         misfit,
         noise: models,
         remarks: one_motion_of(&records[0].held)

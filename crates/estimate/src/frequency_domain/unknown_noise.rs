@@ -55,7 +55,10 @@ pub(super) fn with_unknown_noise(
     let coloured = match pooling {
         Pooling::AllLines => None,
         _ if is_rounding => None,
-        _ => with_coloured_noise(data, unknowns, &white, pooling)?,
+        _ => {
+            let next = |before: &Weighted| spectrum_of_residual(data, unknowns, before, pooling);
+            reweighted(data, unknowns, &white, next)?
+        }
     };
     let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
     let weighted = coloured.map_or((white, true), |coloured| (coloured, false));
@@ -71,31 +74,10 @@ pub(super) fn with_response_noise(
     unknowns: &Unknowns,
 ) -> Result<OutputErrorFit, EstimateError> {
     let (white, is_rounding) = with_white_noise(data, unknowns, None, None)?;
-    let proportional =
-        if is_rounding { None } else { with_proportional_noise(data, unknowns, &white)? };
+    let next = |before: &Weighted| response_noise(data, unknowns, before);
+    let proportional = if is_rounding { None } else { reweighted(data, unknowns, &white, next)? };
     let weighted = proportional.map_or((white, true), |proportional| (proportional, false));
     finished(data, unknowns, weighted, 0)
-}
-
-/// Fits with noise of the responses that is chosen from the residual of the previous fit; `None` if
-/// it is white.
-fn with_proportional_noise(
-    data: &FrequencyData,
-    unknowns: &Unknowns,
-    white: &Weighted,
-) -> Result<Option<Weighted>, EstimateError> {
-    let mut last: Option<Weighted> = None;
-    for _ in 0..COLOURED_ROUNDS {
-        let before = last.as_ref().unwrap_or(white);
-        let Some(noise) = response_noise(data, unknowns, before)? else { return Ok(None) };
-        let mut misfit = Misfit::new(data, unknowns, &noise)?;
-        match before.fit.clone().followed(&mut misfit) {
-            Ok(fit) => last = Some(Weighted { fit, noise }),
-            // The result is the previous fit, with its weights.
-            Err(_) => break,
-        }
-    }
-    Ok(last)
 }
 
 /// Chooses the noise of each channel from the residual of a fit; `None` if all are white.
@@ -261,21 +243,18 @@ fn with_white_noise(
     Err(EstimateError::NotConverged { searches, steps })
 }
 
-/// Fits with a noise spectrum that is estimated from the residual of the previous fit; `None` if
-/// this residual is white.
-fn with_coloured_noise(
+/// Fits with the noise that `next` estimates from the residual of the previous fit; `None` if this
+/// residual is white.
+fn reweighted(
     data: &FrequencyData,
     unknowns: &Unknowns,
     white: &Weighted,
-    pooling: Pooling,
+    next: impl Fn(&Weighted) -> Result<Option<NoiseSpectrum>, EstimateError>,
 ) -> Result<Option<Weighted>, EstimateError> {
     let mut last: Option<Weighted> = None;
     for _ in 0..COLOURED_ROUNDS {
         let before = last.as_ref().unwrap_or(white);
-        let noise = spectrum_of_residual(data, unknowns, before, pooling)?;
-        if noise.models() == [NoiseModel::White] {
-            return Ok(None);
-        }
+        let Some(noise) = next(before)? else { return Ok(None) };
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         match before.fit.clone().followed(&mut misfit) {
             Ok(fit) => last = Some(Weighted { fit, noise }),
@@ -288,13 +267,14 @@ fn with_coloured_noise(
 
 /// Estimates the noise spectrum from the residual, separately for each channel or for unmeasured
 /// forces. At each line the noise of the round before is scaled by the ratio of the residual power
-/// to its expected value; the part due to the stated noise of the force is subtracted.
+/// to its expected value; the part due to the stated noise of the force is subtracted. `None` if
+/// the spectrum is white.
 fn spectrum_of_residual(
     data: &FrequencyData,
     unknowns: &Unknowns,
     before: &Weighted,
     pooling: Pooling,
-) -> Result<NoiseSpectrum, EstimateError> {
+) -> Result<Option<NoiseSpectrum>, EstimateError> {
     let (n, theta) = (data.dof(), &before.fit.minimum.parameters);
     let mut misfit = Misfit::new(data, unknowns, &before.noise)?;
     misfit.try_at(theta).ok_or(NumericsError::Overflow)?;
@@ -323,7 +303,8 @@ fn spectrum_of_residual(
     }
     let (omega, measured, forces) = (data.omega(), data.measured(), Some(&of_forces));
     let noise = NoiseSpectrum::from_measured(omega, covariance, measured, 1, pooling, forces)?;
-    Ok(noise.with_force_variance(data.force_variance()))
+    let is_white = noise.models() == [NoiseModel::White];
+    Ok((!is_white).then(|| noise.with_force_variance(data.force_variance())))
 }
 
 /// Returns the leverage of each row and channel, the share of its noise that the parameters fit,

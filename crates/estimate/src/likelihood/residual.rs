@@ -200,12 +200,12 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
                 let of_line = weighted_columns(&line, &weighted.lower, unknowns)?;
                 let omega = self.data.omega()[row];
                 if unknowns.transient > 0 {
-                    of_line.of_transient(omega, unknowns, |at, column| {
+                    of_line.for_each_of_transient(omega, unknowns, |at, column| {
                         let mut to = columns.column_mut(at);
                         write_real(column, &mut to.as_mut_slice()[part.clone()]);
                     });
                 }
-                of_line.of_pulses(omega, unknowns, |at, effect| {
+                of_line.for_each_of_pulses(omega, unknowns, |at, effect| {
                     let mut to = effects.column_mut(at);
                     write_real(effect, &mut to.as_mut_slice()[part.clone()]);
                 });

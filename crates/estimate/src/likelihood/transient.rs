@@ -97,7 +97,7 @@ impl LineColumns {
     /// Passes the weighted columns of the transient to `write` with their indices, p entries each:
     /// the response to the state loads in powers of s/ω₀, then a polynomial in s/ω₀ for every
     /// output, which describes aliasing.
-    pub(super) fn of_transient(
+    pub(super) fn for_each_of_transient(
         &self,
         omega: f64,
         unknowns: &RecordUnknowns<'_>,
@@ -117,7 +117,7 @@ impl LineColumns {
     /// Passes the weighted effects of the amplitudes of the pulse errors on y − G u to `write` with
     /// their indices, p entries each. They have a negative sign, because the measured inputs u
     /// contain the errors.
-    pub(super) fn of_pulses(
+    pub(super) fn for_each_of_pulses(
         &self,
         omega: f64,
         unknowns: &RecordUnknowns<'_>,

@@ -97,10 +97,10 @@ impl LvmHeader {
                 rows.add(&key, fields.collect());
             }
         }
-        header.units = rows.of_channels(&rows.units, header.instants);
+        header.units = rows.channel_fields(&rows.units, header.instants);
         let number = |text: String| text.replace(',', ".").parse::<f64>().unwrap_or(f64::NAN);
         let numbers = |fields: &[String]| {
-            rows.of_channels(fields, header.instants).into_iter().map(number).collect::<Vec<_>>()
+            rows.channel_fields(fields, header.instants).into_iter().map(number).collect::<Vec<_>>()
         };
         header.axes = numbers(&rows.starts).into_iter().zip(numbers(&rows.steps)).collect();
         Some(header)
@@ -144,7 +144,7 @@ impl ChannelRows {
     ///
     /// If each channel has a column of instants, most programs write the field of a channel above
     /// its values, with an empty field above the next instants. Others write no empty fields.
-    fn of_channels(&self, fields: &[String], instants: Instants) -> Vec<String> {
+    fn channel_fields(&self, fields: &[String], instants: Instants) -> Vec<String> {
         let is_packed = self.are_packed || is_packed(fields);
         let step = if instants == Instants::Each && !is_packed { 2 } else { 1 };
         fields.iter().step_by(step).cloned().collect()

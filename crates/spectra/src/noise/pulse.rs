@@ -66,9 +66,9 @@ impl PulseErrors {
         let gram = DMatrix::from_fn(count, count, |a, b| correlation[a.abs_diff(b)]);
         let eigen = hermitian_eigen(gram)?;
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
-        let kept: Vec<usize> =
+        let strong: Vec<usize> =
             (0..count).filter(|at| eigen.eigenvalues[*at] > PULSE_PATTERN * largest).collect();
-        if kept.is_empty() {
+        if strong.is_empty() {
             return Ok(None);
         }
         let scale = noise.deviation / (noise.sampling.len() as f64).sqrt();
@@ -77,7 +77,7 @@ impl PulseErrors {
             input: noise.channel,
             sample_interval: dt,
             first_sample: noise.samples.start,
-            patterns: eigen.eigenvectors.select_columns(&kept) * scale,
+            patterns: eigen.eigenvectors.select_columns(&strong) * scale,
         }))
     }
 
