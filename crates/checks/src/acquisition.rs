@@ -12,9 +12,8 @@ use super::finding::{Channel, Finding, Quantity};
 use super::limits::{
     ACQUISITION_ROUNDS, DELAY_REMAINING, HIGH_PASS_STEP, LINEARITY_NEIGHBOURS, STANDARD_ERRORS,
 };
-use super::spectral_residual::SpectralResidual;
+use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
 use super::weighted_fit::{Weighing, after_spectral_fit};
-use super::{Subject, Verdict};
 
 /// Deviation of the acquisition from a band-limited force and channels that pass all frequencies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -244,26 +243,13 @@ pub fn fault_of_acquisition(
             continue;
         }
         let residuals_without = after_spectral_fit(&without, estimate, extent)?.records;
-        if remaining <= DELAY_REMAINING || is_noise(after) || is_unexplained(&residuals_without) {
+        // Correlation from line to line is allowed: the transients were estimated with the fault.
+        if remaining <= DELAY_REMAINING || is_noise(after) || is_uncorrelated(&residuals_without) {
             let cause = fault.cause(first, &driven, corner);
             best = Some((remaining, Finding::Alternative(Alternative { cause, remaining })));
         }
     }
     Ok(best.map(|(_, finding)| finding))
-}
-
-/// Returns whether no test of the residuals warns.
-fn is_noise(after: &[SpectralResidual]) -> bool {
-    let mut findings = after.iter().flat_map(SpectralResidual::findings);
-    findings.all(|finding| finding.verdict() == Verdict::Good)
-}
-
-/// Returns whether no residual is correlated with a force. Correlation from line to line is
-/// allowed: the transients were estimated with the fault.
-fn is_unexplained(after: &[SpectralResidual]) -> bool {
-    let findings = after.iter().flat_map(SpectralResidual::findings);
-    let mut correlations = findings.filter(|f| f.subject() == Subject::CrossCorrelation);
-    correlations.all(|finding| finding.verdict() == Verdict::Good)
 }
 
 /// Returns the amount of a fault after some refinements, and the records without it.

@@ -16,11 +16,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::finding::{Check, Finding, Names};
 use super::limits::{
-    DELAY_NEAR, DELAY_PARABOLAS, DELAY_PREFERRED, DELAY_PROMISING, DELAY_REACH, DELAY_REDUCTIONS,
-    DELAY_RESOLVED, HARDLY_FOLLOWS, LEAST_PART,
+    DELAY_NEAR, DELAY_PARABOLAS, DELAY_PREFERRED, DELAY_REACH, DELAY_REDUCTIONS, DELAY_RESOLVED,
+    HARDLY_FOLLOWS, LEAST_PART,
 };
 use super::limits::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
-use super::spectral_residual::SpectralResidual;
+use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
 use super::weighted_fit::after_spectral_fit;
 use super::{MAX_SAMPLES, Subject, Verdict};
 
@@ -75,10 +75,11 @@ fn delay_of_equations(
 
 /// Finds a delay of the responses of open records ([`Finding::Delay`]) that explains the residual
 /// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
-/// uncorrelated with the forces. `is_explained` is false if the residual without the delay is
-/// uncorrelated with the forces, too; then at most a quarter of its power may remain. `dt` is the
-/// sampling interval in s; sinusoidal disturbances have been subtracted from the `records`. `None`
-/// if no delay of up to 16 samples (64 if the response hardly follows the force) satisfies this.
+/// uncorrelated with the forces. If the residuals `without_delay` are uncorrelated with the forces,
+/// too, either at most a quarter of the power may remain, or the tests of the residual warn without
+/// the delay and pass with it. `dt` is the sampling interval in s; sinusoidal disturbances have
+/// been subtracted from the `records`. `None` if no delay of up to 16 samples (64 if the response
+/// hardly follows the force) satisfies this.
 ///
 /// The transients are estimated again for each delay; otherwise they would absorb a part of it.
 ///
@@ -90,16 +91,18 @@ pub fn delay_of_open_records(
     dt: f64,
     unknowns: &Unknowns,
     fit: &OutputErrorFit,
-    is_explained: bool,
+    without_delay: &[SpectralResidual],
 ) -> Option<Finding> {
-    let (first, remaining_records) = records.split_first()?;
-    let joined = remaining_records
-        .iter()
-        .try_fold(first.clone(), |joined, record| joined.and(record))
-        .ok()?;
-    let mut likelihood = DelayedOpenRecord::from_fit(&joined, unknowns, fit)?;
+    let with_pulses = joined(records)?;
+    let corrected = joined(&fit.without_pulse_errors(records).ok()?)?;
+    let mut likelihood = DelayedOpenRecord::from_fit(&with_pulses, unknowns, fit)?;
     let undelayed = likelihood.cost(0.0)?;
-    let near = delay_of_either_window(&joined, dt, unknowns, &fit.estimate).unwrap_or(0.0);
+    let freedom = likelihood.spare().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
+    let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
+    let is_significant =
+        |delayed: f64| distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
+    let follows_force = !is_uncorrelated(without_delay);
+    let near = delay_of_either_window(&corrected, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     if near.abs() > DELAY_NEAR {
         likelihood.search(near * dt)?;
     }
@@ -117,7 +120,7 @@ pub fn delay_of_open_records(
         };
         samples += step * width;
         delayed = likelihood.cost(samples * dt)?;
-        if !is_explained && delayed > DELAY_PROMISING * undelayed {
+        if !follows_force && !is_significant(delayed) {
             return None;
         }
         width *= f64::clamp(step.abs(), LEAST_PART, 1.0);
@@ -125,28 +128,35 @@ pub fn delay_of_open_records(
             break;
         }
     }
-    let freedom = likelihood.spare().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
-    let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
-    let is_significant = distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
+    if !is_significant(delayed) {
+        return None;
+    }
     let remaining = delayed / undelayed;
-    let is_most = is_explained || remaining <= DELAY_REMAINING;
-    let delay_finding = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
-    (is_significant && is_most && explains(records, samples * dt, unknowns)?).then(delay_finding)
+    let with_delay = residuals_with(records, samples * dt, unknowns)?;
+    let becomes_noise = !is_noise(without_delay) && is_noise(&with_delay);
+    let is_most = follows_force || remaining <= DELAY_REMAINING || becomes_noise;
+    let delay = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
+    (is_most && is_uncorrelated(&with_delay)).then(delay)
 }
 
-/// Returns whether the residual of a fit with the delay (s) is uncorrelated with the forces.
-fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Option<bool> {
+/// Returns the residuals of a fit with the delay (s).
+fn residuals_with(
+    records: &[FrequencyData],
+    delay: f64,
+    unknowns: &Unknowns,
+) -> Option<Vec<SpectralResidual>> {
     let late: Vec<FrequencyData> =
         records.iter().map(|record| record.with_later_force(delay)).collect();
-    let (first, remaining) = late.split_first()?;
-    let joined =
-        remaining.iter().try_fold(first.clone(), |joined, record| joined.and(record)).ok()?;
-    let fit = output_error(&joined, unknowns).ok()?;
-    let closed = fit.ends.as_ref()?.without_transients(&late).ok()?;
-    let after = after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?;
-    let findings = after.records.iter().flat_map(SpectralResidual::findings);
-    let mut correlations = findings.filter(|f| f.subject() == Subject::CrossCorrelation);
-    Some(correlations.all(|finding| finding.verdict() == Verdict::Good))
+    let fit = output_error(&joined(&late)?, unknowns).ok()?;
+    let corrected = fit.without_pulse_errors(&late).ok()?;
+    let closed = fit.ends.as_ref()?.without_transients(&corrected).ok()?;
+    Some(after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?.records)
+}
+
+/// Returns the rows of all records; `None` without a record or for records of different kinds.
+fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
+    let (first, following) = records.split_first()?;
+    following.iter().try_fold(first.clone(), |joined, record| joined.and(record)).ok()
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the

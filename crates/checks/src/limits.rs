@@ -167,10 +167,6 @@ pub(crate) const LEAST_PART: f64 = 0.1;
 /// Parabola width, in samples, that ends the search for a delay.
 pub(crate) const DELAY_RESOLVED: f64 = 0.005;
 
-/// Maximum share of the residual power after the first parabolic step, if no correlation with a
-/// force indicates a delay.
-pub(crate) const DELAY_PROMISING: f64 = 0.5;
-
 /// Maximum ratio of the residual power of a longer delay to that of a shorter one, for the longer
 /// delay to be preferred.
 pub(crate) const DELAY_PREFERRED: f64 = 0.99;

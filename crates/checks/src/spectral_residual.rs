@@ -10,12 +10,14 @@ use rayon::prelude::*;
 use super::concentration::Part;
 use super::cross_correlation::CrossCorrelation;
 use super::finding::Finding;
+use super::holm_adjustment::adjust_p_values;
 use super::limits::LAGS;
 use super::limits::{FREE_RESIDUALS, LINES_PER_CORRELATION, SPECTRAL_LEAKED};
 use super::line_correlation::correlation_of_lines;
 use super::misfit::{Concentration, Misfit, NoiseSource};
 use super::p_value::{CorrelationTest, PValue};
 use super::whiteness::{Residual, Whiteness};
+use super::{Subject, Verdict};
 
 /// Residual of one record of a fit of spectra, in units of its noise.
 #[derive(Debug, Clone)]
@@ -43,6 +45,23 @@ pub struct SpectralResidual {
     force_decides: Option<(f64, f64)>,
     /// Few lines with most of the misfit of all records.
     concentration: Option<Concentration>,
+}
+
+/// Returns whether no test of the residuals warns, with p-values adjusted for their number.
+pub(super) fn is_noise(residuals: &[SpectralResidual]) -> bool {
+    passes(residuals.iter().flat_map(SpectralResidual::findings).collect())
+}
+
+/// Returns whether no residual is correlated with a force, with p-values adjusted for the number of
+/// tests.
+pub(super) fn is_uncorrelated(residuals: &[SpectralResidual]) -> bool {
+    let findings = residuals.iter().flat_map(SpectralResidual::findings);
+    passes(findings.filter(|finding| finding.subject() == Subject::CrossCorrelation).collect())
+}
+
+fn passes(mut findings: Vec<Finding>) -> bool {
+    adjust_p_values(&mut findings);
+    findings.iter().all(|finding| finding.verdict() == Verdict::Good)
 }
 
 impl SpectralResidual {

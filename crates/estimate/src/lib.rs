@@ -36,6 +36,7 @@ pub mod likelihood;
 mod limits;
 mod modal;
 mod prediction;
+mod pulse_covariance;
 mod related_equations;
 mod relations;
 mod sweep;

@@ -81,6 +81,23 @@ pub(crate) const MAX_PARTS: usize = 1 << 24;
 /// lines; in larger fits the errors of the lines are assumed to be independent.
 pub(crate) const MAX_SENSITIVITIES: usize = 1 << 22;
 
+/// Number of partial sums of the products of the effects of pulses. It limits their memory, and is
+/// the same for any number of threads, so that the result is, too.
+pub(crate) const PULSE_SUMS: usize = 8;
+
+/// Maximum number of effects of the errors of pulses on the residuals, and of sensitivities of such
+/// a fit: 128 MiB of numbers each, with some copies in memory at a time. In a larger fit the errors
+/// of the lines are assumed to be independent.
+pub(crate) const MAX_PULSE_EFFECTS: usize = 1 << 24;
+
+/// Maximum number of rounds that alternate between the errors of pulses and the fit to the data
+/// without them; about three suffice.
+pub(crate) const PULSE_ROUNDS: usize = 8;
+
+/// Change of the amplitudes of pulse errors, in standard deviations of the stated noise, that ends
+/// these rounds.
+pub(crate) const PULSE_SETTLED: f64 = 0.02;
+
 /// Relative change of the noise levels that ends the rounds of weighting.
 pub(crate) const WEIGHT_TOLERANCE: f64 = 1e-3;
 

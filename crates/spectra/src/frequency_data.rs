@@ -3,8 +3,6 @@
 
 mod derived_data;
 
-use std::ops::Range;
-
 use mechid_model::ResponseQuantity;
 use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::{Record, Sampling, Spectrum};
@@ -13,7 +11,7 @@ use nalgebra::{Complex, DMatrix};
 use crate::SpectraError;
 use crate::limits::SCATTER_ROUNDING;
 use crate::lines::{Lines, check_sampling};
-use crate::noise::pulse::PulseNoise;
+use crate::noise::pulse::{PulseErrors, PulseNoise};
 use crate::noise::spectrum::NoiseSpectrum;
 use crate::noise::spectrum::variance_on_lines;
 use crate::open_record::OpenRecord;
@@ -37,8 +35,8 @@ pub struct FrequencyData {
     transient: DMatrix<Complex<f64>>,
     /// Time axis of each open record.
     open: Vec<Sampling>,
-    /// Noise of forces that act only for a few samples.
-    pulses: Vec<PulseNoise>,
+    /// Errors of forces that act only for a few samples, in N.
+    pulses: Vec<PulseErrors>,
 }
 
 impl FrequencyData {
@@ -230,42 +228,47 @@ impl FrequencyData {
         Ok(self)
     }
 
-    /// Returns the same data of one record with white noise of known standard deviation (N) on some
-    /// samples of one force channel, counted from 0, and none on the others: the samples of the
-    /// pulse of a hammer hit. Such noise is correlated between lines.
+    /// Returns the same data of one record with noise on the samples of some pulses and none on the
+    /// other samples, such as the pulses of hammer hits. Such noise is common to all lines.
     ///
     /// # Errors
     /// As [`FrequencyData::with_force_noise`]; [`NumericsError::Size`] if there is no such channel
-    /// or sample.
+    /// or sample, or if the rows of a pulse are not all rows; [`SpectraError::Numerics`] if the
+    /// decomposition of the noise fails.
     ///
     /// # Source
     /// As [`FrequencyData::with_force_noise`].
-    pub fn with_pulse_noise(
-        mut self,
-        channel: usize,
-        deviation: f64,
-        samples: Range<usize>,
-        sampling: Sampling,
-    ) -> Result<Self, SpectraError> {
-        let share = samples.len() as f64 / sampling.len() as f64;
-        let mut levels = vec![0.0; self.dof()];
-        for (what, expected, got) in [
-            ("force channel with noise, below", self.dof(), channel),
-            ("sample with noise, below", sampling.len(), samples.end.saturating_sub(1)),
-        ] {
-            if got >= expected {
-                return Err(NumericsError::Size { what, expected, got }.into());
+    pub fn with_pulse_noise(mut self, pulses: &[PulseNoise]) -> Result<Self, SpectraError> {
+        let rows = self.len();
+        self.force_variance.fill(0.0);
+        for pulse in pulses {
+            check_size("rows of a pulse", rows, pulse.rows.len())?;
+            check_size("rows up to the last of a pulse", rows, pulse.rows.end)?;
+            let samples = pulse.sampling.len();
+            for (what, expected, got) in [
+                ("force channel with noise, below", self.dof(), pulse.channel),
+                ("sample with noise, below", samples, pulse.samples.end.saturating_sub(1)),
+            ] {
+                if got >= expected {
+                    return Err(NumericsError::Size { what, expected, got }.into());
+                }
             }
+            let value = pulse.deviation;
+            if !(value >= 0.0 && value.is_finite()) {
+                let column = self.dof() + pulse.channel;
+                return Err(SpectraError::NoiseVariance { row: 0, column, value });
+            }
+            let share = pulse.samples.len() as f64 / samples as f64;
+            let variance = variance_on_lines(value, samples) * share;
+            self.force_variance.column_mut(pulse.channel).add_scalar_mut(variance);
         }
-        levels[channel] = deviation * share.sqrt();
-        self = self.with_force_noise(&levels, sampling.len())?;
-        self.pulses =
-            vec![PulseNoise { rows: 0..self.len(), sampling, channel, deviation, samples }];
+        // The amplitude of a sinusoid is twice the mean over the samples.
+        self.pulses = PulseErrors::all(pulses, &self.omega, |samples| 2.0 / samples as f64)?;
         Ok(self)
     }
 
-    /// Returns the noise of forces that act only for a few samples.
-    pub fn pulses(&self) -> &[PulseNoise] {
+    /// Returns the errors of forces that act only for a few samples, in N.
+    pub fn pulse_errors(&self) -> &[PulseErrors] {
         &self.pulses
     }
 
@@ -361,10 +364,10 @@ impl FrequencyData {
         })
     }
 
-    fn pulses_of_both(&self, other: &Self) -> Vec<PulseNoise> {
-        let below = |pulse: &PulseNoise| PulseNoise {
-            rows: pulse.rows.start + self.len()..pulse.rows.end + self.len(),
-            ..pulse.clone()
+    fn pulses_of_both(&self, other: &Self) -> Vec<PulseErrors> {
+        let below = |pulse: &PulseErrors| {
+            let rows = pulse.rows();
+            pulse.with_rows(rows.start + self.len()..rows.end + self.len())
         };
         self.pulses.iter().cloned().chain(other.pulses.iter().map(below)).collect()
     }

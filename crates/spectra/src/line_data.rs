@@ -6,7 +6,6 @@ use std::ops::Range;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
-use crate::limits::PULSE_SAMPLES;
 use crate::noise::pulse::{PulseErrors, PulseNoise};
 use crate::{LineNoise, SpectraError};
 
@@ -142,7 +141,6 @@ impl LineData {
     /// [`SpectraError::Size`] for an input that does not exist or rows that are not those of one
     /// record, [`SpectraError::Numerics`] if the decomposition of the noise fails.
     pub fn with_pulse_noise(self, pulses: &[PulseNoise]) -> Result<Self, SpectraError> {
-        let mut pulse_errors = Vec::new();
         for pulse in pulses {
             let (what, expected, got) = ("inputs", pulse.channel + 1, self.inputs.ncols());
             if expected > got {
@@ -152,13 +150,10 @@ impl LineData {
                 let (what, expected, got) = ("rows of a pulse", self.len(), pulse.rows.len());
                 return Err(SpectraError::Size { what, expected, got });
             }
-            // Noise of parts of a pulse is independent; the decomposition takes the cube of a part.
-            for start in pulse.samples.clone().step_by(PULSE_SAMPLES) {
-                let samples = start..pulse.samples.end.min(start + PULSE_SAMPLES);
-                let part = PulseNoise { samples, ..pulse.clone() };
-                pulse_errors.extend(PulseErrors::new(&part, &self.omega[pulse.rows.clone()])?);
-            }
         }
+        // Unitary amplitudes.
+        let unit = |samples: usize| (samples as f64).sqrt().recip();
+        let pulse_errors = PulseErrors::all(pulses, &self.omega, unit)?;
         Ok(Self { pulse_errors, ..self })
     }
 

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use mechid_signal::noise_above_band;
 use mechid_spectra::FrequencyData;
+use mechid_spectra::noise::pulse::PulseNoise;
 use serde::Serialize;
 
 use crate::AnalysisError;
@@ -101,11 +102,17 @@ impl ForceNoise {
     ) -> Result<FrequencyData, AnalysisError> {
         let levels: Vec<f64> = (0..self.levels_n.len()).map(|force| self.level(force)).collect();
         let sampling = held.force.sampling();
-        let pulses = self.pulses().and_then(<[_]>::first).zip(self.pulses().and_then(<[_]>::last));
-        Ok(match (pulses, &held.driven[..]) {
-            (Some((first, last)), [struck]) => {
-                let pulse = first.start..last.end;
-                data.with_pulse_noise(*struck, levels[*struck], pulse, sampling)?
+        Ok(match (self.pulses(), &held.driven[..]) {
+            (Some(pulses), &[channel]) => {
+                let (deviation, rows) = (levels[channel], data.len());
+                let noise = pulses.iter().map(|samples| PulseNoise {
+                    rows: 0..rows,
+                    sampling,
+                    channel,
+                    deviation,
+                    samples: samples.clone(),
+                });
+                data.with_pulse_noise(&noise.collect::<Vec<_>>())?
             }
             _ => data.with_force_noise(&levels, sampling.len())?,
         })

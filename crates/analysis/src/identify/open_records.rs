@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use mechid_checks::{
-    AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, Subject, Verdict,
-    after_spectral_fit, before_spectral_fit, delay_of_lines, delay_of_open_records,
-    fault_of_acquisition, fitted_band, linearity_of_open_record,
+    AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, after_spectral_fit,
+    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition, fitted_band,
+    linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
@@ -148,20 +148,22 @@ pub(super) fn fit(
     let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
     spectra.data = data;
     spectra.without_sinusoids(&fit);
-    let OpenSpectra { data, lines, force_noise } = spectra;
+    let OpenSpectra { data: with_pulses, lines, force_noise } = spectra;
+    let data = fit.without_pulse_errors(&with_pulses)?;
     let (closed, alone) = without_transients(&fit, &data)?;
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
-    let late = delay_of_open_records(&data, dt, unknowns, &fit, follows_force(&residuals));
+    let late = delay_of_open_records(&with_pulses, dt, unknowns, &fit, &residuals);
     let Compared { parts, omitted } = agreement(&data, &fit, &residuals, excitation)?;
     let fault = match excitation {
-        // The noise of a pulse correlates its lines, which the score test does not allow for.
+        // Short forces hardly show whether the residual is correlated with them, so that a wrong
+        // fault would count as the explanation.
         Excitation::Hits(_) => None,
         _ => fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?,
     };
     let likelier = likelier(late, fault);
     let quantity = records[0].held.response().1;
-    let refit = |finding| refitted_with(finding, &data, quantity, unknowns, noise.response);
+    let refit = |finding| refitted_with(finding, &with_pulses, quantity, unknowns, noise.response);
     let explained = likelier.as_ref().and_then(refit);
     let explained = explained.map(|other| squared_change(&fit.estimate, &other));
     let sinusoids = sinusoid_rows(records, &fit);
@@ -204,14 +206,6 @@ fn without_transients(
     let Some(ends) = &fit.ends else { return Ok((data.to_vec(), data.to_vec())) };
     let alone = ends.without_transient_responses(data, &fit.estimate.system()?)?;
     Ok((ends.without_transients(data)?, alone))
-}
-
-/// Returns whether a residual is correlated with a force.
-fn follows_force(residuals: &[SpectralResidual]) -> bool {
-    let is_correlated = |finding: &Finding| {
-        finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
-    };
-    residuals.iter().any(|residual| residual.findings().iter().any(is_correlated))
 }
 
 /// Returns the sinusoids of all records.
@@ -367,8 +361,17 @@ fn remarks(
     let of_ends = format!(
         "{windows}: their transients were estimated together with the system, on all lines of the band"
     );
+    let is_noisy =
+        force_noise.iter().any(|noise| noise.levels_n.iter().flatten().any(|n| *n > 0.0));
+    let are_apart = matches!(excitation, Excitation::Hits(_)) && is_noisy;
+    let of_pulses = (are_apart && fit.pulse_amplitudes.is_empty()).then(|| {
+        "the noise of the force was taken as independent from line to line, because its pulses could not be \
+         fitted (they may be too many): the checks of the residual may warn of this noise"
+            .into()
+    });
     one_motion_of(&records[0].held)
         .into_iter()
+        .chain(of_pulses)
         .chain([of_ends, noise_remark(1, false, &fit.noise), ForceNoise::remark(force_noise)])
         .chain(SinusoidRow::remark(sinusoids))
         .collect()

@@ -1,5 +1,7 @@
 //! Open records with a delayed force.
 
+use std::borrow::Cow;
+
 use mechid_numerics::gauss_newton::minimise;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::DVector;
@@ -9,13 +11,14 @@ use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
 use super::multi_start::search;
 use super::output_error_fit::{plausible, spare};
+use super::pulse_fit::PulseFit;
 use super::unknown_noise::white_noise_at;
 use crate::Unknowns;
 use crate::limits::DELAY_STEPS;
 use crate::relations::Relations;
 
 /// Maximum likelihood for the lines of open records with a delayed force; each delay has its own
-/// estimate of the transients.
+/// estimate of the transients and of the errors of pulses.
 pub struct DelayedOpenRecord<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
@@ -23,6 +26,8 @@ pub struct DelayedOpenRecord<'a> {
     noise: NoiseSpectrum,
     /// Estimate for the last delay, the initial estimate for the next one.
     theta: DVector<f64>,
+    /// Amplitudes of the errors of pulses for the last delay; empty if there are none.
+    amplitudes: Vec<f64>,
 }
 
 impl<'a> DelayedOpenRecord<'a> {
@@ -39,8 +44,10 @@ impl<'a> DelayedOpenRecord<'a> {
         };
         theta.extend_from_slice(fit.ends.as_ref()?.loads());
         let theta = DVector::from_vec(theta);
-        let noise = white_noise_at(data, unknowns, &theta).ok()?;
-        Some(Self { data, unknowns, noise, theta })
+        let amplitudes = fit.pulse_amplitudes.clone();
+        let exact = corrected(data, &amplitudes)?;
+        let noise = white_noise_at(exact.as_ref(), unknowns, &theta).ok()?;
+        Some(Self { data, unknowns, noise, theta, amplitudes })
     }
 
     /// Number of real equations minus the number of unknowns.
@@ -51,6 +58,7 @@ impl<'a> DelayedOpenRecord<'a> {
     /// Estimates the parameters with the force `delay` (s) later, from all initial estimates.
     pub fn search(&mut self, delay: f64) -> Option<()> {
         let late = self.data.with_later_force(delay);
+        let late = corrected(&late, &self.amplitudes)?;
         let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
         let starts = InitialEstimates::new(&late, self.unknowns, &self.noise);
         let spare = self.spare() as f64;
@@ -63,9 +71,30 @@ impl<'a> DelayedOpenRecord<'a> {
     /// estimate.
     pub fn cost(&mut self, delay: f64) -> Option<f64> {
         let late = self.data.with_later_force(delay);
+        let of_lines = self.minimise(&late)?;
+        if self.amplitudes.is_empty() {
+            return Some(of_lines);
+        }
+        let (noise, before) = ((&self.noise, 1.0), &self.amplitudes);
+        self.amplitudes =
+            PulseFit::new(&late, self.unknowns, &self.theta, noise, before)?.amplitudes;
+        let of_pulses: f64 = self.amplitudes.iter().map(|amplitude| amplitude.powi(2)).sum();
+        Some(self.minimise(&late)? + of_pulses)
+    }
+
+    fn minimise(&mut self, late: &FrequencyData) -> Option<f64> {
+        let late = corrected(late, &self.amplitudes)?;
         let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
         let minimum = minimise(&mut misfit, self.theta.clone(), DELAY_STEPS)?;
         self.theta = minimum.parameters;
         Some(minimum.cost)
     }
+}
+
+/// Returns the data without the errors of pulses.
+fn corrected<'a>(data: &'a FrequencyData, amplitudes: &[f64]) -> Option<Cow<'a, FrequencyData>> {
+    if amplitudes.is_empty() {
+        return Some(Cow::Borrowed(data));
+    }
+    data.without_pulse_errors(amplitudes).ok().map(Cow::Owned)
 }

@@ -47,6 +47,7 @@
 mod delayed_force;
 mod delayed_open_record;
 mod equation_error;
+mod force_responses;
 mod initial_estimates;
 mod instrumental;
 mod likelihood_ratio;
@@ -58,7 +59,7 @@ mod normal_equations;
 mod output_error;
 mod output_error_fit;
 mod parts;
-mod pulse_covariance;
+mod pulse_fit;
 mod sampled_force;
 mod search;
 mod structural_damping;

@@ -139,7 +139,7 @@ fn with_known_noise(
         level: 1.0,
         inflation,
         weights: uncertain_weights(data, unknowns, &best.minimum.parameters, noise),
-        pulses: None,
+        with_pulses: None,
         degrees_of_freedom: noise.total_degrees_of_freedom(),
         misfit_ratio: best.minimum.cost / expected,
         deviance: Some(best.minimum.cost / inflation),

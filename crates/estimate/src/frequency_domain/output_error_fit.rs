@@ -4,6 +4,7 @@ use mechid_model::SecondOrderSystem;
 use mechid_numerics::gauss_newton::SumOfSquares;
 use mechid_numerics::{NumericsError, check_size};
 use mechid_spectra::SpectraError;
+use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::transient;
 use mechid_spectra::transient::TransientLoad;
 use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum, Sinusoid};
@@ -52,6 +53,39 @@ pub struct OutputErrorFit {
     /// Sinusoids that are not a response to the forces and are subtracted from each open record;
     /// empty if the noise is stated.
     pub sinusoids: Vec<Vec<Sinusoid>>,
+    /// Most likely amplitudes of the errors of pulses, one for each pattern of
+    /// [`FrequencyData::pulse_errors`], pure numbers; empty if there are none.
+    pub pulse_amplitudes: Vec<f64>,
+}
+
+impl OutputErrorFit {
+    /// Returns the fitted records, each without the most likely errors of the pulses of its forces.
+    ///
+    /// # Errors
+    /// [`NumericsError::Size`] if the records have more or fewer pulse errors than the fitted ones.
+    ///
+    /// # Source
+    /// As [`FrequencyData::without_pulse_errors`].
+    pub fn without_pulse_errors(
+        &self,
+        records: &[FrequencyData],
+    ) -> Result<Vec<FrequencyData>, EstimateError> {
+        if self.pulse_amplitudes.is_empty() {
+            return Ok(records.to_vec());
+        }
+        let count = |data: &FrequencyData| -> usize {
+            data.pulse_errors().iter().map(PulseErrors::count).sum()
+        };
+        let all = records.iter().map(count).sum();
+        check_size("amplitudes of the errors of pulses", all, self.pulse_amplitudes.len())?;
+        let mut following = &self.pulse_amplitudes[..];
+        let corrected = records.iter().map(|data| {
+            let (own, rest) = following.split_at(count(data));
+            following = rest;
+            Ok(data.without_pulse_errors(own)?)
+        });
+        corrected.collect()
+    }
 }
 
 /// Transient loads of open records, as defined at [`FrequencyData::as_open_record`].
@@ -156,8 +190,9 @@ pub(super) struct Scale {
     /// Factor of the covariance for sampled weights, used without a [`WeightUncertainty`].
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
-    /// Matrix that correlated errors of the lines add to the inverse of the Fisher information.
-    pub(super) pulses: Option<DMatrix<f64>>,
+    /// Inverse of the Fisher information with errors of pulses in the forces; `None` if it is that
+    /// of independent lines.
+    pub(super) with_pulses: Option<DMatrix<f64>>,
     pub(super) degrees_of_freedom: usize,
     pub(super) misfit_ratio: f64,
     pub(super) deviance: Option<f64>,
@@ -169,16 +204,13 @@ impl Scale {
     /// Returns the covariance of the independent unknowns divided by the noise level, and its
     /// degrees of freedom, from the inverse of the Fisher information.
     fn covariance(&self, inverse: DMatrix<f64>) -> (DMatrix<f64>, usize) {
-        let (covariance, degrees_of_freedom) = match &self.weights {
+        let inverse = self.with_pulses.clone().unwrap_or(inverse);
+        match &self.weights {
             None => (inverse * self.inflation, self.degrees_of_freedom),
             Some(weights) => {
                 let fewest = weights.degrees_of_freedom.min(self.degrees_of_freedom as f64);
                 (inverse + &weights.excess, fewest.max(1.0) as usize)
             }
-        };
-        match &self.pulses {
-            Some(excess) => (covariance + excess, degrees_of_freedom),
-            None => (covariance, degrees_of_freedom),
         }
     }
 }
@@ -243,6 +275,7 @@ pub(super) fn finish(
         spectrum: scale.spectrum,
         ends,
         sinusoids: Vec::new(),
+        pulse_amplitudes: Vec::new(),
     })
 }
 

@@ -7,6 +7,7 @@ use mechid_numerics::NumericsError;
 use mechid_numerics::gauss_newton::SumOfSquares;
 use mechid_spectra::SpectraError;
 use mechid_spectra::noise::level::{ResponseNoise, motion_level};
+use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::sinusoids;
 use mechid_spectra::sinusoids::Sinusoid;
 use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling};
@@ -20,14 +21,15 @@ use super::output_error_fit::{
     OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
     uncertain_weights,
 };
-use super::pulse_covariance;
+use super::pulse_fit::PulseFit;
 use crate::limits::{
-    COLOURED_ROUNDS, MAX_LEVERAGES, MAX_ROUNDS, NOISE_KEPT, NOISE_LEAST, RESIDUAL_ROUNDING,
-    SINUSOID_ROUNDS, SINUSOID_TOLERANCE, WEIGHT_TOLERANCE,
+    COLOURED_ROUNDS, MAX_LEVERAGES, MAX_ROUNDS, NOISE_KEPT, NOISE_LEAST, PULSE_ROUNDS,
+    PULSE_SETTLED, RESIDUAL_ROUNDING, SINUSOID_ROUNDS, SINUSOID_TOLERANCE, WEIGHT_TOLERANCE,
 };
 use crate::{EstimateError, Unknowns};
 
 /// A fit and the noise of its weights.
+#[derive(Clone)]
 struct Weighted {
     fit: GlobalMinimum,
     noise: NoiseSpectrum,
@@ -45,25 +47,115 @@ pub(super) fn with_unknown_noise(
         return Err(SpectraError::TooFewAverages { got: 1, needed: 2 }.into());
     }
     let (white, is_rounding) = with_white_noise(data, unknowns, nominal, None)?;
+    let pulses = if is_rounding { None } else { without_pulses(data, unknowns, &white) };
+    let (corrected, white, is_rounding) = match &pulses {
+        Some(pulses) => (&pulses.data, pulses.white.clone(), pulses.is_rounding),
+        None => (data, white, is_rounding),
+    };
     let mut with_sinusoids =
-        FitWithSinusoids { data: Cow::Borrowed(data), sinusoids: Vec::new(), white };
+        FitWithSinusoids { data: Cow::Borrowed(corrected), sinusoids: Vec::new(), white };
     if !is_rounding {
-        with_sinusoids.find(data, unknowns, nominal)?;
+        with_sinusoids.find(corrected, unknowns, nominal)?;
     }
-    let FitWithSinusoids { data, sinusoids, white } = with_sinusoids;
-    let data = data.as_ref();
+    let FitWithSinusoids { data: reduced, sinusoids, white } = with_sinusoids;
     let coloured = match pooling {
         Pooling::AllLines => None,
         _ if is_rounding => None,
         _ => {
-            let next = |before: &Weighted| spectrum_of_residual(data, unknowns, before, pooling);
-            reweighted(data, unknowns, &white, next)?
+            let next =
+                |before: &Weighted| spectrum_of_residual(&reduced, unknowns, before, pooling);
+            reweighted(&reduced, unknowns, &white, next)?
         }
     };
     let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
-    let weighted = coloured.map_or((white, true), |coloured| (coloured, false));
-    let fit = finished(data, unknowns, weighted, of_sinusoids)?;
-    Ok(OutputErrorFit { sinusoids, ..fit })
+    let (weighted, is_white) = coloured.map_or((white, true), |coloured| (coloured, false));
+    let Some(WithoutPulses { amplitudes, .. }) = &pulses else {
+        let subtracted = Subtracted { of_sinusoids, pulses: None };
+        let fit = finished(&reduced, unknowns, (weighted, is_white), subtracted)?;
+        return Ok(OutputErrorFit { sinusoids, ..fit });
+    };
+    // The amplitudes in the final weights.
+    let (searches, steps) = (weighted.fit.searches, weighted.fit.minimum.steps);
+    let with_pulses = data.without_sinusoids(&sinusoids);
+    let (pulses, data, weighted) = with_pulse_fit(&with_pulses, unknowns, weighted, amplitudes)?
+        .ok_or(EstimateError::NotConverged { searches, steps })?;
+    let pulse_amplitudes = pulses.amplitudes.clone();
+    let subtracted = Subtracted { of_sinusoids, pulses: Some(pulses) };
+    let fit = finished(&data, unknowns, (weighted, is_white), subtracted)?;
+    Ok(OutputErrorFit { sinusoids, pulse_amplitudes, ..fit })
+}
+
+/// Errors of data that were estimated and subtracted before the last fit.
+struct Subtracted {
+    /// Number of unknowns of the sinusoids.
+    of_sinusoids: usize,
+    pulses: Option<PulseFit>,
+}
+
+/// Data without the errors of the pulses of their forces, with a fit in white noise.
+struct WithoutPulses {
+    /// Most likely amplitudes of the errors.
+    amplitudes: Vec<f64>,
+    data: FrequencyData,
+    white: Weighted,
+    /// `true` if the residual is only rounding.
+    is_rounding: bool,
+}
+
+/// Alternates between the errors of the pulses of the forces and a fit in white noise to the data
+/// without them, from a fit in which every line has errors of its own. `None` if there are no
+/// pulses or too many, or if the first round fails.
+fn without_pulses(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    white: &Weighted,
+) -> Option<WithoutPulses> {
+    if !PulseFit::is_possible(data, unknowns) {
+        return None;
+    }
+    let patterns: usize = data.pulse_errors().iter().map(PulseErrors::count).sum();
+    let round = |before: &[f64], fit: Weighted| -> Option<WithoutPulses> {
+        let (PulseFit { amplitudes, .. }, data, Weighted { fit, .. }) =
+            with_pulse_fit(data, unknowns, fit, before).ok()??;
+        let (white, is_rounding) = with_white_noise(&data, unknowns, None, Some(fit)).ok()?;
+        Some(WithoutPulses { amplitudes, data, white, is_rounding })
+    };
+    let mut last = round(&vec![0.0; patterns], white.clone())?;
+    for _ in 1..PULSE_ROUNDS {
+        if last.is_rounding {
+            break;
+        }
+        // The result is the round before if this one fails.
+        let Some(next) = round(&last.amplitudes, last.white.clone()) else { break };
+        let pairs = next.amplitudes.iter().zip(&last.amplitudes);
+        let change = pairs.map(|(next, last)| (next - last).abs()).fold(0.0, f64::max);
+        last = next;
+        if change <= PULSE_SETTLED {
+            break;
+        }
+    }
+    Some(last)
+}
+
+/// Finds the errors of pulses, linearised at the amplitudes `before`, and fits the data without
+/// them in the same noise; `None` as for [`PulseFit::new`].
+fn with_pulse_fit(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    Weighted { fit, noise }: Weighted,
+    before: &[f64],
+) -> Result<Option<(PulseFit, FrequencyData, Weighted)>, EstimateError> {
+    let level = fit.minimum.cost / spare(data, unknowns).max(1) as f64;
+    let theta = &fit.minimum.parameters;
+    let Some(pulses) = PulseFit::new(data, unknowns, theta, (&noise, level), before) else {
+        return Ok(None);
+    };
+    let corrected = data.without_pulse_errors(&pulses.amplitudes)?;
+    let noise = noise.with_force_variance(corrected.force_variance());
+    let mut misfit = Misfit::new(&corrected, unknowns, &noise)?;
+    let fit = fit.followed(&mut misfit)?;
+    drop(misfit);
+    Ok(Some((pulses, corrected, Weighted { fit, noise })))
 }
 
 /// Estimates the parameters of responses whose noise is white, in proportion to the response, or
@@ -77,7 +169,7 @@ pub(super) fn with_response_noise(
     let next = |before: &Weighted| response_noise(data, unknowns, before);
     let proportional = if is_rounding { None } else { reweighted(data, unknowns, &white, next)? };
     let weighted = proportional.map_or((white, true), |proportional| (proportional, false));
-    finished(data, unknowns, weighted, 0)
+    finished(data, unknowns, weighted, Subtracted { of_sinusoids: 0, pulses: None })
 }
 
 /// Chooses the noise of each channel from the residual of a fit; `None` if all are white.
@@ -121,18 +213,19 @@ fn response_noise(
     Ok(Some(noise.with_model(NoiseModel::Proportional { with_white })))
 }
 
-/// Returns the result of a fit in white or other noise, which the flag states, with the number of
-/// unknowns `of_sinusoids`.
+/// Returns the result of a fit in white or other noise, which the flag states, to data without the
+/// errors that were subtracted before.
 fn finished(
     data: &FrequencyData,
     unknowns: &Unknowns,
     (Weighted { fit, noise }, is_white): (Weighted, bool),
-    of_sinusoids: usize,
+    Subtracted { of_sinusoids, pulses }: Subtracted,
 ) -> Result<OutputErrorFit, EstimateError> {
     let mut misfit = Misfit::new(data, unknowns, &noise)?;
     misfit.try_at(&fit.minimum.parameters).ok_or(NumericsError::Overflow)?;
     misfit.accept();
-    let free = spare(data, unknowns).saturating_sub(of_sinusoids);
+    let of_pulses = pulses.as_ref().map_or(0.0, |pulses| pulses.determined.round());
+    let free = spare(data, unknowns).saturating_sub(of_sinusoids + of_pulses as usize);
     let level = fit.minimum.cost / free.max(1) as f64;
     let inflation = if is_white {
         1.0
@@ -143,7 +236,7 @@ fn finished(
         level,
         inflation,
         weights: uncertain_weights(data, unknowns, &fit.minimum.parameters, &noise),
-        pulses: pulse_covariance::excess(data, unknowns, &fit.minimum.parameters, &noise),
+        with_pulses: pulses.map(|pulses| pulses.covariance),
         degrees_of_freedom: free,
         misfit_ratio: 1.0,
         deviance: None,

@@ -10,7 +10,6 @@ use super::limits::{
     CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE,
 };
 use super::multi_start::{self, Minima, starts};
-use super::pulses::PulseCovariance;
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
 use super::search::{Bounds, Minimum};
@@ -18,6 +17,7 @@ use super::thinned::Thinned;
 use super::unknown_noise::{UnknownNoise, WeightedMinimum};
 use super::weights::Weights;
 use super::{LikelihoodError, NoiseSource, Settings};
+use crate::pulse_covariance::PulseCovariance;
 
 /// Initial values, bounds and priors of the parameters of a model.
 #[derive(Debug, Clone, PartialEq)]

@@ -46,10 +46,6 @@ pub(super) const SHORT_STEP: f64 = 1.0;
 /// to its derivative, 64 MiB; more are computed again for each record.
 pub(super) const KEPT_RESPONSES: usize = 1 << 22;
 
-/// Number of partial sums of the products of the effects of pulses. It limits their memory, and is
-/// the same for any number of threads, so that the result is, too.
-pub(super) const PULSE_SUMS: usize = 8;
-
 /// Maximum number of steps of a search.
 pub(super) const STEPS: usize = 200;
 

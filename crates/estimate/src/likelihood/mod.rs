@@ -14,7 +14,6 @@ mod limits;
 pub mod machine;
 mod multi_start;
 mod profile;
-mod pulses;
 mod residual;
 mod response_model;
 mod search;

@@ -9,12 +9,12 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::limits::KEPT_RESPONSES;
-use super::pulses::PulseCovariance;
 use super::response_model::{LineResponse, ResponseModel};
 use super::search::{LeastSquaresProblem, Linearisation};
 use super::transient::{self, LineColumns, RecordUnknowns, TransientBasis};
 use super::weights::{WeightedLine, Weights};
 use crate::limits::LINES_AT_ONCE;
+use crate::pulse_covariance::PulseCovariance;
 
 /// Normal prior of a parameter, as one row of the residual.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,6 +4,7 @@ use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::output_error_pooling;
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling, noise};
+use mechid_spectra::noise::pulse::PulseNoise;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -42,7 +43,10 @@ fn errors(seed: u64, as_pulse: bool) -> Vec<f64> {
     let (measured, force) = (ResponseQuantity::Displacement, lines.read(&noisy).unwrap());
     let data = FrequencyData::from_amplitudes(lines.omega(), force, response, measured).unwrap();
     let data = match as_pulse {
-        true => data.with_pulse_noise(0, DEVIATION, PULSE, sampling),
+        true => {
+            let (rows, samples, deviation) = (0..200, PULSE, DEVIATION);
+            data.with_pulse_noise(&[PulseNoise { rows, sampling, channel: 0, deviation, samples }])
+        }
         false => {
             let share = (PULSE.len() as f64 / SAMPLES as f64).sqrt();
             data.with_force_noise(&[DEVIATION * share], SAMPLES)

@@ -2,9 +2,12 @@
 //! delay, or of one load alone.
 
 use mechid_model::SecondOrderSystem;
+use mechid_numerics::check_size;
 use nalgebra::{Complex, DMatrix};
 
 use super::FrequencyData;
+use crate::SpectraError;
+use crate::noise::pulse::PulseErrors;
 
 impl FrequencyData {
     fn no_longer_open(&mut self) {
@@ -25,11 +28,38 @@ impl FrequencyData {
         Self { force, ..self.clone() }
     }
 
+    /// Returns the same data without the errors of the pulses of the forces (N), which are the
+    /// `amplitudes` (pure numbers) times the patterns of all [`FrequencyData::pulse_errors`] in
+    /// their order; the forces then count as exact.
+    ///
+    /// # Errors
+    /// [`SpectraError::Numerics`] for another number of amplitudes than patterns.
+    ///
+    /// # Source
+    /// As [`PulseErrors::at`](crate::noise::pulse::PulseErrors::at).
+    pub fn without_pulse_errors(&self, amplitudes: &[f64]) -> Result<Self, SpectraError> {
+        let count = self.pulses.iter().map(PulseErrors::count).sum();
+        check_size("amplitudes of the errors of pulses", count, amplitudes.len())?;
+        let mut corrected = self.clone();
+        let mut following = amplitudes;
+        for pulse in &self.pulses {
+            let (own, rest) = following.split_at(pulse.count());
+            following = rest;
+            for row in pulse.rows() {
+                let errors = pulse.at(self.omega[row]);
+                let error: Complex<f64> = errors.iter().zip(own).map(|(e, a)| e * *a).sum();
+                corrected.force[(row, pulse.input())] -= error;
+                corrected.force_variance[(row, pulse.input())] = 0.0;
+            }
+        }
+        Ok(corrected)
+    }
+
     /// Returns the same data with the same first-order high-pass filter on all channels. The
     /// `responses` and `forces` listed here, counted from 0, were already filtered during the
     /// measurement with the `corner` frequency (rad/s); the filter is applied to all others. A
     /// filter that is equal on all channels does not change the system, and the high-pass amplifies
-    /// no noise.
+    /// no noise. The errors of pulses are not filtered.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 2 (first-order systems).
@@ -168,6 +198,7 @@ impl FrequencyData {
             later.force.row_mut(row).apply(|f| *f *= turn);
         }
         later.noise = self.noise.as_ref().map(|noise| noise.with_later_force(delay));
+        later.pulses = self.pulses.iter().map(|pulse| pulse.later(delay)).collect();
         later
     }
 }

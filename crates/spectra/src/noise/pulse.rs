@@ -7,7 +7,7 @@ use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::SpectraError;
-use crate::limits::PULSE_PATTERN;
+use crate::limits::{PULSE_PATTERN, PULSE_SAMPLES};
 
 /// Noise on the samples of a pulse; the other samples of its record have none.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,38 +24,48 @@ pub struct PulseNoise {
     pub samples: Range<usize>,
 }
 
-impl PulseNoise {
-    /// Returns the amplitude, on a line at `omega` (rad/s), of a force of 1 N on one sample, in N.
-    ///
-    /// # Source
-    /// The shift theorem of Fourier transforms.
-    pub fn impulse(&self, sample: usize, omega: f64) -> Complex<f64> {
-        let turn = -omega * sample as f64 * self.sampling.dt();
-        Complex::from_polar(2.0 / self.sampling.len() as f64, turn)
-    }
-}
-
-/// Errors of an input of line data due to the noise of a pulse: sums of a few patterns over the
-/// lines, whose amplitudes are independent and have unit variance.
+/// Errors of an input due to the noise of a pulse: sums of a few patterns over the lines of a
+/// record, whose amplitudes are independent and have unit variance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PulseErrors {
     rows: Range<usize>,
     input: usize,
     sample_interval: f64,
-    first_sample: usize,
+    /// Instant of the first sample, in s after the first sample of the record.
+    start: f64,
     /// Patterns over the samples of the pulse, samples × patterns, in the unit of the amplitudes of
     /// the lines.
     patterns: DMatrix<f64>,
 }
 
 impl PulseErrors {
-    /// Decomposes the noise of a pulse on the lines of its record at `omega` (rad/s), with the
-    /// unitary amplitudes of [`LineData`](crate::LineData). Patterns with hardly any power on these
-    /// lines are omitted; `None` without noise.
+    /// Decomposes the noise of pulses on the lines of their records at `omega` (rad/s). The
+    /// amplitude of a line is `unit` times the sum over the samples of the record, given their
+    /// number. Patterns with hardly any power on the lines of a record are omitted.
     ///
     /// # Errors
     /// [`SpectraError::Numerics`] if the decomposition fails.
-    pub(crate) fn new(noise: &PulseNoise, omega: &[f64]) -> Result<Option<Self>, SpectraError> {
+    pub(crate) fn all(
+        pulses: &[PulseNoise],
+        omega: &[f64],
+        unit: impl Fn(usize) -> f64,
+    ) -> Result<Vec<Self>, SpectraError> {
+        let mut errors = Vec::new();
+        for pulse in pulses {
+            // Noise of parts of a pulse is independent; the decomposition takes the cube of a part.
+            for start in pulse.samples.clone().step_by(PULSE_SAMPLES) {
+                let samples = start..pulse.samples.end.min(start + PULSE_SAMPLES);
+                let part = PulseNoise { samples, ..pulse.clone() };
+                let scale = part.deviation * unit(part.sampling.len());
+                errors.extend(Self::new(&part, &omega[part.rows.clone()], scale)?);
+            }
+        }
+        Ok(errors)
+    }
+
+    /// Decomposes the noise of a pulse, whose samples have the deviation `scale` on the lines;
+    /// `None` without noise.
+    fn new(noise: &PulseNoise, omega: &[f64], scale: f64) -> Result<Option<Self>, SpectraError> {
         if noise.deviation == 0.0 {
             return Ok(None);
         }
@@ -71,12 +81,11 @@ impl PulseErrors {
         if strong.is_empty() {
             return Ok(None);
         }
-        let scale = noise.deviation / (noise.sampling.len() as f64).sqrt();
         Ok(Some(Self {
             rows: noise.rows.clone(),
             input: noise.channel,
             sample_interval: dt,
-            first_sample: noise.samples.start,
+            start: dt * noise.samples.start as f64,
             patterns: eigen.eigenvectors.select_columns(&strong) * scale,
         }))
     }
@@ -84,6 +93,11 @@ impl PulseErrors {
     /// Returns the same errors with the record at other rows.
     pub(crate) fn with_rows(&self, rows: Range<usize>) -> Self {
         Self { rows, ..self.clone() }
+    }
+
+    /// Returns the errors of an input that is delayed by `delay` seconds.
+    pub(crate) fn later(&self, delay: f64) -> Self {
+        Self { start: self.start + delay, ..self.clone() }
     }
 
     /// Returns the input with these errors, counted from 0.
@@ -109,15 +123,15 @@ impl PulseErrors {
     /// power in a band).
     pub fn at(&self, omega: f64) -> DVector<Complex<f64>> {
         let step = Complex::cis(-omega * self.sample_interval);
-        let mut turn = Complex::cis(-omega * self.sample_interval * self.first_sample as f64);
-        let mut values = DVector::zeros(self.count());
-        for sample in self.patterns.row_iter() {
-            for (value, pattern) in values.iter_mut().zip(sample.iter()) {
-                *value += turn * pattern;
-            }
+        let mut turn = Complex::cis(-omega * self.start);
+        let mut turns = Vec::with_capacity(self.patterns.nrows());
+        for _ in 0..self.patterns.nrows() {
+            turns.push(turn);
             turn *= step;
         }
-        values
+        let value = |pattern: &[f64]| turns.iter().zip(pattern).map(|(turn, p)| turn * p).sum();
+        let patterns = self.patterns.as_slice().chunks_exact(turns.len().max(1));
+        DVector::from_iterator(self.count(), patterns.map(value))
     }
 }
 
@@ -139,7 +153,7 @@ mod tests {
             samples: 50..74,
         };
         for (lines, most) in [(omega.len(), 24), (50, 12)] {
-            let errors = PulseErrors::new(&noise, &omega[..lines]).unwrap().unwrap();
+            let errors = PulseErrors::new(&noise, &omega[..lines], 3.0 / 20.0).unwrap().unwrap();
             assert!(errors.count() <= most, "{}", errors.count());
             for (a, b) in [(0, 0), (0, 1), (5, 40), (lines - 1, lines - 1)] {
                 let expected: Complex<f64> = (50..74)

@@ -7,7 +7,6 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::split::Cuts;
 use super::{Part, PartsOfFit, Split};
-use crate::frequency_domain::pulse_covariance::scatter;
 use crate::frequency_responses::covariance_of_errors;
 use crate::limits::PART_INFORMS;
 
@@ -47,14 +46,13 @@ pub struct Difference {
 
 /// Scores of the parts of a linearised fit, and their covariance in units of the noise.
 struct Scores<'a> {
-    /// Orthonormal columns Q that the parameters explain.
-    basis: &'a DMatrix<f64>,
     /// Change of every parameter per unit of each column, parameters × columns.
     root: &'a DMatrix<f64>,
     /// Values of the parameters, each in its unit.
     values: &'a DVector<f64>,
-    /// Products D_p Q of every part p, with its selection D_p of the rows.
-    parts: Vec<DMatrix<f64>>,
+    /// Change of the coefficients of Q by a change of the residual by D_p Q, for the selection D_p
+    /// of the rows of every part p.
+    effects: Vec<DMatrix<f64>>,
     /// Scores Qᵀ D_p e of the parts, one below the other, with the residual e.
     scores: DVector<f64>,
     covariance: DMatrix<f64>,
@@ -107,12 +105,12 @@ struct PartDifference {
 impl Scores<'_> {
     /// Returns the scores of a part.
     fn scores_of(&self, part: usize) -> DVector<f64> {
-        self.scores.rows(part * self.basis.ncols(), self.basis.ncols()).into_owned()
+        self.scores.rows(part * self.root.ncols(), self.root.ncols()).into_owned()
     }
 
     /// Returns the covariance of the scores of a part.
     fn covariance_of(&self, part: usize) -> DMatrix<f64> {
-        let count = self.basis.ncols();
+        let count = self.root.ncols();
         self.covariance.view((part * count, part * count), (count, count)).into_owned()
     }
 
@@ -141,7 +139,7 @@ impl Scores<'_> {
             let root = self.root.row(row).transpose();
             let square = |part: usize| root.dot(&self.scores_of(part)).powi(2);
             let expected = |part: usize| root.dot(&(self.covariance_of(part) * &root));
-            let parts = self.parts.len();
+            let parts = self.effects.len();
             let (squares, expected) = (
                 (0..parts).map(square).sum::<f64>(),
                 (0..parts).map(expected).sum::<f64>() * level,
@@ -154,10 +152,10 @@ impl Scores<'_> {
     /// Returns the difference of one part from the others that is largest in units of its standard
     /// error.
     fn largest_difference(&self, level: f64) -> Option<PartDifference> {
-        let of_part = |(part, own): (usize, &DMatrix<f64>)| {
+        let of_part = |part: usize| {
             let (inverse, _) = pseudo_inverse(&self.covariance_of(part))?;
             let difference = &inverse * self.scores_of(part);
-            let of_others = -self.basis.tr_mul(&(own * &difference));
+            let of_others = -(&self.effects[part] * &difference);
             let one = |row: usize| {
                 let root = self.root.row(row).transpose();
                 let variance = level * root.dot(&(&inverse * &root));
@@ -173,7 +171,7 @@ impl Scores<'_> {
             let all = (0..self.root.nrows()).map(one);
             all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
         };
-        let all = self.parts.iter().enumerate().filter_map(of_part);
+        let all = (0..self.effects.len()).filter_map(of_part);
         all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
     }
 }
@@ -242,18 +240,14 @@ impl PartsOfFit<'_> {
             let unexplained = self.linear.unexplained(part.clone());
             all.columns_mut(at * count, count).copy_from(&unexplained);
         }
-        let mut covariance = match self.responses {
+        let covariance = match self.responses {
             Some(records) => covariance_of_errors(records, self.data.dof(), &all).0,
-            None => all.tr_mul(&all),
+            None => self.linear.covariance_of_products(&all),
         };
-        if let Some(responses) = &self.linear.responses {
-            covariance += scatter(self.data, responses, &all);
-        }
         Scores {
-            basis: &self.linear.basis,
             root: &self.linear.root,
             values: &self.values,
-            parts,
+            effects: parts.iter().map(|part| self.linear.effect_of(part)).collect(),
             scores: all.tr_mul(&self.linear.residual),
             covariance,
         }

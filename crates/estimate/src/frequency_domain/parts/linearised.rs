@@ -1,13 +1,14 @@
 //! Weighted residual of a fit and its sensitivities, without what transients explain.
 
-use std::ops::Range;
-
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::Unknowns;
 use crate::frequency_domain::Whitened;
-use crate::frequency_domain::pulse_covariance::{ForceResponses, orthonormal, transient_basis};
+use crate::frequency_domain::force_responses::{
+    ForceResponses, RecordColumns, orthonormal, pulse_covariances, remove, transient_bases,
+};
+use crate::pulse_covariance::PulseCovariance;
 
 /// Weighted residual and sensitivities at some values of the parameters.
 pub(super) struct Linearised {
@@ -18,9 +19,11 @@ pub(super) struct Linearised {
     /// Change of every parameter per unit of each basis column, parameters × columns.
     pub(super) root: DMatrix<f64>,
     /// Range of the residuals of each open record, and an orthonormal basis of its transient.
-    pub(super) transients: Vec<(Range<usize>, DMatrix<f64>)>,
-    /// Responses to unit forces, if the noise of forces acts for some samples only.
-    pub(super) responses: Option<ForceResponses>,
+    pub(super) transients: Vec<RecordColumns<DMatrix<f64>>>,
+    /// Covariance of the errors of pulses, whose most likely values are subtracted.
+    pulses: Vec<RecordColumns<PulseCovariance>>,
+    /// Factor of QᵀV⁻¹Q with the covariance V of lines and pulses; `None` without pulses.
+    information: Option<Cholesky<f64, Dyn>>,
     /// Coefficients Qᵀe.
     coefficients: DVector<f64>,
 }
@@ -38,17 +41,17 @@ impl Linearised {
         let covariance = |row: usize| noise.covariance(row).clone();
         let Whitened { mut residual, mut sensitivity } =
             Whitened::new(closed, unknowns, entries, covariance)?;
-        let responses = if data.transient().ncols() > 0 {
+        let exact_forces = data.force_variance().iter().all(|variance| *variance == 0.0);
+        let without_pulses = !data.pulse_errors().is_empty() && exact_forces;
+        let responses = if data.transient().ncols() > 0 || without_pulses {
             Some(ForceResponses::new(data, unknowns, entries, noise)?)
         } else {
             None
         };
-        let mut transients = Vec::new();
-        if let Some(responses) = &responses {
-            for record in 0..data.transient().ncols() / 2 {
-                transients.push(transient_basis(data, record, responses)?);
-            }
-        }
+        let transients = match &responses {
+            Some(responses) => transient_bases(data, responses)?,
+            None => Vec::new(),
+        };
         for (rows, transient) in &transients {
             let mut part = residual.rows_mut(rows.start, rows.len());
             part -= transient * transient.tr_mul(&part);
@@ -56,8 +59,16 @@ impl Linearised {
         remove(&transients, &mut sensitivity);
         let (basis, root) = orthonormal(sensitivity)?;
         let coefficients = basis.tr_mul(&residual);
-        let responses = responses.filter(|_| !data.pulses().is_empty());
-        Some(Self { residual, basis, root, transients, responses, coefficients })
+        let (pulses, information) = (Vec::new(), None);
+        let mut linear =
+            Self { residual, basis, root, transients, pulses, information, coefficients };
+        if let Some(responses) = responses.as_ref().filter(|_| without_pulses) {
+            let level = linear.cost() / linear.free();
+            linear.pulses = pulse_covariances(data, responses, &linear.transients, level)?;
+            let weighted = linear.weighted(linear.basis.clone());
+            linear.information = Some(linear.basis.tr_mul(&weighted).cholesky()?);
+        }
+        Some(linear)
     }
 
     pub(super) fn cost(&self) -> f64 {
@@ -95,18 +106,48 @@ impl Linearised {
         part
     }
 
-    /// Number of residuals minus the number of parameters and transient loads.
+    /// Returns the covariance of the products of columns with the residual, in units of the noise.
+    /// The most likely errors of pulses are subtracted from the residual e, whose covariance is
+    /// therefore V⁻¹ − V⁻¹Q(QᵀV⁻¹Q)⁻¹QᵀV⁻¹ with the covariance V of lines and pulses.
+    pub(super) fn covariance_of_products(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        if self.pulses.is_empty() {
+            return columns.tr_mul(columns);
+        }
+        let weighted = self.weighted(columns.clone());
+        columns.tr_mul(&weighted) - self.basis.tr_mul(&weighted).tr_mul(&self.effect_of(columns))
+    }
+
+    /// Returns how much of each basis column the parameters take up of a change of the residual by
+    /// each of these columns, (QᵀV⁻¹Q)⁻¹QᵀV⁻¹ times the columns.
+    pub(super) fn effect_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        match &self.information {
+            Some(information) => {
+                information.solve(&self.basis.tr_mul(&self.weighted(columns.clone())))
+            }
+            None => self.basis.tr_mul(columns),
+        }
+    }
+
+    /// Returns whether errors of pulses were subtracted from the residual.
+    pub(super) fn is_without_pulses(&self) -> bool {
+        !self.pulses.is_empty()
+    }
+
+    /// Returns V⁻¹ times columns over all residuals, with the covariance V of lines and pulses.
+    fn weighted(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        for (rows, pulses) in &self.pulses {
+            let mut part = columns.rows(rows.start, rows.len()).into_owned();
+            pulses.whiten(&mut [&mut part]);
+            columns.rows_mut(rows.start, rows.len()).copy_from(&part);
+        }
+        columns
+    }
+
+    /// Number of residuals minus the number of parameters, transient loads, and amplitudes of
+    /// pulses.
     pub(super) fn free(&self) -> f64 {
         let transients: usize = self.transients.iter().map(|(_, columns)| columns.ncols()).sum();
-        self.residual.len() as f64 - (self.basis.ncols() + transients) as f64
-    }
-}
-
-/// Removes the components that the transients explain from columns over all residuals.
-pub(super) fn remove(transients: &[(Range<usize>, DMatrix<f64>)], columns: &mut DMatrix<f64>) {
-    for (rows, transient) in transients {
-        let mut part = columns.rows_mut(rows.start, rows.len());
-        let explained = transient.tr_mul(&part);
-        part -= transient * explained;
+        let amplitudes: f64 = self.pulses.iter().map(|(_, pulses)| pulses.determined()).sum();
+        self.residual.len() as f64 - (self.basis.ncols() + transients) as f64 - amplitudes
     }
 }

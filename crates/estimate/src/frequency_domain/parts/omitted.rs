@@ -6,9 +6,8 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::PartsOfFit;
 use super::comparison::pseudo_inverse;
-use super::linearised::remove;
 use super::terms::{LikelyMotion, OmittedTerm, SampledRows};
-use crate::frequency_domain::pulse_covariance::scatter;
+use crate::frequency_domain::force_responses::remove;
 use crate::frequency_responses::covariance_of_errors;
 use crate::limits::PART_INFORMS;
 
@@ -95,7 +94,7 @@ impl PartsOfFit<'_> {
     /// Returns the explained part of the residual for a term with these columns.
     fn explained(&self, term: OmittedTerm, mut columns: DMatrix<f64>) -> Option<Explained> {
         remove(&self.linear.transients, &mut columns);
-        let by_parameters = self.linear.basis.tr_mul(&columns);
+        let by_parameters = self.linear.effect_of(&columns);
         let beyond = &columns - &self.linear.basis * &by_parameters;
         let kept: Vec<usize> = (0..columns.ncols())
             .filter(|at| {
@@ -108,19 +107,21 @@ impl PartsOfFit<'_> {
         if kept.is_empty() {
             return None;
         }
-        let mut covariance = match self.responses {
+        let covariance = match self.responses {
             Some(records) => covariance_of_errors(records, self.data.dof(), &beyond).0,
-            None => beyond.tr_mul(&beyond),
+            None => self.linear.covariance_of_products(&beyond),
         };
-        if let Some(responses) = &self.linear.responses {
-            covariance += scatter(self.data, responses, &beyond);
-        }
         let scores = beyond.tr_mul(&self.linear.residual);
         let (inverse, rank) = pseudo_inverse(&covariance)?;
-        let squares = scores.dot(&(inverse * &scores));
+        let squares = scores.dot(&(&inverse * &scores));
         let (level, of_level) = self.level(squares, rank)?;
         let law = FisherSnedecor::new(rank as f64, of_level).ok()?;
-        let (solve, _) = pseudo_inverse(&beyond.tr_mul(&beyond))?;
+        // The residual without the errors of pulses is that of generalised least squares.
+        let solve = if self.linear.is_without_pulses() {
+            inverse
+        } else {
+            pseudo_inverse(&beyond.tr_mul(&beyond))?.0
+        };
         let to_parameters = -&self.linear.root * by_parameters * solve;
         let changes = &to_parameters * scores;
         Some(Explained {

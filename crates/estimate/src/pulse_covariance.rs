@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, Dyn};
 use rayon::prelude::*;
 
-use super::limits::PULSE_SUMS;
+use crate::limits::PULSE_SUMS;
 
 /// Covariance I + P Pᵀ of the weighted errors of a record, with the weighted effects P of the
 /// amplitudes of its pulse errors in blocks of rows.
@@ -11,16 +11,16 @@ use super::limits::PULSE_SUMS;
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 2.1.4 (formula of Sherman,
 /// Morrison and Woodbury).
-pub(super) struct PulseCovariance {
+pub(crate) struct PulseCovariance {
     /// Rows of P.
-    pub(super) effects: Vec<DMatrix<f64>>,
+    pub(crate) effects: Vec<DMatrix<f64>>,
     /// Factor of I + PᵀP.
     factor: Cholesky<f64, Dyn>,
 }
 
 impl PulseCovariance {
     /// Factors I + PᵀP; `None` if an effect is not finite or there is no block.
-    pub(super) fn new(effects: Vec<DMatrix<f64>>) -> Option<Self> {
+    pub(crate) fn new(effects: Vec<DMatrix<f64>>) -> Option<Self> {
         let count = effects.first()?.ncols();
         let products: Vec<_> = effects
             .par_chunks(effects.len().div_ceil(PULSE_SUMS))
@@ -39,7 +39,7 @@ impl PulseCovariance {
     /// Replaces the columns v of a matrix, in blocks of rows, by v − P b with (I + PᵀP) b = Pᵀv,
     /// and returns b. With b as further rows, the products of two such columns are those of the
     /// columns before with the inverse of the covariance.
-    pub(super) fn whiten(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
+    pub(crate) fn whiten(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
         let columns = parts.first().map_or(0, |part| part.ncols());
         let pairs = self.effects.par_iter().zip(parts.par_iter());
         let products: Vec<_> = pairs.map(|(effects, part)| effects.tr_mul(&**part)).collect();
@@ -53,13 +53,13 @@ impl PulseCovariance {
 
     /// Returns Vᵀ(I + PᵀP)⁻¹V for V = Pᵀv, the part of the products vᵀv that the errors of the
     /// pulses explain.
-    pub(super) fn explained(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn explained(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
         products.tr_mul(&self.factor.solve(products))
     }
 
     /// Returns the blocks of rows of X with X Xᵀ = P (I + PᵀP)⁻¹Pᵀ: for errors v the covariance of
     /// v − P b is I − X Xᵀ. `None` if a factor is singular.
-    pub(super) fn explained_columns(&self) -> Option<Vec<DMatrix<f64>>> {
+    pub(crate) fn explained_columns(&self) -> Option<Vec<DMatrix<f64>>> {
         let lower = self.factor.l();
         let columns = |effects: &DMatrix<f64>| {
             Some(lower.solve_lower_triangular(&effects.transpose())?.transpose())
@@ -69,12 +69,12 @@ impl PulseCovariance {
 
     /// Returns the number of amplitudes that the lines determine, each counted by the share of the
     /// information about it that they have.
-    pub(super) fn determined(&self) -> f64 {
+    pub(crate) fn determined(&self) -> f64 {
         self.factor.l_dirty().nrows() as f64 - self.factor.inverse().trace()
     }
 
     /// Returns the logarithm of the determinant of the covariance.
-    pub(super) fn log_determinant(&self) -> f64 {
+    pub(crate) fn log_determinant(&self) -> f64 {
         2.0 * self.factor.l_dirty().diagonal().iter().map(|root| root.ln()).sum::<f64>()
     }
 }
