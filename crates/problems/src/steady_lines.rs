@@ -55,6 +55,22 @@ pub fn displacements(
     displacements
 }
 
+/// Responses D(ω)⁻¹ F, lines × degrees of freedom, of M, C and K to forces, by dense elimination
+/// line by line, which does not use the receptance of a model.
+pub fn eliminated(
+    [m, c, k]: [&DMatrix<f64>; 3],
+    omega: &[f64],
+    forces: &ComplexMatrix,
+) -> ComplexMatrix {
+    let mut all = DMatrix::zeros(omega.len(), m.nrows());
+    for (row, w) in omega.iter().enumerate() {
+        let dynamic = k.zip_zip_map(c, m, |k, c, m| Complex::new(k - w * w * m, w * c));
+        let load: DVector<Complex<f64>> = forces.row(row).transpose();
+        all.row_mut(row).copy_from(&dynamic.lu().solve(&load).unwrap().transpose());
+    }
+    all
+}
+
 /// Record with samples Σ Re(h A_n exp(i n ω0 t)), summed term by term; A_n are displacement
 /// amplitudes, and the factor h converts them into the given quantity.
 ///

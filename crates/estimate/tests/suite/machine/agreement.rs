@@ -12,11 +12,12 @@ use mechid_model::elements::{
 };
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::RandomTest;
+use mechid_problems::steady_lines::eliminated;
 use mechid_signal::{NoiseLevel, lines, noise};
 use mechid_spectra::{FrequencyData, LineData, LineNoise, NoiseSpectrum, Transient};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
-use super::generator::{complex_noise, random_phases, responses};
+use super::generator::{complex_noise, random_phases};
 
 /// Two degrees of freedom, nothing symmetric.
 fn truth() -> [DMatrix<f64>; 3] {
@@ -89,7 +90,7 @@ fn both(force_noise: f64, seed: u64) -> (FrequencyData, LineData) {
     let lines = omega.len();
     let exact = random_phases(lines, 2, seed) * Complex::from(100.0);
     let [m, c, k] = truth();
-    let all = responses([&m, &c, &k], &omega, &exact);
+    let all = eliminated([&m, &c, &k], &omega, &exact);
     let level = 0.001 * all.norm() / ((2 * lines) as f64).sqrt();
     let noise = complex_noise(lines, 4, seed + 500);
     let outputs = &all + noise.columns(0, 2) * Complex::from(level);

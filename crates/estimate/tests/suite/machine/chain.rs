@@ -6,11 +6,12 @@ use mechid_estimate::likelihood::machine::identify_machine;
 use mechid_estimate::likelihood::{LikelihoodEstimate, NoiseSource, Settings};
 use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_problems::steady_lines::eliminated;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
-use super::generator::{measured, random_phases, responses};
+use super::generator::{measured, random_phases};
 use super::judge::judge;
 
 pub const MASSES: [f64; 5] = [2.0, 1.5, 1.8, 1.2, 1.0];
@@ -36,7 +37,7 @@ pub fn data(stiffnesses: &[f64; 5], seed: u64) -> LineData {
     let phases = random_phases(omega.len(), 1, 1000 + seed);
     let force = phases.clone().insert_columns(1, 4, Complex::default());
     let mass = DMatrix::from_diagonal(&MASSES.to_vec().into());
-    let all = responses([&mass, &chain(&DAMPINGS), &chain(stiffnesses)], &omega, &force);
+    let all = eliminated([&mass, &chain(&DAMPINGS), &chain(stiffnesses)], &omega, &force);
     measured(&omega, phases, all.select_columns(&[0, 4]), 0.005, seed)
 }
 
@@ -199,7 +200,7 @@ pub fn three_masses(seed: u64) -> Option<LikelihoodEstimate> {
         five.view((0, 0), (3, 3)).into_owned()
     };
     let mass = DMatrix::from_diagonal(&m.to_vec().into());
-    let all = responses([&mass, &shorter(c), &shorter(k)], &omega, &force);
+    let all = eliminated([&mass, &shorter(c), &shorter(k)], &omega, &force);
     let data = measured(&omega, phases, all.select_columns(&[0, 2]), 0.005, 5000 + seed);
     let free = |start: f64| FreeCoefficient::from_start(start).at_least(0.0);
     let mut machine = Machine::new(["x1", "x2", "x3"]);

@@ -6,9 +6,10 @@ use mechid_estimate::Unknowns;
 use mechid_estimate::likelihood::entries::{Channels, identify_entries};
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
+use mechid_problems::steady_lines::eliminated;
 use nalgebra::{Complex, DMatrix, dmatrix};
 
-use super::generator::{measured, random_phases, responses};
+use super::generator::{measured, random_phases};
 
 fn system() -> SecondOrderSystem {
     let mass = dmatrix![2.0, 0.0, 0.0; 0.0, 1.5, 0.0; 0.0, 0.0, 1.2];
@@ -35,7 +36,7 @@ fn identified(unknowns: &Unknowns, seed: u64) -> LikelihoodEstimate {
     let omega: Vec<f64> = (8..=320).map(|line| TAU * 0.125 * f64::from(line)).collect();
     let phases = random_phases(omega.len(), 1, seed);
     let force = phases.clone().insert_columns(1, 2, Complex::default());
-    let all = responses([exact.mass(), exact.damping(), exact.stiffness()], &omega, &force);
+    let all = eliminated([exact.mass(), exact.damping(), exact.stiffness()], &omega, &force);
     let quantity = ResponseQuantity::Acceleration;
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
         all[(row, 2 * at)] * quantity.per_displacement(omega[row])

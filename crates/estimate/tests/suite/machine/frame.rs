@@ -6,10 +6,11 @@ use mechid_estimate::likelihood::machine::identify_machine;
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
 use mechid_model::ResponseQuantity::Acceleration;
 use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
+use mechid_problems::steady_lines::eliminated;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix, dmatrix};
 
-use super::generator::{measured, random_phases, responses};
+use super::generator::{measured, random_phases};
 use super::judge::judge;
 
 const MASSES: [f64; 2] = [120.0, 100.0];
@@ -28,7 +29,7 @@ fn data(is_relative: [bool; 2], delay: f64, seed: u64) -> LineData {
     let mass = dmatrix![MASSES[0], 0.0; 0.0, MASSES[1]];
     // Relative motion z under −M ι a, and x = z + x_g.
     let force = DMatrix::from_fn(omega.len(), 2, |row, at| -ground[(row, 0)] * MASSES[at]);
-    let relative = responses([&mass, &shear(DAMPINGS), &shear(STIFFNESSES)], &omega, &force);
+    let relative = eliminated([&mass, &shear(DAMPINGS), &shear(STIFFNESSES)], &omega, &force);
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
         let of_relative = relative[(row, at)] * -omega[row] * omega[row];
         let of_ground = if is_relative[at] { Complex::default() } else { ground[(row, 0)] };

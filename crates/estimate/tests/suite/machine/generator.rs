@@ -1,4 +1,4 @@
-//! Exact responses by dense elimination line by line, with noise.
+//! Forces and noise of lines whose exact responses come from dense elimination.
 
 use mechid_signal::{Sampling, noise};
 use mechid_spectra::{LineData, LineNoise, Transient};
@@ -16,21 +16,6 @@ pub fn complex_noise(rows: usize, columns: usize, seed: u64) -> DMatrix<Complex<
 /// Inputs of unit size with random phases, lines × q.
 pub fn random_phases(lines: usize, inputs: usize, seed: u64) -> DMatrix<Complex<f64>> {
     complex_noise(lines, inputs, seed).map(|z| z / z.norm())
-}
-
-/// Responses D(ω)⁻¹ F, lines × n, of forces lines × n.
-pub fn responses(
-    [m, c, k]: [&DMatrix<f64>; 3],
-    omega: &[f64],
-    force: &DMatrix<Complex<f64>>,
-) -> DMatrix<Complex<f64>> {
-    let mut all = DMatrix::zeros(omega.len(), m.nrows());
-    for (row, w) in omega.iter().enumerate() {
-        let dynamic = k.zip_zip_map(c, m, |k, c, m| Complex::new(k - w * w * m, w * c));
-        let load: DVector<Complex<f64>> = force.row(row).transpose();
-        all.row_mut(row).copy_from(&dynamic.lu().solve(&load).unwrap().transpose());
-    }
-    all
 }
 
 /// Outputs with noise of a share of their root mean square, and data that state its covariance.

@@ -6,10 +6,11 @@ use mechid_estimate::likelihood::machine::{MeasuredReceptance, identify_joined};
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
 use mechid_model::ResponseQuantity;
 use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
+use mechid_problems::steady_lines::eliminated;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
 
-use super::generator::{complex_noise, measured, random_phases, responses};
+use super::generator::{complex_noise, measured, random_phases};
 use super::judge::judge;
 
 const STIFFNESS: f64 = 5e6;
@@ -74,7 +75,7 @@ fn parts(omega: &[f64], seed: u64) -> MeasuredReceptance {
     for (column, dof) in ends.into_iter().enumerate() {
         let mut force = DMatrix::zeros(omega.len(), 2 * n);
         force.column_mut(dof).fill(Complex::new(1.0, 0.0));
-        let all = responses([&m, &c, &k], omega, &force);
+        let all = eliminated([&m, &c, &k], omega, &force);
         for (row, table) in receptance.iter_mut().enumerate() {
             for (at, end) in ends.into_iter().enumerate() {
                 table[(at, column)] = all[(row, end)];
@@ -98,7 +99,7 @@ pub fn fit(seed: u64) -> Option<LikelihoodEstimate> {
     let mut forces = DMatrix::zeros(omega.len(), 2 * n);
     forces.column_mut(0).copy_from(&force.column(0));
     let [m, c, k] = whole(true);
-    let outputs = responses([&m, &c, &k], &omega, &forces).select_columns(&[0, 2 * n - 2]);
+    let outputs = eliminated([&m, &c, &k], &omega, &forces).select_columns(&[0, 2 * n - 2]);
     let data: LineData = measured(&omega, force, outputs, 0.002, 7000 + seed);
     let free = |start: f64| FreeCoefficient::from_start(start).at_least(0.0);
     let mut machine = Machine::new(["a1", "a9", "b1", "b9"])

@@ -13,10 +13,11 @@ use mechid_model::ResponseQuantity::{Acceleration, Displacement};
 use mechid_model::elements::{
     Element, FreeCoefficient, Input, Instruments, Machine, MachineError, Sensor,
 };
+use mechid_problems::steady_lines::eliminated;
 use mechid_spectra::{LineData, LineNoise, Transient};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
-use super::generator::{complex_noise, measured, random_phases, responses};
+use super::generator::{complex_noise, measured, random_phases};
 
 fn free(start: f64) -> FreeCoefficient {
     FreeCoefficient::from_start(start).at_least(0.0)
@@ -56,7 +57,7 @@ fn a_frame_on_a_shake_table() {
     let mass = dmatrix![m[0], 0.0; 0.0, m[1]];
     // Relative motion z under −M ι a, and x = z + x_g.
     let force = DMatrix::from_fn(omega.len(), 2, |row, at| -ground[(row, 0)] * m[at]);
-    let relative = responses([&mass, &damping, &stiffness], &omega, &force);
+    let relative = eliminated([&mass, &damping, &stiffness], &omega, &force);
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
         let of_relative = relative[(row, at)] * -omega[row] * omega[row];
         if at == 0 { of_relative } else { of_relative + ground[(row, 0)] }
@@ -90,7 +91,7 @@ fn oscillator(damping: f64, seed: u64) -> LineData {
     let omega = omega(10..=110, 0.25);
     let force = random_phases(omega.len(), 1, seed);
     let [m, c, k] = [dmatrix![2.0], dmatrix![damping], dmatrix![2e4]];
-    let all = responses([&m, &c, &k], &omega, &force);
+    let all = eliminated([&m, &c, &k], &omega, &force);
     measured(&omega, force, all, 0.02, seed)
 }
 
@@ -124,7 +125,7 @@ fn profile_intervals_of_weak_parameters_hold() {
         let [m, c, k] = [dmatrix![2.0], dmatrix![5.0], dmatrix![2e4]];
         // Far below the resonance the damper has little effect.
         let data =
-            measured(&omega, force.clone(), responses([&m, &c, &k], &omega, &force), 0.06, seed);
+            measured(&omega, force.clone(), eliminated([&m, &c, &k], &omega, &force), 0.06, seed);
         let estimate = identified(&data, &machine, &instruments);
         let damper = estimate.parameter("foot.c").unwrap();
         profiles += usize::from(damper.interval_kind != IntervalKind::Wald);
@@ -231,7 +232,7 @@ fn a_joint_between_two_measured_parts() {
     for (column, dof) in ends.into_iter().enumerate() {
         let mut force = DMatrix::zeros(omega.len(), 8);
         force.column_mut(dof).fill(Complex::new(1.0, 0.0));
-        let all = responses([&m, &c, &k], &omega, &force);
+        let all = eliminated([&m, &c, &k], &omega, &force);
         for (row, table) in receptance.iter_mut().enumerate() {
             for (at, end) in ends.into_iter().enumerate() {
                 table[(at, column)] = all[(row, end)];
@@ -248,7 +249,7 @@ fn a_joint_between_two_measured_parts() {
     let mut forces = DMatrix::zeros(omega.len(), 8);
     forces.column_mut(0).copy_from(&force.column(0));
     let [m, c, k] = whole(true);
-    let outputs = responses([&m, &c, &k], &omega, &forces).select_columns(&[0, 7]);
+    let outputs = eliminated([&m, &c, &k], &omega, &forces).select_columns(&[0, 7]);
     let data = measured(&omega, force, outputs, 0.002, 8);
     let mut machine = Machine::new(["a1", "a4", "b1", "b4"])
         .with("joint", Element::spring_damper(["a4", "b1"], free(2e4), free(5.0)));
@@ -336,7 +337,7 @@ fn noisy_forces_are_allowed_for() {
     let c = dmatrix![12.0, -4.0; -4.0, 4.0];
     let mut forces = exact.clone().insert_columns(1, 1, Complex::default());
     forces.column_mut(0).copy_from(&exact.column(0));
-    let all = responses([&m, &c, &k], &omega, &forces);
+    let all = eliminated([&m, &c, &k], &omega, &forces);
     let machine = Machine::new(["x1", "x2"])
         .with("m1", Element::mass("x1", 2.0))
         .with("m2", Element::mass("x2", 1.5))
