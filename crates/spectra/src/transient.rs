@@ -33,6 +33,10 @@ impl<'a> TransientLoad<'a> {
         let n = self.data.dof();
         let powers = powers(self.data.omega()[row]);
         for (column, z) in self.data.transient().row(row).iter().enumerate() {
+            // The transients of all other records are zero on this line.
+            if *z == Complex::default() {
+                continue;
+            }
             for matrix in Matrix::ALL {
                 let z = z * powers[matrix as usize];
                 for (dof, force) in force.iter_mut().enumerate() {

@@ -198,11 +198,11 @@ impl Layout {
             let triangle = block.triangle(&r);
             for first in [block.lines.start, lines + block.lines.start] {
                 let part = factors.regressors.columns(first, block.lines.len());
-                let mut part = part.select_rows(&block.columns);
-                triangle.tr_solve_upper_triangular_mut(&mut part).then_some(())?;
+                let mut part = part.select_rows(&block.columns).transpose();
+                divide(&mut part, &triangle).then_some(())?;
                 let mut to = factors.regressors.columns_mut(first, block.lines.len());
-                for (row, &column) in part.row_iter().zip(&block.columns) {
-                    to.row_mut(column).copy_from(&row);
+                for (values, &column) in part.column_iter().zip(&block.columns) {
+                    to.row_mut(column).tr_copy_from(&values);
                 }
             }
         }
@@ -521,4 +521,21 @@ impl Coordinates {
             Some((block, start))
         })
     }
+}
+/// Replaces a matrix X with many rows by X R⁻¹ for an upper triangular R; returns `false` if a
+/// diagonal entry is zero. Whole columns are subtracted, which is faster than the dot products of
+/// `tr_solve_upper_triangular_mut` on the transposed matrix.
+fn divide(matrix: &mut DMatrix<f64>, triangle: &DMatrix<f64>) -> bool {
+    for at in 0..matrix.ncols() {
+        let (before, mut others) = matrix.columns_range_pair_mut(..at, at..);
+        let mut column = others.column_mut(0);
+        for (done, factor) in before.column_iter().zip(triangle.column(at).iter()) {
+            column.axpy(-factor, &done, 1.0);
+        }
+        if triangle[(at, at)] == 0.0 {
+            return false;
+        }
+        column.unscale_mut(triangle[(at, at)]);
+    }
+    true
 }
