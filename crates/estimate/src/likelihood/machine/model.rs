@@ -253,6 +253,14 @@ impl MachineModel {
     }
 }
 
+/// Adds a column times a factor to another one. It is several times as fast as the `axpy` of
+/// nalgebra, which multiplies every complex entry by two further factors.
+fn add_scaled(to: &mut [Complex<f64>], factor: Complex<f64>, column: &[Complex<f64>]) {
+    for (to, value) in to.iter_mut().zip(column) {
+        *to += factor * value;
+    }
+}
+
 impl ResponseModel for MachineModel {
     type Line<'a> = MachineLine<'a>;
 
@@ -280,7 +288,9 @@ impl ResponseModel for MachineModel {
         if j > 0 {
             let mut coupled = DMatrix::identity(j, j);
             for (row, column, value) in change.0.iter().filter(|entry| entry.1 < j) {
-                coupled.column_mut(*row).axpy(*value, &nominal.from_joints.column(*column), ONE);
+                let mut to = coupled.column_mut(*row);
+                let from = nominal.from_joints.column(*column);
+                add_scaled(to.as_mut_slice(), *value, from.as_slice());
             }
             solve_in_place(&mut coupled, &mut from_joints).then_some(())?;
             let mut reaction = DMatrix::zeros(j, load_count);
@@ -384,18 +394,17 @@ impl LineResponse for MachineLine<'_> {
             motion.rows_mut(0, count).gemv_tr(ONE, internal, states, ONE);
         }
         let assembly = &self.model.assembly;
+        let mut response = vec![Complex::default(); self.from_joints.nrows()];
         for (term, factor) in self.model.terms.iter().zip(&self.factors) {
             let source = &assembly.terms()[term.term];
             if source.is_known() {
                 continue;
             }
-            let response = self.response_to(&term.entries, &motion) * -*factor;
+            self.response_to(&term.entries, &motion, &mut response);
+            response.iter_mut().for_each(|reading| *reading *= -*factor);
             for (parameter, slope) in source.derivatives(parameters) {
-                to.column_mut(parameter).axpy(
-                    Complex::from(slope),
-                    &response,
-                    Complex::new(1.0, 0.0),
-                );
+                let mut to = to.column_mut(parameter);
+                add_scaled(to.as_mut_slice(), Complex::from(slope), &response);
             }
         }
         // A delay τ multiplies a reading y by e^{−iωτ}: ∂y/∂τ = −iω y.
@@ -417,19 +426,19 @@ impl LineResponse for MachineLine<'_> {
 }
 
 impl MachineLine<'_> {
-    /// Returns the readings for the forces of a term of unit coefficient under `motion` (j + 1).
+    /// Writes the readings for the forces of a term of unit coefficient under `motion` (j + 1).
     fn response_to(
         &self,
         entries: &JointPattern,
         motion: &DVector<Complex<f64>>,
-    ) -> DVector<Complex<f64>> {
-        let one = Complex::new(1.0, 0.0);
-        let mut response = DVector::zeros(self.from_joints.nrows());
+        response: &mut [Complex<f64>],
+    ) {
+        response.fill(Complex::default());
         match entries {
             JointPattern::Dyad { left, right } => {
                 let stretch: Complex<f64> = right.iter().map(|(at, b)| motion[*at] * *b).sum();
                 for (at, a) in left {
-                    response.axpy(stretch * *a, &self.from_joints.column(*at), one);
+                    add_scaled(response, stretch * *a, self.from_joints.column(*at).as_slice());
                 }
             }
             JointPattern::Block { dofs, matrix, support } => {
@@ -439,10 +448,9 @@ impl MachineLine<'_> {
                     let force: Complex<f64> =
                         moved.map(|(j, column)| motion[*column] * matrix[(i, j)]).sum();
                     let force = force + ground * support[i];
-                    response.axpy(force, &self.from_joints.column(*row), one);
+                    add_scaled(response, force, self.from_joints.column(*row).as_slice());
                 }
             }
         }
-        response
     }
 }
