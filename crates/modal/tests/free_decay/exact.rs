@@ -41,7 +41,7 @@ fn intervals_hold_and_the_scatter_is_that_of_the_bound() {
 #[test]
 fn noise_alone_has_no_modes() {
     for coloured in [false, true] {
-        assert_eq!(found_in_noise(2, coloured, 20), 0);
+        assert_eq!(found_in_noise(2, coloured, 12), 0);
     }
 }
 

@@ -30,7 +30,7 @@ fn compared(test: &Test, band_hz: [f64; 2]) -> PartsComparison {
 #[test]
 fn parts_of_an_unchanged_structure_agree() {
     let case = Case { unmeasured: 0.05, ..pair(8) };
-    for seed in 0..6 {
+    for seed in 0..3 {
         let compared = compared(&case.record(seed), case.band_hz);
         assert_eq!(compared.pairs.len(), 6, "{seed}");
         assert!(!compared.differ(), "{seed}: {}", compared.p_value());
