@@ -140,23 +140,25 @@ fn a_late_response_is_told_by_its_delay() {
             [force, response].map(|all| all.window(SAMPLES / 2 + 1, SAMPLES).unwrap());
         measured([force, response], seed)
     };
-    let told = |tests: &[Measurement]| {
+    let fitted = |tests: &[Measurement]| {
         let found = identify(tests, &Identify::default()).unwrap();
         let checks = found.summary().checks.iter();
         let delay = checks.filter(|check| check.subject == Subject::Delay);
-        delay.filter_map(|check| check.value).collect::<Vec<f64>>()
+        let told: Vec<f64> = delay.filter_map(|check| check.value).collect();
+        (found, told)
     };
-    for samples in [-2.0, 0.1, 3.3] {
-        for seed in 0..2 {
-            let told = told(&[late(samples, seed)]);
-            assert!(
-                matches!(told[..], [found] if (found - samples).abs() < 0.03),
-                "{samples}, seed {seed}: {told:?}"
-            );
-        }
-    }
+    let one = |samples: f64, seed: u64| {
+        let (found, told) = fitted(&[late(samples, seed)]);
+        assert!(
+            matches!(told[..], [found] if (found - samples).abs() < 0.03),
+            "{samples}, seed {seed}: {told:?}"
+        );
+        found
+    };
+    one(-2.0, 0);
+    one(0.1, 1);
     // The intervals include the change of the parameters by the delay.
-    let found = identify(&[late(3.3, 0)], &Identify::default()).unwrap();
+    let found = one(3.3, 0);
     let system = rig().system;
     let truth = [system.mass(), system.damping(), system.stiffness()];
     let truth =
@@ -165,7 +167,7 @@ fn a_late_response_is_told_by_its_delay() {
     let held = held.filter(|(p, exact)| (p.value - exact).abs() < 1.96 * p.standard_error);
     let (held, all) = (held.count(), found.estimate().parameters().len());
     assert!(10 * held >= 9 * all, "{held} of {all}: {found}");
-    let both = told(&[late(0.5, 4), late(0.5, 5)]);
+    let (_, both) = fitted(&[late(0.5, 4), late(0.5, 5)]);
     assert!(matches!(both[..], [found] if (found - 0.5).abs() < 0.02), "{both:?}");
 }
 
@@ -176,18 +178,19 @@ fn a_period_stays_one() {
         let how = Identify::spectra(Method::MaximumLikelihood);
         is_open(&identify(&[test], &how).unwrap())
     };
-    let wrong = (0..16).into_par_iter().filter(|seed| open(*seed)).count();
-    assert_eq!(wrong, 0, "of 16");
+    let wrong = (0..10).into_par_iter().filter(|seed| open(*seed)).count();
+    assert_eq!(wrong, 0, "of 10");
     // If the user states the period, the record is not taken for an open one.
     let periods = random_test(0).period(SAMPLES).unwrap();
     assert!(!is_open(&identify(&[periods], &Identify::default()).unwrap()));
 }
 
 /// Noise biases least squares, so a single period with visible noise is fitted by maximum
-/// likelihood. The test has 48 intervals of 95 %.
+/// likelihood. Of 30 intervals of 95 %, fewer than 26 contain the true value with a probability of
+/// 0.02; of 30 intervals of 80 % with one of 0.74.
 #[test]
 fn noise_on_one_period_biases_nothing() {
-    let each: Vec<(usize, bool)> = (0..16)
+    let each: Vec<(usize, bool)> = (0..10)
         .into_par_iter()
         .map(|seed| {
             let [force, response] = rig().period(seed).unwrap();
@@ -206,7 +209,7 @@ fn noise_on_one_period_biases_nothing() {
         .collect();
     let held: usize = each.iter().map(|(held, _)| held).sum();
     let warned = each.iter().filter(|(_, warned)| *warned).count();
-    assert!(held >= 42 && warned <= 1, "{held} of 48, {warned} warn");
+    assert!(held >= 26 && warned <= 1, "{held} of 30, {warned} warn");
 }
 
 #[test]
