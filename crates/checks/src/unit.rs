@@ -25,6 +25,11 @@ pub struct Unit {
     pub si: &'static str,
 }
 
+/// Returns whether a text states decibels.
+fn is_level(text: &str) -> bool {
+    text.get(..2).is_some_and(|start| start.eq_ignore_ascii_case("db"))
+}
+
 impl Check for Unit {
     fn subject(&self) -> Subject {
         Subject::Unit
@@ -52,10 +57,16 @@ impl Check for Unit {
                 "may be a unit with the factor {factor}, which was not applied; the numbers are read as \
                  {si}: state the unit (`unit`) or the factor (`scale`)"
             ),
+            (None, _) if is_level(text) => write!(
+                f,
+                "states decibels: a magnitude in a table of responses is read with a reference of 1 in \
+                 SI units unless the header has another one (\"dB re 1 g/N\"); the samples of a record \
+                 are read as {si}"
+            ),
             (None, _) => write!(
                 f,
-                "is not understood, and the numbers are read as {si}: state the unit (`unit`) or the \
-                 factor (`scale`)"
+                "is not a unit that can be converted to {si}, and the numbers are read as {si}: state \
+                 the unit (`unit`) or the factor (`scale`)"
             ),
         }
     }

@@ -206,3 +206,23 @@ fn a_time_column_with_a_factor_or_an_unknown_unit_is_asked_about() {
         assert_eq!(finding["finding"]["factor"].as_f64(), factor, "{finding}");
     }
 }
+
+/// Reference: the same record with the names in SI units.
+#[test]
+fn a_unit_of_another_quantity_in_a_name_gives_a_warning() {
+    let names = ["Force, psi", "x_mm", "velocity", "acceleration"];
+    let folder = records(names, [1.0, 1e3, 1.0, 1.0], None);
+    let how = "--force 2 --displacement 3 --period 256";
+    let (si, other) = (
+        json(folder.path(), &format!("identify si.csv {how}")),
+        json(folder.path(), &format!("identify other.csv {how}")),
+    );
+    alike("parameters", &si["parameters"], &other["parameters"]);
+    let warnings = other["checks"].as_array().unwrap().iter();
+    let warnings: Vec<&str> = warnings
+        .filter(|check| check["subject"] == "unit" && check["verdict"] == "doubtful")
+        .map(|check| check["text"].as_str().unwrap())
+        .collect();
+    let [warning] = warnings[..] else { panic!("{warnings:?}") };
+    assert!(warning.contains("\"psi\"") && warning.contains("converted to N"), "{warning}");
+}

@@ -168,6 +168,10 @@ impl Parser<'_> {
         if len == 0 {
             return (!marked).then_some(None);
         }
+        // The 1 of `g1` is the number of a point.
+        if !marked && !minus && &unsigned[..len] == "1" {
+            return None;
+        }
         let digits = format!("{}{}", if minus { "-" } else { "" }, &unsigned[..len]);
         self.rest = &unsigned[len..];
         if bracketed {

@@ -6,6 +6,7 @@ use super::expression::Expression;
 use super::notes::{
     Bracket, Note, bare_note, brackets, notes_of, read_note, unit_in_notes, without_spans,
 };
+use super::other_unit::is_numbered;
 use super::plain::{multiplier, number_and_rest, with_plain_signs};
 use super::unit_words::{unit_from_words, unit_words};
 use super::words::{is_ambiguous, split_words};
@@ -260,5 +261,7 @@ fn unit_after_stroke(name: &str) -> Option<StatedUnit> {
     }
     let (_, after) = name.split_once('/')?;
     let unit = Expression::parse(after)?;
-    unit.dimension.is_electric().then(|| StatedUnit::new(after, None, Evidence::Unused))
+    let is_other = !unit.dimension.is_number() && !is_numbered(after.trim());
+    let is_stated = unit.dimension.is_electric() || is_other;
+    is_stated.then(|| StatedUnit::new(after, Unit::parse(after), Evidence::Unused))
 }

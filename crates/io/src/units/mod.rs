@@ -3,6 +3,7 @@
 mod expression;
 mod header;
 mod notes;
+mod other_unit;
 mod plain;
 mod unit_words;
 mod vocabulary;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::expression::Expression;
 use super::header::{Evidence, StatedUnit};
 use super::notes::weight;
+use super::other_unit::{is_preposition, other_unit};
 use super::plain::{with_restored_signs, without_treatment};
 use super::words::{
     is_ambiguous, is_label, is_prefix, is_quantity_word, is_unclear, joined_unit, quantity_word,
@@ -50,25 +51,49 @@ pub(super) fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWor
         return Some(UnitWords::new(name, 0..name.len(), unit, evidence));
     }
     let words = split_words(name);
+    let quantity =
+        wanted.or_else(|| words.iter().find_map(|span| quantity_word(&name[span.clone()])));
+    let of_quantity = unit_of_quantity(name, &words, quantity);
+    let Some(wanted) = wanted else { return of_quantity };
+    let is_stated = |words: &&UnitWords| words.evidence == Evidence::Stated;
+    if of_quantity.as_ref().filter(is_stated).is_some() {
+        return of_quantity;
+    }
+    let other = other_unit(name, &words, wanted);
+    other
+        .map(|(span, unit)| UnitWords::new(name, span, unit, Evidence::Unused))
+        .or(of_quantity)
+        .or_else(|| leading_unit(name, &words, wanted))
+        .or_else(|| qualified(name, &words, wanted))
+        .or_else(|| glued(name, &words, wanted))
+        .or_else(|| unclear(name, &words))
+}
+
+/// Returns the last words after the first one that are a unit of this quantity; of any quantity
+/// without other meanings if none is given.
+fn unit_of_quantity(
+    name: &str,
+    words: &[Range<usize>],
+    quantity: Option<Quantity>,
+) -> Option<UnitWords> {
     let text_of = |span: &Range<usize>| &name[span.clone()];
-    let implied = || words.iter().find_map(|span| quantity_word(text_of(span)));
-    let quantity = wanted.or_else(implied);
     for first in (1..words.len()).rev() {
+        let before = text_of(&words[first - 1]);
         for count in (1..=MAX_WORDS.min(words.len() - first)).rev() {
             let span = words[first].start..words[first + count - 1].end;
             let parts: Vec<&str> = words[first..first + count].iter().map(text_of).collect();
-            let Some(unit) = joined_unit(&parts) else { continue };
-            if quantity.is_some_and(|quantity| unit.quantity != quantity) {
-                continue;
-            }
+            let fits = |unit: &Unit| quantity.is_none_or(|quantity| unit.quantity == quantity);
+            let Some(unit) = joined_unit(&parts).filter(fits) else { continue };
             // The words of `milli-g` are one unit.
-            if is_prefix(text_of(&words[first - 1])) {
+            if is_prefix(before) {
                 continue;
             }
-            let is_short = parts.len() == 1 && is_ambiguous(parts[0]);
+            let after = &words[first + count..];
+            // The last word of `x in in` can only be a unit.
+            let follows_in = after.is_empty() && first > 1 && is_preposition(before);
+            let is_short = parts.len() == 1 && is_ambiguous(parts[0]) && !follows_in;
             let named =
                 words[..first].iter().any(|word| is_quantity_word(text_of(word), unit.quantity));
-            let after = &words[first + count..];
             // `in` before other words is a preposition.
             let labels = after.iter().all(|word| is_label(text_of(word)))
                 && (after.is_empty() || !parts[0].eq_ignore_ascii_case("in"));
@@ -80,12 +105,7 @@ pub(super) fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWor
             return Some(UnitWords::new(name, span, unit, evidence));
         }
     }
-    wanted.and_then(|wanted| {
-        leading_unit(name, &words, wanted)
-            .or_else(|| qualified(name, &words, wanted))
-            .or_else(|| glued(name, &words, wanted))
-            .or_else(|| unclear(name, &words))
-    })
+    None
 }
 
 /// Reads a unit before the name: `lbf: Hammer`, `mm displacement`. It is used if it has no other

@@ -19,16 +19,22 @@ impl Dimension {
     pub const FREQUENCY: Self = Self([0, -1, 0, 0, 0, 0]);
     pub const FORCE: Self = Self([0, 0, 1, 0, 0, 0]);
     pub const MASS: Self = Self([-1, 2, 1, 0, 0, 0]);
-    const MOMENT: Self = Self([1, 0, 1, 0, 0, 0]);
+    pub const MOMENT: Self = Self([1, 0, 1, 0, 0, 0]);
     const PRESSURE: Self = Self([-2, 0, 1, 0, 0, 0]);
     const VOLTAGE: Self = Self([0, 0, 0, 1, 0, 0]);
     const CHARGE: Self = Self([0, 0, 0, 0, 1, 0]);
+    const CURRENT: Self = Self([0, -1, 0, 0, 1, 0]);
     const COUNT: Self = Self([0, 0, 0, 0, 0, 1]);
 
     /// Returns whether the numbers are the output of a converter or an amplifier: voltage, charge
     /// or counts.
     pub fn is_electric(self) -> bool {
         self.0[3..].iter().any(|exponent| *exponent != 0)
+    }
+
+    /// Returns whether this is the dimension of an angle, a strain or another pure number.
+    pub fn is_number(self) -> bool {
+        self == Self::NONE
     }
 
     /// Returns the dimension of a product of two powers.
@@ -39,6 +45,11 @@ impl Dimension {
         }
         Some(product)
     }
+}
+
+/// Returns whether a word is a spelling of a unit, in its usual case.
+pub(super) fn is_spelling(word: &str) -> bool {
+    VOCABULARY.iter().any(|entry| entry.spellings.contains(&word))
 }
 
 /// Unit and its spellings.
@@ -74,9 +85,14 @@ pub(super) const VOCABULARY: &[Entry] = &[
     entry(&["N", "newton", "newtons"], D::FORCE, 1.0),
     entry(&["µN", "uN"], D::FORCE, 1e-6),
     entry(&["mN", "millinewton", "millinewtons"], D::FORCE, 1e-3),
-    entry(&["daN", "decanewton"], D::FORCE, 10.0),
+    entry(&["nN", "nanonewton", "nanonewtons"], D::FORCE, 1e-9),
+    entry(&["cN", "centinewton", "centinewtons"], D::FORCE, 1e-2),
+    entry(&["dN", "decinewton", "decinewtons"], D::FORCE, 0.1),
+    entry(&["daN", "decanewton", "decanewtons"], D::FORCE, 10.0),
+    entry(&["hN", "hectonewton", "hectonewtons"], D::FORCE, 100.0),
     entry(&["kN", "kilonewton", "kilonewtons"], D::FORCE, 1e3),
     entry(&["MN", "meganewton", "meganewtons"], D::FORCE, 1e6),
+    entry(&["GN", "giganewton", "giganewtons"], D::FORCE, 1e9),
     entry(&["dyn", "dyne", "dynes"], D::FORCE, 1e-5),
     entry(&["gf", "gramf", "pond"], D::FORCE, 1e-3 * G),
     entry(
@@ -328,16 +344,27 @@ pub(super) const VOCABULARY: &[Entry] = &[
     ),
     entry(&["tonne", "tonnes"], D::MASS, 1e3),
     // No force and no response has these units: a column in one of them is never read silently.
-    entry(&["Nm"], D::MOMENT, 1.0),
+    entry(&["Nm", "newtonmeter", "newtonmetre"], D::MOMENT, 1.0),
+    entry(&["mNm", "Nmm"], D::MOMENT, 1e-3),
+    entry(&["cNm", "Ncm"], D::MOMENT, 1e-2),
+    entry(&["kNm"], D::MOMENT, 1e3),
+    entry(&["MNm"], D::MOMENT, 1e6),
+    entry(&["lbft", "ftlb", "ftlbf", "lbfft", "ftlbs"], D::MOMENT, 12.0 * INCH * POUND),
+    entry(&["lbin", "inlb", "inlbf", "lbfin", "inlbs"], D::MOMENT, INCH * POUND),
     entry(&["Pa", "pascal"], D::PRESSURE, 1.0),
+    entry(&["hPa", "mbar"], D::PRESSURE, 100.0),
     entry(&["kPa"], D::PRESSURE, 1e3),
     entry(&["MPa"], D::PRESSURE, 1e6),
+    entry(&["GPa"], D::PRESSURE, 1e9),
     entry(&["bar"], D::PRESSURE, 1e5),
-    entry(&["psi"], D::PRESSURE, POUND / (INCH * INCH)),
+    entry(&["psi", "psig", "psia"], D::PRESSURE, POUND / (INCH * INCH)),
+    entry(&["ksi"], D::PRESSURE, 1e3 * POUND / (INCH * INCH)),
     entry(&["V", "volt", "volts", "vdc"], D::VOLTAGE, 1.0),
     entry(&["mV", "millivolt", "millivolts", "mvolt"], D::VOLTAGE, 1e-3),
     entry(&["µV", "uV", "microvolt", "microvolts"], D::VOLTAGE, 1e-6),
     entry(&["kV"], D::VOLTAGE, 1e3),
+    // A sensor with an output of 4 to 20 mA.
+    entry(&["mA", "milliamp", "milliamps", "milliampere"], D::CURRENT, 1e-3),
     entry(&["C", "coulomb"], D::CHARGE, 1.0),
     entry(&["nC"], D::CHARGE, 1e-9),
     entry(&["pC"], D::CHARGE, 1e-12),
@@ -346,4 +373,6 @@ pub(super) const VOCABULARY: &[Entry] = &[
         D::COUNT,
         1.0,
     ),
+    // A strain gauge has its own kind of counts.
+    entry(&["µε", "uε", "ustrain", "µstrain", "microstrain", "microstrains"], D::COUNT, 1e-6),
 ];

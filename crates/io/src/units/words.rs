@@ -284,7 +284,8 @@ pub(super) fn is_ambiguous(unit: &str) -> bool {
 }
 
 /// Words that are units without a single size, or no size: tons of three kinds, decibels.
-const UNCLEAR: &[&str] = &["ton", "tons", "tn", "db", "percent", "%", "%fs"];
+const UNCLEAR: &[&str] =
+    &["ton", "tons", "tn", "db", "dba", "dbv", "dbu", "dbm", "dbfs", "percent", "%", "%fs", "‰"];
 
 /// Returns whether a word is a unit whose size it does not determine.
 pub(super) fn is_unclear(word: &str) -> bool {

@@ -426,7 +426,7 @@ fn the_word_in_before_a_unit_is_no_inch() {
         assert!((unit.in_si / factor - 1.0).abs() < 1e-12, "{name}");
     }
     // A unit that is not known.
-    let stated = stated_unit("F (in cN)", "", Some(Quantity::Force)).unwrap();
+    let stated = stated_unit("F (in stone)", "", Some(Quantity::Force)).unwrap();
     assert_eq!((stated.evidence, stated.unit), (Evidence::Unused, None));
 }
 
@@ -464,5 +464,205 @@ fn units_that_contradict_each_other_are_reported() {
     ] {
         let stated = stated_unit(name, unit, Some(quantity)).unwrap_or_else(|| panic!("{name}"));
         assert_eq!(stated.evidence, Evidence::Stated, "{name}, {unit}: {stated:?}");
+    }
+}
+
+/// Answer to a header outside brackets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Answer {
+    /// The numbers are multiplied by the factor, without a finding.
+    Factor(f64),
+    /// A finding names this text; the numbers are read in SI units.
+    Finding,
+    /// No unit and no finding.
+    Nothing,
+}
+
+/// Word for a quantity, and units with the right answers.
+type Expected = (&'static str, Quantity, &'static [(&'static str, Answer)]);
+
+const FINDING: Answer = Answer::Finding;
+
+/// Words for the quantities, with units and the right answers.
+const LAST_WORDS: [Expected; 4] = [
+    (
+        "Force",
+        Quantity::Force,
+        &[
+            ("cN", Answer::Factor(0.01)),
+            ("lbf", Answer::Factor(POUND)),
+            ("Nm", FINDING),
+            ("kNm", FINDING),
+            ("psi", FINDING),
+            ("MPa", FINDING),
+            ("mm", FINDING),
+            ("m/s²", FINDING),
+            ("mV", FINDING),
+            ("mA", FINDING),
+            ("%", FINDING),
+        ],
+    ),
+    (
+        "x",
+        Quantity::DISPLACEMENT,
+        &[
+            ("mm", Answer::Factor(1e-3)),
+            ("micron", Answer::Factor(1e-6)),
+            ("kN", FINDING),
+            ("mm/s", FINDING),
+            ("deg", FINDING),
+            ("microstrain", FINDING),
+        ],
+    ),
+    (
+        "vel",
+        Quantity::VELOCITY,
+        &[("in/s", Answer::Factor(0.0254)), ("rpm", FINDING), ("rad/s", FINDING), ("mm", FINDING)],
+    ),
+    (
+        "Acc",
+        Quantity::ACCELERATION,
+        &[
+            ("mg", Answer::Factor(1e-3 * G)),
+            ("g", Answer::Factor(G)),
+            ("ips", FINDING),
+            ("deg/s^2", FINDING),
+            ("kN", FINDING),
+        ],
+    ),
+];
+
+fn answer(name: &str, quantity: Quantity) -> Answer {
+    match stated_unit(name, "", Some(quantity)) {
+        None => Answer::Nothing,
+        Some(stated) => match (stated.evidence, stated.used()) {
+            (Evidence::Stated, Some(unit)) if unit.quantity == quantity => {
+                Answer::Factor(unit.in_si)
+            }
+            (Evidence::Unused, None) => Answer::Finding,
+            other => panic!("{name}: {other:?}"),
+        },
+    }
+}
+
+/// Judge: the definitions of the units, and what a person would read. A unit of the column after a
+/// mark is taken; one of another quantity is reported.
+#[test]
+fn last_words_that_are_units_are_taken_or_reported() {
+    const STYLES: [&str; 8] =
+        ["W, U", "W in U", "W - U", "W / U", "W: U", "W_U", "W = U", "W en U"];
+    let mut count = 0;
+    for (word, quantity, units) in LAST_WORDS {
+        for (unit, right) in units {
+            for style in STYLES {
+                let name = header(style, word, unit);
+                // After a stroke the unit is that of the numbers, and a wrong one is refused.
+                let stated = stated_unit(&name, "", Some(quantity));
+                let refused = stated.as_ref().and_then(|stated| stated.used());
+                if style == "W / U" && refused.is_some_and(|unit| unit.quantity != quantity) {
+                    assert_eq!(*right, FINDING, "{name}");
+                    continue;
+                }
+                match (answer(&name, quantity), right) {
+                    (Answer::Factor(factor), Answer::Factor(right)) => {
+                        assert!((factor / right - 1.0).abs() < 1e-12, "{name}: {factor}");
+                    }
+                    (answer, right) => assert_eq!(answer, *right, "{name}"),
+                }
+                count += 1;
+            }
+        }
+    }
+    assert!(count >= 200, "{count}");
+}
+
+/// Names of forces that end with a place, a channel, a treatment or a condition.
+const FORCES: [&str; 40] = [
+    "F in",
+    "in_1",
+    "m1",
+    "N1",
+    "A",
+    "F-X",
+    "F_A",
+    "F_t",
+    "F_max",
+    "F_min",
+    "force_in",
+    "force_out",
+    "F_rev",
+    "F_bar",
+    "force_bar",
+    "Force bar",
+    "Force in bar 3",
+    "force_std",
+    "force_ss",
+    "F_mg",
+    "F_MS",
+    "F_m2",
+    "F/m2",
+    "F_N1",
+    "F_d",
+    "F_h",
+    "Force at point A",
+    "Force in Z",
+    "Force in direction X",
+    "Force en point A",
+    "Force, left",
+    "Force - left",
+    "Force: 3",
+    "Force in test",
+    "hits per s",
+    "gain per mm",
+    "force_grav",
+    "force second",
+    "force day 2",
+    "F, mean",
+];
+
+/// Names of responses of the same kinds.
+const RESPONSES: [&str; 30] = [
+    "x/y",
+    "acc_g1",
+    "x_psi",
+    "x_bar",
+    "Acc, V",
+    "Acc, H",
+    "Acc - V",
+    "acc, rad",
+    "acc_rad",
+    "acc_foot",
+    "acc_PA",
+    "acc_lb",
+    "acc 50 Hz",
+    "acc_50Hz",
+    "acc at 50 Hz",
+    "acc_ms",
+    "x_min",
+    "x_h",
+    "x_c",
+    "rod_end",
+    "disp 10 kN",
+    "x_N",
+    "disp_C",
+    "a_rms",
+    "acc_kp",
+    "x_day",
+    "acc, left",
+    "acc_2",
+    "x: 12+Z",
+    "sensor A",
+];
+
+/// Judge: what a person would read. The names are of places, channels, treatments and conditions.
+#[test]
+fn last_words_that_are_no_units_are_not_reported() {
+    let columns = FORCES.map(|name| (name, Quantity::Force)).into_iter();
+    let of_response = |name: &'static str| {
+        let is_acceleration = name.starts_with(['a', 'A']);
+        (name, if is_acceleration { Quantity::ACCELERATION } else { Quantity::DISPLACEMENT })
+    };
+    for (name, quantity) in columns.chain(RESPONSES.map(of_response)) {
+        assert_eq!(answer(name, quantity), Answer::Nothing, "{name}");
     }
 }
