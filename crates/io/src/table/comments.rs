@@ -2,16 +2,22 @@
 
 use std::ops::RangeInclusive;
 
+use mechid_signal::message;
+
 use super::delimiter::{Delimiter, is_comment};
 use super::dialect::is_data;
 use super::fields::{Fields, Layout};
 use super::heading::are_units;
 use super::rows::text_of;
-use crate::units::{is_named_quantity, unit_text};
+use crate::escaped;
+use crate::units::{is_named_quantity, is_unit, unit_text};
 
 /// Maximum number of lines above a table that are searched for names and units; names further up
 /// are not read.
 const MOST_LINES: usize = 64;
+
+/// Signs at the beginning of a comment.
+const COMMENT_SIGNS: [char; 6] = ['#', '%', '!', ';', ' ', '\t'];
 
 /// Words, in lower case, before the names in a comment; a colon or an equals sign follows them.
 const NAMES: [&str; 6] = ["columns", "column names", "channels", "fields", "names", "spalten"];
@@ -23,6 +29,17 @@ const UNITS: [&str; 6] = ["units", "unit", "einheiten", "einheit", "unités", "u
 #[derive(Debug, Default)]
 pub(super) struct Comments {
     lines: Vec<CommentLine>,
+    /// Comments with names or units whose number is not that of the columns, the nearest first.
+    unfitting: Vec<Unfitting>,
+}
+
+/// Comment with names or units whose number is not that of the columns.
+#[derive(Debug)]
+struct Unfitting {
+    text: String,
+    fields: usize,
+    /// `true` if the fields are units.
+    has_units: bool,
 }
 
 /// Comment line with one field per column.
@@ -49,6 +66,9 @@ impl Comments {
                 continue;
             }
             let fitting = CommentLine::new(&text, &widths, layout, is_adjacent);
+            if fitting.is_none() {
+                comments.unfitting.extend(Unfitting::new(&text, layout, is_adjacent));
+            }
             is_adjacent &= fitting.as_ref().is_some_and(|line| line.are_units);
             comments.lines.extend(fitting);
         }
@@ -79,6 +99,21 @@ impl Comments {
         others.map(|(_, line)| units_of(&line.fields, line.are_units))
     }
 
+    /// Returns remarks on the comments with names or units that were not read, because their number
+    /// is not that of the `columns`; if the columns have names from elsewhere, only on units.
+    pub fn remarks(&self, columns: usize, has_names: bool) -> impl Iterator<Item = String> {
+        let unread = self.unfitting.iter().filter(move |line| line.has_units || !has_names);
+        unread.map(move |Unfitting { text, fields, has_units }| {
+            let what = if *has_units { "names or units" } else { "names" };
+            format!(
+                "not read: the comment \"{}\" has {fields} fields and the table {}: if they are {what} of \
+                 columns, give each column one (units also with `unit`)",
+                escaped(text),
+                message::count(columns, "column")
+            )
+        })
+    }
+
     /// Returns the index of the nearest line of units.
     pub fn units_line(&self) -> Option<usize> {
         self.lines.iter().position(|line| line.are_units)
@@ -91,6 +126,31 @@ pub(super) fn units_of(fields: &[String], are_units: bool) -> Vec<String> {
     fields.iter().map(unit).collect()
 }
 
+impl Unfitting {
+    /// Detects names or units in a comment whose number of fields is not that of the columns: a
+    /// word says so, at least half of the fields have a unit or the name of a quantity, or the
+    /// comment directly above the table has only single words between delimiters.
+    fn new(comment: &str, layout: Layout, is_adjacent: bool) -> Option<Self> {
+        let text = comment.trim_start_matches(COMMENT_SIGNS);
+        let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
+        let stated = names.or(units);
+        if stated.is_none() && !is_adjacent {
+            return None;
+        }
+        let any = 2..=usize::MAX;
+        let (fields, by_blanks) = fields_of(stated.unwrap_or(text), &any, layout)?;
+        let count = |is: &dyn Fn(&str) -> bool| fields.iter().filter(|field| is(field)).count();
+        let with_units = count(&|field| !unit_text(field).is_empty() || is_unit(field));
+        let named = count(&|field| is_named_quantity(field) || is_unit(field));
+        let are_words = fields.iter().all(|field| !field.contains(char::is_whitespace));
+        let is_table = 2 * named >= fields.len() || are_words;
+        let is_stated = stated.is_some() || is_table && !by_blanks;
+        let has_units = units.is_some() || 2 * with_units >= fields.len();
+        let fields = fields.len();
+        is_stated.then(|| Self { text: text.trim().into(), fields, has_units })
+    }
+}
+
 impl CommentLine {
     fn new(
         comment: &str,
@@ -98,7 +158,7 @@ impl CommentLine {
         layout: Layout,
         is_adjacent: bool,
     ) -> Option<Self> {
-        let text = comment.trim_start_matches(['#', '%', '!', ';', ' ', '\t']);
+        let text = comment.trim_start_matches(COMMENT_SIGNS);
         let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
         let (fields, by_blanks) = fields_of(names.or(units).unwrap_or(text), widths, layout)?;
         // Words of a sentence may be units, too: `sampled in s`.

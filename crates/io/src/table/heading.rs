@@ -20,6 +20,8 @@ pub(super) struct Above {
     /// Further units of the columns, in comments and in other rows: one text per column in each,
     /// empty for a column without a unit.
     pub further_units: Vec<Vec<String>>,
+    /// Remarks on comments that were not read.
+    pub remarks: Vec<String>,
 }
 
 /// Names and units above the rows of numbers.
@@ -115,11 +117,13 @@ impl Above {
             .filter(|_| are_numeric || !above.is_empty());
         let comment = names.as_ref().and_then(|names| names.comment);
         let mut further_units: Vec<Vec<String>> = comments.units(comment).collect();
+        let has_names = names.is_some() || !above.is_empty();
+        let remarks = comments.remarks(filled.first, has_names).collect();
         let heading = names.map(|Names { names, units, row, further_units: of_rows, .. }| {
             further_units.extend(of_rows);
             Heading { names, units, begin, names_row: row, filled: filled.first }
         });
-        Self { heading, further_units }
+        Self { heading, further_units, remarks }
     }
 }
 

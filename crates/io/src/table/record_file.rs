@@ -215,10 +215,8 @@ impl RecordFile {
         let order: Vec<_> = order.map(|c| (columns[c], lengths[c])).collect();
         time_axis::same_length(&self.head, &order)?;
         let means = sums.into_iter().map(|sum| sum / len as f64).collect();
-        let remarks = match end {
-            Some(end) => end.remark().into_iter().collect(),
-            None => self.head.remarks().to_vec(),
-        };
+        let mut remarks = self.head.remarks().to_vec();
+        remarks.extend(end.and_then(TextEnd::remark));
         Ok(Survey { sampling, means, peaks, remarks })
     }
 

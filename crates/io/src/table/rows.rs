@@ -38,6 +38,8 @@ pub(super) struct Rows {
     lvm: Option<LvmHeader>,
     /// Units of the columns in comments and further rows, until the columns have them.
     further_units: Vec<Vec<String>>,
+    /// Remarks on comments that were not read.
+    remarks: Vec<String>,
     /// Reference days of the instants of columns, by column.
     origins: BTreeMap<usize, i64>,
     /// Clocks without a date of columns, by column.
@@ -83,6 +85,7 @@ impl Rows {
             lines: Lines::default(),
             lvm: None,
             further_units: Vec::new(),
+            remarks: Vec::new(),
             origins: BTreeMap::new(),
             clocks: BTreeMap::new(),
             empty: Vec::new(),
@@ -190,8 +193,8 @@ impl Rows {
         if rows.iter().any(|row| row.row.text.len() > self.limits.row_bytes) {
             return Ok(None);
         }
-        let Above { heading, further_units } = Above::new(&block.text, &rows, self.layout);
-        self.further_units = further_units;
+        let Above { heading, further_units, remarks } = Above::new(&block.text, &rows, self.layout);
+        (self.further_units, self.remarks) = (further_units, remarks);
         let Some(heading) = heading else { return Ok(None) };
         let begin = &rows[heading.begin];
         let line = block.line + rows[heading.names_row.unwrap_or(heading.begin)].row.line;
@@ -415,6 +418,7 @@ impl Rows {
             columns: self.columns,
             lines: self.lines,
             samples: self.samples,
+            remarks: self.remarks,
             ..Contents::default()
         })
     }

@@ -156,8 +156,10 @@ impl<'a> TextReader<'a> {
         match above(self.table, &self.rows, self.blocks.file()) {
             Some(above) if self.table.is_some_and(|t| self.rows.width() < t.fields) => Err(above),
             _ => {
-                let (open_line, remarks) = (end.open_line, end.remark().into_iter().collect());
-                Ok(Contents { open_line, remarks, ..self.rows.finish()? })
+                let mut contents = self.rows.finish()?;
+                contents.open_line = end.open_line;
+                contents.remarks.extend(end.remark());
+                Ok(contents)
             }
         }
     }

@@ -294,3 +294,38 @@ fn channels_with_their_own_instants_have_their_own_units() {
         assert_eq!(table.sampling(&TimeAxis::OfFile, &["Force", "Disp"]).unwrap().dt(), 0.5);
     }
 }
+
+/// A comment with names or units for fewer or more columns than the table has is not read, and a
+/// remark says so.
+#[test]
+fn comments_with_another_number_of_fields_are_reported() {
+    let numbers = "0,1,2\n0.1,2,3\n0.2,1,1\n";
+    for (above, comment) in [
+        ("# t, F\n", "t, F"),
+        ("# t [s], F [kN], x [mm], note\n", "t [s], F [kN], x [mm], note"),
+        ("# units: s kN\n", "units: s kN"),
+        ("% F in kN, x in mm\n", "F in kN, x in mm"),
+        ("t,F,x\n# s,kN\n", "s,kN"),
+        ("t,F,x\n# [s], [kN], [mm], [-]\n", "[s], [kN], [mm], [-]"),
+        ("# columns: time force\n", "columns: time force"),
+    ] {
+        let table = Table::parse("a.csv", format!("{above}{numbers}").as_bytes()).unwrap();
+        let [remark] = table.remarks() else { panic!("{above}: {:?}", table.remarks()) };
+        assert!(remark.contains(&format!("\"{comment}\"")), "{above}: {remark}");
+        assert!(remark.contains("3 columns"), "{above}: {remark}");
+    }
+    for above in [
+        "# t, F, x\n",
+        "# t, F, x\n# s, kN, mm\n",
+        "# Measured on rig 4, by hand\n",
+        "# Rig 4\nt,F,x\n",
+        "# Monday, the first of March, in the hall\n",
+        "# a, b\n# a note\nt,F,x\n",
+        "# a, b\nt,F,x\n",
+        "# sampled at 100 Hz\n",
+        "# 3, 4\n",
+    ] {
+        let table = Table::parse("a.csv", format!("{above}{numbers}").as_bytes()).unwrap();
+        assert_eq!(table.remarks(), [] as [String; 0], "{above}");
+    }
+}
