@@ -19,7 +19,7 @@ use crate::identify::left_out::LineRule;
 use crate::identify::rows::WindowRow;
 use crate::identify::{LeftOut, LineChoice};
 use crate::limits::PULSE_EFFECTS;
-use crate::measurement::{Block, Measurement, check_distinct};
+use crate::measurement::{Block, Hold, Measurement, check_distinct};
 use crate::modes::driven_band;
 
 /// Inputs and outputs of one record, in the order of the instruments.
@@ -87,7 +87,7 @@ fn from_windows(
     how: &IdentifyElements,
     windows: Windows,
 ) -> Result<ElementData, AnalysisError> {
-    let cut = hits::cut(&[measurement.hold_any()?], rule, windows)?;
+    let cut = hits::cut(&[measurement.hold_any(Hold::Whole)?], rule, windows)?;
     let tests = cut.hits.into_iter().zip(&cut.noise).map(|(hit, noise)| {
         let block = hit.into_held();
         let data = Signals::new(&block, how)?.open(&block, TestKind::Hit, how)?;

@@ -21,7 +21,7 @@ pub use self::table::FrfTable;
 use crate::AnalysisError;
 use crate::identify::left_out::{LeftOut, LineRule};
 use crate::identify::lines::LineChoice;
-use crate::measurement::{Hold, Measurement, Windowed, check_distinct};
+use crate::measurement::{Block, Hold, Measurement, Windowed, check_distinct};
 use crate::text::significant;
 use crate::words;
 
@@ -67,7 +67,8 @@ pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, Ana
 /// Estimates the frequency responses and the coherence of one or several records of the same
 /// machine from the averaged auto- and cross-spectra of the segments of all records.
 ///
-/// The records need the same columns and time step, and periods or segments of the same length;
+/// The numbers of forces and responses may differ from each other. The records need the same
+/// numbers of both, the same time step, and periods or segments of the same length;
 /// their own lengths may differ. Without periods and segments, records that end at rest or have the
 /// same force are averaged as a whole; others are cut into segments like one record. Each force
 /// need act only in one record.
@@ -120,21 +121,32 @@ pub fn frf_of_records(
     Ok(table)
 }
 
-/// Reads the records, at least one, and checks that all have the same number of forces.
+/// Reads the records, at least one, and checks that all have the same numbers of forces and
+/// responses.
 fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, AnalysisError> {
     check_distinct(measurements)?;
-    let records = measurements.iter().map(|measured| measured.hold(hold));
+    let records = measurements.iter().map(|measured| {
+        measured.channels().check_some()?;
+        measured.hold_any(hold)
+    });
     let records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
-    let dofs = records.first().ok_or(AnalysisError::NoRecord)?.held.force.channels();
+    let first = &records.first().ok_or(AnalysisError::NoRecord)?.held;
     for Windowed { held, .. } in &records {
-        let got = held.force.channels();
+        let [got, dofs] = [held, first].map(|held| held.force.channels());
         if got != dofs {
             return Err(AnalysisError::DegreesOfFreedom { file: held.file.clone(), got, dofs });
         }
-        let [kind, first] = [held, &records[0].held].map(|held| held.response().1);
-        if kind != first {
-            let why = format!("{} has a {kind}, the first record a {first}", held.file);
-            return Err(AnalysisError::Setting { setting: "response", why });
+        let [(response, kind), (of_first, kind_of_first)] = [held, first].map(Block::response);
+        let wrong = |what: String, of_first: String| AnalysisError::Setting {
+            setting: "response",
+            why: format!("{} has {what}, the first record {of_first}", held.file),
+        };
+        if kind != kind_of_first {
+            return Err(wrong(format!("a {kind}"), format!("a {kind_of_first}")));
+        }
+        if response.channels() != of_first.channels() {
+            let count = |record: &Record| message::count(record.channels(), "response");
+            return Err(wrong(count(response), count(of_first)));
         }
     }
     Ok(records)
@@ -219,6 +231,19 @@ impl Estimator {
             Estimator::H2 => "H2",
             Estimator::Hv => "Hv",
         }
+    }
+
+    /// Refuses H2 for several forces unless there are as many responses: only then is the matrix of
+    /// cross-spectra square, as its inverse requires.
+    fn check(self, forces: usize, responses: usize) -> Result<(), AnalysisError> {
+        if self != Estimator::H2 || forces <= 1 || forces == responses {
+            return Ok(());
+        }
+        let why = format!(
+            "h2 of {} needs as many responses, and there are {responses}: use h1 or hv",
+            message::count(forces, "force")
+        );
+        Err(AnalysisError::Setting { setting: "estimator", why })
     }
 
     fn estimator(self) -> FrfEstimator {
@@ -405,6 +430,7 @@ impl Responses {
         {
             average = average.at(&average.driven())?;
         }
+        estimator.check(apart.len(), first_record.response().0.channels())?;
         let (frf, lines) = (average.frf(estimator.estimator())?, average.lines().clone());
         let dof = |at: usize| driven[acting[at]];
         let following = following.iter().map(|one| Crosstalk {

@@ -114,6 +114,7 @@ pub(super) fn responses_of_hits(
     let cut = cut(records, rule, Windows::Separate)?;
     let averaged = average_of_hits(&cut.hits, lines, how.exponential_percent)?;
     let AverageOfHits { average, lines, driven, segments, added_decay, at_end, before } = averaged;
+    how.estimator.check(driven.len(), records[0].held.response().0.channels())?;
     let frf = average.frf(how.estimator.estimator())?;
     let mut remarks = cut.remarks.clone();
     if at_end > DIED_OUT {

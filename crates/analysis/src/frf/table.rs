@@ -49,9 +49,9 @@ pub struct FrfTable {
     pub quantity: String,
     /// SI unit.
     pub unit: &'static str,
-    /// Names of the responses, one per degree of freedom.
+    /// Names of the responses.
     pub response_names: Vec<String>,
-    /// Names of the forces, one per degree of freedom.
+    /// Names of the forces; there may be more or fewer than responses.
     pub force_names: Vec<String>,
     /// Frequencies, in Hz, one per value of a response.
     pub frequency_hz: Vec<f64>,
@@ -129,7 +129,7 @@ const WIDE: usize = 4;
 
 impl FrfTable {
     pub(super) fn new(records: &[Windowed], averaged: &Responses, how: &FrfSettings) -> Self {
-        let n = records[0].held.force.channels();
+        let n = records[0].held.response().0.channels();
         let mut responses = Vec::new();
         for motion in 0..n {
             for (input, dof) in averaged.driven.iter().enumerate() {
@@ -157,7 +157,7 @@ impl FrfTable {
         how: &FrfSettings,
     ) -> Self {
         let Interleaved { parts, crosstalk } = responses;
-        let n = records[0].held.force.channels();
+        let n = records[0].held.response().0.channels();
         let lines = parts.iter().enumerate().flat_map(|(part, averaged)| {
             averaged.frf.omega().iter().enumerate().map(move |(at, omega)| (*omega, part, at))
         });
@@ -214,7 +214,7 @@ impl FrfTable {
             segments: *segments,
         };
         let remarks = records.iter().flat_map(|recorded| recorded.held.unit_notes());
-        let dofs = 0..measured.force.channels();
+        let (motions, forces) = (measured.response().0.channels(), measured.force.channels());
         let names: Vec<&Channels> = records.iter().map(|recorded| &*recorded.held.names).collect();
         let names = Channels::together(&names);
         Self {
@@ -233,8 +233,8 @@ impl FrfTable {
                 ResponseQuantity::Velocity => "m/(s·N)",
                 ResponseQuantity::Acceleration => "m/(s²·N)",
             },
-            response_names: dofs.clone().map(|dof| names.response_name(kind, dof)).collect(),
-            force_names: dofs.map(|dof| names.force_name(dof)).collect(),
+            response_names: (0..motions).map(|dof| names.response_name(kind, dof)).collect(),
+            force_names: (0..forces).map(|dof| names.force_name(dof)).collect(),
             frequency_hz: omega.iter().map(|omega| omega / TAU).collect(),
             responses,
             coherence,
@@ -337,7 +337,9 @@ impl FrfTable {
     /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and for forces
     /// with interleaved lines.
     pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
-        let dofs = self.coherence.len();
+        let motions = self.coherence.len();
+        let last_force = self.responses.iter().map(|response| response.force).max();
+        let dofs = motions.max(last_force.unwrap_or(0));
         if self.is_interleaved() {
             let why = "the forces have separate lines, and this format has the same frequencies for all \
                        functions: write a .csv file";
@@ -364,7 +366,7 @@ impl FrfTable {
         let coherence = self.coherence.iter().map(|c| CoherenceFunction {
             response: point(c.motion),
             // The multiple coherence with one force is the ordinary one.
-            reference: (self.responses.len() == dofs)
+            reference: (self.responses.len() == motions)
                 .then(|| self.responses.first().map(|r| point(r.force)))
                 .flatten(),
             values: c.values.clone(),

@@ -190,17 +190,25 @@ impl Channels {
         self.roles().into_iter().map(|role| role.column).collect()
     }
 
+    /// Checks that there is at least one force and one response.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`].
+    pub fn check_some(&self) -> Result<(), AnalysisError> {
+        if self.force.is_empty() {
+            return Err(AnalysisError::NoForce);
+        }
+        let has_response =
+            ResponseQuantity::ALL.iter().any(|kind| !self.response(*kind).is_empty());
+        if has_response { Ok(()) } else { Err(AnalysisError::NoMotion) }
+    }
+
     /// Checks that every degree of freedom has a force and a response, as identification requires.
     ///
     /// # Errors
     /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`].
     pub fn check_pairs(&self) -> Result<(), AnalysisError> {
-        if self.force.is_empty() {
-            return Err(AnalysisError::NoForce);
-        }
-        if ResponseQuantity::ALL.iter().all(|kind| self.response(*kind).is_empty()) {
-            return Err(AnalysisError::NoMotion);
-        }
+        self.check_some()?;
         let forces = self.force.len();
         for kind in ResponseQuantity::ALL {
             let got = self.response(kind).len();

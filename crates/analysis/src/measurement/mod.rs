@@ -326,7 +326,7 @@ impl Measurement {
     /// # Errors
     /// If the file cannot be read again.
     pub fn force(&self) -> Result<Record, AnalysisError> {
-        Ok(self.hold(Hold::Whole)?.held.force)
+        Ok(self.hold_any(Hold::Whole)?.held.force)
     }
 
     /// Returns every measured kind of response over the whole window, samples × degrees of freedom,
@@ -335,7 +335,7 @@ impl Measurement {
     /// # Errors
     /// If the file cannot be read again.
     pub fn responses(&self) -> Result<Vec<(ResponseQuantity, Record)>, AnalysisError> {
-        let window = self.hold(Hold::Whole)?.held;
+        let window = self.hold_any(Hold::Whole)?.held;
         Ok(window.responses().into_iter().map(|(kind, record)| (kind, record.clone())).collect())
     }
 
@@ -395,12 +395,13 @@ impl Measurement {
 }
 
 impl Measurement {
-    /// Reads and buffers the whole window, with any numbers of forces and responses.
+    /// Reads the window, with any numbers of forces and responses, and buffers the part stated by
+    /// `hold`.
     ///
     /// # Errors
     /// As [`Measurement::hold`].
-    pub(crate) fn hold_any(&self) -> Result<Windowed, AnalysisError> {
-        Windowed::from_any_layout(self, Hold::Whole)
+    pub(crate) fn hold_any(&self, hold: Hold) -> Result<Windowed, AnalysisError> {
+        Windowed::from_any_layout(self, hold)
     }
 }
 

@@ -9,7 +9,7 @@ use super::settings::Places;
 use crate::AnalysisError;
 use crate::hits::{self, HitRow, Windows};
 use crate::limits::{DRIVEN_LINES, DRIVEN_POWER, SMALLER_HALF};
-use crate::measurement::{Block, Channels, Measurement, check_distinct};
+use crate::measurement::{Block, Channels, Hold, Measurement, check_distinct};
 
 /// Records of one test: inputs and outputs with their names.
 #[derive(Debug)]
@@ -78,7 +78,8 @@ impl Recorded {
             let blocks = match rule {
                 None => vec![measurement.whole_block()?],
                 Some(rule) => {
-                    let cut = hits::cut(&[measurement.hold_any()?], rule, Windows::Joined)?;
+                    let cut =
+                        hits::cut(&[measurement.hold_any(Hold::Whole)?], rule, Windows::Joined)?;
                     hits.extend(cut.rows.into_iter().map(|row| columns.placed(at, row)));
                     cut.hits.into_iter().map(|hit| hit.into_held()).collect()
                 }

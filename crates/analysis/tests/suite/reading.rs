@@ -198,3 +198,51 @@ fn frequency_responses_take_one_force_and_several_responses() {
         assert!((table.responses[1].real[at] + 0.5 * re).abs() <= 1e-12 * re.abs());
     }
 }
+
+/// Reference: the rows of H1 do not depend on each other, so a response has the same values beside
+/// other responses and alone.
+#[test]
+fn frequency_responses_take_fewer_responses_than_forces() {
+    use mechid_analysis::frf::Estimator;
+    use mechid_analysis::{FrfSettings, frf};
+    use mechid_signal::noise;
+    let sampling = Sampling::from_rate_hz(RATE_HZ, 32 * PERIOD).unwrap();
+    let forces = noise::white(sampling, 2, 1.0, 3).unwrap();
+    let [f1, f2] = [0, 1].map(|at| forces.channel(at));
+    let delayed = |f: &[f64], k: usize| if k == 0 { 0.0 } else { f[k - 1] };
+    let rows = 0..sampling.len();
+    let x: Vec<f64> = rows.clone().map(|k| f1[k] - 0.3 * delayed(f2, k)).collect();
+    let y: Vec<f64> = rows.map(|k| 0.7 * f2[k] + 0.2 * delayed(f1, k)).collect();
+    let columns = [("f1", f1), ("f2", f2), ("x", &x[..]), ("y", &y[..])];
+    let open = |force: &str, response: &str| {
+        let channels = Channels::new(force, ResponseQuantity::Displacement, response);
+        let test = Measurement::from_columns(sampling, &columns, &channels).unwrap();
+        test.period(PERIOD).unwrap()
+    };
+    let how = |estimator| FrfSettings { estimator, ..FrfSettings::default() };
+    for estimator in [Estimator::H1, Estimator::Hv] {
+        let [alone, both] =
+            ["x", "x,y"].map(|response| frf(&open("f1,f2", response), &how(estimator)).unwrap());
+        assert_eq!([alone.responses.len(), both.responses.len()], [2, 4]);
+        assert_eq!((alone.coherence.len(), alone.response_names.len()), (1, 1));
+        assert_eq!(alone.force_names, ["f1", "f2"]);
+        for (one, other) in alone.responses.iter().zip(&both.responses) {
+            assert_eq!(one.real, other.real);
+            assert_eq!(one.imaginary, other.imaginary);
+        }
+        let points = alone.to_responses(&["1+X".into(), "2+X".into()]).unwrap();
+        assert_eq!(points.functions[1].reference, "2+X");
+    }
+    let why = |force: &str, response: &str, estimator| {
+        frf(&open(force, response), &how(estimator)).unwrap_err().to_string()
+    };
+    let h2 = why("f1,f2", "x", Estimator::H2);
+    assert!(h2.contains("h2 of 2 forces needs as many responses, and there are 1"), "{h2}");
+    let same = why("f1,f1", "x", Estimator::H1);
+    assert!(same.contains("do not act independently"), "{same}");
+    // As many periods as forces give no average.
+    let short = open("f1,f2", "x");
+    let window = Window { start: 1, period: Some(PERIOD), periods: Some(2) };
+    let few = frf(&short.window(window).unwrap(), &how(Estimator::H1)).unwrap_err().to_string();
+    assert!(few.contains('3'), "{few}");
+}

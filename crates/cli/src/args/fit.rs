@@ -10,7 +10,7 @@ use mechid::analysis::identify::{
     IdentifiedResponses, Identify, IdentifyResponses, Keywords, KnownMass, LeftOut, LineChoice,
     Method, Refinement, Structure, ValidationWindow,
 };
-use mechid::analysis::{ResponseQuantity, Segmentation, Window, frf};
+use mechid::analysis::{Channels, ResponseQuantity, Segmentation, Window, frf};
 use mechid::io::{FrequencyResponses, LineSpec};
 use mechid::model::{Discretisation, Terms};
 use mechid::nonlinear::{Criterion, Weighting};
@@ -300,6 +300,7 @@ impl FitArgs {
     pub fn identify(&self) -> Result<Identified, CliError> {
         let how = self.settings()?;
         let channels = self.hits.channels_of(&self.channels.channels(), 1 + self.more.len())?;
+        channels.iter().try_for_each(Channels::check_pairs)?;
         let first = self.input.open(&channels[0])?;
         let mut records = vec![first.clone()];
         for &start in &self.more_starts {

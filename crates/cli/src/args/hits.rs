@@ -42,18 +42,10 @@ impl HitArgs {
         channels: &Channels,
         records: usize,
     ) -> Result<Vec<Channels>, CliError> {
-        let of_records = if self.struck.is_empty() {
-            vec![channels.clone(); records]
-        } else {
-            channels.struck(&self.struck, records)?
-        };
-        of_records.iter().try_for_each(Channels::check_pairs)?;
-        Ok(of_records)
-    }
-
-    /// Returns whether each record has a different struck point.
-    pub fn is_struck(&self) -> bool {
-        !self.struck.is_empty()
+        if self.struck.is_empty() {
+            return Ok(vec![channels.clone(); records]);
+        }
+        Ok(channels.struck(&self.struck, records)?)
     }
 
     /// Returns the rule for the detection of hits, if the records are hammer tests.

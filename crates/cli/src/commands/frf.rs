@@ -4,8 +4,8 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::analysis::FrfSettings;
 use mechid::analysis::frf::Estimator;
+use mechid::analysis::{Channels, FrfSettings};
 
 use crate::args::fit::{LineArgs, SegmentArgs};
 use crate::args::hits::HitArgs;
@@ -88,11 +88,9 @@ impl FrfArgs {
 
     /// Reads, averages, and reports.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
-        let mut channels = self.channels.channels();
-        if !self.hits.is_struck() {
-            channels = channels.with_a_force_each();
-        }
+        let channels = self.channels.channels();
         let channels = self.hits.channels_of(&channels, 1 + self.more.len())?;
+        channels.iter().try_for_each(Channels::check_some)?;
         let how = FrfSettings {
             estimator: self.estimator,
             lines: self.lines.choice(),

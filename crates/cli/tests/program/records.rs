@@ -7,6 +7,7 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use mechid::io::{Table, TimeAxis};
+use mechid::signal::Sampling;
 
 use super::{mechid, refused};
 
@@ -213,4 +214,35 @@ fn what_was_left_out_of_a_file_is_told() {
         let told = mechid(folder.path(), command);
         assert!(told.contains("4096 zero bytes after the last line"), "{command}: {told}");
     }
+}
+
+/// The frequency responses of one sensor to two forces; a comment with two names above five columns
+/// is not read, and a note says so.
+#[test]
+fn frequency_responses_take_any_numbers_of_forces_and_responses() {
+    let folder = tempfile::tempdir().unwrap();
+    let noise = |seed: u64| {
+        let sampling = Sampling::new(0.01, 2048).unwrap();
+        mechid::signal::noise::white(sampling, 1, 1.0, seed).unwrap().channel(0).to_vec()
+    };
+    let (f, g) = (noise(1), noise(2));
+    let mut text = String::from("# time, force\n");
+    for k in 0..f.len() {
+        let before = if k > 0 { g[k - 1] } else { 0.0 };
+        let [x, y] = [2.0 * f[k] - before, f[k] + 3.0 * before];
+        text += &format!("{:?},{:?},{:?},{x:?},{y:?}\n", k as f64 * 0.01, f[k], g[k]);
+    }
+    fs::write(folder.path().join("a.csv"), text).unwrap();
+    let common = "frf a.csv --time 1 --force 2,3 --segment 256";
+    let found = mechid(folder.path(), &format!("{common} --displacement 4 --output r.unv"));
+    assert!(found.contains("the comment \"time, force\" has 2 fields"), "{found}");
+    let tables = [("4", 1), ("4,5", 2)].map(|(columns, motions)| {
+        let run = format!("{common} --displacement {columns} --json");
+        let table: serde_json::Value = serde_json::from_str(&mechid(folder.path(), &run)).unwrap();
+        assert_eq!(table["coherence"].as_array().unwrap().len(), motions);
+        table["responses"][1]["real"].clone()
+    });
+    assert_eq!(tables[0], tables[1]);
+    let why = super::refused(folder.path(), &format!("{common} --displacement 4 --estimator h2"));
+    assert!(why.contains("as many responses"), "{why}");
 }
