@@ -5,7 +5,10 @@ use std::fmt::{self, Formatter};
 use mechid_signal::{Record, message};
 
 use super::finding::{Channel, Check, Finding, Names, Quantity};
-use super::limits::{DROP_OUT_LEVEL, DROP_OUT_MOTION, DROP_OUT_NEIGHBOURS};
+use super::limits::{
+    DROP_OUT_LEVEL, DROP_OUT_MOTION, DROP_OUT_NEIGHBOURS, FORCE_ACTING, FORCE_JUMP, FORCE_PAUSE,
+    FORCE_SAMPLES,
+};
 use super::{Subject, Verdict};
 
 /// Channel that keeps one value for some samples within its motion: a drop-out of the transmission.
@@ -24,13 +27,18 @@ pub struct DropOut {
     pub level: f64,
 }
 
-/// Finds the channels of a response (any unit) whose longest run of equal samples is too long for
-/// chance ([`Finding::DropOut`]).
+/// Finds the channels of a response or a force (any unit) whose longest run of equal samples is too
+/// long for chance ([`Finding::DropOut`]).
 ///
 /// The p-value is the probability that the second longest run would continue to the length of the
 /// longest, with the continuation rate of runs in the rest of the record: a coarse converter and a
 /// slow motion have many runs. A structure that comes to rest moves by only a few steps of the
 /// converter; therefore the channel must move by many steps on both sides of the run.
+///
+/// A force may also be zero by intention: between the hits of a hammer, or between bursts. A run in
+/// a force therefore is a drop-out only if it has some samples and is a small part of a record in
+/// which the force acts at nearly all other samples. It begins or ends with a jump, near the mean
+/// of the force with a larger one.
 ///
 /// # Source
 /// Ours: runs of a Markov chain are distributed geometrically.
@@ -40,7 +48,9 @@ pub fn dropped_channels(quantity: Quantity, response: &Record) -> Vec<Finding> {
         let (sample, samples) = longest_run(x)?;
         let channel = Channel { quantity, index };
         let finding = DropOut { channel, sample, samples, level: x[sample] };
-        (p_value(x, sample, samples)? <= DROP_OUT_LEVEL).then_some(Finding::DropOut(finding))
+        let by_intention = quantity == Quantity::Force && may_be_intended(x, sample, samples);
+        let is_drop_out = p_value(x, sample, samples)? <= DROP_OUT_LEVEL && !by_intention;
+        is_drop_out.then_some(Finding::DropOut(finding))
     };
     (0..response.channels()).filter_map(one).collect()
 }
@@ -60,8 +70,7 @@ fn longest_run(x: &[f64]) -> Option<(usize, usize)> {
 /// `None` unless the channel moves on both sides.
 fn p_value(x: &[f64], sample: usize, samples: usize) -> Option<f64> {
     let (before, after) = (&x[..sample], &x[sample + samples..]);
-    let changes = x.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
-    let step = changes.fold(f64::INFINITY, f64::min);
+    let step = smallest_change(x);
     let near = DROP_OUT_NEIGHBOURS;
     let moves =
         |side: &[f64]| side.len() >= near.min(samples) && deviation(side) >= DROP_OUT_MOTION * step;
@@ -72,6 +81,30 @@ fn p_value(x: &[f64], sample: usize, samples: usize) -> Option<f64> {
     let runs = before.chunk_by(|a, b| a == b).chain(after.chunk_by(|a, b| a == b));
     let second = runs.map(<[f64]>::len).max()?;
     Some(continuation([before, after]).powf((samples - second) as f64))
+}
+
+/// Returns the smallest change from sample to sample that is not zero.
+fn smallest_change(x: &[f64]) -> f64 {
+    let changes = x.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min)
+}
+
+/// Returns whether a run of equal samples of a force may be part of the excitation: it is short, as
+/// at a smooth peak, or long, the force rests at other times too, or it comes to rest and begins
+/// again without a jump.
+fn may_be_intended(x: &[f64], sample: usize, samples: usize) -> bool {
+    let (before, after) = (&x[..sample], &x[sample + samples..]);
+    let (level, rest) = (x[sample], DROP_OUT_MOTION * smallest_change(x));
+    let others = before.iter().chain(after);
+    let acting = others.filter(|f| (**f - level).abs() > rest).count();
+    let (mean, jump) = (x.iter().sum::<f64>() / x.len() as f64, FORCE_JUMP * deviation(x));
+    let least = if (mean - level).abs() > jump { rest } else { rest.max(jump) };
+    let jumps = |f: Option<&f64>| f.is_some_and(|f| (f - level).abs() > least);
+    let is_smooth = !(jumps(before.last()) || jumps(after.first()));
+    samples < FORCE_SAMPLES
+        || samples as f64 > FORCE_PAUSE * x.len() as f64
+        || (acting as f64) < FORCE_ACTING * (x.len() - samples) as f64
+        || is_smooth
 }
 
 /// Returns the standard deviation of samples.
@@ -173,5 +206,101 @@ mod tests {
             assert_eq!(found(hits.collect()), [], "{seed}");
         }
         assert_eq!(found(vec![1.0; 100]), []);
+    }
+
+    const SAMPLES: usize = 4096;
+
+    /// Forces of usual tests, by name, as fractions of the largest; `seed` changes phases and
+    /// noise.
+    fn excitations(seed: u64) -> Vec<(&'static str, Vec<f64>)> {
+        let sampling = Sampling::new(0.01, SAMPLES).unwrap();
+        let noise = noise::white(sampling, 1, 0.25, seed).unwrap();
+        let (random, phase) = (noise.channel(0), seed as f64);
+        let of = |value: &dyn Fn(usize) -> f64| (0..SAMPLES).map(value).collect::<Vec<f64>>();
+        let t = |k: usize| k as f64 / SAMPLES as f64;
+        // A burst for 70 % of each of several periods, also with a record that begins within one.
+        let burst = |periods: usize, shift: usize| {
+            let len = SAMPLES / periods;
+            of(&|k| if (k + shift) % len < len * 7 / 10 { random[k] } else { 0.0 })
+        };
+        let sweep = |rest: f64| {
+            of(&move |k| {
+                let at = (2.0 * t(k)).fract();
+                let x = at / (1.0 - rest);
+                if x < 1.0 { (TAU * (3.0 * x + 40.0 * x * x)).sin() } else { 0.0 }
+            })
+        };
+        let mut hits = vec![0.0; SAMPLES];
+        for start in [20 + seed as usize % 50, 900, 2900 + seed as usize % 300, 2960] {
+            for k in 0..12 {
+                hits[start + k] = (TAU * (k as f64 + 0.5) / 24.0).sin();
+            }
+        }
+        let multisine = of(&|k| {
+            (1..40)
+                .map(|n| (TAU * f64::from(n) * t(k) + f64::from(n * n) * 0.7 + phase).cos())
+                .sum::<f64>()
+                / 15.0
+        });
+        vec![
+            ("random", random.to_vec()),
+            ("burst random", burst(4, 0)),
+            ("one burst", burst(1, 0)),
+            ("pause between bursts", burst(1, SAMPLES / 2)),
+            ("multisine", multisine),
+            ("sweep", sweep(0.0)),
+            ("sweep with rests", sweep(0.02)),
+            ("hammer", hits),
+            ("stepped sine", of(&|k| (TAU * (2 + k / 512) as f64 * 0.01 * k as f64).sin())),
+            ("slow sine", of(&|k| 0.9 * (TAU * 3.0 * t(k) + phase).sin())),
+        ]
+    }
+
+    /// Rounds to levels of a converter.
+    fn converted(x: &[f64], levels: f64) -> Vec<f64> {
+        x.iter().map(|x| (x * levels).round() / levels).collect()
+    }
+
+    fn force(x: Vec<f64>) -> Vec<Finding> {
+        let sampling = Sampling::new(0.01, x.len()).unwrap();
+        dropped_channels(Quantity::Force, &Record::from_channel(sampling, x).unwrap())
+    }
+
+    #[test]
+    fn forces_that_rest_by_intention_are_not_named() {
+        for seed in 0..30 {
+            for (name, x) in excitations(seed) {
+                for levels in [1e12, 30_000.0, 2000.0, 100.0, 20.0] {
+                    assert_eq!(force(converted(&x, levels)), [], "{name}, {seed}, {levels}");
+                }
+            }
+        }
+    }
+
+    /// A drop-out is missed only where the force passes through its mean at both of its ends.
+    #[test]
+    fn drop_outs_of_forces_are_named() {
+        let (mut all, mut named) = (0, 0);
+        for seed in 0..20 {
+            for (name, x) in excitations(seed) {
+                if !["random", "multisine", "sweep", "stepped sine"].contains(&name) {
+                    continue;
+                }
+                let start = 700 + 61 * seed as usize % 2500;
+                for (samples, is_held) in [(30, false), (30, true), (90, false), (90, true)] {
+                    let mut x = converted(&x, 30_000.0);
+                    let level = if is_held { x[start - 1] } else { 0.0 };
+                    x[start..start + samples].fill(level);
+                    let found = force(x);
+                    all += 1;
+                    named += found.len();
+                    for finding in found {
+                        let Finding::DropOut(drop) = finding else { panic!("{finding:?}") };
+                        assert!(drop.sample.abs_diff(start) <= 3, "{drop:?}");
+                    }
+                }
+            }
+        }
+        assert!(20 * named >= 19 * all, "{named} of {all}");
     }
 }

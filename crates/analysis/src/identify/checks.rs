@@ -127,6 +127,7 @@ fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding
 /// Returns the faults of the sensors, independent of any model.
 pub(crate) fn sensor_findings(measured: &Block) -> Vec<Finding> {
     let mut findings = clipped_channels(Quantity::Force, &measured.force);
+    findings.extend(dropped_channels(Quantity::Force, &measured.force));
     for (kind, motion) in measured.responses() {
         findings.extend(clipped_channels(Quantity::Response(kind), motion));
         findings.extend(constant_channels(Quantity::Response(kind), motion));

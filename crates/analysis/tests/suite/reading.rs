@@ -246,3 +246,22 @@ fn frequency_responses_take_fewer_responses_than_forces() {
     let few = frf(&short.window(window).unwrap(), &how(Estimator::H1)).unwrap_err().to_string();
     assert!(few.contains('3'), "{few}");
 }
+
+#[test]
+fn a_drop_out_of_the_force_is_named_among_the_checks() {
+    let [force, x, _] = record().map(|channel| channel.repeat(5));
+    let sampling = Sampling::from_rate_hz(RATE_HZ, force.len()).unwrap();
+    let channels = Channels::new("f", ResponseQuantity::Displacement, "x");
+    let named = |force: &[f64]| {
+        let columns = [("f", force), ("x", &x[..])];
+        let test = Measurement::from_columns(sampling, &columns, &channels).unwrap();
+        let found = identify(&[test.period(PERIOD).unwrap()], &Identify::default()).unwrap();
+        let checks = found.summary().checks.iter().map(|check| check.text.clone());
+        checks.filter(|text| text.contains("drop-out")).collect::<Vec<_>>()
+    };
+    assert_eq!(named(&force), [] as [String; 0]);
+    let mut faulty = force.clone();
+    faulty[500..530].fill(0.0);
+    let [text] = &named(&faulty)[..] else { panic!("{:?}", named(&faulty)) };
+    assert!(text.contains("f ") && text.contains("sample 501"), "{text}");
+}
