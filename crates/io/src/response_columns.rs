@@ -50,7 +50,9 @@ struct Heading {
 impl Heading {
     fn new(table: &Table, column: usize) -> Option<Self> {
         let name = table.names()[column].trim();
-        let lower = name_without_brackets(name).to_lowercase();
+        let bare = name_without_brackets(name);
+        let (bare, reference) = without_level(&bare);
+        let lower = bare.to_lowercase();
         let mut heading = Self {
             column,
             part: Part::Real,
@@ -64,42 +66,55 @@ impl Heading {
         };
         let (mut part, mut points) = (None, Vec::new());
         for word in lower.split(['_', ' ', '.', ':', ',']).filter(|word| !word.is_empty()) {
-            match word {
-                "real" | "re" => part = Some(Part::Real),
-                "imaginary" | "imag" | "im" => part = Some(Part::Imaginary),
-                "magnitude" | "mag" | "amplitude" | "ampl" | "abs" | "modulus" => {
-                    part = Some(part.unwrap_or(Part::Magnitude));
-                }
-                "db" => part = Some(Part::Level),
-                "phase" | "angle" | "arg" => part = Some(Part::Phase(None)),
-                "deg" | "degrees" | "degree" | "rad" | "radians"
-                    if matches!(part, Some(Part::Phase(_))) =>
-                {
-                    part = Some(Part::Phase(angle(word)));
-                }
-                "error" => part = Some(Part::StandardError),
-                "standard" | "std" | "h" | "frf" | "part" | "of" | "tf" => {}
-                "receptance" | "compliance" => {
-                    heading.quantity = Some(ResponseQuantity::Displacement)
-                }
-                "mobility" => heading.quantity = Some(ResponseQuantity::Velocity),
-                "accelerance" | "inertance" => {
-                    heading.quantity = Some(ResponseQuantity::Acceleration)
-                }
-                "apparent" | "mass" => heading.inverse(ResponseQuantity::Acceleration),
-                "impedance" => heading.inverse(ResponseQuantity::Velocity),
-                "stiffness" => heading.inverse(ResponseQuantity::Displacement),
-                "mechanical" | "dynamic" => {}
-                other => points.push(original(name, other)),
+            if !heading.take_word(word, &mut part, lower == word) {
+                points.push(original(name, word));
             }
         }
-        heading.part = part?;
+        let notes: Vec<String> = reference.into_iter().chain(label_notes(name)).collect();
+        let is_level = notes.iter().any(|note| level(note).is_some());
+        heading.part = part.or(is_level.then_some(Part::Level))?;
         heading.points = match points_in_notes(&label_notes(name)) {
             Some(points_in_notes) => points_in_notes,
             None => points_of(points)?,
         };
-        heading.take_notes(table, column, name);
+        heading.take_notes(table, column, notes);
         Some(heading)
+    }
+
+    /// Reads a word of the name, in lower case, which may be alone there; returns `false` for a
+    /// word that is not known, such as a point.
+    fn take_word(&mut self, word: &str, part: &mut Option<Part>, is_alone: bool) -> bool {
+        match word {
+            "real" | "re" => *part = Some(Part::Real),
+            "imaginary" | "imag" | "im" => *part = Some(Part::Imaginary),
+            "magnitude" | "mag" | "amplitude" | "ampl" | "abs" | "modulus" => {
+                *part = Some(part.unwrap_or(Part::Magnitude));
+            }
+            "db" => *part = Some(Part::Level),
+            _ if word.starts_with("20log") || word.starts_with("20*log") => {
+                *part = Some(Part::Level);
+            }
+            "deg" | "degrees" | "°" | "rad" if is_alone => {
+                *part = Some(Part::Phase(angle(word)));
+            }
+            "phase" | "angle" | "arg" => *part = Some(Part::Phase(None)),
+            "deg" | "degrees" | "degree" | "rad" | "radians"
+                if matches!(part, Some(Part::Phase(_))) =>
+            {
+                *part = Some(Part::Phase(angle(word)));
+            }
+            "error" => *part = Some(Part::StandardError),
+            "standard" | "std" | "h" | "frf" | "part" | "of" | "tf" | "level" | "gain" => {}
+            "receptance" | "compliance" => self.quantity = Some(ResponseQuantity::Displacement),
+            "mobility" => self.quantity = Some(ResponseQuantity::Velocity),
+            "accelerance" | "inertance" => self.quantity = Some(ResponseQuantity::Acceleration),
+            "apparent" | "mass" => self.inverse(ResponseQuantity::Acceleration),
+            "impedance" => self.inverse(ResponseQuantity::Velocity),
+            "stiffness" => self.inverse(ResponseQuantity::Displacement),
+            "mechanical" | "dynamic" => {}
+            _ => return false,
+        }
+        true
     }
 
     fn inverse(&mut self, quantity: ResponseQuantity) {
@@ -107,29 +122,32 @@ impl Heading {
     }
 
     /// Reads the texts in brackets and in the line of units.
-    fn take_notes(&mut self, table: &Table, column: usize, name: &str) {
-        let notes = label_notes(name);
+    fn take_notes(&mut self, table: &Table, column: usize, notes: Vec<String>) {
         let row = label_notes(&format!("[{}]", table.unit_text(column)));
         let notes = notes.into_iter().filter(|note| points_in_note(note).is_none());
         for note in notes.chain(row).filter(|note| !note.is_empty()) {
             let lower = note.to_lowercase();
-            let is_level = lower.split([' ', ':', '(']).next() == Some("db");
             if let (Part::Phase(_), Some(unit)) = (self.part, angle(&lower)) {
                 self.part = Part::Phase(Some(unit));
-            } else if is_level && matches!(self.part, Part::Magnitude | Part::Level) {
+            } else if let (Part::Magnitude | Part::Level, Some(reference)) =
+                (self.part, level(&note))
+            {
                 self.part = Part::Level;
-                // `dB re 1 m/s²/N`, `dB(g/N)`.
-                let after = note[2..].trim_start_matches([' ', ':']);
-                let reference = after.strip_prefix("re ").or(after.strip_prefix("ref "));
-                let reference = reference.unwrap_or(after).trim();
-                let inner = reference.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
-                let reference = inner.unwrap_or(reference);
                 self.take_unit(number_and_rest(reference).unwrap_or((1.0, reference)));
             } else if !self.take_unit((1.0, &note)) && !matches!(self.part, Part::Phase(_)) {
                 let evidence = Evidence::Unused;
                 self.doubt.get_or_insert(StatedUnit { text: note, unit: None, evidence });
             }
         }
+    }
+
+    /// Returns the doubt about the column: a text that may be a unit, or a level in dB without its
+    /// reference.
+    fn doubt(&self) -> Option<StatedUnit> {
+        let has_reference = self.part != Part::Level || self.unit.is_some();
+        let text = "dB without a reference".into();
+        let assumed = StatedUnit { text, unit: None, evidence: Evidence::Unused };
+        self.doubt.clone().or((!has_reference).then_some(assumed))
     }
 
     fn take_unit(&mut self, (number, text): (f64, &str)) -> bool {
@@ -147,6 +165,33 @@ impl Heading {
         self.is_inverse = unit.is_inverse;
         self.in_si = number * unit.in_si;
         true
+    }
+}
+
+/// Returns the reference of a level, which is empty if it has none; `None` for other text:
+/// `dB re 1 m/s²/N`, `dB(g/N)`, `dB`.
+fn level(note: &str) -> Option<&str> {
+    let after = note.get(..2).filter(|start| start.eq_ignore_ascii_case("db"))?;
+    let after = &note[after.len()..];
+    if after.starts_with(char::is_alphanumeric) {
+        return None;
+    }
+    let after = after.trim_start_matches([' ', ':', ',']);
+    let reference = ["re ", "ref ", "re. ", "ref. ", "re: ", "rel. "];
+    let reference = reference.into_iter().find_map(|word| after.strip_prefix(word));
+    let reference = reference.unwrap_or(after).trim();
+    let inner = reference.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
+    Some(inner.unwrap_or(reference))
+}
+
+/// Splits a name without brackets at a level with a reference: `H11 dB re 1 g/N`.
+fn without_level(name: &str) -> (&str, Option<String>) {
+    let lower = name.to_ascii_lowercase();
+    let starts_word = |at: &usize| !name[..*at].ends_with(char::is_alphanumeric);
+    let start = ["db re", "db:re", "db(re"].into_iter().find_map(|text| lower.find(text));
+    match start.filter(starts_word) {
+        Some(at) => (name[..at].trim_end_matches([' ', ',', '_', '-']), Some(name[at..].into())),
+        None => (name, None),
     }
 }
 
@@ -233,10 +278,10 @@ pub(crate) fn add_functions(
         responses.functions.push(function);
         let doubts = [Some(first), same_response(&|part| part == Part::Imaginary)];
         for heading in doubts.into_iter().flatten() {
-            if let Some(doubt) = &heading.doubt {
+            if let Some(doubt) = heading.doubt() {
                 let quantity = heading.quantity.unwrap_or(ResponseQuantity::Displacement);
                 let label = table.label(heading.column);
-                responses.doubts.push((label, doubt.clone(), quantity.into()));
+                responses.doubts.push((label, doubt, quantity.into()));
             }
         }
     }
@@ -252,41 +297,17 @@ fn function<'a>(
     first: &Heading,
     other: &OtherPart<'a>,
 ) -> Result<ResponseFunction, IoError> {
-    let missing = |what: &str| IoError::Description {
-        file: table.file().into(),
-        what: format!(
-            "column {} has no matching {what}: a frequency response has a real and an imaginary part, or a \
-             magnitude and a phase",
-            table.label(first.column)
-        ),
-    };
     let values = table.values(first.column)?;
     let mut values = match first.part {
         Part::Real => {
-            let second =
-                other(&|part| part == Part::Imaginary).ok_or_else(|| missing("imaginary part"))?;
+            let second = other(&|part| part == Part::Imaginary)
+                .ok_or_else(|| missing(table, first, "imaginary part"))?;
             let imaginary = table.values(second.column)?;
             let in_si = if second.in_si == 1.0 { first.in_si } else { second.in_si };
             let pairs = values.iter().zip(imaginary);
             pairs.map(|(re, im)| Complex::new(re * first.in_si, im * in_si)).collect::<Vec<_>>()
         }
-        _ => {
-            let second =
-                other(&|part| matches!(part, Part::Phase(_))).ok_or_else(|| missing("phase"))?;
-            let phase = table.values(second.column)?;
-            let largest = phase.iter().fold(0.0_f64, |largest, phase| largest.max(phase.abs()));
-            let unit = match second.part {
-                Part::Phase(Some(unit)) => unit,
-                _ if largest > MAX_RADIANS => 1_f64.to_radians(),
-                _ => 1.0,
-            };
-            let size = |value: f64| match first.part {
-                Part::Level => first.in_si * 10_f64.powf(value / 20.0),
-                _ => first.in_si * value,
-            };
-            let pairs = values.iter().zip(phase);
-            pairs.map(|(value, phase)| Complex::from_polar(size(*value), phase * unit)).collect()
-        }
+        _ => polar(table, first, other, values)?,
     };
     let mut standard_error = match other(&|part| part == Part::StandardError) {
         Some(error) => {
@@ -306,6 +327,62 @@ fn function<'a>(
     }
     let [response, reference] = first.points.clone();
     Ok(ResponseFunction { response, reference, quantity: first.quantity, values, standard_error })
+}
+
+/// Reads a response with this magnitude, perhaps in dB, and the phase of another column.
+fn polar<'a>(
+    table: &Table,
+    first: &Heading,
+    other: &OtherPart<'a>,
+    magnitude: &[f64],
+) -> Result<Vec<Complex<f64>>, IoError> {
+    let phase = other(&|part| matches!(part, Part::Phase(_)));
+    let second = phase.ok_or_else(|| match first.part {
+        Part::Level => without_phase(table, first),
+        _ => missing(table, first, "phase"),
+    })?;
+    let phase = table.values(second.column)?;
+    let largest = phase.iter().fold(0.0_f64, |largest, phase| largest.max(phase.abs()));
+    let unit = match second.part {
+        Part::Phase(Some(unit)) => unit,
+        _ if largest > MAX_RADIANS => 1_f64.to_radians(),
+        _ => 1.0,
+    };
+    let size = |value: f64| match first.part {
+        Part::Level => first.in_si * 10_f64.powf(value / 20.0),
+        _ => first.in_si * value,
+    };
+    let pairs = magnitude.iter().zip(phase);
+    Ok(pairs.map(|(value, phase)| Complex::from_polar(size(*value), phase * unit)).collect())
+}
+
+/// Returns the error of a column without the other part of its response.
+fn missing(table: &Table, heading: &Heading, what: &str) -> IoError {
+    IoError::Description {
+        file: table.file().into(),
+        what: format!(
+            "column {} has no matching {what}: a frequency response has a real and an imaginary part, or a \
+             magnitude and a phase",
+            table.label(heading.column)
+        ),
+    }
+}
+
+/// Returns the error of a level in dB without a phase.
+fn without_phase(table: &Table, heading: &Heading) -> IoError {
+    let column = table.label(heading.column);
+    let reference = match &heading.unit {
+        Some((_, text)) => format!("re {}", escaped(text)),
+        None => "without a reference".into(),
+    };
+    IoError::Description {
+        file: table.file().into(),
+        what: format!(
+            "column {column} is a magnitude in decibels {reference}, and its phase is missing: add a \
+             column with the phase (\"Phase [deg]\"), because a magnitude alone does not determine the \
+             response"
+        ),
+    }
 }
 
 /// Replaces values by their inverses and carries their standard errors over; fails with the number

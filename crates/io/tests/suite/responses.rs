@@ -343,13 +343,10 @@ fn units_of_axes_and_responses_are_read() {
             let error = (function.values[at] - values[at]).norm() / values[at].norm();
             assert!(error < 1e-12, "{header}: {error}");
         }
-        // The file does not state the meaning of `w`.
-        assert_eq!(
-            found.doubts.len(),
-            usize::from(header.starts_with("w,")),
-            "{header}: {:?}",
-            found.doubts
-        );
+        // The file does not state the meaning of `w`, or the reference of a level in dB.
+        let is_doubtful =
+            header.starts_with("w,") || header.contains("(dB)") || header.contains("_db");
+        assert_eq!(found.doubts.len(), usize::from(is_doubtful), "{header}: {:?}", found.doubts);
     }
 }
 
@@ -402,4 +399,39 @@ fn mirrored_and_unsorted_tables_are_the_one_sided_ones() {
     }
     let twice = parse("f,real,imaginary\n1,2,3\n1,2,3\n").unwrap_err().to_string();
     assert!(twice.contains("twice"), "{twice}");
+}
+
+/// Judge: H in dB is 20 log |H/reference|.
+#[test]
+fn levels_in_decibels_are_read_with_their_reference() {
+    const G: f64 = 9.80665;
+    let value = Complex::from_polar(0.25_f64, -1.2);
+    let phase = value.arg().to_degrees();
+    let micro = 1e-6;
+    for (columns, reference) in [
+        ("H [dB],Phase [deg]", None),
+        ("H1 (dB),H1 phase", None),
+        ("Mag dB,Phase [deg]", None),
+        ("20log|H|,Phase", None),
+        ("dB,deg", None),
+        ("dB (g/N),Phase [deg]", Some(G)),
+        ("Accelerance [dB re 1 g/N],Phase [deg]", Some(G)),
+        ("dB re 1 g/N,deg", Some(G)),
+        ("H11 dB re 1 m/s^2/N,H11 phase", Some(1.0)),
+        ("Level [dB re 1e-6 m/N],Phase", Some(micro)),
+    ] {
+        let level = 20.0 * (value.norm() / reference.unwrap_or(1.0)).log10();
+        let text =
+            format!("Frequency [Hz],{columns}\n1,{level:?},{phase:?}\n2,{level:?},{phase:?}\n");
+        let found = parse(&text).unwrap_or_else(|e| panic!("{columns}: {e}"));
+        let error = (found.functions[0].values[0] - value).norm() / value.norm();
+        assert!(error < 1e-12, "{columns}: {error}");
+        // A reference that is not stated is assumed to be 1, and that is reported.
+        let has_doubt = found.doubts.iter().any(|(_, doubt, _)| doubt.text.starts_with("dB"));
+        assert_eq!(has_doubt, reference.is_none(), "{columns}: {:?}", found.doubts);
+    }
+    for columns in ["H [dB]", "Mag dB", "dB (g/N)", "Accelerance [dB re 1 g/N]"] {
+        let why = parse(&format!("f,{columns}\n1,3\n2,4\n")).unwrap_err().to_string();
+        assert!(why.contains("decibels") && why.contains("phase is missing"), "{columns}: {why}");
+    }
 }
