@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -126,6 +128,69 @@ def test_wrong_arguments_are_of_this_package(wrong: dict[str, Any]) -> None:
     with pytest.raises((mechid.MechidError, TypeError)) as raised:
         mechid.identify(force, x, **{"fs": 128, "period": 256, **wrong})
     assert str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"threads": True}, "`threads` is a whole number, got True"),
+        ({"threads": "2"}, "`threads` is a whole number, got '2'"),
+        ({"unit": "g"}, "`unit` is a mapping of names of columns"),
+        ({"unit": {"x": 3}}, "`unit` of 'x' is a text, got 3"),
+        ({"scale": {"x": "two"}}, "`scale` of 'x' is a number, got 'two'"),
+        ({"scale": 2.0}, "`scale` is a mapping of names of columns"),
+        ({"time": 3}, "`time` is a text, got 3"),
+        ({"displacement": 2}, "`displacement` of a file or table is a name of a column"),
+    ],
+)
+def test_values_of_a_wrong_type_are_refused_in_a_sentence(wrong: dict[str, Any], said: str) -> None:
+    force, x = record()
+    table = {"f": force, "x": x}
+    how = {"force": "f", "displacement": "x", "fs": 128, "period": 256, **wrong}
+    with pytest.raises(TypeError, match=re.escape(said)):
+        mechid.identify(table, **how)
+    if "fs" in how:
+        how["fs"] = None
+    with pytest.raises(TypeError, match=re.escape(said)):
+        mechid.identify("examples/machine.csv", **how)
+
+
+def test_lines_to_skip_are_a_whole_number() -> None:
+    with pytest.raises(TypeError, match="`skip_lines` is a whole number, got 1.5"):
+        mechid.identify("examples/machine.csv", force="force", displacement="displacement", skip_lines=1.5)
+
+
+def test_a_rate_and_a_time_column_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+    force, x = record()
+    table = {"t": np.arange(len(x)) / 128, "f": force, "x": x}
+    how = {"force": "f", "displacement": "x", "period": 256, "time": "t"}
+    for fs in (128, 128.001, None):
+        mechid.identify(table, **how, fs=fs)
+    with pytest.raises(ValueError, match="128 Hz, and `fs` is 64 Hz"):
+        mechid.identify(table, **how, fs=64)
+    path = tmp_path / "a.csv"
+    np.savetxt(path, np.transpose(list(table.values())), header="t,f,x", delimiter=",", comments="")
+    mechid.identify(path, **how, fs=128)
+    with pytest.raises(mechid.MechidError, match="says 128 Hz, and `fs` is 64 Hz"):
+        mechid.identify(path, **how, fs=64)
+
+
+def test_rates_of_sep_5_are_in_the_channels() -> None:
+    force, x = record()
+    channels: list[dict[str, Any]] = [{"name": "f", "data": force, "fs": 128}, {"name": "x", "data": x, "fs": 128}]
+    how = {"force": "f", "displacement": "x", "period": 256}
+    right = mechid.identify(channels, **how)
+    for same in ({"channels": channels}, SimpleNamespace(channels=channels)):
+        assert mechid.identify(same, **how).parameters["m"].value == right.parameters["m"].value
+    with pytest.raises(ValueError, match="128 Hz, and `fs` is 64 Hz"):
+        mechid.identify(channels, **how, fs=64)
+    for channel in channels:
+        channel["time"] = np.arange(len(x)) / 64
+    with pytest.raises(ValueError, match=r"several sampling rates: \[64\.0, 128\.0\] Hz"):
+        mechid.identify(channels, **how)
+    channels = [{"name": "f", "data": force, "fs": "fast"}, {"name": "x", "data": x, "fs": 128}]
+    with pytest.raises(TypeError, match="`fs` is a number, got 'fast'"):
+        mechid.identify(channels, **how)
 
 
 def test_foreign_exceptions_do_not_come_through(tmp_path: Path) -> None:

@@ -133,7 +133,8 @@ impl Measurement {
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read or has no such columns,
     /// [`AnalysisError::NoTimeAxis`], [`AnalysisError::Unit`] if a column is in a unit of another
-    /// quantity.
+    /// quantity, [`AnalysisError::Setting`] if a time column and a sampling rate are given and
+    /// contradict each other.
     pub fn open_with(
         path: impl AsRef<Path>,
         channels: &Channels,
@@ -156,6 +157,7 @@ impl Measurement {
             available: file.head().available(),
             unclear: file.head().unclear_time().map(|(at, text)| (file.head().label(at), text)),
         })?;
+        units::check_rate(file.head(), reading)?;
         let survey = file.survey(&time, &channels.used())?;
         let doubtful_time = units::doubtful_time(file.head(), &time, survey.sampling);
         let doubt = units::contradicted_rate(file.head(), reading);

@@ -129,6 +129,27 @@ const SAME_RATE: f64 = 1e-4;
 /// Returns a remark if the given sampling rate differs from the rate of the file, which its time
 /// column or a number with the name of a sampling rate (`Fs`) gives.
 pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<String> {
+    let [rate, source, of_file] = two_rates(table, reading)?;
+    Some(format!("{}: `sample_rate` {rate} Hz is used; {source} says {of_file} Hz", table.file()))
+}
+
+/// Refuses a sampling rate that contradicts the time column, if both are given.
+///
+/// # Errors
+/// [`AnalysisError::Setting`].
+pub(crate) fn check_rate(table: &Table, reading: &Reading) -> Result<(), AnalysisError> {
+    let rates = reading.time.as_ref().and_then(|_| two_rates(table, reading));
+    let Some([rate, source, of_file]) = rates else { return Ok(()) };
+    let file = table.file();
+    let why = format!(
+        "{file}: {source} says {of_file} Hz, and `sample_rate` is {rate} Hz: leave one of them out"
+    );
+    Err(AnalysisError::Setting { setting: "time", why })
+}
+
+/// Returns the given sampling rate in Hz, the source of another rate in the file, and this rate in
+/// Hz; `None` if there is no other rate.
+fn two_rates(table: &Table, reading: &Reading) -> Option<[String; 3]> {
     let rate_hz = reading.sample_rate_hz?;
     let of_file = Reading { sample_rate_hz: None, ..reading.clone() };
     let time = of_file.time_axis(table)?;
@@ -142,7 +163,7 @@ pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<Stri
         _ => return None,
     };
     let [rate, of_file] = [rate_hz, file_hz].map(|hz| compact(hz, 8));
-    Some(format!("{}: `sample_rate` {rate} Hz is used; {source} says {of_file} Hz", table.file()))
+    Some([rate, source, of_file])
 }
 
 /// Maximum doubtful sampling rate, in Hz, of a time column without a unit, for any length: only

@@ -146,7 +146,7 @@ class Measurement:
         fs : float, optional
             Sampling rate in Hz, if there is no time column.
         time : str, optional
-            The time column.
+            The time column; its rate must not contradict `fs`.
         skip_lines : int
             Number of header lines to skip above the table.
         detrend : {"none", "mean"}
@@ -251,17 +251,19 @@ class Measurement:
 
         Parameters
         ----------
-        table : mapping of names to columns, or sequence of SEP 5 dictionaries
+        table : mapping of names to columns, or SEP 5 dictionaries
             Columns are converted to N, m, m/s and m/s² if another unit is stated: in the name, such
             as ``"x [um]"``, in the ``units`` among the ``attrs``, or in the ``unit_str`` of a SEP 5
-            channel.
+            channel. The channels of SEP 5 are a sequence, one dictionary, or the ``channels`` of an
+            object.
         force, displacement, velocity, acceleration : str or sequence of str
             Names of columns, with their units or without, one per degree of freedom; ``"0"`` if no
             force acts.
         fs : float, optional
-            Sampling rate, in Hz. Default: that of the time column, of the index or of SEP 5 channels
-            (``fs`` or ``time``). The index is time if it contains dates, is called time or has a
-            unit of time; without a name, numbers whose steps are not all 1 are time in s.
+            Sampling rate, in Hz; it must not contradict `time` or SEP 5 channels. Default: that of
+            the time column, of the index or of SEP 5 channels (``fs`` or ``time``). The index is time
+            if it contains dates, is called time or has a unit of time; without a name, numbers whose
+            steps are not all 1 are time in s.
         time : str, optional
             The time column, or the name of the index.
         unit : mapping of str to str, optional
@@ -283,11 +285,12 @@ class Measurement:
         columns: list[tuple[str, NDArray[np.float64]]] = []
         given = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
         source: _Sep5 | _Frame
-        if isinstance(table, Sequence):
-            source = _Sep5(table, unit, scale)
+        channels_of_table = _sep5_channels(table)
+        if channels_of_table is None:
+            source = _Frame(table, unit, scale)  # type: ignore[arg-type]
         else:
-            source = _Frame(table, unit, scale)
-        used = [name for names in given.values() for name in _names("columns", names) if name != "0"]
+            source = _Sep5(channels_of_table, unit, scale)
+        used = [name for kind, names in given.items() for name in _names(kind, names) if name != "0"]
         if isinstance(source, _Sep5):
             source.check_starts(used)
         else:
@@ -303,7 +306,10 @@ class Measurement:
                         raise ValueError(f"column {column!r} consists of {len(found)} columns")
                     columns.append((label, found[0] * factor if factor != 1.0 else found[0]))
                 channels[kind].append(label)
-        rate = source.fs(given, time) if fs is None else fs
+        rate = fs
+        if fs is None or time is not None or isinstance(source, _Sep5):
+            stated = source.fs(given, _text("time", time))
+            rate = stated if fs is None else _same_rate(stated, fs)
         if rate is None:
             raise TypeError(
                 "a table needs its sampling rate: give `fs`, in Hz, or a column or an index of time (`time`)"
@@ -433,8 +439,8 @@ class _Sep5:
         self._channels = {str(channel["name"]): channel for channel in channels}
         if len(self._channels) < len(channels):
             raise ValueError("several channels have the same name")
-        self._unit = {self._find(name): text for name, text in (unit or {}).items()}
-        self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
+        self._unit = {self._find(name): text for name, text in _units(unit).items()}
+        self._scale = {self._find(name): factor for name, factor in _scales(scale).items()}
 
     def _find(self, wanted: str) -> str:
         if wanted in self._channels:
@@ -477,17 +483,65 @@ class _Sep5:
         names = [name for kind, names in given.items() for name in _names(kind, names)]
         used = [self._channels[self._find(name)] for name in names if name != "0"]
         rates: set[float] = set()
+        if time is not None:
+            rates.add(_rate_of(time, self[time]))
         for channel in used:
             rate, instants = channel.get("fs"), channel.get("time")
             if rate is not None:
-                rates.add(float(rate))  # type: ignore[arg-type]
-            elif instants is not None:
-                rates.add(_rate_of("time", instants))
+                rates.add(_number("fs", rate))
+            if instants is not None and np.ndim(instants) == 1:  # type: ignore[arg-type]
+                of_time = _rate_of("time", instants)
+                known = [known for known in rates if _are_same(known, of_time)]
+                rates.add(known[0] if known else of_time)
         if len(rates) > 1:
             raise ValueError(f"the channels have several sampling rates: {sorted(rates)} Hz")
         if not used:
             raise TypeError("no column of the channels is named")
         return rates.pop() if rates else None
+
+
+def _sep5_channels(table: object) -> Sequence[Mapping[str, object]] | None:
+    """Return the channels of a table in the form of SEP 5: a sequence of channels, one channel
+    alone, or an object with ``channels``; None for another table."""
+    if isinstance(table, Mapping):
+        is_channel = isinstance(table.get("name"), str) and "data" in table
+        inner = table.get("channels")
+    else:
+        is_channel, inner = False, getattr(table, "channels", None)
+    if is_channel:
+        return [table]  # type: ignore[list-item]
+    if _are_channels(inner):
+        return inner
+    if isinstance(table, Sequence):
+        for number, channel in enumerate(table, 1):
+            if not isinstance(channel, Mapping):
+                raise TypeError(f"channel {number} is a {type(channel).__name__}, not a mapping of SEP 5")
+        return table
+    return None
+
+
+def _are_channels(given: object) -> bool:
+    is_list = isinstance(given, Sequence) and not isinstance(given, str)
+    return is_list and bool(given) and all(isinstance(channel, Mapping) for channel in given)  # type: ignore[attr-defined]
+
+
+_SAME_RATE = 1e-4
+"""Maximum relative difference of equal sampling rates, because instants have few digits."""
+
+
+def _are_same(first: float, second: float) -> bool:
+    return math.isclose(first, second, rel_tol=_SAME_RATE)
+
+
+def _same_rate(stated: float | None, fs: float) -> float:
+    """Return the sampling rate `fs`, in Hz, unless a table states another one."""
+    given = _number("fs", fs)
+    if stated is not None and not _are_same(stated, given):
+        raise ValueError(
+            f"the sampling rate of the table is {stated:.8g} Hz, and `fs` is {given:.8g} Hz: leave `fs` out, or "
+            "correct one of them"
+        )
+    return given
 
 
 def _start(value: object) -> str | None:
@@ -541,8 +595,8 @@ class _Frame:
         self._index: Any = getattr(table, "index", None) if hasattr(table, "columns") else None
         named = getattr(self._index, "name", None)
         self._index_name = None if named is None else str(named)
-        self._unit = {self._find(name): text for name, text in (unit or {}).items()}
-        self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
+        self._unit = {self._find(name): text for name, text in _units(unit).items()}
+        self._scale = {self._find(name): factor for name, factor in _scales(scale).items()}
 
     def _find(self, wanted: str) -> str:
         if wanted in self._names:
@@ -837,14 +891,14 @@ def reading_of(
 ) -> dict[str, object]:
     """Return the settings for reading a file."""
     return {
-        "units": dict(unit or {}),
-        "scales": {column: float(factor) for column, factor in (scale or {}).items()},
-        "skip_lines": skip_lines,
-        "time": time,
+        "units": _units(unit),
+        "scales": _scales(scale),
+        "skip_lines": _index("skip_lines", skip_lines),
+        "time": _text("time", time),
         "sample_rate_hz": _rate(fs),
         "detrend": detrend,
-        "record_column": record_column,
-        "record_id": record_id,
+        "record_column": _text("record_column", record_column),
+        "record_id": _text("record_id", record_id),
         **({} if memory_gb is None else {"memory_gb": _number("memory_gb", memory_gb)}),
     }
 
@@ -1066,7 +1120,9 @@ def matrix(name: str, values: object) -> NDArray[np.float64]:
 
 def _is_table(source: object) -> bool:
     if isinstance(source, Sequence) and not isinstance(source, str):
-        return bool(source) and all(isinstance(channel, Mapping) for channel in source)
+        return _are_channels(source)
+    if _are_channels(getattr(source, "channels", None)):
+        return True
     return isinstance(source, Mapping) or (
         hasattr(source, "keys") and (hasattr(source, "columns") or hasattr(source, "data_vars"))
     )
@@ -1116,6 +1172,39 @@ def _index(name: str, value: object) -> int:
 
 def _rate(fs: float | None) -> float | None:
     return None if fs is None else _number("fs", fs)
+
+
+def _text(name: str, value: object) -> str | None:
+    if value is None or isinstance(value, str):
+        return value
+    raise TypeError(f"`{name}` is a text, got {value!r}")
+
+
+def _pairs(name: str, given: object) -> dict[str, object]:
+    """Return a setting that has a value for each of some columns."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or not all(isinstance(column, str) for column in given):
+        raise TypeError(f"`{name}` is a mapping of names of columns, such as {{'acc': …}}, got {given!r}")
+    return dict(given)
+
+
+def _units(given: object) -> dict[str, str]:
+    units = _pairs("unit", given)
+    for column, unit in units.items():
+        if not isinstance(unit, str):
+            raise TypeError(f"`unit` of {column!r} is a text, got {unit!r}")
+    return units  # type: ignore[return-value]
+
+
+def _scales(given: object) -> dict[str, float]:
+    scales = {}
+    for column, factor in _pairs("scale", given).items():
+        try:
+            scales[column] = _number("scale", factor)
+        except TypeError:
+            raise TypeError(f"`scale` of {column!r} is a number, got {factor!r}") from None
+    return scales
 
 
 def _number(name: str, value: object) -> float:
