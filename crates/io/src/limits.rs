@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// Memory per number while a file is read, in bytes: the number, and a copy while its column grows.
+/// Memory for each number of a file while it is read, in bytes: a column that grows is copied, so
+/// that each number is in memory twice.
 pub(crate) const NUMBER_BYTES: usize = 16;
 
 /// Number of bytes at the beginning of a record that are searched for its details: headers of
@@ -49,16 +50,17 @@ pub struct Limits {
     /// Numbers in memory at one time, over all columns; 2²⁸ (2 GiB) by default. A long text that is
     /// read in chunks ([`RecordFile`](crate::RecordFile)) may have any number of rows.
     pub numbers: usize,
-    /// Unpacked bytes of a text in gzip per byte of the file, in addition to the first 64 MiB; 100
-    /// by default. Gzip reduces the printed numbers of a measured record to about a quarter.
+    /// Largest size of a text in gzip, in bytes per byte of the compressed file, in addition to 64
+    /// MiB; 100 by default. Gzip reduces the printed numbers of a measured record to about a
+    /// quarter.
     pub text_per_byte: usize,
     /// Bytes of the name of a column, a unit or a record; 4 KiB by default.
     pub name_bytes: usize,
     /// Memory that a file of any size may use, in bytes; 256 MiB by default.
     pub memory_bytes: usize,
-    /// Further memory per byte of the file, in bytes; 512 by default. A number of a measured record
-    /// needs at least one byte of its file; a file with more numbers than bytes is not measured
-    /// data.
+    /// Additional memory for each byte of the file, in bytes; 512 by default. Each number of a
+    /// measured record takes at least one byte of the file, so a file with more numbers than bytes
+    /// is not a measured record.
     pub memory_per_byte: usize,
     /// Largest memory that any file may use, in bytes; 8 GiB by default.
     pub most_memory_bytes: usize,
@@ -170,7 +172,7 @@ impl fmt::Display for Limit {
                 write!(f, "the compressed data are longer than {limit} bytes")
             }
             Self::Numbers(limit) => {
-                write!(f, "there are more than {limit} numbers to hold in memory")
+                write!(f, "there are more than {limit} numbers, which is the limit for one file")
             }
             Self::NameBytes(limit) => write!(f, "the name is longer than {limit} bytes"),
             Self::Memory(limit) => {

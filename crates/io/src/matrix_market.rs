@@ -159,12 +159,12 @@ impl Header {
         let is_coordinate = match format {
             "coordinate" => true,
             "array" => false,
-            _ => return Err(lines.malformed("coordinate and array are the formats that are read")),
+            _ => return Err(lines.malformed("only the formats coordinate and array can be read")),
         };
         if !matches!(field, "real" | "double" | "integer") {
-            return Err(
-                lines.malformed("the entries of the matrix of a machine are real or integer")
-            );
+            return Err(lines.malformed(
+                "only matrices with real, double or integer entries can be read (third word of the first line)",
+            ));
         }
         let symmetry = match symmetry {
             "general" => Symmetry::General,
@@ -337,8 +337,14 @@ mod tests {
             ("".into(), "line 1: it is empty"),
             ("1 2 3\n".into(), "line 1: a Matrix Market file begins"),
             (banner[1..].into(), "line 1: a Matrix Market file begins"),
-            ("%%MatrixMarket matrix coordinate complex general\n".into(), "real or integer"),
-            ("%%MatrixMarket matrix coordinate pattern general\n".into(), "real or integer"),
+            (
+                "%%MatrixMarket matrix coordinate complex general\n".into(),
+                "real, double or integer",
+            ),
+            (
+                "%%MatrixMarket matrix coordinate pattern general\n".into(),
+                "real, double or integer",
+            ),
             ("%%MatrixMarket matrix coordinate real hermitian\n".into(), "symmetries"),
             (banner.into(), "line 2: the line with the size"),
             (format!("{banner}2 3 1\n"), "line 2: the matrix of a machine has as many rows"),

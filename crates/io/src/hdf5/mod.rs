@@ -283,7 +283,10 @@ fn natural(name: &str) -> (String, u64, String) {
 }
 
 fn damaged(error: hdf5_pure::Error) -> Fault {
-    Fault::new(0, format!("its structure is damaged, or of a kind that is not read here ({error})"))
+    Fault::new(
+        0,
+        format!("the file is damaged, or it uses a part of HDF5 that mechid cannot read ({error})"),
+    )
 }
 
 /// Subtracts the memory of numbers from the budget; a file of `len` bytes can have only a limited

@@ -134,13 +134,16 @@ fn object(elements: &mut Elements<'_>) -> &'static str {
 /// Returns the number of elements of a full matrix; messages name the position of its data.
 fn count_of(part: &Element<'_>, lengths: &[usize]) -> Result<usize, Fault> {
     let Some(count) = part.count() else {
-        let what = format!("a variable holds data of type {}, not numbers", part.kind);
+        let what = format!(
+            "the data of a variable have type {}, which is not a type of numbers",
+            part.kind
+        );
         return Err(Fault::new(part.at, what));
     };
     let product = lengths.iter().try_fold(1_usize, |product, len| product.checked_mul(*len));
     if product != Some(count) {
         let sizes: Vec<String> = lengths.iter().map(usize::to_string).collect();
-        let what = format!("a variable of {} numbers holds {count}", sizes.join(" × "));
+        let what = format!("a variable of size {} has {count} numbers", sizes.join(" × "));
         return Err(Fault::new(part.at, what));
     }
     Ok(count)
@@ -214,7 +217,7 @@ fn inner(
 ) -> Result<Array, Fault> {
     let element = elements.required("elements")?;
     if element.kind != MATRIX {
-        return Err(Fault::new(element.at, "an element of an array is not a variable"));
+        return Err(Fault::new(element.at, "an entry of a cell array or a struct is not an array"));
     }
     if depth == MOST_NESTED {
         let what = format!("arrays are nested more than {MOST_NESTED} deep");

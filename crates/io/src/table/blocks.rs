@@ -222,7 +222,8 @@ impl<'a> Blocks<'a> {
         Err(IoError::Malformed {
             file: self.file.clone(),
             at: Place::Line(line),
-            what: "there are zero bytes within the text: the file is damaged, or not text".into(),
+            what: "the text contains bytes with the value 0: the file is damaged, or it is not a text file"
+                .into(),
         })
     }
 

@@ -16,8 +16,8 @@ const EVEN: f64 = 1e-9;
 pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, String> {
     let mut text = String::new();
     let title = printable(&responses.file);
-    // The lines are name, description, program, dates, program and date of the file; a date would
-    // make two runs differ.
+    // The header has the name of the file, a description, programs and dates. The dates are always
+    // the same, so that two runs write the same file.
     for line in ["    -1", "   151", &title, "NONE", "mechid"] {
         let _ = writeln!(text, "{line}");
     }
@@ -127,8 +127,8 @@ impl Dataset<'_> {
         self.ordinate.into_iter().for_each(|ordinate| axis(text, ordinate));
         axis(text, (0, "NONE", "NONE"));
         let numbers_per_value = if self.is_complex { 2 } else { 1 };
-        // The standard requires four numbers per line; with uneven frequencies, one or two values
-        // with their frequencies.
+        // A line has four numbers at even frequencies, as the standard requires. At uneven ones it
+        // has one complex or two real values, each after its frequency.
         let values = match (is_even, self.is_complex) {
             (true, true) => 2,
             (true, false) => 4,

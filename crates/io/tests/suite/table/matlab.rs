@@ -121,8 +121,8 @@ fn lengths_that_are_none_are_refused() {
         (9, doubles(&[0.5, 16.0]), "0.5 is not a possible size of a dimension"),
         (9, doubles(&[f64::NAN, 8.0]), "is not a possible size"),
         (9, doubles(&[f64::INFINITY, 0.0]), "is not a possible size"),
-        (5, words(&[0, 8]), "a variable of 0 × 8 numbers holds 8"),
-        (5, words(&[1 << 30, 1 << 30, 1 << 30]), "numbers holds 8"),
+        (5, words(&[0, 8]), "a variable of size 0 × 8 has 8 numbers"),
+        (5, words(&[1 << 30, 1 << 30, 1 << 30]), "has 8 numbers"),
         (5, words(&[8]), "a variable has no size"),
         (5, words(&[1; 65]), "a variable has no size"),
     ] {

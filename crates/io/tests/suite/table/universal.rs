@@ -178,8 +178,8 @@ fn broken_files_are_refused_with_the_line() {
         ),
         (
             with("4         8         1", "3         8         1", 0),
-            "a.unv, line 20: ordinate data type 3 with spacing 1: known are 2, 4, 5 and 6 with 0 and \
-             1",
+            "a.unv, line 20: data type 3 of the ordinate with spacing 1 cannot be read, only the \
+             types 2, 4, 5 and 6 with spacing 0 or 1",
         ),
         (
             with("NONE         1  -1       NONE", "NONE         1  -9       NONE", 0),
