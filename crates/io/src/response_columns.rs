@@ -188,7 +188,14 @@ fn level(note: &str) -> Option<&str> {
 fn without_level(name: &str) -> (&str, Option<String>) {
     let lower = name.to_ascii_lowercase();
     let starts_word = |at: &usize| !name[..*at].ends_with(char::is_alphanumeric);
-    let start = ["db re", "db:re", "db(re"].into_iter().find_map(|text| lower.find(text));
+    let find = |text: &str| {
+        let at = lower.find(text)?;
+        let is_word = !lower[at + text.len()..].starts_with(char::is_alphabetic);
+        is_word.then_some(at)
+    };
+    let words =
+        ["re", "ref", "rel"].map(|word| ["db ", "db:", "db("].map(|db| format!("{db}{word}")));
+    let start = words.as_flattened().iter().find_map(|text| find(text));
     match start.filter(starts_word) {
         Some(at) => (name[..at].trim_end_matches([' ', ',', '_', '-']), Some(name[at..].into())),
         None => (name, None),

@@ -1,6 +1,6 @@
 //! Units as people write them: `m/s^2`, `mm s-2`, `in/sec²`, `ms^-2`, `g/N`, `m/(s²·N)`.
 
-use super::vocabulary::{Dimension, Entry, VOCABULARY};
+use super::vocabulary::{CASED, Dimension, Entry, VOCABULARY};
 
 /// Maximum length of a unit, in bytes; a longer text is not a unit.
 const MAX_BYTES: usize = 64;
@@ -55,7 +55,8 @@ fn lookup(word: &str) -> Option<Expression> {
         return Some(of(entry));
     }
     let mut matches = VOCABULARY.iter().filter(|entry| {
-        entry.spellings.iter().any(|spelling| spelling.eq_ignore_ascii_case(&word))
+        let mut spellings = entry.spellings.iter().filter(|spelling| !CASED.contains(spelling));
+        spellings.any(|spelling| spelling.eq_ignore_ascii_case(&word))
     });
     let first = matches.next()?;
     matches.next().is_none().then(|| of(first))

@@ -79,6 +79,9 @@ const TURN: f64 = std::f64::consts::TAU;
 
 use Dimension as D;
 
+/// Spellings that are units only in this case: `F_DN` may point down, and `F_CN` be a channel.
+pub(super) const CASED: [&str; 4] = ["nN", "cN", "dN", "hN"];
+
 /// All units. Spellings differ in case only where the units do (`mN` and `MN`).
 pub(super) const VOCABULARY: &[Entry] = &[
     // Force.

@@ -418,6 +418,7 @@ fn levels_in_decibels_are_read_with_their_reference() {
         ("Accelerance [dB re 1 g/N],Phase [deg]", Some(G)),
         ("dB re 1 g/N,deg", Some(G)),
         ("H11 dB re 1 m/s^2/N,H11 phase", Some(1.0)),
+        ("H11 dB receptance,H11 phase", None),
         ("Level [dB re 1e-6 m/N],Phase", Some(micro)),
     ] {
         let level = 20.0 * (value.norm() / reference.unwrap_or(1.0)).log10();

@@ -577,8 +577,12 @@ fn last_words_that_are_units_are_taken_or_reported() {
 }
 
 /// Names of forces that end with a place, a channel, a treatment or a condition.
-const FORCES: [&str; 40] = [
+const FORCES: [&str; 44] = [
     "F in",
+    "Force_DN",
+    "F_NN",
+    "Force CN",
+    "F_HN",
     "in_1",
     "m1",
     "N1",
