@@ -482,17 +482,18 @@ class _Sep5:
     def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
         names = [name for kind, names in given.items() for name in _names(kind, names)]
         used = [self._channels[self._find(name)] for name in names if name != "0"]
-        rates: set[float] = set()
-        if time is not None:
-            rates.add(_rate_of(time, self[time]))
-        for channel in used:
-            rate, instants = channel.get("fs"), channel.get("time")
-            if rate is not None:
-                rates.add(_number("fs", rate))
-            if instants is not None and np.ndim(instants) == 1:  # type: ignore[arg-type]
-                of_time = _rate_of("time", instants)
-                known = [known for known in rates if _are_same(known, of_time)]
-                rates.add(known[0] if known else of_time)
+        rates: list[float] = [_number("fs", c["fs"]) for c in used if c.get("fs") is not None]
+        rates = sorted(set(rates))
+        of_times = [_rate_of(time, self[time])] if time is not None else []
+        of_times += [
+            _rate_of("time", c["time"])
+            for c in used
+            if c.get("time") is not None and np.ndim(c["time"]) == 1  # type: ignore[arg-type]
+        ]
+        # Instants with few digits give a slightly different rate.
+        for rate in of_times:
+            if not any(_are_same(known, rate) for known in rates):
+                rates.append(rate)
         if len(rates) > 1:
             raise ValueError(f"the channels have several sampling rates: {sorted(rates)} Hz")
         if not used:
