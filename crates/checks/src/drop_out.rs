@@ -6,8 +6,8 @@ use mechid_signal::{Record, message};
 
 use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::limits::{
-    DROP_OUT_LEVEL, DROP_OUT_MOTION, DROP_OUT_NEIGHBOURS, FORCE_ACTING, FORCE_JUMP, FORCE_PAUSE,
-    FORCE_SAMPLES,
+    DROP_OUT_FORCE_ACTING, DROP_OUT_FORCE_JUMP, DROP_OUT_FORCE_PAUSE, DROP_OUT_FORCE_SAMPLES,
+    DROP_OUT_LEVEL, DROP_OUT_MOTION, DROP_OUT_NEIGHBOURS,
 };
 use super::{Subject, Verdict};
 
@@ -97,13 +97,13 @@ fn may_be_intended(x: &[f64], sample: usize, samples: usize) -> bool {
     let (level, rest) = (x[sample], DROP_OUT_MOTION * smallest_change(x));
     let others = before.iter().chain(after);
     let acting = others.filter(|f| (**f - level).abs() > rest).count();
-    let (mean, jump) = (x.iter().sum::<f64>() / x.len() as f64, FORCE_JUMP * deviation(x));
+    let (mean, jump) = (x.iter().sum::<f64>() / x.len() as f64, DROP_OUT_FORCE_JUMP * deviation(x));
     let least = if (mean - level).abs() > jump { rest } else { rest.max(jump) };
     let jumps = |f: Option<&f64>| f.is_some_and(|f| (f - level).abs() > least);
     let is_smooth = !(jumps(before.last()) || jumps(after.first()));
-    samples < FORCE_SAMPLES
-        || samples as f64 > FORCE_PAUSE * x.len() as f64
-        || (acting as f64) < FORCE_ACTING * (x.len() - samples) as f64
+    samples < DROP_OUT_FORCE_SAMPLES
+        || samples as f64 > DROP_OUT_FORCE_PAUSE * x.len() as f64
+        || (acting as f64) < DROP_OUT_FORCE_ACTING * (x.len() - samples) as f64
         || is_smooth
 }
 
@@ -142,12 +142,17 @@ impl Check for DropOut {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} is {} from sample {} on, {} in a row, while it moves before and after: a drop-out of the transmission; \
+            "{} is {} from sample {} on, {} in a row, while it changes before and after: {}; \
              leave it out of the window",
             names.channel(self.channel),
             message::number(self.level),
             self.sample + 1,
-            message::count(self.samples, "sample")
+            message::count(self.samples, "sample"),
+            if self.channel.quantity == Quantity::Force {
+                "a drop-out of the transmission, or a pause of the excitation"
+            } else {
+                "a drop-out of the transmission"
+            }
         )
     }
 }

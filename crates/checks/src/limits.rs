@@ -296,16 +296,16 @@ pub(crate) const LISTED_CHANGES: usize = 3;
 
 /// Maximum length of a drop-out of a force, as a fraction of the record; a longer run of equal
 /// samples is a pause of the excitation.
-pub const FORCE_PAUSE: f64 = 0.05;
+pub const DROP_OUT_FORCE_PAUSE: f64 = 0.05;
 
 /// Minimum fraction of the other samples at which a force with a drop-out acts; hammers and bursts
 /// rest for a larger part of the record.
-pub const FORCE_ACTING: f64 = 0.75;
+pub const DROP_OUT_FORCE_ACTING: f64 = 0.75;
 
 /// Minimum jump of a force at the beginning or the end of a drop-out near its mean, in standard
 /// deviations of the force; a sweep comes to rest with a smaller one.
-pub const FORCE_JUMP: f64 = 0.2;
+pub const DROP_OUT_FORCE_JUMP: f64 = 0.2;
 
 /// Minimum number of samples of a drop-out of a force; at a smooth peak a converter gives fewer
 /// equal samples.
-pub const FORCE_SAMPLES: usize = 8;
+pub const DROP_OUT_FORCE_SAMPLES: usize = 8;
