@@ -61,19 +61,6 @@ impl Channels {
         self
     }
 
-    /// Returns the same channels with one force entry for each response: missing ones are forces
-    /// that do not act. Only fits need this; frequency responses accept forces and responses as two
-    /// lists.
-    #[must_use]
-    pub fn with_a_force_each(mut self) -> Self {
-        let responses = ResponseQuantity::ALL.iter().map(|kind| self.response(*kind).len()).max();
-        let count = responses.unwrap_or(0).max(self.force.len());
-        if !self.force.is_empty() {
-            self.force.resize(count, ABSENT.into());
-        }
-        self
-    }
-
     /// Returns the columns of one kind of response.
     pub fn response(&self, kind: ResponseQuantity) -> &[String] {
         match kind {
