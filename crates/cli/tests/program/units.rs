@@ -210,7 +210,7 @@ fn a_time_column_with_a_factor_or_an_unknown_unit_is_asked_about() {
 /// Reference: the same record with the names in SI units.
 #[test]
 fn a_unit_of_another_quantity_in_a_name_gives_a_warning() {
-    let names = ["Force, psi", "x_mm", "velocity", "acceleration"];
+    let names = ["\"Force, psi\"", "x_mm", "velocity", "acceleration"];
     let folder = records(names, [1.0, 1e3, 1.0, 1.0], None);
     let how = "--force 2 --displacement 3 --period 256";
     let (si, other) = (
