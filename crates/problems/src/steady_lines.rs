@@ -55,8 +55,14 @@ pub fn displacements(
     displacements
 }
 
-/// Responses D(ω)⁻¹ F, lines × degrees of freedom, of M, C and K to forces, by dense elimination
-/// line by line, which does not use the receptance of a model.
+/// Responses D(ω)⁻¹ F (m), lines × degrees of freedom, of M, C and K (SI units) to forces (N), by
+/// dense elimination line by line, which does not use the receptance of a model.
+///
+/// # Panics
+/// If D is singular at a line.
+///
+/// # Source
+/// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (dynamic stiffness).
 pub fn eliminated(
     [m, c, k]: [&DMatrix<f64>; 3],
     omega: &[f64],
