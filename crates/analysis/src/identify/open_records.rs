@@ -168,10 +168,8 @@ pub(super) fn fit(
     let explained = explained.map(|other| squared_change(&fit.estimate, &other));
     let sinusoids = sinusoid_rows(records, &fit);
     let joint = joined(&closed)?;
-    let prediction = Prediction::Sampled {
-        discretisation: acquisition.between_samples.unwrap_or(Discretisation::FirstOrderHold),
-        extent: Extent::Open,
-    };
+    let between = acquisition.between_samples.unwrap_or(Discretisation::FirstOrderHold);
+    let prediction = Prediction::Sampled { discretisation: between, extent: Extent::Open };
     let fitted = Fitted {
         equations: 2 * joint.len(),
         before_all: before_spectral_fit(&joint, unknowns)?,

@@ -6,11 +6,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Whitened;
 use super::force_responses::{
-    ForceResponses, orthonormal, pulse_covariances, remove, transient_bases,
+    ForceResponses, RecordColumns, orthonormal, pulse_covariances, remove, transient_bases,
 };
 use super::output_error_fit::{entries, parts};
 use crate::Unknowns;
 use crate::limits::MAX_PULSE_EFFECTS;
+use crate::pulse_covariance::PulseCovariance;
 
 /// Most likely errors of the pulses of the forces, which are common to all lines of a record.
 pub(super) struct PulseFit {
@@ -80,25 +81,8 @@ impl PulseFit {
         let transients = transient_bases(data, &responses)?;
         remove(&transients, &mut columns);
         let pulses = pulse_covariances(data, &responses, &transients, level)?;
-        let (mut rows_of_amplitudes, mut determined) = (Vec::new(), 0.0);
-        let mut following = before;
-        for (rows, pulses) in &pulses {
-            let effects = &pulses.effects[0];
-            let (own, rest) = following.split_at(effects.ncols());
-            following = rest;
-            let mut part = columns.rows(rows.start, rows.len()).into_owned();
-            part.column_mut(count).gemv(-1.0, effects, &DVector::from_column_slice(own), 1.0);
-            rows_of_amplitudes.push(pulses.whiten(&mut [&mut part]));
-            columns.rows_mut(rows.start, rows.len()).copy_from(&part);
-            determined += pulses.determined();
-        }
         let lines = columns.nrows();
-        let mut extended = columns.resize_vertically(lines + before.len(), 0.0);
-        let mut first = lines;
-        for rows in &rows_of_amplitudes {
-            extended.rows_mut(first, rows.nrows()).copy_from(rows);
-            first += rows.nrows();
-        }
+        let extended = whitened(columns, &pulses, before);
         let residual = extended.column(count).into_owned();
         let sensitivity = extended.columns(0, count).into_owned();
         let of_amplitudes = sensitivity.rows(lines, before.len()).into_owned();
@@ -108,7 +92,32 @@ impl PulseFit {
         Some(Self {
             amplitudes: amplitudes.as_slice().to_vec(),
             covariance: &root * root.transpose() / level,
-            determined,
+            determined: pulses.iter().map(|(_, pulses)| pulses.determined()).sum(),
         })
     }
+}
+
+/// Returns columns over all residuals, whitened by the covariance of the errors of pulses, with the
+/// rows of the amplitudes below them. The last column is a residual with the amplitudes `before`
+/// already subtracted; the one returned has none subtracted.
+fn whitened(
+    columns: DMatrix<f64>,
+    pulses: &[RecordColumns<PulseCovariance>],
+    before: &[f64],
+) -> DMatrix<f64> {
+    let (lines, residual) = (columns.nrows(), columns.ncols() - 1);
+    let mut extended = columns.resize_vertically(lines + before.len(), 0.0);
+    let mut first = 0;
+    for (rows, pulses) in pulses {
+        let effects = &pulses.effects[0];
+        let next = first + effects.ncols();
+        let subtracted = DVector::from_column_slice(&before[first..next]);
+        let mut part = extended.rows(rows.start, rows.len()).into_owned();
+        part.column_mut(residual).gemv(-1.0, effects, &subtracted, 1.0);
+        let of_amplitudes = pulses.whiten(&mut [&mut part]);
+        extended.rows_mut(rows.start, rows.len()).copy_from(&part);
+        extended.rows_mut(lines + first, effects.ncols()).copy_from(&of_amplitudes);
+        first = next;
+    }
+    extended
 }

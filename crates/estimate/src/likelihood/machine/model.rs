@@ -283,14 +283,12 @@ impl ResponseModel for MachineModel {
         let (change, factors) = self.change(parameters, omega);
         let load_count = nominal.loads.ncols();
         // `from_joints` is H₀ᵀ before the solution of (I + Δ H₀)ᵀ Hᵀ = H₀ᵀ, and Hᵀ after it.
-        let mut from_joints = nominal.from_joints.clone();
-        let mut loads = nominal.loads.clone();
+        let (mut from_joints, mut loads) = (nominal.from_joints.clone(), nominal.loads.clone());
         if j > 0 {
             let mut coupled = DMatrix::identity(j, j);
             for (row, column, value) in change.0.iter().filter(|entry| entry.1 < j) {
-                let mut to = coupled.column_mut(*row);
                 let from = nominal.from_joints.column(*column);
-                add_scaled(to.as_mut_slice(), *value, from.as_slice());
+                add_scaled(coupled.column_mut(*row).as_mut_slice(), *value, from.as_slice());
             }
             solve_in_place(&mut coupled, &mut from_joints).then_some(())?;
             let mut reaction = DMatrix::zeros(j, load_count);
