@@ -95,8 +95,8 @@ fn smallest_change(x: &[f64]) -> f64 {
 fn may_be_intended(x: &[f64], sample: usize, samples: usize) -> bool {
     let (before, after) = (&x[..sample], &x[sample + samples..]);
     let (level, rest) = (x[sample], DROP_OUT_MOTION * smallest_change(x));
-    let others = before.iter().chain(after);
-    let acting = others.filter(|f| (**f - level).abs() > rest).count();
+    let acting = before.iter().chain(after);
+    let acting = acting.filter(|f| (**f - level).abs() > rest).count();
     let (mean, jump) = (x.iter().sum::<f64>() / x.len() as f64, DROP_OUT_FORCE_JUMP * deviation(x));
     let least = if (mean - level).abs() > jump { rest } else { rest.max(jump) };
     let jumps = |f: Option<&f64>| f.is_some_and(|f| (f - level).abs() > least);

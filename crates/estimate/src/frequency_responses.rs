@@ -6,7 +6,7 @@ use mechid_spectra::frf::Frf;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::frequency_domain::{OutputErrorFit, Whitened, output_error};
+use crate::frequency_domain::{OutputErrorFit, Whitened, orthonormal, output_error};
 use crate::limits::{MAX_SENSITIVITIES, SHARPENING_ROUNDS, SHARPENING_SETTLED};
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
@@ -185,19 +185,7 @@ impl Errors {
     ) -> Option<Self> {
         let data = joined(records, responses).ok()?;
         let white = Whitened::new(&data, unknowns, entries, |row| noise.covariance(row).clone())?;
-        let mut sensitivity = white.sensitivity.clone();
-        let lengths: Vec<f64> = sensitivity.column_iter().map(|c| c.norm()).collect();
-        for (mut column, length) in sensitivity.column_iter_mut().zip(&lengths) {
-            if *length > 0.0 {
-                column.unscale_mut(*length);
-            }
-        }
-        let (q, r) = sensitivity.qr().unpack();
-        let mut root = DMatrix::identity(r.nrows(), r.ncols());
-        r.solve_upper_triangular_mut(&mut root).then_some(())?;
-        for (mut row, length) in root.row_iter_mut().zip(&lengths) {
-            row.unscale_mut(*length);
-        }
+        let (q, root) = orthonormal(white.sensitivity.clone())?;
         root.iter().all(|v| v.is_finite()).then_some(Self { white, dof: data.dof(), q, root })
     }
 

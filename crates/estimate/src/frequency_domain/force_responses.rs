@@ -129,19 +129,3 @@ pub(super) fn pulse_covariances(
     };
     data.pulse_errors().chunk_by(|one, next| one.rows() == next.rows()).map(of_record).collect()
 }
-
-/// Returns Q and R⁻¹ of the sensitivities J = Q R; `None` if the columns of J are linearly
-/// dependent.
-pub(super) fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let lengths: Vec<f64> = sensitivity.column_iter().map(|column| column.norm()).collect();
-    for (mut column, length) in sensitivity.column_iter_mut().zip(&lengths) {
-        if *length > 0.0 {
-            column.unscale_mut(*length);
-        }
-    }
-    let (q, r) = sensitivity.qr().unpack();
-    let mut root = DMatrix::identity(r.nrows(), r.ncols());
-    r.solve_upper_triangular_mut(&mut root).then_some(())?;
-    root.row_iter_mut().zip(&lengths).for_each(|(mut row, length)| row.unscale_mut(*length));
-    Some((q, root))
-}

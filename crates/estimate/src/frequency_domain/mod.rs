@@ -84,3 +84,4 @@ pub use parts::{
 pub use sampled_force::equivalent_force;
 pub use structural_damping::{StructuralDamping, structural_damping};
 pub use whitened::Whitened;
+pub(crate) use whitened::orthonormal;

@@ -4,11 +4,11 @@ use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{DMatrix, DVector};
 
-use super::Whitened;
 use super::force_responses::{
-    ForceResponses, RecordColumns, orthonormal, pulse_covariances, remove, transient_bases,
+    ForceResponses, RecordColumns, pulse_covariances, remove, transient_bases,
 };
 use super::output_error_fit::{entries, parts};
+use super::{Whitened, orthonormal};
 use crate::Unknowns;
 use crate::limits::MAX_PULSE_EFFECTS;
 use crate::pulse_covariance::PulseCovariance;

@@ -4,10 +4,10 @@ use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::Unknowns;
-use crate::frequency_domain::Whitened;
 use crate::frequency_domain::force_responses::{
-    ForceResponses, RecordColumns, orthonormal, pulse_covariances, remove, transient_bases,
+    ForceResponses, RecordColumns, pulse_covariances, remove, transient_bases,
 };
+use crate::frequency_domain::{Whitened, orthonormal};
 use crate::pulse_covariance::PulseCovariance;
 
 /// Weighted residual and sensitivities at some values of the parameters.
