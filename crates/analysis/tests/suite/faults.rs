@@ -69,8 +69,8 @@ fn every_fault_is_told_by_a_check_that_is_meant_for_it() {
             let warned = warnings(Some(fault), on, *seed);
             warned.iter().any(|warned| warned == subject)
         };
-        let told = (0..4_u64).into_par_iter().filter(told).count();
-        assert_eq!(told, 4, "{fault:?} on {on:?}: {subject}");
+        let told = (0..8_u64).into_par_iter().filter(told).count();
+        assert_eq!(told, 8, "{fault:?} on {on:?}: {subject}");
     }
 }
 

@@ -41,14 +41,14 @@ fn of_open_record(seed: u64, delays: [f64; 2]) -> MachineEstimate {
     identify_machine(&data, &machine, &instruments, &Settings::default()).unwrap()
 }
 
-/// Of 6 tests at 5 %, more than 2 reject with a probability of 0.002.
+/// Of 10 tests at 5 %, more than 3 reject with a probability of 0.001.
 #[test]
 fn no_delay_is_found_in_right_data() {
     for test in [of_chain, of_prior, of_open_record] {
         let scores: Vec<DelayScore> =
-            (0..6).into_par_iter().map(|seed| test(seed, [0.0; 2]).delay.unwrap()).collect();
+            (0..10).into_par_iter().map(|seed| test(seed, [0.0; 2]).delay.unwrap()).collect();
         let found = scores.iter().filter(|score| score.p_value < 0.05).count();
-        assert!(found <= 2, "{found} {scores:?}");
+        assert!(found <= 3, "{found} {scores:?}");
     }
 }
 
