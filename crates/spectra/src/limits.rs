@@ -126,6 +126,10 @@ pub(crate) const END_LEVERAGE: f64 = 0.25;
 /// Maximum number of steps of the search for the log power of a smooth noise spectrum.
 pub(crate) const SMOOTH_STEPS: usize = 200;
 
+/// Maximum length of a step of that search with the Hessian of an earlier step, relative to the step
+/// before; a longer step is computed again with its own Hessian.
+pub(crate) const HESSIAN_REUSED: f64 = 0.25;
+
 /// Change of the log power (RMS) that ends the search for the final fit.
 pub(crate) const SMOOTH_TOLERANCE: f64 = 1e-9;
 
@@ -150,6 +154,10 @@ pub(crate) const BUMP_HIGHER: f64 = 3.0;
 /// floor.
 pub(crate) const PEAK_REACH: f64 = 10.0;
 
+/// Width of the groups of lines whose mean level represents them in the search for a bump, relative
+/// to their distance from its middle and at least to its half-width.
+pub(crate) const BUMP_GROUP: f64 = 0.03125;
+
 /// Number of flat bumps of different widths around which other shapes are tried.
 pub(crate) const BEST_WIDTHS: usize = 6;
 
@@ -159,8 +167,8 @@ pub(crate) const BUMP_VARIATIONS: usize = 12;
 /// Maximum number of steps of the search for the height of a bump.
 pub(crate) const HEIGHT_STEPS: usize = 10;
 
-/// Change of the height of a bump that ends the search.
-pub(crate) const HEIGHT_TOLERANCE: f64 = 1e-4;
+/// Change of the height of a bump that ends the search: the gain is then known up to its cube.
+pub(crate) const HEIGHT_TOLERANCE: f64 = 1e-2;
 
 /// Maximum height of a bump, as the logarithm of the power.
 pub(crate) const BUMP_HIGHEST: f64 = 30.0;

@@ -4,14 +4,15 @@ mod bump;
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use rayon::prelude::*;
 
 pub(crate) use self::bump::Bump;
 use self::bump::{most_conspicuous, widths};
 use crate::limits::{
-    BUMP_REMAINDER, END_LEVERAGE, LINES_PER_ORDER, MAX_BUMPS, MAX_ORDER, QUIET_DEVIATIONS,
-    SMOOTH_COMPARED, SMOOTH_FLOOR, SMOOTH_SEARCHED, SMOOTH_STEPS, SMOOTH_TOLERANCE,
+    BUMP_REMAINDER, END_LEVERAGE, HESSIAN_REUSED, LINES_PER_ORDER, MAX_BUMPS, MAX_ORDER,
+    QUIET_DEVIATIONS, SMOOTH_COMPARED, SMOOTH_FLOOR, SMOOTH_SEARCHED, SMOOTH_STEPS,
+    SMOOTH_TOLERANCE,
 };
 
 /// Form of a noise spectrum: the logarithm of the power is a polynomial in the logarithm of the
@@ -326,18 +327,26 @@ fn most_likely(
     let mut next_ratio = ratio.clone();
     let (transposed, mut weighted) = (basis.transpose(), basis.clone());
     let mut information = DMatrix::zeros(basis.ncols(), basis.ncols());
+    let mut factors: Option<Cholesky<f64, Dyn>> = None;
+    let mut previous = f64::INFINITY;
     for _ in 0..SMOOTH_STEPS {
         let slope = basis.tr_mul(&ratio.add_scalar(-1.0));
-        for (mut column, own) in weighted.column_iter_mut().zip(basis.column_iter()) {
-            column.zip_zip_apply(&own, &ratio, |w, own, ratio| *w = own * ratio);
-        }
-        information.gemm(1.0, &transposed, &weighted, 0.0);
-        // If the Hessian is not positive definite, the expected information, which is the identity
-        // matrix, replaces it in Newton's step.
-        let mut step = match information.clone().cholesky() {
-            Some(factors) => factors.solve(&slope),
-            None => slope,
+        let reused = factors.as_ref().map(|factors| factors.solve(&slope));
+        // The Hessian of an earlier step is used as long as the steps become much shorter.
+        let mut step = match reused.filter(|step| step.norm() <= HESSIAN_REUSED * previous) {
+            Some(step) => step,
+            None => {
+                for (mut column, own) in weighted.column_iter_mut().zip(basis.column_iter()) {
+                    column.zip_zip_apply(&own, &ratio, |w, own, ratio| *w = own * ratio);
+                }
+                information.gemm(1.0, &transposed, &weighted, 0.0);
+                factors = information.clone().cholesky();
+                // If the Hessian is not positive definite, the expected information, which is the
+                // identity matrix, replaces it in Newton's step.
+                factors.as_ref().map_or_else(|| slope.clone(), |factors| factors.solve(&slope))
+            }
         };
+        previous = step.norm();
         while step.norm() > tolerance {
             let next = &log_power + basis * &step;
             let lower = deviance(&next, variances, &mut next_ratio);

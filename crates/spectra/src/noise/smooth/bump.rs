@@ -5,8 +5,8 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::limits::{
-    BEST_WIDTHS, BUMP_HIGHER, BUMP_HIGHEST, BUMP_PEAK, BUMP_VARIATIONS, BUMP_WIDER, HEIGHT_STEPS,
-    HEIGHT_TOLERANCE, PEAK_REACH, QUIET_DEVIATIONS, SMOOTH_FLOOR,
+    BEST_WIDTHS, BUMP_GROUP, BUMP_HIGHER, BUMP_HIGHEST, BUMP_PEAK, BUMP_VARIATIONS, BUMP_WIDER,
+    HEIGHT_STEPS, HEIGHT_TOLERANCE, PEAK_REACH, QUIET_DEVIATIONS, SMOOTH_FLOOR,
 };
 
 /// Shape that, multiplied by an unknown height, is added to the log powers around a line.
@@ -95,7 +95,11 @@ impl Bump {
     }
 
     pub(super) fn at(&self, line: usize) -> f64 {
-        let away = (line as f64 - self.middle).abs();
+        self.height_at(line as f64)
+    }
+
+    fn height_at(&self, place: f64) -> f64 {
+        let away = (place - self.middle).abs();
         match self.shape {
             Shape::Flat => f64::from(u8::from(away < self.reach)),
             Shape::Tent => (1.0 - away / self.reach).max(0.0),
@@ -126,6 +130,26 @@ impl Bump {
         let first = (self.middle - self.reach).ceil().max(0.0) as usize;
         first..((self.middle + self.reach).floor() as usize + 1).min(lines)
     }
+
+    /// Returns groups of neighbouring lines on which the bump is not zero, so narrow that its height
+    /// hardly changes within a group.
+    fn groups(&self, lines: usize) -> Vec<Range<usize>> {
+        let scale = match self.shape {
+            Shape::Flat | Shape::Tent => self.reach,
+            Shape::Peak { half_width, .. } => half_width,
+        };
+        let support = self.support(lines);
+        let mut groups = Vec::new();
+        let mut start = support.start;
+        while start < support.end {
+            let away = (start as f64 - self.middle).abs();
+            let width = ((BUMP_GROUP * away.max(scale)) as usize).max(1);
+            let end = (start + width).min(support.end);
+            groups.push(start..end);
+            start = end;
+        }
+        groups
+    }
 }
 
 /// Returns the widths of the bands that are tried: 1, 2, 3, 4, 6, 8, 12 …, up to a third of the
@@ -154,7 +178,7 @@ pub(super) fn most_conspicuous(
     let (of_flat, band) = flat.first()?;
     let none = vec![0.0; channels];
     let shapes = flat.iter().flat_map(|(_, band)| Bump::about(band));
-    let fit = |bump: Bump, start: &[f64]| Gained::fit(bump, start, &levels, &gains);
+    let fit = |bump: Bump, start: &[f64]| Gained::fit(bump, start, &gains);
     let mut fitted = best(&mut shapes.map(|bump| fit(bump, &none)))?;
     for _ in 0..BUMP_VARIATIONS {
         let varied = fitted.bump.varied().into_iter();
@@ -235,47 +259,61 @@ struct Gained {
 }
 
 impl Gained {
-    /// Fits the heights, beginning with `start`, to the levels v/p; `sums` holds their cumulative
-    /// sums.
-    fn fit(bump: Bump, start: &[f64], levels: &DMatrix<f64>, sums: &FlatGains) -> Self {
-        let lines = levels.nrows();
-        let support = bump.support(lines);
-        let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
+    /// Fits the heights, beginning with `start`, to the levels v/p with these cumulative sums.
+    fn fit(bump: Bump, start: &[f64], sums: &FlatGains) -> Self {
+        let lines = sums.below.nrows() - 1;
+        let groups = bump.groups(lines);
+        let parts: Vec<Part> = groups.iter().map(|group| Part::new(&bump, group)).collect();
+        let mut levels = vec![0.0; groups.len()];
         let mut heights = start.to_vec();
-        let channels = levels.column_iter().zip(sums.below.column_iter());
-        let gains = heights.iter_mut().zip(channels).map(|(height, (all, below))| {
-            let inside = &all.as_slice()[support.clone()];
-            let outside = below[support.start] + (below[lines] - below[support.end]);
-            raised(&parts, inside, outside, lines as f64, height, sums.nu)
+        let channels = heights.iter_mut().zip(sums.below.column_iter());
+        let gains = channels.map(|(height, below)| {
+            for (level, group) in levels.iter_mut().zip(&groups) {
+                *level = below[group.end] - below[group.start];
+            }
+            let inside: f64 = levels.iter().sum();
+            raised(&parts, &levels, below[lines] - inside, lines as f64, height, sums.nu)
         });
         let gain = gains.sum();
         Self { bump, gain, heights }
     }
 }
 
-/// Fits the height of a bump whose shape has the values `parts` on its lines with the levels v/p
-/// `inside`, and returns the reduction of Σ log p + v/p; the levels of all other lines have the sum
-/// `outside`.
+/// Group of lines on which a bump has about the same height.
+struct Part {
+    /// Height relative to the middle of the bump.
+    height: f64,
+    lines: f64,
+}
+
+impl Part {
+    fn new(bump: &Bump, group: &Range<usize>) -> Self {
+        let middle = 0.5 * (group.start + group.end - 1) as f64;
+        Self { height: bump.height_at(middle), lines: group.len() as f64 }
+    }
+}
+
+/// Fits the height of a bump of these `parts`, whose levels v/p have the sums `inside`, and returns
+/// the reduction of Σ log p + v/p; the levels of all other lines have the sum `outside`.
 fn raised(
-    parts: &[f64],
+    parts: &[Part],
     inside: &[f64],
     outside: f64,
     lines: f64,
     height: &mut f64,
     nu: f64,
 ) -> f64 {
-    let area: f64 = parts.iter().sum();
+    let area: f64 = parts.iter().map(|part| part.height * part.lines).sum();
     let total = outside + inside.iter().sum::<f64>();
     let (mut least, mut most) = (-BUMP_HIGHEST, BUMP_HIGHEST);
-    let mut sum = total;
+    let mut gain = 0.0;
     for _ in 0..HEIGHT_STEPS {
-        let (mut first, mut second) = (0.0, 0.0);
-        sum = outside;
+        let (mut sum, mut first, mut second) = (outside, 0.0, 0.0);
         for (part, level) in parts.iter().zip(inside) {
-            let scaled_level = level * f64::exp(-*height * part);
+            let scaled_level = level * f64::exp(-*height * part.height);
             sum += scaled_level;
-            first += part * scaled_level;
-            second += part * part * scaled_level;
+            first += part.height * scaled_level;
+            second += part.height * part.height * scaled_level;
         }
         // The cost L log Σ v/p + height Σ part is convex, so Newton's method with bisection finds
         // its minimum.
@@ -286,16 +324,51 @@ fn raised(
         } else {
             most = *height
         }
+        gain = lines * (total / sum).ln() - *height * area;
         let next = *height - slope / curvature;
-        let next = if next > least && next < most { next } else { 0.5 * (least + most) };
-        // The sum was computed for the previous height, which is accurate enough.
-        if (next - *height).abs() <= HEIGHT_TOLERANCE {
+        let newton = next > least && next < most;
+        let step = if newton { next } else { 0.5 * (least + most) } - *height;
+        *height += step;
+        if step.abs() <= HEIGHT_TOLERANCE {
+            // The last step of Newton's method adds this gain, up to third order.
+            gain += if newton { 0.5 * slope * slope / curvature } else { 0.0 };
             break;
         }
-        *height = next;
     }
     if *height <= 0.0 && area * nu < QUIET_DEVIATIONS {
         return 0.0;
     }
-    lines * (total / sum).ln() - *height * area
+    gain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The gain of a peak is that of the exact likelihood of all lines, at the height that maximises
+    /// it, for peaks from two lines to half the band wide.
+    #[test]
+    fn gains_of_grouped_lines_are_those_of_all_lines() {
+        let (lines, nu) = (2000, 1.0);
+        let deviation = |line: usize| -(1.0 - (0.618_033_988_75 * line as f64).fract()).ln();
+        for (half_width, above_floor) in [(0.5, 100.0), (4.0, 30.0), (20.0, 1000.0), (150.0, 9.0)] {
+            let truth = Bump::peak(900.3, half_width, above_floor);
+            let level = |line: usize| deviation(line + 1) * (2.5 * truth.at(line)).exp();
+            let levels = DMatrix::from_fn(lines, 1, |line, _| level(line));
+            let total = levels.sum();
+            for tried in truth.varied().into_iter().chain([truth]) {
+                let of_height = |height: f64| {
+                    let raised = |line: usize| levels[line] * (-height * tried.at(line)).exp();
+                    let sum: f64 = (0..lines).map(raised).sum();
+                    let area: f64 = (0..lines).map(|line| tried.at(line)).sum();
+                    lines as f64 * (total / sum).ln() - height * area
+                };
+                let exact = (0..=4000).map(|step| of_height(0.001 * f64::from(step)));
+                let exact = exact.fold(f64::NEG_INFINITY, f64::max);
+                let found = Gained::fit(tried, &[0.0], &FlatGains::new(&levels, nu));
+                let off = (found.gain - exact).abs();
+                assert!(off < 0.05 + 1e-3 * exact, "{tried:?}: {} for {exact}", found.gain);
+            }
+        }
+    }
 }
