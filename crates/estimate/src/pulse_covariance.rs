@@ -1,5 +1,6 @@
 //! Errors of pulses: noise of the inputs that is common to all lines of a record.
 
+use mechid_numerics::products::transposed_product;
 use nalgebra::{Cholesky, DMatrix, Dyn};
 use rayon::prelude::*;
 
@@ -25,9 +26,8 @@ impl PulseCovariance {
         let products: Vec<_> = effects
             .par_chunks(effects.len().div_ceil(PULSE_SUMS))
             .map(|blocks| {
-                blocks.iter().fold(DMatrix::zeros(count, count), |mut sum, block| {
-                    sum.gemm_tr(1.0, block, block, 1.0);
-                    sum
+                blocks.iter().fold(DMatrix::zeros(count, count), |sum, block| {
+                    sum + transposed_product(block.as_view(), block.as_view())
                 })
             })
             .collect();
@@ -42,7 +42,9 @@ impl PulseCovariance {
     pub(crate) fn whiten(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
         let columns = parts.first().map_or(0, |part| part.ncols());
         let pairs = self.effects.par_iter().zip(parts.par_iter());
-        let products: Vec<_> = pairs.map(|(effects, part)| effects.tr_mul(&**part)).collect();
+        let products: Vec<_> = pairs
+            .map(|(effects, part)| transposed_product(effects.as_view(), part.as_view()))
+            .collect();
         let zeros = DMatrix::zeros(self.factor.l_dirty().nrows(), columns);
         let mut amplitudes = products.iter().fold(zeros, |sum, block| sum + block);
         self.factor.solve_mut(&mut amplitudes);

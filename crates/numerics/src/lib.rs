@@ -7,6 +7,7 @@
 //! | least squares from row blocks, with covariance and rank | [`least_squares`] |
 //! | the triangular factor of any number of rows | [`triangular`] |
 //! | the Cholesky factor of a large matrix | [`cholesky`] |
+//! | products of tall matrices | [`products`] |
 //! | singular values, Hermitian eigenvalues, exponential, always finite | [`linear_algebra`] |
 //! | eigenvalues of any matrix, equal ones too | [`real_schur`] |
 //! | linear equations and largest eigenvalues of operators given by products | [`krylov`] |
@@ -32,6 +33,7 @@ mod limits;
 pub mod linear_algebra;
 pub mod logarithm;
 pub mod nelder_mead;
+pub mod products;
 mod quasi_triangular;
 pub mod real_schur;
 pub mod triangular;

@@ -51,3 +51,7 @@ pub(crate) const PATIENCE: usize = 20;
 /// Maximum number of QR sweeps without a deflation; if more are needed, the iteration does not
 /// converge.
 pub(crate) const SWEEPS: usize = 100;
+
+/// Number of rows of a block of a tall matrix that is multiplied at a time: a block of a hundred
+/// columns then fits in the cache of a core.
+pub(crate) const PRODUCT_ROWS: usize = 1024;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use mechid_numerics::products::transposed_product;
 use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::transient::powers;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
@@ -88,8 +89,8 @@ fn transient_basis(
 pub(super) fn remove(transients: &[RecordColumns<DMatrix<f64>>], columns: &mut DMatrix<f64>) {
     for (rows, transient) in transients {
         let mut part = columns.rows_mut(rows.start, rows.len());
-        let explained = transient.tr_mul(&part);
-        part -= transient * explained;
+        let explained = transposed_product(transient.as_view(), part.as_view());
+        part.gemm(-1.0, transient, &explained, 1.0);
     }
 }
 
@@ -122,8 +123,8 @@ pub(super) fn pulse_covariances(
         let is_common = |rows: &Range<usize>| rows.start < range.end && range.start < rows.end;
         for (rows, transient) in transients.iter().filter(|(rows, _)| is_common(rows)) {
             (*rows == range).then_some(())?;
-            let explained = transient.tr_mul(&effects);
-            effects -= transient * explained;
+            let explained = transposed_product(transient.as_view(), effects.as_view());
+            effects.gemm(-1.0, transient, &explained, 1.0);
         }
         Some((range, PulseCovariance::new(vec![effects])?))
     };

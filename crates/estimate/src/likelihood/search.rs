@@ -1,5 +1,6 @@
 //! Bounded Gauss–Newton search with damping (Levenberg–Marquardt).
 
+use mechid_numerics::products::transposed_product;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::limits::{SAME_MINIMUM, SHORT_STEP, STEPS};
@@ -102,7 +103,7 @@ impl<'a> Local<'a> {
         for (mut column, scale) in columns.column_iter_mut().zip(scale.iter()) {
             column.unscale_mut(*scale);
         }
-        let gram = columns.tr_mul(&columns);
+        let gram = transposed_product(columns.as_view(), columns.as_view());
         let gradient = columns.tr_mul(residual);
         Self { linearisation, free, scale, gram, gradient }
     }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use mechid_numerics::products::transposed_product;
 use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector, Dyn, PermutationSequence, QR};
@@ -191,7 +192,9 @@ impl TransientBasis {
         let rank = self.triangle.ncols();
         let vectors = parts.first().map_or(0, |part| part.ncols());
         let pairs = self.blocks.par_iter().zip(parts.par_iter());
-        let products: Vec<_> = pairs.map(|(basis, part)| basis.tr_mul(&**part)).collect();
+        let products: Vec<_> = pairs
+            .map(|(basis, part)| transposed_product(basis.as_view(), part.as_view()))
+            .collect();
         let components =
             products.iter().fold(DMatrix::zeros(rank, vectors), |sum, of_block| sum + of_block);
         let pairs = self.blocks.par_iter().zip(parts.par_iter_mut());

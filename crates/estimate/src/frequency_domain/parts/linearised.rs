@@ -1,5 +1,6 @@
 //! Weighted residual of a fit and its sensitivities, without what transients explain.
 
+use mechid_numerics::products::transposed_product;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -66,7 +67,7 @@ impl Linearised {
             let level = linear.cost() / linear.free();
             linear.pulses = pulse_covariances(data, responses, &linear.transients, level)?;
             let weighted = linear.weighted(linear.basis.clone());
-            linear.information = Some(linear.basis.tr_mul(&weighted).cholesky()?);
+            linear.information = Some(linear.products_with_basis(&weighted).cholesky()?);
         }
         Some(linear)
     }
@@ -100,8 +101,8 @@ impl Linearised {
     /// Returns D_p Q of a part without the components that the parameters and the transients of all
     /// data explain.
     pub(super) fn unexplained(&self, mut part: DMatrix<f64>) -> DMatrix<f64> {
-        let explained = self.basis.tr_mul(&part);
-        part -= &self.basis * explained;
+        let explained = self.products_with_basis(&part);
+        part.gemm(-1.0, &self.basis, &explained, 1.0);
         remove(&self.transients, &mut part);
         part
     }
@@ -111,10 +112,12 @@ impl Linearised {
     /// therefore V⁻¹ − V⁻¹Q(QᵀV⁻¹Q)⁻¹QᵀV⁻¹ with the covariance V of lines and pulses.
     pub(super) fn covariance_of_products(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         if self.pulses.is_empty() {
-            return columns.tr_mul(columns);
+            return transposed_product(columns.as_view(), columns.as_view());
         }
         let weighted = self.weighted(columns.clone());
-        columns.tr_mul(&weighted) - self.basis.tr_mul(&weighted).tr_mul(&self.effect_of(columns))
+        let information = self.products_with_basis(&weighted);
+        transposed_product(columns.as_view(), weighted.as_view())
+            - information.tr_mul(&self.effect_of(columns))
     }
 
     /// Returns how much of each basis column the parameters take up of a change of the residual by
@@ -122,10 +125,15 @@ impl Linearised {
     pub(super) fn effect_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.information {
             Some(information) => {
-                information.solve(&self.basis.tr_mul(&self.weighted(columns.clone())))
+                information.solve(&self.products_with_basis(&self.weighted(columns.clone())))
             }
-            None => self.basis.tr_mul(columns),
+            None => self.products_with_basis(columns),
         }
+    }
+
+    /// Returns Qᵀ times columns over all residuals.
+    fn products_with_basis(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        transposed_product(self.basis.as_view(), columns.as_view())
     }
 
     /// Returns whether errors of pulses were subtracted from the residual.
