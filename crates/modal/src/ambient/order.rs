@@ -74,7 +74,17 @@ impl Choice<'_> {
     /// Schwarz (1978), Annals of Statistics 6, 461–464.
     fn penalty(&self) -> f64 {
         let parameters = 2.0 * self.band.outputs() as f64 + 2.0;
-        parameters * (2.0 * self.band.omega.len() as f64).ln()
+        parameters * self.penalty_of_parameter()
+    }
+
+    fn penalty_of_parameter(&self) -> f64 {
+        (2.0 * self.band.omega.len() as f64).ln()
+    }
+
+    /// Returns the penalty of all polynomials of the noise.
+    fn penalty_of_noise(&self, fit: &Fit) -> f64 {
+        let layout = &fit.parameters.layout;
+        (layout.noise_terms * layout.outputs) as f64 * self.penalty_of_parameter()
     }
 
     fn drop_pole(&mut self, pole: &Pole, reason: DropReason) {
@@ -146,9 +156,17 @@ impl Choice<'_> {
             .filter(|(evidence, _)| *evidence < STRONG_EVIDENCE * needed)
             .collect();
         weak.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let gain = |next: &Fit| {
+            let penalty = self.penalty_of_noise(next) - self.penalty_of_noise(fit);
+            2.0 * (next.cost - fit.cost) + penalty
+        };
         weak.into_iter().find_map(|(_, mode)| {
-            let next = self.without(fit, mode)?;
-            let gain = 2.0 * (next.cost - fit.cost);
+            let mut next = self.without(fit, mode)?;
+            if gain(&next) >= needed {
+                // Noise that its polynomials cannot follow looks like a mode with large damping.
+                next = with_more_noise_terms(&next, self.band)?;
+            }
+            let gain = gain(&next);
             (gain < needed).then_some((next, mode, DropReason::SmallGain { gain, needed }))
         })
     }

@@ -119,6 +119,22 @@ fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
     assert!(errors.iter().sum::<f64>().abs() < 6.0, "{errors:?}");
 }
 
+/// Noise that falls steeply, in two records for which the first polynomials and a mode with a damping
+/// ratio of 15 % describe it better than the first polynomials alone.
+#[test]
+fn noise_that_falls_steeply_is_no_mode() {
+    let noise = Noise { level: 0.1, pole: 0.9 };
+    for seed in [1021, 1065] {
+        let record = tower().accelerations(20.0, 6000, noise, seed);
+        let estimate = identified(&record, AmbientSettings::default());
+        let modes = estimate.modes.iter();
+        let modes: Vec<_> =
+            modes.map(|m| (m.natural_frequency_hz.value, m.damping_ratio.value)).collect();
+        assert_eq!(modes.len(), 4, "{modes:?}");
+        assert_eq!(is_right(&estimate, &tower()), 4, "{modes:?}");
+    }
+}
+
 /// Two records for which a wrong quantity has the larger maximum of the likelihood, and two for
 /// which the likelihood of independent lines has a false one, because a mode changes much between
 /// the ends: at damping ratios a tenth of the true ones or less.
