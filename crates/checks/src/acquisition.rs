@@ -1,6 +1,6 @@
 //! Forces held or linear between samples, and AC coupled channels, as explanations of a residual.
 
-use mechid_estimate::frequency_domain::equivalent_force;
+use mechid_estimate::frequency_domain::{ChangedRecords, OutputErrorFit, equivalent_force};
 use mechid_estimate::{Estimate, EstimateError};
 use mechid_model::{Discretisation, SecondOrderSystem};
 use mechid_signal::Extent;
@@ -10,8 +10,10 @@ use nalgebra::DVector;
 use super::alternative::{Alternative, Cause};
 use super::finding::{Channel, Finding, Quantity};
 use super::limits::{
-    ACQUISITION_ROUNDS, DELAY_REMAINING, HIGH_PASS_STEP, LINEARITY_NEIGHBOURS, STANDARD_ERRORS,
+    ACQUISITION_ROUNDS, CORNER_WIDTHS, DELAY_REMAINING, HIGH_PASS_STEP, LINEARITY_NEIGHBOURS,
+    STANDARD_ERRORS,
 };
+use super::open_fit::{joined, minimum_near, residuals_of_fit};
 use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
 use super::weighted_fit::{Weighing, after_spectral_fit};
 
@@ -250,6 +252,55 @@ pub fn fault_of_acquisition(
         }
     }
     Ok(best.map(|(_, finding)| finding))
+}
+
+/// Finds AC coupling that explains the residual of a maximum-likelihood `fit` to hits
+/// ([`Finding::Alternative`]). `records` are the data of the fit, sampled every `dt` (s), `closed`
+/// those without the transients, and `after` the residuals. `None` unless the tests of the residual
+/// warn, and without the AC coupling they pass or at most a quarter of the power remains: a short
+/// force hardly shows whether the residual is correlated with it.
+///
+/// # Source
+/// Rao's score test; maximum likelihood with new transients for the corner frequency.
+pub fn fault_of_hits(
+    records: &[FrequencyData],
+    closed: &[FrequencyData],
+    dt: f64,
+    fit: &OutputErrorFit,
+    after: &[SpectralResidual],
+) -> Option<Finding> {
+    let estimate = &fit.estimate;
+    let system = estimate.system().ok()?;
+    let first = closed.first().filter(|_| after.len() == closed.len())?;
+    if is_noise(after) || after.iter().any(SpectralResidual::is_rounding) {
+        return None;
+    }
+    let weighing = Weighing::new(closed, estimate, Extent::Open)?;
+    let unknowns = estimate.unknowns();
+    let parameters = unknowns.independent();
+    let of_fit =
+        Residuals { records: closed, after, weighing: &weighing, system: &system, dt, parameters };
+    let acts = |dof: &usize| closed.iter().any(|data| data.force().column(*dof).norm() > 0.0);
+    let driven: Vec<usize> = (0..first.dof()).filter(acts).collect();
+    let mut faults = Fault::all(first.dof(), &driven);
+    faults.retain(|fault| !matches!(fault, Fault::Between(_)));
+    let joint = joined(records)?;
+    let explained = of_fit.significant(faults).into_iter().filter_map(|(fault, score)| {
+        let mut likelihood = ChangedRecords::from_fit(&joint, unknowns, fit)?;
+        let undisturbed = likelihood.cost(&joint)?;
+        let cost = |corner: f64| likelihood.cost(&fault.removed(&joint, &system, dt, corner)?);
+        let widths = CORNER_WIDTHS.map(|width| width * score.amount);
+        let (corner, least) = minimum_near(score.amount, widths, cost, |cost| cost < undisturbed)?;
+        fault.is_plausible(corner).then_some(())?;
+        let without: Option<Vec<FrequencyData>> =
+            records.iter().map(|data| fault.removed(data, &system, dt, corner)).collect();
+        let remaining = least / undisturbed;
+        let becomes_noise = || Some(is_noise(&residuals_of_fit(&without?, unknowns)?));
+        (remaining <= DELAY_REMAINING || becomes_noise()?)
+            .then(|| (remaining, fault.cause(first, &driven, corner)))
+    });
+    let (remaining, cause) = explained.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(Finding::Alternative(Alternative { cause, remaining }))
 }
 
 /// Returns the amount of a fault after some refinements, and the records without it.

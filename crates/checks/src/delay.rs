@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::{self, Formatter};
 
 use mechid_estimate::frequency_domain::{
-    DelayedForce, DelayedOpenRecord, OutputErrorFit, output_error,
+    ChangedRecords, DelayedForce, OutputErrorFit, output_error,
 };
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
@@ -16,12 +16,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::finding::{Check, Finding, Names};
 use super::limits::{
-    DELAY_NEAR, DELAY_PARABOLAS, DELAY_PREFERRED, DELAY_REACH, DELAY_REDUCTIONS, DELAY_RESOLVED,
-    HARDLY_FOLLOWS, LEAST_PART,
+    DELAY_NEAR, DELAY_PREFERRED, DELAY_REACH, DELAY_REDUCTIONS, DELAY_RESOLVED, HARDLY_FOLLOWS,
 };
 use super::limits::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
+use super::open_fit::{joined, minimum_near, residuals_of_fit};
 use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
-use super::weighted_fit::after_spectral_fit;
 use super::{MAX_SAMPLES, Subject, Verdict};
 
 /// Maximum delay, in samples, to either side.
@@ -95,39 +94,22 @@ pub fn delay_of_open_records(
 ) -> Option<Finding> {
     let with_pulses = joined(records)?;
     let corrected = joined(&fit.without_pulse_errors(records).ok()?)?;
-    let mut likelihood = DelayedOpenRecord::from_fit(&with_pulses, unknowns, fit)?;
-    let undelayed = likelihood.cost(0.0)?;
+    let mut likelihood = ChangedRecords::from_fit(&with_pulses, unknowns, fit)?;
+    let undelayed = likelihood.cost(&with_pulses)?;
     let freedom = likelihood.spare().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
     let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
     let is_significant =
         |delayed: f64| distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
     let follows_force = !is_uncorrelated(without_delay);
     let near = delay_of_either_window(&corrected, dt, unknowns, &fit.estimate).unwrap_or(0.0);
+    let late = |samples: f64| with_pulses.with_later_force(samples * dt);
     if near.abs() > DELAY_NEAR {
-        likelihood.search(near * dt)?;
+        likelihood.search(&late(near))?;
     }
-    let (mut samples, mut delayed) = (near, likelihood.cost(near * dt)?);
-    let mut width = DELAY_REACH;
-    for _ in 0..DELAY_PARABOLAS {
-        let [before, after] = [samples - width, samples + width];
-        let [before, after] = [likelihood.cost(before * dt)?, likelihood.cost(after * dt)?];
-        let (slope, curvature) = (after - before, after - 2.0 * delayed + before);
-        // The step is limited if the three points do not enclose a minimum.
-        let step = if curvature > 0.0 {
-            (-0.5 * slope / curvature).clamp(-2.0, 2.0)
-        } else {
-            -2.0 * slope.signum()
-        };
-        samples += step * width;
-        delayed = likelihood.cost(samples * dt)?;
-        if !follows_force && !is_significant(delayed) {
-            return None;
-        }
-        width *= f64::clamp(step.abs(), LEAST_PART, 1.0);
-        if width < DELAY_RESOLVED {
-            break;
-        }
-    }
+    let cost = |samples: f64| likelihood.cost(&late(samples));
+    let promises = |delayed: f64| follows_force || is_significant(delayed);
+    let widths = [DELAY_REACH, DELAY_RESOLVED];
+    let (samples, delayed) = minimum_near(near, widths, cost, promises)?;
     if !is_significant(delayed) {
         return None;
     }
@@ -147,16 +129,7 @@ fn residuals_with(
 ) -> Option<Vec<SpectralResidual>> {
     let late: Vec<FrequencyData> =
         records.iter().map(|record| record.with_later_force(delay)).collect();
-    let fit = output_error(&joined(&late)?, unknowns).ok()?;
-    let corrected = fit.without_pulse_errors(&late).ok()?;
-    let closed = fit.ends.as_ref()?.without_transients(&corrected).ok()?;
-    Some(after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?.records)
-}
-
-/// Returns the rows of all records; `None` without a record or for records of different kinds.
-fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
-    let (first, following) = records.split_first()?;
-    following.iter().try_fold(first.clone(), |joined, record| joined.and(record)).ok()
+    residuals_of_fit(&late, unknowns)
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the

@@ -50,6 +50,7 @@ mod mass;
 mod misfit;
 mod no_logarithm;
 mod omitted;
+mod open_fit;
 mod p_value;
 mod parts;
 mod period;
@@ -78,7 +79,7 @@ mod whiteness;
 
 use std::fmt;
 
-pub use acquisition::fault_of_acquisition;
+pub use acquisition::{fault_of_acquisition, fault_of_hits};
 pub use after::after_fit;
 pub use alternative::{Alternative, Cause, ModelledResponses, better_model};
 pub use before::{before_equation_of_motion, before_fit};

@@ -158,10 +158,10 @@ pub(crate) const DELAY_NEAR: f64 = 0.5;
 /// Half width of the first parabola through the sums of squares around a delay, in samples.
 pub(crate) const DELAY_REACH: f64 = 0.25;
 
-/// Maximum number of parabolic steps in the search for a delay.
-pub(crate) const DELAY_PARABOLAS: usize = 8;
+/// Maximum number of parabolic steps in the search for a delay or a corner frequency.
+pub(crate) const PARABOLAS: usize = 8;
 
-/// Minimum ratio of successive parabola widths in the search for a delay.
+/// Minimum ratio of successive parabola widths in these searches.
 pub(crate) const LEAST_PART: f64 = 0.1;
 
 /// Parabola width, in samples, that ends the search for a delay.
@@ -286,6 +286,10 @@ pub const DROP_OUT_LEVEL: f64 = 1e-4;
 
 /// Maximum number of rounds in which the corner frequency of an AC-coupled channel is refined.
 pub(crate) const ACQUISITION_ROUNDS: usize = 4;
+
+/// Half width of the first and of the last parabola through the sums of squares around a corner
+/// frequency of hits, relative to its first estimate.
+pub(crate) const CORNER_WIDTHS: [f64; 2] = [0.5, 0.01];
 
 /// Step of the corner frequency, relative to the lowest line, in the derivative of the effect of a
 /// high-pass.

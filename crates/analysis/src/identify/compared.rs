@@ -30,4 +30,17 @@ impl Compared {
             omitted: omitted.map(|omitted| omitted.mean_square),
         }
     }
+    /// Returns the comparison without the omitted term, if another explanation of the residual,
+    /// with which a fraction `remaining` of its power remains, explains more than the term.
+    pub(super) fn beside(mut self, remaining: Option<f64>) -> Self {
+        let is_less_likely = |finding: &Finding| match (finding, remaining) {
+            (Finding::TermLeftOut(term), Some(remaining)) => term.explained < 1.0 - remaining,
+            _ => false,
+        };
+        if self.parts.iter().any(is_less_likely) {
+            self.parts.retain(|finding| !is_less_likely(finding));
+            self.omitted = None;
+        }
+        self
+    }
 }

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use mechid_checks::{
     AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, after_spectral_fit,
-    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition, fitted_band,
-    linearity_of_open_record,
+    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition,
+    fault_of_hits, fitted_band, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
@@ -154,14 +154,13 @@ pub(super) fn fit(
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let late = delay_of_open_records(&with_pulses, dt, unknowns, &fit, &residuals);
-    let Compared { parts, omitted } = agreement(&data, &fit, &residuals, excitation)?;
+    let compared = agreement(&data, &fit, &residuals, excitation)?;
     let fault = match excitation {
-        // Short forces hardly show whether the residual is correlated with them, so that a wrong
-        // fault would count as the explanation.
-        Excitation::Hits(_) => None,
+        Excitation::Hits(_) => fault_of_hits(&with_pulses, &closed, dt, &fit, &residuals),
         _ => fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?,
     };
     let likelier = likelier(late, fault);
+    let Compared { parts, omitted } = compared.beside(likelier.as_ref().map(remaining));
     let quantity = records[0].held.response().1;
     let refit = |finding| refitted_with(finding, &with_pulses, quantity, unknowns, noise.response);
     let explained = likelier.as_ref().and_then(refit);
@@ -258,12 +257,16 @@ pub(super) fn rows_of(records: &[FrequencyData]) -> Vec<Vec<Range<usize>>> {
 
 /// Returns the explanation of a residual that reduces its power most.
 fn likelier(one: Option<Finding>, other: Option<Finding>) -> Option<Finding> {
-    let remaining = |finding: &Finding| match finding {
+    one.into_iter().chain(other).min_by(|a, b| remaining(a).total_cmp(&remaining(b)))
+}
+
+/// Returns the fraction of the residual power that remains with the explanation of a finding.
+fn remaining(finding: &Finding) -> f64 {
+    match finding {
         Finding::Delay(delay) => delay.remaining,
         Finding::Alternative(alternative) => alternative.remaining,
         _ => 1.0,
-    };
-    one.into_iter().chain(other).min_by(|a, b| remaining(a).total_cmp(&remaining(b)))
+    }
 }
 
 /// Returns the estimate with a delay or a fault of the acquisition that a finding names, for

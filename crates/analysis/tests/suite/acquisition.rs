@@ -37,7 +37,7 @@ fn simulated(between: Discretisation, kind: ResponseQuantity, seed: u64) -> Meas
     Measurement::from_records(&force, &[(kind, &noisy.unwrap())]).unwrap()
 }
 
-fn cause(found: &Identified) -> Option<Cause> {
+pub fn cause(found: &Identified) -> Option<Cause> {
     let checks = found.summary().checks.iter().filter(|check| check.is_conspicuous());
     let mut causes = checks.filter_map(|check| match &check.finding {
         Finding::Alternative(Alternative { cause, .. }) => Some(cause.clone()),
@@ -97,7 +97,7 @@ fn heavy() -> Sdof {
 
 /// Steady state after a first-order high-pass filter with the corner `hz`, exact on the lines of
 /// its period.
-fn coupled(record: &Record, hz: f64) -> Record {
+pub fn coupled(record: &Record, hz: f64) -> Record {
     let spectrum = Spectrum::from_record(record);
     let spacing = TAU * record.sampling().rate_hz() / record.len() as f64;
     let mut lines = spectrum.lines().clone();

@@ -44,8 +44,8 @@
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 
+mod changed_records;
 mod delayed_force;
-mod delayed_open_record;
 mod equation_error;
 mod force_responses;
 mod initial_estimates;
@@ -67,8 +67,8 @@ mod unknown_noise;
 mod weight_uncertainty;
 mod whitened;
 
+pub use changed_records::ChangedRecords;
 pub use delayed_force::DelayedForce;
-pub use delayed_open_record::DelayedOpenRecord;
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};

@@ -1,4 +1,4 @@
-//! Open records with a delayed force.
+//! Open records whose channels are changed: a delayed force, a high-pass.
 
 use std::borrow::Cow;
 
@@ -17,23 +17,24 @@ use crate::Unknowns;
 use crate::limits::DELAY_STEPS;
 use crate::relations::Relations;
 
-/// Maximum likelihood for the lines of open records with a delayed force; each delay has its own
-/// estimate of the transients and of the errors of pulses.
-pub struct DelayedOpenRecord<'a> {
-    data: &'a FrequencyData,
+/// Maximum likelihood for the lines of open records with changed channels, such as a delayed force;
+/// each change has its own estimate of the transients and of the errors of pulses.
+pub struct ChangedRecords<'a> {
     unknowns: &'a Unknowns,
-    /// Noise estimated from the residual without a delay.
+    /// Noise estimated from the residual without a change.
     noise: NoiseSpectrum,
-    /// Estimate for the last delay, the initial estimate for the next one.
+    /// Number of real equations minus the number of unknowns.
+    spare: usize,
+    /// Estimate for the last change, the initial estimate for the next one.
     theta: DVector<f64>,
-    /// Amplitudes of the errors of pulses for the last delay; empty if there are none.
+    /// Amplitudes of the errors of pulses for the last change; empty if there are none.
     amplitudes: Vec<f64>,
 }
 
-impl<'a> DelayedOpenRecord<'a> {
-    /// Starts at the result of a `fit` to the same data; `None` if the fit has no transient.
+impl<'a> ChangedRecords<'a> {
+    /// Starts at the result of a `fit` to the unchanged `data`; `None` if the fit has no transient.
     pub fn from_fit(
-        data: &'a FrequencyData,
+        data: &FrequencyData,
         unknowns: &'a Unknowns,
         fit: &OutputErrorFit,
     ) -> Option<Self> {
@@ -47,44 +48,41 @@ impl<'a> DelayedOpenRecord<'a> {
         let amplitudes = fit.pulse_amplitudes.clone();
         let exact = corrected(data, &amplitudes)?;
         let noise = white_noise_at(exact.as_ref(), unknowns, &theta).ok()?;
-        Some(Self { data, unknowns, noise, theta, amplitudes })
+        Some(Self { unknowns, noise, spare: spare(data, unknowns), theta, amplitudes })
     }
 
     /// Number of real equations minus the number of unknowns.
     pub fn spare(&self) -> usize {
-        spare(self.data, self.unknowns)
+        self.spare
     }
 
-    /// Estimates the parameters with the force `delay` (s) later, from all initial estimates.
-    pub fn search(&mut self, delay: f64) -> Option<()> {
-        let late = self.data.with_later_force(delay);
-        let late = corrected(&late, &self.amplitudes)?;
-        let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
-        let starts = InitialEstimates::new(&late, self.unknowns, &self.noise);
-        let spare = self.spare() as f64;
+    /// Estimates the parameters of `changed` data, from all initial estimates.
+    pub fn search(&mut self, changed: &FrequencyData) -> Option<()> {
+        let changed = corrected(changed, &self.amplitudes)?;
+        let mut misfit = Misfit::new(&changed, self.unknowns, &self.noise).ok()?;
+        let starts = InitialEstimates::new(&changed, self.unknowns, &self.noise);
+        let spare = self.spare as f64;
         let global = search(&mut misfit, &starts, plausible(None, spare, spare)).ok()?;
         self.theta = global.minimum.parameters;
         Some(())
     }
 
-    /// Returns the sum of squares with the force `delay` (s) later, minimised from the last
-    /// estimate.
-    pub fn cost(&mut self, delay: f64) -> Option<f64> {
-        let late = self.data.with_later_force(delay);
-        let of_lines = self.minimise(&late)?;
+    /// Returns the sum of squares of `changed` data, minimised from the last estimate.
+    pub fn cost(&mut self, changed: &FrequencyData) -> Option<f64> {
+        let of_lines = self.minimise(changed)?;
         if self.amplitudes.is_empty() {
             return Some(of_lines);
         }
         let (noise, before) = ((&self.noise, 1.0), &self.amplitudes);
         self.amplitudes =
-            PulseFit::new(&late, self.unknowns, &self.theta, noise, before)?.amplitudes;
+            PulseFit::new(changed, self.unknowns, &self.theta, noise, before)?.amplitudes;
         let of_pulses: f64 = self.amplitudes.iter().map(|amplitude| amplitude.powi(2)).sum();
-        Some(self.minimise(&late)? + of_pulses)
+        Some(self.minimise(changed)? + of_pulses)
     }
 
-    fn minimise(&mut self, late: &FrequencyData) -> Option<f64> {
-        let late = corrected(late, &self.amplitudes)?;
-        let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
+    fn minimise(&mut self, changed: &FrequencyData) -> Option<f64> {
+        let changed = corrected(changed, &self.amplitudes)?;
+        let mut misfit = Misfit::new(&changed, self.unknowns, &self.noise).ok()?;
         let minimum = minimise(&mut misfit, self.theta.clone(), DELAY_STEPS)?;
         self.theta = minimum.parameters;
         Some(minimum.cost)

@@ -1,0 +1,61 @@
+//! New fits of open records whose channels a check has changed.
+
+use mechid_estimate::Unknowns;
+use mechid_estimate::frequency_domain::output_error;
+use mechid_signal::Extent;
+use mechid_spectra::FrequencyData;
+
+use super::limits::{LEAST_PART, PARABOLAS};
+use super::spectral_residual::SpectralResidual;
+use super::weighted_fit::after_spectral_fit;
+
+/// Returns the residuals of a new maximum-likelihood fit to all records together, without the errors
+/// of their pulses and without their transients; `None` if the fit fails.
+pub(super) fn residuals_of_fit(
+    records: &[FrequencyData],
+    unknowns: &Unknowns,
+) -> Option<Vec<SpectralResidual>> {
+    let fit = output_error(&joined(records)?, unknowns).ok()?;
+    let corrected = fit.without_pulse_errors(records).ok()?;
+    let closed = fit.ends.as_ref()?.without_transients(&corrected).ok()?;
+    Some(after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?.records)
+}
+
+/// Returns the rows of all records; `None` without a record or for records of different kinds.
+pub(super) fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
+    let (first, following) = records.split_first()?;
+    following.iter().try_fold(first.clone(), |joined, record| joined.and(record)).ok()
+}
+
+/// Returns the place of the minimum of a `cost` near `start` and the cost there, by parabolas whose
+/// half width falls from the first of `widths` to the last; `None` if a cost does not exist or no
+/// longer `promises` an explanation.
+pub(super) fn minimum_near(
+    start: f64,
+    widths: [f64; 2],
+    mut cost: impl FnMut(f64) -> Option<f64>,
+    promises: impl Fn(f64) -> bool,
+) -> Option<(f64, f64)> {
+    let ([mut width, resolved], mut place) = (widths, start);
+    let mut least = cost(place)?;
+    for _ in 0..PARABOLAS {
+        let [before, after] = [cost(place - width)?, cost(place + width)?];
+        let (slope, curvature) = (after - before, after - 2.0 * least + before);
+        // The step is limited if the three points do not enclose a minimum.
+        let step = if curvature > 0.0 {
+            (-0.5 * slope / curvature).clamp(-2.0, 2.0)
+        } else {
+            -2.0 * slope.signum()
+        };
+        place += step * width;
+        least = cost(place)?;
+        if !promises(least) {
+            return None;
+        }
+        width *= f64::clamp(step.abs(), LEAST_PART, 1.0);
+        if width < resolved {
+            break;
+        }
+    }
+    Some((place, least))
+}
