@@ -9,8 +9,8 @@ use super::limits::{LEAST_PART, PARABOLAS};
 use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::after_spectral_fit;
 
-/// Returns the residuals of a new maximum-likelihood fit to all records together, without the errors
-/// of their pulses and without their transients; `None` if the fit fails.
+/// Returns the residuals of a new maximum-likelihood fit to all records together, without the
+/// errors of their pulses and without their transients; `None` if the fit fails.
 pub(super) fn residuals_of_fit(
     records: &[FrequencyData],
     unknowns: &Unknowns,

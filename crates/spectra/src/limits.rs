@@ -126,8 +126,8 @@ pub(crate) const END_LEVERAGE: f64 = 0.25;
 /// Maximum number of steps of the search for the log power of a smooth noise spectrum.
 pub(crate) const SMOOTH_STEPS: usize = 200;
 
-/// Maximum length of a step of that search with the Hessian of an earlier step, relative to the step
-/// before; a longer step is computed again with its own Hessian.
+/// Maximum length of a step of that search with the Hessian of an earlier step, relative to the
+/// step before; a longer step is computed again with its own Hessian.
 pub(crate) const HESSIAN_REUSED: f64 = 0.25;
 
 /// Change of the log power (RMS) that ends the search for the final fit.

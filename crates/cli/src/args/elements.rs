@@ -76,10 +76,11 @@ impl FitArgs {
         };
         let files = || std::iter::once(&self.input.record).chain(&self.more);
         let mut data = if elements.speed_table {
+            self.input.refuse_units()?;
             let tables = files().map(Table::read).collect::<Result<Vec<_>, _>>()?;
             ElementData::from_speeds(&tables, &how)?
         } else if table.frf_table {
-            let tables = files().map(FrequencyResponses::read).collect::<Result<Vec<_>, _>>()?;
+            let tables = self.input.read_responses(&self.more)?;
             ElementData::from_responses(&tables, &how)?
         } else {
             let channels = how.channels()?;

@@ -11,7 +11,7 @@ use mechid::analysis::identify::{
     Method, Refinement, Structure, ValidationWindow,
 };
 use mechid::analysis::{Channels, ResponseQuantity, Segmentation, Window, frf};
-use mechid::io::{FrequencyResponses, LineSpec};
+use mechid::io::LineSpec;
 use mechid::model::{Discretisation, Terms};
 use mechid::nonlinear::{Criterion, Weighting};
 use mechid::signal::Extent;
@@ -335,10 +335,7 @@ impl FitArgs {
             let (option, why) = ("--frf-table", "belongs to --domain frequency");
             return Err(CliError::MisplacedOption { option, why });
         }
-        let files = std::iter::once(self.input.record.as_path())
-            .chain(self.more.iter().map(PathBuf::as_path));
-        let tables: Vec<FrequencyResponses> =
-            files.map(FrequencyResponses::read).collect::<Result<_, _>>()?;
+        let tables = self.input.read_responses(&self.more)?;
         let how = IdentifyResponses {
             quantity: table.quantity,
             averages: table.averages.map(|count| count as f64),

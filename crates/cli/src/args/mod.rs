@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::{Detrend, Measurement, Reading, RecordPlan, Window};
-use mechid::io::{Geometry, input_name, record_details};
+use mechid::io::{FrequencyResponses, Geometry, input_name, record_details};
 use mechid::report::{ModeShapes, PageSettings};
 
 pub use self::channels::{ChannelArgs, ResponseArgs};
@@ -264,6 +264,25 @@ pub struct RecordArgs {
     /// window
     #[arg(long, value_name = "WHAT", value_parser = word::<Detrend>(), help_heading = "Time and window")]
     pub detrend: Option<Detrend>,
+}
+
+impl RecordArgs {
+    /// Refuses units and factors of columns, which only records have.
+    pub fn refuse_units(&self) -> Result<(), CliError> {
+        let why = "belongs to records; a table states its units in its header";
+        match (self.units.is_empty(), self.scales.is_empty()) {
+            (true, true) => Ok(()),
+            (false, _) => Err(CliError::MisplacedOption { option: "--unit", why }),
+            (true, false) => Err(CliError::MisplacedOption { option: "--scale", why }),
+        }
+    }
+
+    /// Reads the record and `more` files as tables of frequency responses.
+    pub fn read_responses(&self, more: &[PathBuf]) -> Result<Vec<FrequencyResponses>, CliError> {
+        self.refuse_units()?;
+        let files = std::iter::once(&self.record).chain(more);
+        Ok(files.map(FrequencyResponses::read).collect::<Result<_, _>>()?)
+    }
 }
 
 /// Parses a column and a text behind the last equals sign.

@@ -155,6 +155,7 @@ impl BearingArgs {
         }
         let data = |paths: &mut dyn Iterator<Item = &PathBuf>| -> Result<BearingData, CliError> {
             if self.tables.frf_table {
+                self.input.refuse_units()?;
                 let tables = paths.map(FrequencyResponses::read).collect::<Result<Vec<_>, _>>()?;
                 return Ok(BearingData::from_responses(&tables, &how)?);
             }

@@ -220,6 +220,7 @@ impl ModesArgs {
              name the columns of a record, for example --acceleration a1,a2",
             &self.record_options(),
         )?;
+        self.input.refuse_units()?;
         let files = std::iter::once(&self.input.record).chain(&self.more);
         let read = |file: &PathBuf| {
             FrequencyResponses::read(file).map_err(|error| match error {

@@ -286,6 +286,10 @@ fn a_whole_period_closes() {
     }
     let segments = format!("{common} --from-frf h1 --segment 64 --extent period");
     refused(folder, &segments, &["--extent: it belongs to", "not to --from-frf"]);
+    for option in ["--unit f=kHz", "--scale real=2"] {
+        let table = format!("identify h.csv --frf-table {option}");
+        refused(folder, &table, &["belongs to records", "states its units in its header"]);
+    }
     let weights = format!("{common} --method least-squares --noise smooth");
     refused(folder, &weights, &["--noise: it applies only to --method maximum-likelihood"]);
     let weights = format!("{common} --noise per-line --extent period");

@@ -67,7 +67,8 @@ impl<'a> ChangedRecords<'a> {
         Some(())
     }
 
-    /// Returns the sum of squares of `changed` data, minimised from the last estimate.
+    /// Returns the sum of squares (a pure number) of `changed` data, minimised from the last
+    /// estimate.
     pub fn cost(&mut self, changed: &FrequencyData) -> Option<f64> {
         let of_lines = self.minimise(changed)?;
         if self.amplitudes.is_empty() {

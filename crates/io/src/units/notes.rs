@@ -28,8 +28,24 @@ pub(super) struct Bracket {
 /// Returns the outermost brackets of a name, with their contents; one that is never closed extends
 /// to the end.
 pub(super) fn brackets(name: &str) -> Vec<Bracket> {
-    const PAIRS: [(char, char); 7] =
-        [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>'), ('⟨', '⟩'), ('«', '»'), ('（', '）')];
+    const PAIRS: [(char, char); 16] = [
+        ('[', ']'),
+        ('(', ')'),
+        ('{', '}'),
+        ('<', '>'),
+        ('⟨', '⟩'),
+        ('⟦', '⟧'),
+        ('«', '»'),
+        ('‹', '›'),
+        ('“', '”'),
+        ('‘', '’'),
+        ('（', '）'),
+        ('［', '］'),
+        ('｛', '｝'),
+        ('【', '】'),
+        ('「', '」'),
+        ('﹙', '﹚'),
+    ];
     let mut brackets = Vec::new();
     let mut open: Option<(usize, (char, char), usize)> = None;
     for (at, c) in name.char_indices() {

@@ -265,6 +265,22 @@ fn a_name_is_what_stands_beside_the_unit() {
 }
 
 #[test]
+fn units_stand_in_brackets_of_any_kind() {
+    for pair in [
+        "()", "[]", "{}", "<>", "⟨⟩", "⟦⟧", "«»", "‹›", "“”", "‘’", "（）", "［］", "｛｝", "【】",
+        "「」", "﹙﹚",
+    ] {
+        let mut signs = pair.chars();
+        let (open, close) = (signs.next().unwrap(), signs.next().unwrap());
+        for name in [format!("Force{open}kN{close}"), format!("{open}kN{close} force")] {
+            let text = format!("t,{name}\n0,1\n1,2\n");
+            let table = Table::parse("a.csv", text.as_bytes()).unwrap();
+            assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1000.0, "{name}");
+        }
+    }
+}
+
+#[test]
 fn a_unit_or_a_factor_may_be_stated() {
     let mut table = Table::parse("a.csv", b"t,Force [mV],acc\n0,1,2\n1,2,3\n").unwrap();
     table.set_scale("Force", 0.25).unwrap();

@@ -115,8 +115,8 @@ pub struct AmbientMode {
 pub enum DropReason {
     /// The likelihood gains less than the penalty of the parameters.
     SmallGain {
-        /// Increase of 2 ln L by the mode; beside a model without the mode but with more polynomials
-        /// of the noise, plus the penalty of these.
+        /// Increase of 2 ln L by the mode; beside a model without the mode but with more
+        /// polynomials of the noise, plus the penalty of these.
         gain: f64,
         /// Increase that was needed.
         needed: f64,

@@ -131,8 +131,8 @@ impl Bump {
         first..((self.middle + self.reach).floor() as usize + 1).min(lines)
     }
 
-    /// Returns groups of neighbouring lines on which the bump is not zero, so narrow that its height
-    /// hardly changes within a group.
+    /// Returns groups of neighbouring lines on which the bump is not zero, so narrow that its
+    /// height hardly changes within a group.
     fn groups(&self, lines: usize) -> Vec<Range<usize>> {
         let scale = match self.shape {
             Shape::Flat | Shape::Tent => self.reach,
