@@ -226,8 +226,7 @@ pub fn fault_of_acquisition(
     let (weighing, system) = (&weighing, &system);
     let parameters = estimate.unknowns().independent();
     let residuals = Residuals { records, after, weighing, system, dt, parameters };
-    let acts = |dof: &usize| records.iter().any(|data| data.force().column(*dof).norm() > 0.0);
-    let driven: Vec<usize> = (0..first.dof()).filter(acts).collect();
+    let driven = driven(records, first.dof());
     let significant = residuals.significant(Fault::all(first.dof(), &driven));
     if significant.is_empty() {
         return Ok(None);
@@ -280,8 +279,7 @@ pub fn fault_of_hits(
     let parameters = unknowns.independent();
     let of_fit =
         Residuals { records: closed, after, weighing: &weighing, system: &system, dt, parameters };
-    let acts = |dof: &usize| closed.iter().any(|data| data.force().column(*dof).norm() > 0.0);
-    let driven: Vec<usize> = (0..first.dof()).filter(acts).collect();
+    let driven = driven(closed, first.dof());
     let mut faults = Fault::all(first.dof(), &driven);
     faults.retain(|fault| !matches!(fault, Fault::Between(_)));
     let joint = joined(records)?;
@@ -301,6 +299,12 @@ pub fn fault_of_hits(
     });
     let (remaining, cause) = explained.min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Finding::Alternative(Alternative { cause, remaining }))
+}
+
+/// Returns the degrees of freedom on which a force acts.
+fn driven(records: &[FrequencyData], dof: usize) -> Vec<usize> {
+    let acts = |dof: &usize| records.iter().any(|data| data.force().column(*dof).norm() > 0.0);
+    (0..dof).filter(acts).collect()
 }
 
 /// Returns the amount of a fault after some refinements, and the records without it.

@@ -30,6 +30,7 @@ impl Compared {
             omitted: omitted.map(|omitted| omitted.mean_square),
         }
     }
+
     /// Returns the comparison without the omitted term, if another explanation of the residual,
     /// with which a fraction `remaining` of its power remains, explains more than the term.
     pub(super) fn beside(mut self, remaining: Option<f64>) -> Self {
