@@ -1,8 +1,12 @@
 //! Comparison of a fit with its parts and with larger models.
 
+use std::ops::Range;
+
 use mechid_checks::{Finding, RowParts, agreement_of_parts, omitted_term};
 use mechid_estimate::Estimate;
 use mechid_estimate::frequency_domain::{PartsOfFit, SampledRows, Split};
+use mechid_spectra::frf::Frf;
+use mechid_spectra::{FrequencyData, SpectraError};
 use nalgebra::DMatrix;
 
 /// Comparison of a fit with its parts and with larger models.
@@ -31,6 +35,27 @@ impl Compared {
         }
     }
 
+    /// Compares a fit of averaged responses, each with the degrees of freedom of its forces counted
+    /// from 0, with its bands of lines and, if there are several, with its records. `data` has all
+    /// of them.
+    ///
+    /// # Errors
+    /// The errors of [`Frf::data`].
+    pub(super) fn from_averages(
+        data: &FrequencyData,
+        records: &[(Frf, Vec<usize>)],
+        estimate: &Estimate,
+    ) -> Result<Self, SpectraError> {
+        let mut splits = vec![(Split::Bands, RowParts::Records)];
+        if records.len() > 1 {
+            let averages = records.iter().map(|(frf, driven)| frf.data(driven));
+            let averages: Vec<FrequencyData> = averages.collect::<Result<_, _>>()?;
+            splits.push((Split::Rows(rows_of(&averages)), RowParts::Records));
+        }
+        let parts = PartsOfFit::from_responses(data, records, estimate);
+        Ok(parts.map_or_else(Self::default, |fit| Self::new(&fit, &splits, Some(&[]), estimate)))
+    }
+
     /// Returns the comparison without the omitted term, if another explanation of the residual,
     /// with which a fraction `remaining` of its power remains, explains more than the term.
     pub(super) fn beside(mut self, remaining: Option<f64>) -> Self {
@@ -44,4 +69,15 @@ impl Compared {
         }
         self
     }
+}
+
+/// Returns the rows of each record in the joint data.
+pub(super) fn rows_of(records: &[FrequencyData]) -> Vec<Vec<Range<usize>>> {
+    let mut first = 0;
+    let rows = records.iter().map(|data| {
+        let rows = first..first + data.len();
+        first = rows.end;
+        vec![rows]
+    });
+    rows.collect()
 }

@@ -5,10 +5,7 @@ use mechid_estimate::{Estimate, IdentifiedMode};
 use mechid_signal::message;
 
 use super::checks::CheckRow;
-use super::fitted::Fitted;
-use super::options::{PeriodEstimator, PeriodFit};
 use super::rows::CONFIDENCE;
-use super::{Identify, Source};
 use crate::AnalysisError;
 use crate::text::significant;
 
@@ -19,34 +16,26 @@ const NAMED: usize = 6;
 /// response than chance does, or in which the interval of every parameter contains zero, unless
 /// another finding already explains the failure. With several degrees of freedom the modes may
 /// still be determined; with one, the response is then indistinguishable from noise, and so is its
-/// mode.
+/// mode. An estimate that noise biases may explain none of a response that is mostly signal.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
 pub(super) fn check(
-    how: &Identify,
-    fitted: &Fitted,
+    estimate: &Estimate,
     modes: &[IdentifiedMode],
     checks: &[CheckRow],
+    is_biased: bool,
 ) -> Result<(), AnalysisError> {
     let refused = |why: String| Err(AnalysisError::NothingDetermined { why });
     let is_unrelated = |check: &&CheckRow| matches!(check.finding, Finding::Unrelated(_));
-    let says_why = checks.iter().any(|check| check.is_bad() && !is_unrelated(&check));
-    if fitted.nonlinear.is_some() || says_why {
+    if checks.iter().any(|check| check.is_bad() && !is_unrelated(&check)) {
         return Ok(());
     }
-    // Least squares is biased by noise: it may explain none of a response that is mostly signal.
-    let is_biased = fitted.least_squares
-        || matches!(
-            &how.source,
-            Source::Periods(PeriodFit { estimator: Some(PeriodEstimator::LeastSquares), .. })
-        );
     if let Some(check) = checks.iter().find(is_unrelated)
         && !is_biased
     {
         return refused(check.sentence());
     }
-    let estimate = &fitted.estimate;
     let condition = estimate.condition();
     if condition * f64::EPSILON >= 1.0 {
         let number = significant(condition, 2);
@@ -67,11 +56,10 @@ pub(super) fn check(
 }
 
 /// Returns the remark on a fit that determines modes but no parameter.
-pub(super) fn modes_alone(fitted: &Fitted, modes: &[IdentifiedMode]) -> Option<String> {
+pub(super) fn modes_alone(estimate: &Estimate, modes: &[IdentifiedMode]) -> Option<String> {
     let frequencies = determined(modes);
-    let is_alone = fitted.nonlinear.is_none() && is_open(&fitted.estimate);
-    (is_alone && !frequencies.is_empty()).then(|| {
-        let [named, open] = [message::list(&frequencies, ", ", NAMED), intervals(&fitted.estimate)];
+    (is_open(estimate) && !frequencies.is_empty()).then(|| {
+        let [named, open] = [message::list(&frequencies, ", ", NAMED), intervals(estimate)];
         format!("the data determine modes ({named}), but no parameter: {open} contain zero")
     })
 }

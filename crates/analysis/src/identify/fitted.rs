@@ -4,15 +4,16 @@ use std::fmt;
 
 use mechid_checks::limits::{LAGS, SAMPLES_PER_LAG};
 use mechid_checks::{Finding, SpectralResidual};
-use mechid_estimate::Estimate;
+use mechid_estimate::{Estimate, IdentifiedMode};
 use mechid_model::SecondOrderSystem;
 use mechid_nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_signal::{Record, message};
 use mechid_spectra::{FrequencyData, Lines, NoiseModel};
-use nalgebra::{DMatrix, DVector};
 
 use super::checks::CheckRow;
 use super::coherence::ResponseCoherence;
+use super::determined;
+use super::disagreement::Disagreement;
 use super::force_noise::ForceNoise;
 use super::keywords::Domain;
 use super::prediction::{Model, Prediction};
@@ -21,7 +22,7 @@ use super::sinusoids::SinusoidRow;
 use crate::AnalysisError;
 use crate::limits::UNCERTAIN_ERROR;
 use crate::machine::NonlinearPart;
-use crate::text::{scaled_errors, significant};
+use crate::text::significant;
 
 /// An estimate with its data and findings.
 #[derive(Debug)]
@@ -38,14 +39,8 @@ pub struct Fitted {
     pub estimate: Estimate,
     /// Estimate with nonlinear terms, if there are any.
     pub nonlinear: Option<WithTerms>,
-    /// Ratio of the standard errors of `estimate` to those that follow from the noise.
-    pub error_scale: f64,
-    /// Mean square error that omitted terms add to the covariance of the parameters, in the product
-    /// of the units of two parameters (parameters × parameters).
-    pub omitted: Option<DMatrix<f64>>,
-    /// Square of the change of the parameters by another model that explains the residual (a delay,
-    /// a fault of the acquisition), in the product of the units of two parameters.
-    pub explained: Option<DMatrix<f64>>,
+    /// Additions to the standard errors of `estimate`.
+    pub(super) disagreement: Disagreement,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
     /// The spectra of a fit in the frequency domain, and the lines of the first record.
@@ -164,9 +159,7 @@ impl Fitted {
             least_squares: false,
             estimate,
             nonlinear: None,
-            error_scale: 1.0,
-            omitted: None,
-            explained: None,
+            disagreement: Disagreement::default(),
             equations: 0,
             frequency: None,
             scattered: None,
@@ -210,70 +203,21 @@ impl Fitted {
         })
     }
 
-    /// Scales the standard errors if the checks show more disagreement of the data than noise: by
-    /// the scatter of the parts, or the size of the residual. A significant omitted term adds its
-    /// effect, and a delay or a fault of the acquisition the change that it causes. With nonlinear
-    /// terms the errors remain.
-    ///
-    /// # Source
-    /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle
-    /// Physics*, introduction.
-    pub(super) fn scale_errors(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
-        self.scale_by_parts(checks);
-        let is_left_out = |check: &CheckRow| {
-            check.is_conspicuous() && matches!(check.finding, Finding::TermLeftOut(_))
-        };
-        let beside = self.omitted.take().filter(|_| checks.iter().any(is_left_out));
-        if let Some(beside) = beside.filter(|_| self.nonlinear.is_none()) {
-            self.estimate = self.estimate.clone().with_mean_square(&beside)?;
-            self.omitted = Some(beside);
-        }
-        let is_explained = checks.iter().any(CheckRow::is_explanation);
-        self.explained = self.explained.take().filter(|_| is_explained);
-        if let Some(square) = self.explained.as_ref().filter(|_| self.nonlinear.is_none()) {
-            self.estimate = self.estimate.clone().with_mean_square(square)?;
+    /// Includes the disagreement of model and data that the checks show in the standard errors. With
+    /// nonlinear terms the errors remain.
+    pub(super) fn count_disagreement(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
+        let found = std::mem::take(&mut self.disagreement);
+        if self.nonlinear.is_none() {
+            self.disagreement = found.warned_of(checks, self.estimate.degrees_of_freedom());
+            self.estimate = self.disagreement.included_in(self.estimate.clone())?;
         }
         Ok(())
     }
 
-    fn scale_by_parts(&mut self, checks: &[CheckRow]) {
-        let spare = self.estimate.degrees_of_freedom();
-        let of_check = |check: &CheckRow| match &check.finding {
-            Finding::PartsAgreement(parts) => Some((parts.scatter, parts.degrees_of_freedom)),
-            Finding::Misfit(misfit) => Some((misfit.ratio.sqrt(), spare)),
-            _ => None,
-        };
-        let scalings = checks.iter().filter(|check| check.is_conspicuous()).filter_map(of_check);
-        let Some((scale, degrees)) = scalings.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
-        if scale > 1.0 && self.nonlinear.is_none() {
-            self.estimate = self.estimate.clone().with_error_scale(scale, degrees);
-            self.error_scale = scale;
-        }
-    }
-
-    /// Returns a remark on scaled standard errors.
-    pub(super) fn scaled_errors(&self, checks: &[CheckRow]) -> Option<String> {
-        let scales = |check: &&CheckRow| {
-            matches!(check.finding, Finding::Misfit(_) | Finding::PartsAgreement(_))
-        };
-        let scaling = checks.iter().filter(|check| check.is_conspicuous()).filter(scales);
-        let mut names: Vec<String> = scaling.map(|check| check.subject.to_string()).collect();
-        names.dedup();
-        (self.error_scale > 1.0).then(|| scaled_errors(self.error_scale, &names.join(", ")))
-    }
-
-    /// Returns a remark on standard errors that include the change by a model that explains the
-    /// residual.
-    pub(super) fn counted_explanation(&self, checks: &[CheckRow]) -> Option<String> {
-        self.explained.as_ref().and_then(|_| counted_explanation(checks))
-    }
-
-    /// Returns a remark on standard errors that include the effect of an omitted term.
-    pub(super) fn counted_term(&self) -> Option<String> {
-        self.omitted.as_ref().map(|_| {
-            "standard errors and intervals include the effect of the omitted term (see alternative)"
-                .to_owned()
-        })
+    /// Returns the remark on a fit of a linear system that determines modes but no parameter.
+    pub(super) fn modes_alone(&self, modes: &[IdentifiedMode]) -> Option<String> {
+        let is_linear = self.nonlinear.is_none();
+        is_linear.then(|| determined::modes_alone(&self.estimate, modes)).flatten()
     }
 
     /// Returns the fitted system.
@@ -359,23 +303,4 @@ pub(super) fn unexplained_motion(
         }
     }
     Ok((all > 0.0).then(|| (unexplained / all).sqrt()))
-}
-
-/// Returns a remark on standard errors that include the change by a model that explains the
-/// residual, if the checks have one.
-pub(super) fn counted_explanation(checks: &[CheckRow]) -> Option<String> {
-    let explanation = checks.iter().find(|check| check.is_explanation())?;
-    Some(format!(
-        "standard errors and intervals include the change of the parameters by the model that explains the residual (see {})",
-        explanation.subject
-    ))
-}
-
-/// Returns the square of the change from one estimate to another, in the product of the units of
-/// two parameters.
-pub(super) fn squared_change(from: &Estimate, to: &Estimate) -> DMatrix<f64> {
-    let pairs = from.parameters().zip(to.parameters());
-    let change: Vec<f64> = pairs.map(|(from, to)| to.value - from.value).collect();
-    let change = DVector::from_vec(change);
-    &change * change.transpose()
 }

@@ -5,9 +5,8 @@
 //! | `options`, `keywords` | settings as values; as the flat keywords of the program and of Python |
 //! | `lines`, `left_out` | spectral lines to use and to leave out |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
-//! | `open_records` | lines of records that are no periods, with the loads of their ends |
 //! | `open_records` | open records (windows that are not whole periods), with their transients |
-//! | `tables`, `tabulated` | tables of frequency responses that were measured elsewhere, and their conversion to data |
+//! | `tables`, `tabulated`, `table_fit` | tables of frequency responses that were measured elsewhere, their conversion to data, and their fit with its checks |
 //! | `nonlinear`, `open_terms` | whole periods and open records with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
@@ -17,6 +16,7 @@
 //! | `mass`, `structure` | what is known of M, C and K |
 //! | `coherence` | coherence of the records that were fitted |
 //! | `fitted` | a fit: the estimate, its data and settings, its residual |
+//! | `compared`, `disagreement` | a fit beside its parts and larger models; standard errors where they disagree |
 //! | `acquisition` | force between samples and AC coupled channels of open records |
 //! | `force_noise` | noise of the forces, stated or as the record shows it |
 //! | `sinusoids` | sinusoids in open records that are not responses to the forces |
@@ -32,6 +32,7 @@ mod compared;
 mod counts;
 mod derivatives;
 mod determined;
+mod disagreement;
 pub(crate) mod fitted;
 mod fitted_lines;
 mod force_noise;
@@ -55,6 +56,7 @@ mod sinusoids;
 pub(crate) mod spectra;
 pub mod structure;
 pub mod summary;
+mod table_fit;
 pub mod tables;
 pub(crate) mod tabulated;
 mod unscaled;

@@ -1,7 +1,6 @@
 //! Fits of the spectral lines of open records, such as those of random tests.
 
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 use mechid_checks::{
     AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, after_spectral_fit,
@@ -17,8 +16,9 @@ use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
 
 use super::acquisition::Acquisition;
-use super::compared::Compared;
-use super::fitted::{Fitted, Residual, squared_change};
+use super::compared::{Compared, rows_of};
+use super::disagreement::{Disagreement, squared_change};
+use super::fitted::{Fitted, Residual};
 use super::force_noise::ForceNoise;
 use super::keywords::Domain;
 use super::left_out::LineRule;
@@ -176,8 +176,7 @@ pub(super) fn fit(
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
         frequency: lines.into_iter().next().map(|lines| (lines, joint)),
         after_all: bias.into_iter().chain(likelier).chain(parts).collect(),
-        omitted,
-        explained,
+        disagreement: Disagreement::new(omitted, explained),
         residuals: Residual::from_lines(residuals),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
@@ -242,17 +241,6 @@ fn agreement(
     Ok(parts.map_or_else(Compared::default, |of| {
         Compared::new(&of, &splits, Some(&sampled), &fit.estimate)
     }))
-}
-
-/// Returns the rows of each record in the joint data.
-pub(super) fn rows_of(records: &[FrequencyData]) -> Vec<Vec<Range<usize>>> {
-    let mut first = 0;
-    let rows = records.iter().map(|data| {
-        let rows = first..first + data.len();
-        first = rows.end;
-        vec![rows]
-    });
-    rows.collect()
 }
 
 /// Returns the explanation of a residual that reduces its power most.

@@ -414,6 +414,12 @@ impl Identify {
         Self::from(Source::Terms(TermFit { terms, ..TermFit::default() }))
     }
 
+    /// Returns whether least squares are requested for the lines of whole periods.
+    pub(crate) fn is_least_squares(&self) -> bool {
+        let estimator = Some(PeriodEstimator::LeastSquares);
+        matches!(&self.source, Source::Periods(fit) if fit.estimator == estimator)
+    }
+
     /// Uses these spectral lines; samples in time have none.
     #[must_use]
     pub fn lines(mut self, choice: LineChoice) -> Self {

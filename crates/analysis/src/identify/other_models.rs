@@ -13,10 +13,9 @@ use mechid_model::ResponseQuantity;
 use mechid_spectra::{FrequencyData, Pooling};
 use nalgebra::{Complex, DMatrix};
 
-use super::fitted::squared_change;
+use super::disagreement::squared_change;
 use super::response_settings::IdentifyResponses;
-use super::tables::joined;
-use super::tabulated::Tabulated;
+use super::tabulated::{Tabulated, joined};
 
 /// Maximum number of alternations between a delay and a fit with it.
 const DELAY_ROUNDS: usize = 2;
@@ -39,51 +38,52 @@ pub(super) fn better_model_of(
     let likely = output_error_pooling(data, result.unknowns(), Pooling::AllLines).ok();
     let estimate = likely.as_ref().map_or(result, |likely| &likely.estimate);
     let fitted = modelled(data, data, estimate)?;
-    let (mut causes, mut models) = (Vec::new(), Vec::new());
-    let mut add = |cause, model| {
-        causes.push(cause);
+    let (mut others, mut models) = (Vec::new(), Vec::new());
+    let mut add = |cause, model, estimate: Option<Estimate>| {
+        others.push((cause, estimate));
         models.push(model);
     };
-    if let Some((seconds, fit)) = delayed(data, estimate) {
-        let model = modelled(data, &data.with_later_force(seconds), &fit);
-        model.into_iter().for_each(|model| add(Cause::Delay { seconds }, model));
+    if let Some((seconds, fit)) = delayed(data, estimate)
+        && let Some(model) = modelled(data, &data.with_later_force(seconds), &fit)
+    {
+        add(Cause::Delay { seconds }, model, None);
     }
     if let Some(fit) = structural_damping(data, estimate.unknowns()) {
         let model = in_measured_quantity(data, &fit.displacement);
         let model = ModelledResponses { modelled: model, ..fitted.clone() };
-        add(Cause::StructuralDamping { loss_factor: fit.loss_factor }, model);
+        add(Cause::StructuralDamping { loss_factor: fit.loss_factor }, model, None);
     }
     if tables.iter().all(|table| table.added_decay.is_none()) {
         let stated = data.measured();
         for quantity in ResponseQuantity::ALL.into_iter().filter(|other| *other != stated) {
-            let model = refitted(tables, how, quantity, estimate, &|z| z);
-            let cause = || Cause::Quantity { quantity, stated };
-            model.into_iter().for_each(|model| add(cause(), model));
+            if let Some((fit, model)) = refitted(tables, how, quantity, estimate, &|z| z) {
+                add(Cause::Quantity { quantity, stated }, model, Some(fit));
+            }
         }
         for sign in [1.0, -1.0] {
-            let model = level_responses(tables, how, stated, estimate, sign);
-            model.into_iter().for_each(|model| add(Cause::Decibels, model));
+            if let Some((fit, model)) = level_responses(tables, how, stated, estimate, sign) {
+                add(Cause::Decibels, model, Some(fit));
+            }
         }
     }
     let deviation = deviation(data);
     let (best, remaining) = better_model(data.omega(), deviation.as_ref(), &fitted, &models)?;
-    let cause = causes.swap_remove(best);
-    let refitted = match cause {
+    let (cause, mut other) = others.swap_remove(best);
+    if let Cause::Delay { seconds } = cause {
         // The weights are those of the result, so that the change is that by the delay alone.
-        Cause::Delay { seconds } => {
-            let late = data.with_later_force(seconds);
-            output_error_of_table(&late, result.unknowns()).ok()
-        }
-        _ => None,
-    };
-    let change = refitted.map(|refitted| squared_change(result, &refitted.estimate));
+        let late = data.with_later_force(seconds);
+        other = output_error_of_table(&late, result.unknowns()).ok().map(|fit| fit.estimate);
+    }
+    let change = other.map(|other| squared_change(result, &other));
     let finding = Finding::Alternative(Alternative { cause, remaining });
-    Some(BetterModel { finding, change })
+    Some(BetterModel { finding, remaining, change })
 }
 
 /// A model that explains the responses far better.
 pub(super) struct BetterModel {
     pub(super) finding: Finding,
+    /// Fraction of the residual power that remains with this model.
+    pub(super) remaining: f64,
     /// Square of the change of the parameters by this model, in the product of the units of two
     /// parameters; `None` if its parameters have another meaning.
     pub(super) change: Option<DMatrix<f64>>,
@@ -142,14 +142,14 @@ fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, Estimate)>
     Some((seconds, fit))
 }
 
-/// Returns the responses of a fit to tables whose numbers are reinterpreted as another quantity.
+/// Returns a fit to tables whose numbers are reinterpreted as another quantity, and its responses.
 fn refitted(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
     quantity: ResponseQuantity,
     estimate: &Estimate,
     number: &dyn Fn(Complex<f64>) -> Complex<f64>,
-) -> Option<ModelledResponses> {
+) -> Option<(Estimate, ModelledResponses)> {
     let how = IdentifyResponses { quantity: Some(quantity), ..how.clone() };
     let one = |table: &FrequencyResponses| {
         let mut modified = table.clone();
@@ -162,17 +162,18 @@ fn refitted(
     let measured = tables.iter().map(one).collect::<Option<Vec<_>>>()?;
     let data = joined(&measured).ok()?;
     let fit = output_error_pooling(&data, estimate.unknowns(), Pooling::AllLines).ok()?;
-    modelled(&data, &data, &fit.estimate)
+    let model = modelled(&data, &data, &fit.estimate)?;
+    Some((fit.estimate, model))
 }
 
-/// Returns the responses of a fit to tables whose magnitudes are levels in dB with the given sign.
+/// Returns a fit to tables whose magnitudes are levels in dB with the given sign, and its responses.
 fn level_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
     quantity: ResponseQuantity,
     estimate: &Estimate,
     sign: f64,
-) -> Option<ModelledResponses> {
+) -> Option<(Estimate, ModelledResponses)> {
     let values = || tables.iter().flat_map(|table| &table.functions).flat_map(|f| &f.values);
     if values().any(|z| z.norm() > MAX_LEVEL) {
         return None;
@@ -185,11 +186,11 @@ fn level_responses(
     let tables: Vec<FrequencyResponses> = tables.iter().map(without_noise).collect();
     // A negative level that was read as a magnitude has its phase shifted by π.
     let magnitude = |z: Complex<f64>| z * (sign * (sign * z.norm() / DECIBELS).exp() / z.norm());
-    let model = refitted(&tables, how, quantity, estimate, &magnitude)?;
+    let (fit, model) = refitted(&tables, how, quantity, estimate, &magnitude)?;
     let log_area = |z: &Complex<f64>| {
         let level = sign * DECIBELS * z.norm().ln();
         (z.norm_sqr() / (DECIBELS * level)).ln()
     };
     let log_area = model.measured.iter().map(log_area).sum();
-    Some(ModelledResponses { log_area, ..model })
+    Some((fit, ModelledResponses { log_area, ..model }))
 }

@@ -1,10 +1,10 @@
 //! Fits frequency responses.
 
 use mechid_checks::{
-    Finding, RowParts, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
+    Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
     delay_of_lines, leakage, linearity,
 };
-use mechid_estimate::frequency_domain::{PartsOfFit, Split, equation_error};
+use mechid_estimate::frequency_domain::equation_error;
 use mechid_estimate::{
     Estimate, EstimateError, ResponseEstimate, Unknowns, output_error_of_responses,
 };
@@ -15,9 +15,9 @@ use mechid_spectra::{FrequencyData, Lines};
 
 use super::coherence::ResponseCoherence;
 use super::compared::Compared;
+use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Misfit};
 use super::keywords::Domain;
-use super::open_records::rows_of;
 use super::options::{Method, SegmentFit};
 use super::prediction::Prediction;
 use super::remarks::one_motion_of;
@@ -62,7 +62,11 @@ pub fn fit(
     let Findings { before, after, repeats } = findings(records, &responses, &scope)?;
     let Compared { parts, omitted } = match *method {
         Some(Method::LeastSquares) => Compared::default(),
-        _ => agreement(&responses, &data, &estimate)?,
+        _ => {
+            let records: Vec<(Frf, Vec<usize>)> =
+                responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
+            Compared::from_averages(&data, &records, &estimate)?
+        }
     };
     let of_motion = one_motion_of(&records[0].held).into_iter();
     let remarks = of_motion.chain(average_remarks(records, &responses)).chain(remark);
@@ -81,32 +85,12 @@ pub fn fit(
         before,
         after,
         after_all: parts,
-        omitted,
+        disagreement: Disagreement::new(omitted, None),
         misfit: misfit.filter(|_| repeats),
         drawn: Some(measured),
         remarks,
         ..Fitted::new(Domain::Frequency, name, prediction, estimate)
     })
-}
-
-/// Compares the bands of lines and the records, if there are several, and tests terms that the
-/// model omits.
-fn agreement(
-    responses: &[Responses],
-    data: &FrequencyData,
-    estimate: &Estimate,
-) -> Result<Compared, AnalysisError> {
-    let records: Vec<(Frf, Vec<usize>)> =
-        responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
-    let mut splits = vec![(Split::Bands, RowParts::Records)];
-    if records.len() > 1 {
-        let averages = records.iter().map(|(frf, driven)| frf.data(driven));
-        let averages: Vec<FrequencyData> = averages.collect::<Result<_, _>>()?;
-        splits.push((Split::Rows(rows_of(&averages)), RowParts::Records));
-    }
-    let parts = PartsOfFit::from_responses(data, &records, estimate);
-    Ok(parts
-        .map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, Some(&[]), estimate)))
 }
 
 /// Returns remarks on the averages of several records, and on their channels.

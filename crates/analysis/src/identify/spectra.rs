@@ -16,11 +16,12 @@ use mechid_spectra::{
     FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, SpectraError,
 };
 
-use super::compared::Compared;
+use super::compared::{Compared, rows_of};
+use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
-use super::open_records::{joined, rows_of};
+use super::open_records::joined;
 use super::options::PeriodEstimator;
 use super::prediction::Prediction;
 use super::remarks::{noise_remark, one_motion_of};
@@ -107,7 +108,7 @@ pub(super) fn fit(
         before,
         after,
         after_all: bias.into_iter().chain(nonlinear).chain(parts).collect(),
-        omitted,
+        disagreement: Disagreement::new(omitted, None),
         residuals: Residual::from_lines(residuals),
         misfit,
         noise: models,

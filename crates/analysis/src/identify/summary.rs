@@ -157,8 +157,11 @@ impl IdentificationSummary {
         };
         let modes = fitted.estimate.modes()?;
         let checks = checks::rows(fitted, &modes, &records, scope)?;
-        determined::check(how, fitted, &modes, &checks)?;
-        fitted.scale_errors(&checks)?;
+        if fitted.nonlinear.is_none() {
+            let is_biased = fitted.least_squares || how.is_least_squares();
+            determined::check(&fitted.estimate, &modes, &checks, is_biased)?;
+        }
+        fitted.count_disagreement(&checks)?;
         let (fitted, estimate) = (&*fitted, &fitted.estimate);
         let (modes, carried) = (estimate.modes()?, rows::carries_covariance(estimate));
         let mut summary = Self {
@@ -212,10 +215,8 @@ impl IdentificationSummary {
             .chain(fitted.remarks.iter().cloned())
             .chain(looked_at)
             .chain(fitted.few_equations())
-            .chain(fitted.scaled_errors(&self.checks))
-            .chain(fitted.counted_term())
-            .chain(fitted.counted_explanation(&self.checks))
-            .chain(determined::modes_alone(fitted, modes))
+            .chain(fitted.disagreement.remarks(&self.checks))
+            .chain(fitted.modes_alone(modes))
             .chain(self.doubts())
             .chain(least_squares_remark(fitted, &self.checks))
             .chain(rows::omitted_covariance_remark(&fitted.estimate))
@@ -388,7 +389,7 @@ impl FitRow {
             noise: fitted.noise.clone(),
             force_noise: fitted.force_noise.clone(),
             sinusoids: fitted.sinusoids.clone(),
-            error_scale: fitted.error_scale,
+            error_scale: fitted.disagreement.error_scale(),
             condition_number: fitted.estimate.condition(),
             equations: fitted.equations,
             unknowns: match &fitted.nonlinear {

@@ -3,22 +3,14 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use mechid_checks::{
-    Finding, Subject, Verdict, adjust_p_values, before_spectral_fit, constant_phase, gain_symmetry,
-    instability, mass_symmetry, negative_mass, unrelated_response,
-};
-use mechid_estimate::frequency_domain::{equation_error, output_error_of_table};
-use mechid_estimate::{Estimate, ResponseEstimate, Unknowns, output_error_of_responses};
+use mechid_estimate::{Estimate, Unknowns};
 use mechid_io::{FrequencyResponses, ParameterCovariance, SystemMatrices};
 use mechid_model::SecondOrderSystem;
-use mechid_spectra::{FrequencyData, NoiseModel};
-use nalgebra::DMatrix;
+use mechid_spectra::FrequencyData;
 use serde::Serialize;
 
 use super::added_decay;
-use super::checks::{CheckRow, When};
-use super::fitted::{Misfit, counted_explanation, unexplained_motion};
-use super::other_models::better_model_of;
+use super::checks::CheckRow;
 use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
 use super::rows::{
@@ -26,14 +18,12 @@ use super::rows::{
     omitted_covariance_remark, parameter_table, parameters,
 };
 use super::summary::{FitRow, verdict};
-use super::tabulated::{Noise, Tabulated};
-use super::{FittedLine, Method, Unscaled};
+use super::table_fit::{CheckedFit, TableFit};
+use super::tabulated::{Tabulated, joined};
+use super::{FittedLine, Unscaled};
 use crate::AnalysisError;
 use crate::machine::Machine;
-use crate::measurement::Channels;
-use crate::measurement::units::doubt;
 use crate::modal::{ShapedMode, shape_table};
-use crate::modes::resonances;
 use crate::text::{compact, paragraph, significant};
 
 /// Identifies a machine from one or several tables of frequency responses, which are fitted
@@ -59,35 +49,22 @@ pub fn identify_responses(
     let mut measured: Vec<Tabulated> = measured.collect::<Result<_, _>>()?;
     let mut data = joined(&measured)?;
     let driven: Vec<usize> = measured.iter().flat_map(|m| m.driven.iter().copied()).collect();
-    let fit = |unknowns: &Unknowns| {
-        let windowed = match added_decay {
-            Some(rate) => &added_decay::unknowns(unknowns, rate)?,
-            None => unknowns,
-        };
-        let fit = Fit::new(&data, windowed, &measured, how.method)?;
-        let of_machine = match added_decay {
-            Some(rate) => fit.estimate.without_added_decay(rate, unknowns.clone())?,
-            None => fit.estimate.clone(),
-        };
-        Ok((fit, of_machine, before_spectral_fit(&data, windowed)?))
-    };
+    let fit =
+        |unknowns: &Unknowns| TableFit::new(&data, unknowns, &measured, added_decay, how.method);
     let unknowns = how.structure.apply(how.mass.unknowns(data.dof())?)?;
-    let ((fit, of_machine, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
+    let (fit, unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
     if let Some(of_segments) = &fit.averaged {
         let mut responses = of_segments.responses.iter().cloned();
         measured.iter_mut().try_for_each(|one| one.replace(&mut responses))?;
         data = joined(&measured)?;
     }
     let first = measured.first().ok_or(AnalysisError::NoRecord)?;
-    let unexplained = unexplained_motion(&data, &fit.estimate.system()?)?;
-    let fitted = OfFit { fit: &fit, of_machine: &of_machine, data: &data, unexplained };
-    let (checks, change) = fitted.checks(tables, &measured, how, before, unscaled.is_some())?;
-    let mut remarks = remarks(tables, &measured, added_decay, &fit, &of_machine, unscaled.as_ref());
-    remarks.extend(fitted.residual_remarks(&checks, tables, how));
-    let change = change.filter(|_| added_decay.is_none() && unscaled.is_none());
-    let (of_machine, remark) = with_change(of_machine, change, &checks)?;
-    remarks.extend(remark);
-    let (estimate, system) = (&of_machine, of_machine.system()?);
+    let checked = CheckedFit::new(&fit, &data, tables, &measured, how, unscaled.is_some())?;
+    let mut remarks = remarks(tables, &measured, added_decay, &fit, unscaled.as_ref());
+    remarks.extend(checked.remarks(&fit, tables, how)?);
+    let row = checked.row(&fit, data.len());
+    let CheckedFit { checks, estimate, .. } = checked;
+    let system = estimate.system()?;
     let summary = ResponseSummary {
         files: tables.iter().map(|table| table.file.clone()).collect(),
         estimator: fit.name,
@@ -96,131 +73,26 @@ pub fn identify_responses(
         forces: first.driven.iter().map(|dof| first.points[*dof].clone()).collect(),
         frequencies: FrequencyRow::from_table(first),
         confidence: CONFIDENCE,
-        parameters: parameters(estimate, unscaled.as_ref())?,
-        proportional_damping: ProportionalDamping::from_estimate(estimate)?,
+        parameters: parameters(&estimate, unscaled.as_ref())?,
+        proportional_damping: ProportionalDamping::from_estimate(&estimate)?,
         modes: ShapedMode::all(&estimate.modes()?, false)?,
-        fit: fit.row(estimate, unexplained, how.method, data.len()),
+        fit: row,
         fitted_lines: None,
         checks,
         remarks,
         system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
-        covariance: carries_covariance(estimate).then(|| covariance(estimate, unscaled.as_ref())),
+        covariance: carries_covariance(&estimate).then(|| covariance(&estimate, unscaled.as_ref())),
         unscaled,
         analysis: how.clone(),
     };
-    Ok(IdentifiedResponses { estimate: of_machine, fitted: fit.estimate, data, summary })
-}
-
-/// Returns the estimate with the square of a change of its parameters in its covariance, and the
-/// remark on it. Under an exponential window the change would be that of other parameters.
-fn with_change(
-    estimate: Estimate,
-    change: Option<DMatrix<f64>>,
-    checks: &[CheckRow],
-) -> Result<(Estimate, Option<String>), AnalysisError> {
-    Ok(match change {
-        Some(square) => (estimate.with_mean_square(&square)?, counted_explanation(checks)),
-        None => (estimate, None),
-    })
-}
-
-/// A fit with its data.
-struct OfFit<'a> {
-    fit: &'a Fit,
-    of_machine: &'a Estimate,
-    data: &'a FrequencyData,
-    /// Part of the response that the fit does not explain, a ratio.
-    unexplained: Option<f64>,
-}
-
-impl OfFit<'_> {
-    /// Returns the remarks on the residual that its `checks` do not already contain.
-    fn residual_remarks(
-        &self,
-        checks: &[CheckRow],
-        tables: &[FrequencyResponses],
-        how: &IdentifyResponses,
-    ) -> Vec<String> {
-        let mut remarks = Vec::new();
-        if !checks.iter().any(|check| matches!(check.finding, Finding::Misfit(_))) {
-            remarks.extend(self.fit.misfit.map(|misfit| misfit.to_string()));
-        }
-        let is_residual =
-            |check: &CheckRow| check.is_conspicuous() && is_of_residual(&check.finding);
-        if checks.iter().any(is_residual) && !checks.iter().any(CheckRow::is_bad) {
-            remarks.extend(resonances::surplus_of_tables(tables, how));
-        }
-        remarks
-    }
-
-    /// Returns the checks of the tables before and after the fit, and the square of the change of
-    /// the parameters by a model that explains the responses far better.
-    fn checks(
-        &self,
-        tables: &[FrequencyResponses],
-        measured: &[Tabulated],
-        how: &IdentifyResponses,
-        before: Vec<Finding>,
-        is_unscaled: bool,
-    ) -> Result<(Vec<CheckRow>, Option<DMatrix<f64>>), AnalysisError> {
-        let mut findings: Vec<(When, Option<String>, Finding)> =
-            before.into_iter().map(|finding| (When::Before, None, finding)).collect();
-        let named = |table: &FrequencyResponses| (tables.len() > 1).then(|| table.file.clone());
-        for table in tables {
-            let doubts = table.doubts.iter();
-            let doubts =
-                doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
-            let phases = table.functions.iter().filter_map(|f| {
-                constant_phase(&f.response, &f.reference, f.values.iter().copied())
-            });
-            let before = doubts.chain(phases);
-            findings.extend(before.map(|finding| (When::Before, named(table), finding)));
-        }
-        let (fit, rows) = (self.fit, self.data.len());
-        let settled = fit.averaged.as_ref().is_none_or(|averaged| averaged.settled);
-        for (table, measured) in tables.iter().zip(measured) {
-            for (when, finding) in measured.findings(&fit.estimate, rows, settled)? {
-                findings.push((when, named(table), finding));
-            }
-        }
-        let is_left =
-            |finding: &Finding| finding.verdict() > Verdict::Good && is_of_residual(finding);
-        let (mut after, mut change) = (Vec::new(), None);
-        if findings.iter().any(|(_, _, finding)| is_left(finding)) {
-            let better = better_model_of(tables, how, self.data, &fit.estimate);
-            change = better.as_ref().and_then(|better| better.change.clone());
-            after.extend(better.map(|better| better.finding));
-        }
-        let unknowns = fit.estimate.unknowns();
-        let of_one = unknowns.independent().div_ceil(unknowns.dof().max(1));
-        let unrelated = |part| unrelated_response(part, 2 * rows, of_one);
-        after.extend(self.unexplained.and_then(unrelated));
-        after.extend(instability(&self.of_machine.modes()?));
-        if !is_unscaled {
-            after.extend(negative_mass(self.of_machine));
-            after.extend(mass_symmetry(self.of_machine));
-            after.extend(gain_symmetry(self.of_machine));
-        }
-        findings.extend(after.into_iter().map(|finding| (When::After, None, finding)));
-        adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
-        let row = |(when, name, finding): (When, Option<String>, Finding)| {
-            CheckRow::new(when, name, &finding, &Channels::default())
-        };
-        Ok((findings.into_iter().map(row).collect(), change))
-    }
-}
-
-/// Returns whether a finding is about the residual of a fit.
-fn is_of_residual(finding: &Finding) -> bool {
-    matches!(finding.subject(), Subject::Misfit | Subject::Whiteness)
+    Ok(IdentifiedResponses { estimate, fitted: fit.estimate, data, summary })
 }
 
 fn remarks(
     tables: &[FrequencyResponses],
     measured: &[Tabulated],
     added_decay: Option<f64>,
-    fit: &Fit,
-    of_machine: &Estimate,
+    fit: &TableFit,
     unscaled: Option<&Unscaled>,
 ) -> Vec<String> {
     unscaled
@@ -235,7 +107,7 @@ fn remarks(
                 )
             }))
             .chain(fit.averaged.as_ref().and_then(blunted))
-            .chain(omitted_covariance_remark(of_machine))
+            .chain(omitted_covariance_remark(&fit.of_machine))
             .collect()
 }
 
@@ -417,94 +289,5 @@ impl fmt::Display for IdentifiedResponses {
         writeln!(f, "{}", s.fit.lines("linear model"))?;
         f.write_str(&verdict(&s.checks))?;
         f.write_str(&paragraph(s.remarks.iter().map(|remark| format!("note: {remark}"))))
-    }
-}
-
-/// A fit with the normalised power of its residual.
-struct Fit {
-    name: &'static str,
-    estimate: Estimate,
-    misfit: Option<Misfit>,
-    noise: Vec<NoiseModel>,
-    /// Fit of the averages; `None` unless all tables state their segments.
-    averaged: Option<ResponseEstimate>,
-}
-
-/// Returns the data of all tables, concatenated.
-pub(super) fn joined(measured: &[Tabulated]) -> Result<FrequencyData, AnalysisError> {
-    let first = measured.first().ok_or(AnalysisError::NoRecord)?;
-    measured[1..].iter().try_fold(first.data.clone(), |data, next| Ok(data.and(&next.data)?))
-}
-
-impl Fit {
-    /// Returns the quality of the fit; `rows` is the number of rows of all tables together.
-    fn row(
-        &self,
-        of_machine: &Estimate,
-        unexplained: Option<f64>,
-        method: Option<Method>,
-        rows: usize,
-    ) -> FitRow {
-        // Least squares minimises the residual of the force, maximum likelihood the residual of the
-        // response.
-        let residual_nrmse = of_machine.residual_nrmse();
-        let of_force = || {
-            (residual_nrmse.iter().map(|e| e * e).sum::<f64>() / residual_nrmse.len() as f64).sqrt()
-        };
-        let of_response = unexplained.filter(|_| method != Some(Method::LeastSquares));
-        FitRow {
-            nrmse: of_response.unwrap_or_else(of_force),
-            unexplained_motion: unexplained,
-            misfit_ratio: self.misfit.map(|misfit| misfit.ratio),
-            noise: self.noise.clone(),
-            force_noise: Vec::new(),
-            sinusoids: Vec::new(),
-            error_scale: 1.0,
-            condition_number: of_machine.condition(),
-            equations: 2 * rows,
-            unknowns: of_machine.unknowns().independent(),
-        }
-    }
-
-    fn new(
-        data: &FrequencyData,
-        unknowns: &Unknowns,
-        measured: &[Tabulated],
-        method: Option<Method>,
-    ) -> Result<Self, AnalysisError> {
-        if method == Some(Method::Instrumental) {
-            return Err(AnalysisError::InstrumentalResponses);
-        }
-        if method == Some(Method::LeastSquares) {
-            let name = "least squares on frequency responses, all with equal weights";
-            let estimate = equation_error(data, unknowns)?;
-            return Ok(Self { name, estimate, misfit: None, noise: Vec::new(), averaged: None });
-        }
-        let averaged: Option<Vec<_>> = measured.iter().map(Tabulated::averaged).collect();
-        let averaged = match averaged {
-            Some(each) => {
-                let records: Vec<_> = each.into_iter().flatten().cloned().collect();
-                Some(output_error_of_responses(&records, unknowns)?)
-            }
-            None => None,
-        };
-        let fit = match &averaged {
-            Some(of_segments) => of_segments.fit.clone(),
-            None => output_error_of_table(data, unknowns)?,
-        };
-        let noise = measured[0].noise;
-        let name = match noise {
-            Noise::Stated => {
-                "maximum likelihood on frequency responses, weighted by their standard errors"
-            }
-            Noise::Coherence => {
-                "maximum likelihood on frequency responses, weighted by their coherence"
-            }
-            Noise::Unknown => {
-                "maximum likelihood on frequency responses, with noise estimated from the residual"
-            }
-        };
-        let misfit = noise.source().map(|noise| Misfit { ratio: fit.misfit_ratio, noise });
-        Ok(Self { name, estimate: fit.estimate, misfit, noise: fit.noise, averaged })
     }
 }

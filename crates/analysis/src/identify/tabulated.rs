@@ -203,7 +203,7 @@ impl Tabulated {
             let tables = Columns { points: &points, forces: &forces, rows: &rows, measured };
             let coherent = tables.coherent(table, how, &response, averaged, errors.as_deref())?;
             if let Some(coherent) = coherent {
-                let data = joined(&coherent)?;
+                let data = averages_of(&coherent)?;
                 let noise = if stated { Noise::Stated } else { Noise::Coherence };
                 let columns = Vec::new();
                 return Ok(Self {
@@ -242,7 +242,7 @@ impl Tabulated {
         for ((frf, _), other) in self.coherent.iter_mut().zip(responses) {
             *frf = other;
         }
-        self.data = joined(&self.coherent)?;
+        self.data = averages_of(&self.coherent)?;
         Ok(())
     }
 
@@ -439,8 +439,13 @@ fn rows(table: &FrequencyResponses, band: Option<Band>) -> Result<Vec<usize>, An
 pub(super) type Coherent = Vec<(Frf, Vec<usize>)>;
 
 /// Concatenates responses to the data of one fit.
-fn joined(coherent: &Coherent) -> Result<FrequencyData, AnalysisError> {
+fn averages_of(coherent: &Coherent) -> Result<FrequencyData, AnalysisError> {
     together(coherent.iter().map(|(frf, dofs)| Ok(frf.data(dofs)?)))
+}
+
+/// Returns the data of all tables, concatenated.
+pub(super) fn joined(measured: &[Tabulated]) -> Result<FrequencyData, AnalysisError> {
+    together(measured.iter().map(|one| Ok(one.data.clone())))
 }
 
 /// Concatenates data for one fit.

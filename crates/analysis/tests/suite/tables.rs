@@ -145,6 +145,49 @@ fn intervals_of_late_responses_include_the_delay() {
     }
 }
 
+/// Mobilities that are read as accelerances, and a mass that changes by 2 % within the band: the
+/// standard errors from the noise are far too small. They are scaled, and contain the change to the
+/// right quantity: the intervals reach the machine or, of two, one of them. Those from the noise
+/// alone do not.
+#[test]
+fn intervals_of_a_wrong_model_are_as_wide_as_its_error() {
+    let system = oscillator();
+    let quantity = ResponseQuantity::Acceleration;
+    let heavier = Sdof::new(25.5, 188.0, 142_000.0).unwrap().system();
+    let mobility = exact(&system, ResponseQuantity::Velocity);
+    let mut changed = exact(&system, quantity);
+    let upper = exact(&heavier, quantity);
+    let middle = changed.frequency_hz.partition_point(|hz| *hz < 12.0);
+    changed.functions[0].values[middle..].copy_from_slice(&upper.functions[0].values[middle..]);
+    for (mut table, subject) in [(mobility, Subject::Alternative), (changed, Subject::Parts)] {
+        let values = &mut table.functions[0].values;
+        let errors: Vec<f64> = values.iter().map(|z| 1e-3 * z.norm()).collect();
+        for ((value, error), z) in values.iter_mut().zip(&errors).zip(normal(errors.len(), 5)) {
+            *value += z * *error;
+        }
+        table.functions[0].standard_error =
+            Some(errors.iter().map(|error| error / 2_f64.sqrt()).collect());
+        table.functions[0].quantity = Some(quantity);
+        let found = identify_responses(&[table], &IdentifyResponses::default()).unwrap();
+        let checks = found.summary().checks.iter().filter(|check| check.is_conspicuous());
+        assert!(checks.map(|check| check.subject).any(|other| other == subject), "{found}");
+        let scale = found.summary().fit.error_scale;
+        assert!(scale > 3.0, "{found}");
+        let mut missed = 0;
+        let machines = entries(&system).into_iter().zip(entries(&heavier));
+        for (p, (one, other)) in found.estimate().parameters().zip(machines) {
+            let other = if subject == Subject::Parts { other } else { one };
+            let distance = (p.value - one).abs().min((p.value - other).abs());
+            let [low, high] = p.interval(0.95).unwrap();
+            assert!(low < one.max(other) && high > one.min(other), "{p} {one} {other}: {found}");
+            missed += usize::from(distance > 1.96 * p.standard_error / scale);
+        }
+        assert!(missed > 0, "{found}");
+        let text = found.to_string();
+        assert!(text.contains("times those of the noise alone"), "{text}");
+    }
+}
+
 /// Under a window exp(−σt) the response at iω is that of the machine at iω + σ, for every measured
 /// quantity.
 #[test]
@@ -279,6 +322,7 @@ fn coverage(
     measure: &dyn Fn(FrequencyResponses, u64) -> FrequencyResponses,
 ) -> f64 {
     let truth = entries(system);
+    let scaled = std::cell::Cell::new(0);
     let inside = |estimate: &Estimate| {
         let holds = |(p, exact): (mechid_estimate::Estimated, &f64)| {
             let [low, high] = p.interval(0.95).unwrap();
@@ -288,9 +332,14 @@ fn coverage(
     };
     let all = (0..runs).map(|seed| {
         let table = measure(exact(system, ResponseQuantity::Acceleration), seed);
-        inside(identify_responses(&[table], how).unwrap().estimate())
+        let found = identify_responses(&[table], how).unwrap();
+        scaled.set(scaled.get() + u64::from(found.summary().fit.error_scale > 1.0));
+        inside(found.estimate())
     });
-    all.sum::<usize>() as f64 / (runs as usize * truth.len()) as f64
+    let share = all.sum::<usize>() as f64 / (runs as usize * truth.len()) as f64;
+    // On right data the standard errors are those of the noise.
+    assert!(50 * scaled.get() <= runs, "{} of {runs}", scaled.get());
+    share
 }
 
 /// The share of 500 runs with 12 parameters scatters by about 0.4 %.
