@@ -173,3 +173,13 @@ pub(crate) const PARTS: usize = 4;
 /// Information of a part about a combination of parameters, relative to the information of all
 /// data, below which the part does not determine the combination.
 pub(crate) const PART_INFORMS: f64 = 1e-9;
+
+/// Largest distance of lines whose errors a window correlates, Hann's, the usual one of analysers.
+pub(crate) const CORRELATED_DISTANCES: usize = 2;
+
+/// p-value below which the errors of neighbouring lines of a table are correlated.
+pub(crate) const CORRELATED_LINES: f64 = 0.01;
+
+/// Largest deviation of a distance of lines from a multiple of the smallest one, in steps: the
+/// rounding of a file.
+pub(crate) const LINE_STEP: f64 = 0.01;

@@ -47,6 +47,8 @@ pub(crate) struct Lines {
     pub(crate) blocks: Vec<Block>,
     /// Delays that were removed from the outputs; empty: none.
     pub(crate) delays: Vec<OutputDelay>,
+    /// Stated variance of each output's noise on every line, positive; empty: unknown.
+    pub(crate) stated_noise: Vec<Vec<f64>>,
 }
 
 impl Lines {
@@ -83,7 +85,12 @@ impl Lines {
         }
         blocks.retain(|block| block.len() > 0);
         let (omega, outputs) = (data.omega().to_vec(), columns(data.outputs()));
-        Self { omega, outputs, loads, amplitude, blocks, delays: Vec::new() }
+        let variances = |matrix: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
+            matrix.column_iter().map(|column| column.iter().copied().collect()).collect()
+        };
+        let stated_noise = data.output_variance().map(variances).unwrap_or_default();
+        let delays = Vec::new();
+        Self { omega, outputs, loads, amplitude, blocks, delays, stated_noise }
     }
 
     /// Returns an output without its delay, in s.

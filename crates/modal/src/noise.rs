@@ -225,14 +225,23 @@ impl Residuals {
         Self { error, power }
     }
 
+    /// Returns the smooth spectrum of each output's noise or, if the noise is stated, this noise
+    /// times a smooth factor.
     fn smooth_power(&self, lines: &Lines, power: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let records = record_rows(lines);
-        let outputs = power.into_par_iter().zip(&lines.outputs);
-        let smoothed = |(power, output): (Vec<f64>, &Vec<C>)| {
+        let smoothed = |(at, mut power): (usize, Vec<f64>)| {
+            let output = &lines.outputs[at];
             let level = output.iter().map(|z| z.norm_sqr()).sum::<f64>() / output.len() as f64;
-            smooth(&power, &records, level * LEAST_NOISE * LEAST_NOISE)
+            let floor = level * LEAST_NOISE * LEAST_NOISE;
+            let Some(stated) = lines.stated_noise.get(at) else {
+                return smooth(&power, &records, floor);
+            };
+            power.iter_mut().zip(stated).for_each(|(power, stated)| *power /= stated);
+            let factor = smooth(&power, &records, 0.0);
+            let product = factor.iter().zip(stated).map(|(factor, stated)| factor * stated);
+            product.map(|variance| variance.max(floor)).collect()
         };
-        outputs.map(smoothed).collect()
+        power.into_par_iter().enumerate().map(smoothed).collect()
     }
 }
 

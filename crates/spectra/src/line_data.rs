@@ -38,6 +38,7 @@ pub struct LineData {
     outputs: DMatrix<Complex<f64>>,
     records: Vec<(Range<usize>, Transient)>,
     noise: Option<LineNoise>,
+    output_variance: Option<DMatrix<f64>>,
     pulse_errors: Vec<PulseErrors>,
 }
 
@@ -71,7 +72,8 @@ impl LineData {
             }
         }
         let records = vec![(0..omega.len(), transient)];
-        Ok(Self { omega, inputs, outputs, records, noise: None, pulse_errors: Vec::new() })
+        let (noise, output_variance, pulse_errors) = (None, None, Vec::new());
+        Ok(Self { omega, inputs, outputs, records, noise, output_variance, pulse_errors })
     }
 
     /// Reads the lines of an open record in `band_hz` (Hz), without a window, and without the lines
@@ -131,6 +133,33 @@ impl LineData {
             }
         }
         Ok(Self { noise: Some(noise), ..self })
+    }
+
+    /// Returns the same lines with the variance E|n|² of each output's noise n (lines × p, in the
+    /// squares of the units of the outputs), which is uncorrelated between outputs and not part of
+    /// [`LineData::noise`].
+    ///
+    /// # Errors
+    /// [`SpectraError::Size`] for another number of lines or outputs, [`SpectraError::NotFinite`]
+    /// for a variance that is not positive and finite.
+    pub fn with_output_variance(self, variance: DMatrix<f64>) -> Result<Self, SpectraError> {
+        let sizes = [
+            ("rows of variances", self.len(), variance.nrows()),
+            ("columns of variances", self.outputs.ncols(), variance.ncols()),
+        ];
+        for (what, expected, got) in sizes {
+            if expected != got {
+                return Err(SpectraError::Size { what, expected, got });
+            }
+        }
+        let is_positive = |value: f64| value.is_finite() && value > 0.0;
+        let mut values = variance.iter().enumerate();
+        match values.find(|(_, value)| !is_positive(**value)) {
+            Some((at, &value)) => {
+                Err(SpectraError::NotFinite { row: at % variance.nrows(), value })
+            }
+            None => Ok(Self { output_variance: Some(variance), ..self }),
+        }
     }
 
     /// Returns the same lines with the noise of inputs that act only for a few samples, in place of
@@ -194,6 +223,12 @@ impl LineData {
             pulse.with_rows(rows.start + before..rows.end + before)
         };
         self.pulse_errors.extend(other.pulse_errors.iter().map(moved));
+        let variance = self.output_variance.take().zip(other.output_variance.as_ref());
+        self.output_variance = variance.map(|(one, other)| {
+            let mut both = one.resize_vertically(total, 0.0);
+            both.rows_mut(before, other.nrows()).copy_from(other);
+            both
+        });
         let noise = self.noise.take().zip(other.noise.as_ref());
         self.noise = noise.map(|(one, other)| one.followed_by(other));
         Ok(self)
@@ -229,6 +264,7 @@ impl LineData {
             outputs: self.outputs.select_rows(rows),
             records,
             noise: self.noise.as_ref().map(|noise| noise.rows(rows)),
+            output_variance: self.output_variance.as_ref().map(|v| v.select_rows(rows)),
             pulse_errors: self.pulse_errors.iter().filter_map(moved).collect(),
         })
     }
@@ -261,6 +297,12 @@ impl LineData {
     /// Returns the covariance of the noise of outputs and inputs, if it is known.
     pub fn noise(&self) -> Option<&LineNoise> {
         self.noise.as_ref()
+    }
+
+    /// Returns the variance of each output's noise (lines × p), in the squares of the units of the
+    /// outputs, if it is known.
+    pub fn output_variance(&self) -> Option<&DMatrix<f64>> {
+        self.output_variance.as_ref()
     }
 
     /// Returns the errors of the inputs by the noise of pulses.

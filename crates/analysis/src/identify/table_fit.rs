@@ -22,6 +22,7 @@ use crate::AnalysisError;
 use crate::measurement::Channels;
 use crate::measurement::units::doubt;
 use crate::modes::resonances;
+use crate::text::significant;
 
 /// A fit to the data of tables.
 pub(super) struct TableFit {
@@ -34,6 +35,8 @@ pub(super) struct TableFit {
     noise: Vec<NoiseModel>,
     /// Noise spectrum of the weights; `None` without weights.
     spectrum: Option<NoiseSpectrum>,
+    /// Ratio of the variance of the parameters to that for independent lines.
+    variance_ratio: f64,
     /// Fit of the averages; `None` unless all tables state their segments.
     pub(super) averaged: Option<ResponseEstimate>,
     /// Findings before the fit.
@@ -76,6 +79,7 @@ impl TableFit {
             misfit: None,
             noise: Vec::new(),
             spectrum: None,
+            variance_ratio: 1.0,
             averaged: None,
             before: Vec::new(),
             method: None,
@@ -118,9 +122,20 @@ impl TableFit {
             misfit: noise.source().map(|noise| Misfit { ratio: fit.misfit_ratio, noise }),
             noise: fit.noise,
             spectrum: Some(fit.spectrum),
+            variance_ratio: fit.variance_ratio,
             averaged,
             before: Vec::new(),
             method: None,
+        })
+    }
+
+    /// Returns a remark on errors that are correlated from line to line.
+    fn correlated_lines(&self) -> Option<String> {
+        (self.variance_ratio > 1.0).then(|| {
+            format!(
+                "the errors of neighbouring lines are correlated, as under a window: standard errors and intervals are {} times those of independent lines",
+                significant(self.variance_ratio.sqrt(), 3)
+            )
         })
     }
 
@@ -142,7 +157,8 @@ impl TableFit {
             let tables: Vec<FrequencyData> = measured.iter().map(|one| one.data.clone()).collect();
             splits.push((Split::Rows(rows_of(&tables)), RowParts::Records));
         }
-        let parts = PartsOfFit::new(data, &self.estimate, None, Some(spectrum));
+        let parts = PartsOfFit::new(data, &self.estimate, None, Some(spectrum))
+            .map(|parts| parts.with_variance_ratio(self.variance_ratio));
         Ok(parts.map_or_else(Compared::default, |parts| {
             Compared::new(&parts, &splits, None, &self.estimate)
         }))
@@ -200,6 +216,7 @@ impl CheckedFit {
         if self.checks.iter().any(is_residual) && !self.checks.iter().any(CheckRow::is_bad) {
             remarks.extend(resonances::surplus_of_tables(tables, how));
         }
+        remarks.extend(fit.correlated_lines());
         remarks.extend(self.disagreement.remarks(&self.checks));
         remarks.extend(determined::modes_alone(&self.estimate, &self.estimate.modes()?));
         Ok(remarks)

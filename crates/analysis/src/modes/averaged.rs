@@ -137,19 +137,13 @@ impl Sharpened {
     ) -> Result<Self, AnalysisError> {
         let data = tables.lines(band_hz, None)?;
         let estimate = identify_modes(&data, settings)?;
-        let count = estimate.modes().len();
-        let settings = if settings.near_hz.is_empty() {
-            ModalSettings { modes: Some(count), ..settings.clone() }
-        } else {
-            settings.clone()
-        };
         let mut fit = Self { data, estimate, settled: !tables.is_smoothed() };
         for _ in 0..SHARPENING_ROUNDS {
             if fit.settled {
                 break;
             }
             let data = tables.lines(band_hz, Some(fit.estimate.modes()))?;
-            let Ok(estimate) = identify_modes(&data, &settings) else { break };
+            let Ok(estimate) = identify_modes(&data, settings) else { break };
             let change = largest_change(fit.estimate.modes(), estimate.modes());
             let settled = change < SHARPENING_SETTLED;
             fit = Self { data, estimate, settled };

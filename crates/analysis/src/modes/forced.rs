@@ -124,7 +124,7 @@ pub(super) fn modes_of_tables(
     }
     if tables.is_smoothed() {
         notes.push(
-            "averages under a window have their largest errors at narrow resonances, and the stated noise of a table covers them only in part: intervals there can be half as wide as they should be; fit the record itself for better ones"
+            "averages under a window lose most of the accuracy of a record at narrow resonances; the record itself gives frequencies and damping ratios with smaller errors"
                 .into(),
         );
     }

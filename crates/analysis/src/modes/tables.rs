@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid_io::{FrequencyResponses, ResponseFunction};
+use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid_modal::IdentifiedMode;
 use mechid_model::ResponseQuantity;
 use mechid_spectra::{LineData, Transient};
@@ -135,7 +135,10 @@ impl Tables {
                     let bias = bias.unwrap_or_default();
                     functions[output].values[rows[at]] - bias
                 });
-                let one = LineData::new(omega, inputs, outputs, Transient::None)?;
+                let mut one = LineData::new(omega, inputs, outputs, Transient::None)?;
+                if let Some(variance) = noise_variance(table, &functions, &rows) {
+                    one = one.with_output_variance(variance)?;
+                }
                 data = Some(match data {
                     None => one,
                     Some(before) => before.followed_by(&one)?,
@@ -162,6 +165,42 @@ impl Tables {
         };
         self.responses.iter().map(function).collect()
     }
+}
+
+/// Returns the variance of some responses to a force (rows × responses), up to a factor: from their
+/// standard errors or, if there are none, from their coherence. `None` unless a table states either
+/// of every response, with noise on every row.
+///
+/// # Source
+/// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance from the coherence).
+fn noise_variance(
+    table: &FrequencyResponses,
+    functions: &[&ResponseFunction],
+    rows: &[usize],
+) -> Option<DMatrix<f64>> {
+    let force = &functions.first()?.reference;
+    let is_one_force = table.functions.iter().all(|function| function.reference == *force);
+    let coherence_of = |function: &ResponseFunction| {
+        let is_its = |one: &&CoherenceFunction| {
+            one.response == function.response
+                && one.reference.as_ref().map_or(is_one_force, |reference| reference == force)
+        };
+        table.coherence.iter().find(is_its).map(|one| &one.values)
+    };
+    let column = |function: &&ResponseFunction| -> Option<Vec<f64>> {
+        if let Some(errors) = &function.standard_error {
+            return Some(rows.iter().map(|row| 2.0 * errors[*row].powi(2)).collect());
+        }
+        let coherence = coherence_of(function)?;
+        let variance = |row: &usize| {
+            function.values[*row].norm_sqr() * (1.0 - coherence[*row]) / coherence[*row]
+        };
+        Some(rows.iter().map(variance).collect())
+    };
+    let columns = functions.iter().map(column).collect::<Option<Vec<_>>>()?;
+    let is_noise = |variance: &f64| variance.is_finite() && *variance > 0.0;
+    let is_complete = columns.iter().flatten().all(is_noise);
+    is_complete.then(|| DMatrix::from_fn(rows.len(), columns.len(), |row, at| columns[at][row]))
 }
 
 /// Returns the rows of a table in a band (Hz) with independent errors, without 0 Hz.

@@ -6,8 +6,8 @@ use mechid_analysis::identify::{Method, OpenFit, OpenNoise, Source};
 use mechid_analysis::sweep::{self, Kind};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identified, Identify, IdentifyResponses, Machine, Measurement,
-    Predict, ResponseQuantity, Segmentation, SweepSettings, identify, identify_responses, predict,
-    sweep_record,
+    ModesSettings, Predict, ResponseQuantity, Segmentation, SweepSettings, identify,
+    identify_responses, modes_of_responses, predict, sweep_record,
 };
 use mechid_checks::Linearity;
 use mechid_checks::{Finding, Power, Subject};
@@ -17,6 +17,7 @@ use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::{Fault, RandomTest};
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use mechid_spectra::Pooling;
+use nalgebra::dmatrix;
 use rayon::prelude::*;
 
 const SAMPLES: usize = 2048;
@@ -365,6 +366,43 @@ fn the_length_of_segments_is_chosen() {
     assert_eq!(frf(&period, &FrfSettings::default()).unwrap().segments.window, None);
     let how = Identify::responses(Estimator::H1, Segmentation::default());
     assert!(identify(&[random_test(0)], &how).unwrap().to_string().contains("were chosen"));
+}
+
+/// Under a random force the errors of averaged responses are largest at the resonances. In segments
+/// of 1,024 samples the resonances are two and five lines wide. The 80 intervals are those of
+/// frequency and damping ratio.
+#[test]
+fn intervals_of_modes_of_averaged_responses_hold() {
+    let mode = |hz: f64| (std::f64::consts::TAU * hz).powi(2) * 10.0;
+    let [low, high] = [mode(25.0), mode(40.0)];
+    // Proportional damping of two equal masses: in phase with each other, and opposed.
+    let stiffness = dmatrix![low + high, low - high; low - high, low + high] * 0.5;
+    let [slow, fast] = [0.02, 0.03].map(|ratio| 2.0 * ratio * 10.0);
+    let [slow, fast] = [slow * (low / 10.0).sqrt(), fast * (high / 10.0).sqrt()];
+    let damping = dmatrix![slow + fast, slow - fast; slow - fast, slow + fast] * 0.5;
+    let system = SecondOrderSystem::new(dmatrix![10.0, 0.0; 0.0, 10.0], damping, stiffness);
+    let sampling = Sampling::new(0.002, 32_768).unwrap();
+    let rig = RandomTest { system: system.unwrap(), sampling, quantity: KIND, force: 100.0 };
+    let how = FrfSettings { segments: Segmentation::with_samples(1024), ..FrfSettings::default() };
+    let held = |seed: u64| {
+        let table = frf(&measured(rig.measure(seed).unwrap(), seed), &how).unwrap();
+        let table = FrequencyResponses::parse("a.csv", table.csv().as_bytes()).unwrap();
+        let settings = ModesSettings { quantity: Some(KIND), ..ModesSettings::default() };
+        let found = modes_of_responses(&[table], &settings).unwrap();
+        let rows: Vec<_> = found.summary().modes.iter().map(|mode| &mode.mode.row).collect();
+        assert_eq!(rows.len(), 2, "{seed}: {found}");
+        let truth = [(25.0, 0.02), (40.0, 0.03)];
+        let holds = |value: f64, interval: Option<[f64; 2]>| {
+            usize::from(interval.is_some_and(|[low, high]| (low..=high).contains(&value)))
+        };
+        let both = rows.iter().zip(truth).map(|(row, (hz, ratio))| {
+            holds(hz, row.natural_frequency_hz.interval) + holds(ratio, row.damping_ratio.interval)
+        });
+        both.sum::<usize>()
+    };
+    let held: usize = (0..20_u64).into_par_iter().map(held).sum();
+    // Of 80 intervals 76 hold on average, with a standard deviation of 2.
+    assert!(held >= 70, "{held}");
 }
 
 /// A file of averaged responses states enough of its segments to correct the bias of their window.

@@ -53,6 +53,7 @@ mod instrumental;
 mod likelihood_ratio;
 mod line;
 mod line_block;
+mod line_correlation;
 mod misfit;
 mod multi_start;
 mod normal_equations;

@@ -9,6 +9,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::equation_error;
 use super::initial_estimates::InitialEstimates;
+use super::line_correlation::variance_ratio;
 use super::misfit::Misfit;
 use super::multi_start::search;
 use super::output_error_fit::{
@@ -89,22 +90,29 @@ pub fn output_error_pooling(
 
 /// Estimates as [`output_error`] from frequency responses; where the data state no noise, that of
 /// each response is white, in proportion to the response, or the sum of both, as the residual
-/// shows.
+/// shows. If the residual also shows that the errors of neighbouring lines are correlated, as under
+/// the window of an analyser, the covariance of the parameters includes it
+/// ([`OutputErrorFit::variance_ratio`]).
 ///
 /// # Errors
 /// As [`output_error`].
 ///
 /// # Source
-/// As [`output_error`]; Schwarz (1978), Annals of Statistics 6, 461–464, for the choice.
+/// As [`output_error`]; Schwarz (1978), Annals of Statistics 6, 461–464, for the choice; Newey &
+/// West (1987), Econometrica 55, 703–708, for correlated errors.
 pub fn output_error_of_table(
     data: &FrequencyData,
     unknowns: &Unknowns,
 ) -> Result<OutputErrorFit, EstimateError> {
     equation_error(data, unknowns)?.check_determined()?;
-    match data.noise() {
-        Some(noise) => with_known_noise(data, unknowns, noise, None),
-        None => with_response_noise(data, unknowns),
-    }
+    let mut fit = match data.noise() {
+        Some(noise) => with_known_noise(data, unknowns, noise, None)?,
+        None => with_response_noise(data, unknowns)?,
+    };
+    fit.variance_ratio = variance_ratio(data, &fit.estimate, &fit.spectrum);
+    let freedom = fit.estimate.degrees_of_freedom() as f64 / fit.variance_ratio;
+    fit.estimate = fit.estimate.with_error_scale(fit.variance_ratio.sqrt(), freedom as usize);
+    Ok(fit)
 }
 
 fn search_near(

@@ -56,6 +56,9 @@ pub struct OutputErrorFit {
     /// Most likely amplitudes of the errors of pulses, one for each pattern of
     /// [`FrequencyData::pulse_errors`], pure numbers; empty if there are none.
     pub pulse_amplitudes: Vec<f64>,
+    /// Ratio of the variance of the parameters to that for independent lines; above 1 for a table
+    /// whose neighbouring lines have correlated errors.
+    pub variance_ratio: f64,
 }
 
 impl OutputErrorFit {
@@ -276,6 +279,7 @@ pub(super) fn finish(
         ends,
         sinusoids: Vec::new(),
         pulse_amplitudes: Vec::new(),
+        variance_ratio: 1.0,
     })
 }
 

@@ -9,6 +9,7 @@ mod equation_of_motion;
 mod extremes;
 mod frequency_invariance;
 mod frf;
+mod line_correlation;
 mod machine;
 mod modal;
 mod monte_carlo;

@@ -117,6 +117,13 @@ impl<'a> PartsOfFit<'a> {
         })
     }
 
+    /// Returns the same fit with errors whose correlation from line to line multiplies the variance
+    /// of the parameters by `ratio`, a pure number.
+    #[must_use]
+    pub fn with_variance_ratio(self, ratio: f64) -> Self {
+        Self { inflation: self.inflation * ratio, ..self }
+    }
+
     /// Linearises a fit of averaged responses, each with the degrees of freedom of its forces,
     /// counted from 0; `data` has all of them. `None` as for [`PartsOfFit::new`], and if the error
     /// covariance of a response is unknown.
