@@ -225,24 +225,33 @@ impl Residuals {
         Self { error, power }
     }
 
-    /// Returns the smooth spectrum of each output's noise or, if the noise is stated, this noise
-    /// times a smooth factor.
+    /// Returns the spectrum of each output's noise: smooth or, if it is stated and this is more
+    /// likely, the stated one times a smooth factor.
     fn smooth_power(&self, lines: &Lines, power: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let records = record_rows(lines);
-        let smoothed = |(at, mut power): (usize, Vec<f64>)| {
+        let smoothed = |(at, power): (usize, Vec<f64>)| {
             let output = &lines.outputs[at];
             let level = output.iter().map(|z| z.norm_sqr()).sum::<f64>() / output.len() as f64;
             let floor = level * LEAST_NOISE * LEAST_NOISE;
-            let Some(stated) = lines.stated_noise.get(at) else {
-                return smooth(&power, &records, floor);
-            };
-            power.iter_mut().zip(stated).for_each(|(power, stated)| *power /= stated);
-            let factor = smooth(&power, &records, 0.0);
-            let product = factor.iter().zip(stated).map(|(factor, stated)| factor * stated);
-            product.map(|variance| variance.max(floor)).collect()
+            let plain = smooth(&power, &records, floor);
+            let Some(stated) = lines.stated_noise.get(at) else { return plain };
+            let ratios: Vec<f64> = power.iter().zip(stated).map(|(p, stated)| p / stated).collect();
+            let factor = smooth(&ratios, &records, 0.0);
+            let shaped = factor.iter().zip(stated).map(|(factor, stated)| factor * stated);
+            let shaped: Vec<f64> = shaped.map(|variance| variance.max(floor)).collect();
+            if deviance(&power, &shaped) < deviance(&power, &plain) { shaped } else { plain }
         };
         power.into_par_iter().enumerate().map(smoothed).collect()
     }
+}
+
+/// Returns −2 log L of circular normal noise with these powers and variances, up to a constant.
+fn deviance(power: &[f64], variance: &[f64]) -> f64 {
+    2.0 * power
+        .iter()
+        .zip(variance)
+        .map(|(power, variance)| variance.ln() + power / variance)
+        .sum::<f64>()
 }
 
 /// Returns the rows of each record; neighbouring records with the same loads count as one.
