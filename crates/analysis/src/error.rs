@@ -171,6 +171,16 @@ pub enum AnalysisError {
         /// Names of the forces.
         columns: String,
     },
+    /// No candidate is a mode.
+    #[error("no mode from {from_hz:.6} to {to_hz:.6} Hz{candidates}")]
+    NoMode {
+        /// Lowest frequency, in Hz.
+        from_hz: f64,
+        /// Highest frequency, in Hz.
+        to_hz: f64,
+        /// The candidates with the reasons of their rejection; empty if there are none.
+        candidates: String,
+    },
     /// A force is a combination of the others on every line.
     #[error(
         "force {force} is a multiple of {others} in the band (independent part {own_share:.1e}): their \

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::DroppedCandidate;
+
 /// Reason for which no modes can be identified.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -49,16 +51,24 @@ pub enum ModalError {
         own_share: f64,
     },
     /// No mode is significant.
-    #[error(
-        "no mode in {from_hz:.6} Hz to {to_hz:.6} Hz: {candidates} candidates, none significant"
-    )]
+    #[error("no mode in {from_hz:.6} Hz to {to_hz:.6} Hz: {} candidates, none significant", dropped.len())]
     NoMode {
         /// Lowest frequency, in Hz.
         from_hz: f64,
         /// Highest frequency, in Hz.
         to_hz: f64,
-        /// Number of candidates that were tried.
-        candidates: usize,
+        /// Candidates that were tried, with the reasons of their rejection.
+        dropped: Vec<DroppedCandidate>,
+    },
+    /// A stated frequency is not in the band.
+    #[error("{value} Hz is not between {from_hz:.6} and {to_hz:.6} Hz, the band of the data")]
+    OutsideBand {
+        /// The stated frequency, in Hz.
+        value: f64,
+        /// Lowest frequency, in Hz.
+        from_hz: f64,
+        /// Highest frequency, in Hz.
+        to_hz: f64,
     },
     /// A setting is out of its range.
     #[error("`{setting}` is {value}, but must be {required}")]

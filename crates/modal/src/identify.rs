@@ -16,7 +16,9 @@ use crate::lines::Lines;
 use crate::mode::{DropReason, DroppedCandidate};
 use crate::model::{Model, ResidualPowers, first_powers};
 use crate::noise::{Noise, shapes};
-use crate::order::{add_best, hidden, is_within_resonance, removal_losses, required_gain};
+use crate::order::{
+    Candidate, add_best, hidden, is_within_resonance, removal_losses, required_gain,
+};
 use crate::projection::Weights;
 use crate::residues::with_participations;
 use crate::rules::drop_reasons;
@@ -76,6 +78,7 @@ pub fn identify_modes(
     check_settings(settings)?;
     let lines = Lines::new(data);
     lines.check()?;
+    check_near(&settings.near_hz, &lines)?;
     for constraint in &settings.constraints {
         constraint.check(lines.outputs.len(), lines.inputs())?;
     }
@@ -135,6 +138,16 @@ fn check_settings(settings: &ModalSettings) -> Result<(), ModalError> {
         let required = "positive and finite";
         Err(ModalError::Setting { setting: "near_hz", value: *value, required })
     })
+}
+
+/// Checks that stated frequencies (Hz) are in the band of the lines.
+fn check_near(near_hz: &[f64], lines: &Lines) -> Result<(), ModalError> {
+    let (low, high) = lines.band();
+    let [from_hz, to_hz] = [low / TAU, high / TAU];
+    match near_hz.iter().find(|hz| !(from_hz..=to_hz).contains(*hz)) {
+        Some(&value) => Err(ModalError::OutsideBand { value, from_hz, to_hz }),
+        None => Ok(()),
+    }
 }
 
 /// State of an identification.
@@ -255,10 +268,14 @@ impl<'a> Identification<'a> {
                     }
                 }
                 Err(tried) => {
-                    let reason = |gain| DropReason::Insignificant { gain, required };
-                    self.dropped.extend(
-                        tried.iter().map(|one| DroppedCandidate::new(one.pole, reason(one.gain))),
-                    );
+                    let reason = |one: &Candidate| match one.gain {
+                        gain if gain <= required => DropReason::Insignificant { gain, required },
+                        _ if self.lines.reaches(one.pole) => DropReason::TooDamped,
+                        _ => DropReason::OutsideBand,
+                    };
+                    let rejected =
+                        tried.iter().map(|one| DroppedCandidate::new(one.pole, reason(one)));
+                    self.dropped.extend(rejected);
                     break;
                 }
             }
@@ -530,8 +547,8 @@ impl<'a> Identification<'a> {
 
     fn no_mode(&self) -> ModalError {
         let (low, high) = self.lines.band();
-        let candidates = self.dropped.len();
-        ModalError::NoMode { from_hz: low / TAU, to_hz: high / TAU, candidates }
+        let dropped = self.dropped.clone();
+        ModalError::NoMode { from_hz: low / TAU, to_hz: high / TAU, dropped }
     }
 
     fn finish(mut self) -> Result<ModalEstimate, ModalError> {
@@ -559,6 +576,11 @@ impl<'a> Identification<'a> {
         if !stated.contains(&true) {
             return Err(self.no_mode());
         }
+        let others = poles.iter().zip(&stated).filter(|(pole, stated)| {
+            !**stated && !self.settings.near_hz.is_empty() && self.lines.contains(**pole)
+        });
+        let others = others.map(|(pole, _)| DroppedCandidate::new(*pole, DropReason::NotStated));
+        self.dropped.extend(others);
         let constraints = &self.settings.constraints;
         let (fit, noise) = (&self.fit, &self.noise);
         Ok(ModalEstimate::new(fit, noise, &covariance, self.dropped, &stated, constraints))

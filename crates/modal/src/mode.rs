@@ -105,6 +105,8 @@ pub enum DropReason {
         /// Decrease of −2 log L.
         gain: f64,
     },
+    /// The mode is part of the model, but frequencies were stated, and it is near none of them.
+    NotStated,
 }
 
 /// Rejected candidate.

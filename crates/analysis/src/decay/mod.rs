@@ -22,6 +22,7 @@ use crate::AnalysisError;
 use crate::identify::checks;
 use crate::identify::prediction::Compared;
 use crate::measurement::{Block, Measurement, Window};
+use crate::modes::all_responses;
 use crate::text::significant;
 
 /// Settings of an analysis of a free decay.
@@ -159,6 +160,24 @@ fn responses_of(
 ) -> Result<(ResponseQuantity, &Record), AnalysisError> {
     let response = block.responses().into_iter().find(|(quantity, _)| *quantity == kind);
     response.ok_or(AnalysisError::NoMotion)
+}
+
+/// Returns the part of a record from the beginning to the end of its decay.
+///
+/// # Errors
+/// As [`decay`].
+pub(crate) fn decaying_part(
+    measurement: &Measurement,
+    how: &DecaySettings,
+) -> Result<Measurement, AnalysisError> {
+    let part = how.part(measurement)?;
+    let record = all_responses(&part.whole_block()?)?;
+    let begin = if how.from_s.is_some() { 0 } else { release(&record) };
+    let rest = record.window(begin, record.len() - begin)?;
+    let last = if how.to_s.is_none() { last_shown(&rest) } else { None };
+    let samples = last.map_or(rest.len(), |last| last.samples);
+    let start = part.span()?.0 + begin + 1;
+    measurement.clone().window(Window { start, period: Some(samples), periods: Some(1) })
 }
 
 impl DecaySettings {

@@ -13,7 +13,7 @@ use super::checks;
 use super::diagrams::DiagramData;
 use super::halves::Halves;
 use super::settings::ModesSettings;
-use super::sources::{Output, outputs_of, responses_of};
+use super::sources::{Output, all_responses, outputs_of};
 use super::summary::{
     DroppedRow, HarmonicRow, LEVEL, ModalModeRow, ModesSummary, OutputRow, RecordRow,
 };
@@ -38,12 +38,14 @@ pub(super) fn modes(
         );
         return Err(settings.refused("ambient", why));
     };
+    settings
+        .refuse("an ambient record", &["near_hz", "force_at", "response_at", "validate_percent"])?;
     let outputs = outputs_of(measurement.channels());
     if outputs.is_empty() {
         return Err(AnalysisError::NoMotion);
     }
     let block = measurement.whole_block()?;
-    let record = responses_of(&block)?;
+    let record = all_responses(&block)?;
     let usual = AmbientSettings::default();
     let estimate = identify_ambient(
         &record,
@@ -59,7 +61,9 @@ pub(super) fn modes(
     let estimate = estimate.with_error_scales(&halves.error_scales);
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
     let modes: Vec<ModalModeRow> = estimate.modes.iter().map(row).collect();
+    let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
     let of_modes = halves.check.into_iter().chain(checks::force_peak_check(&modes));
+    let of_modes = of_modes.chain(checks::response_checks(&modes, &names));
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
     let summary = ModesSummary {
         records: vec![RecordRow::from_block(&block)],

@@ -14,7 +14,9 @@ use super::halves::Halves;
 use super::rows::{dropped, mac, modal_mass, notes, row};
 use super::settings::ModesSettings;
 use super::sources::{Output, Recorded};
-use super::summary::{LEVEL, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow};
+use super::summary::{
+    DroppedRow, LEVEL, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
+};
 use super::tables::Tables;
 use super::validation::explained;
 use super::{Modes, ModesSpectrum};
@@ -146,6 +148,9 @@ pub(super) fn modes_of_tables(
     context.with(Fit { data, estimate, modes }, settings)
 }
 
+/// Number of candidates that a message lists.
+const LISTED_CANDIDATES: usize = 3;
+
 /// Number of channels that a message lists by their names.
 pub(super) const LISTED: usize = 8;
 
@@ -162,6 +167,16 @@ fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisEr
         ModalError::DeadInputs { inputs: dead } => {
             let columns = list(&dead, &|at| inputs[at].clone());
             AnalysisError::DeadForces { columns }
+        }
+        ModalError::NoMode { from_hz, to_hz, dropped: candidates } => {
+            let in_words = |row: DroppedRow| {
+                format!("{} Hz ({})", significant(row.frequency_hz, 5), row.reason)
+            };
+            let listed = candidates.iter().map(|candidate| in_words(dropped(candidate)));
+            let listed = message::list(listed, ", ", LISTED_CANDIDATES);
+            let candidates =
+                if listed.is_empty() { listed } else { format!("; no modes are {listed}") };
+            AnalysisError::NoMode { from_hz, to_hz, candidates }
         }
         ModalError::DependentInputs { input, own_share } => {
             let preceding = list(&(0..input).collect::<Vec<_>>(), &|at| inputs[at].clone());
@@ -206,7 +221,6 @@ impl Context {
         let names: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
         let explained = estimate.variance_explained();
         let mut rows = self.checks;
-        rows.extend(checks::output_checks(&explained, &names));
         rows.extend(checks::mode_checks(
             &reported,
             &self.inputs,
@@ -218,6 +232,13 @@ impl Context {
         let mass = |at| modal_mass(&estimate, at, &self.outputs, &self.driving_points);
         let modes: Vec<ModalModeRow> =
             reported.iter().enumerate().map(|(at, mode)| row(mode, mass(at))).collect();
+        let idle = checks::response_checks(&modes, &names);
+        let of_shares = checks::output_checks(&explained, &names);
+        // An idle sensor is told once.
+        let is_told = |at: usize| idle.get(at).is_some_and(|check| !check.passed);
+        let of_shares = of_shares.into_iter().enumerate().filter(|(at, _)| !is_told(*at));
+        rows.extend(of_shares.map(|(_, check)| check));
+        rows.extend(idle);
         let mut model = estimate.model().clone();
         for term in &mut model.terms {
             term.pole[0] += self.added_decay.unwrap_or(0.0);

@@ -1,10 +1,11 @@
-//! Modes of a structure from records under measured forces, from tables of frequency responses, and
-//! from ambient records.
+//! Modes of a structure from records under measured forces, from tables of frequency responses, from
+//! free decays, and from ambient records.
 
 mod ambient;
 mod averaged;
 mod checks;
 mod comparison;
+mod decays;
 mod diagrams;
 mod forced;
 mod halves;
@@ -39,7 +40,7 @@ pub use self::saved::{
 pub(crate) use self::saved::{SavedValue, saved_errors};
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
-pub(crate) use self::sources::driven_band;
+pub(crate) use self::sources::{all_responses, driven_band};
 pub use self::summary::{
     DroppedRow, HarmonicRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
     SegmentsRow, TableRow,
@@ -77,8 +78,9 @@ pub struct ModesSpectrum {
 /// several shakers, a hammer at one point or at a different point in each record. Frequencies,
 /// damping ratios and shapes are maximum-likelihood estimates from the spectral lines of the open
 /// records, without a window; the model includes the transients of the records, unmeasured forces
-/// and modes outside the band. The forces of an ambient record are assumed to be white over the
-/// band.
+/// and modes outside the band. Free decays have no forces: each record has its own initial state,
+/// and all have the same modes ([`decay`](crate::decay()) is for a single one). The forces of an
+/// ambient record are assumed to be white over the band.
 ///
 /// # Errors
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`],
@@ -95,6 +97,9 @@ pub fn modes(
     settings.check()?;
     let hits = match &settings.test {
         ModalTest::Forced { hits } => hits,
+        ModalTest::Decay { from_s, to_s } => {
+            return decays::modes(measurements, settings, [*from_s, *to_s]);
+        }
         ModalTest::Ambient { without_hz, without_harmonics } => {
             return ambient::modes(measurements, settings, without_hz, *without_harmonics);
         }

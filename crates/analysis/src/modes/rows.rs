@@ -119,6 +119,9 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             "forces that were not measured drive it: {} times the measured ones",
             significant(ratio, 2)
         ),
+        DropReason::NotStated => {
+            "it is part of the model, but near no stated frequency (`near_hz`)".into()
+        }
         DropReason::BeyondNumber { .. } => "`modes` asks for fewer, and others explain more".into(),
         _ => "it is not a mode of the record".into(),
     };

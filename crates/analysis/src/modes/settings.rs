@@ -20,7 +20,8 @@ pub struct ModesSettings {
     pub modes: Option<usize>,
     /// Maximum number of modes if the number is not given.
     pub max_modes: Option<usize>,
-    /// Additional initial estimates of natural frequencies, in Hz; a list of any length.
+    /// Frequencies, in Hz, of the modes to report (the nearest within 2 %), even if they are weak;
+    /// other modes are part of the model, but not reported. Empty: all modes.
     pub near_hz: Vec<f64>,
     /// Quantity of the responses of tables that do not state it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -52,6 +53,16 @@ pub enum ModalTest {
         /// Rule that cuts the records into the hits of a hammer; `None`: each record as a whole.
         #[serde(default, deserialize_with = "crate::words::written::optional")]
         hits: Option<HitRule>,
+    },
+    /// Free decays, one in each record, with forces neither measured nor acting.
+    Decay {
+        /// Beginning of each decay, in s from the first sample of the window; `None`: found.
+        #[serde(default)]
+        from_s: Option<f64>,
+        /// End of the part of each decay that is used, in s from the first sample of the window;
+        /// `None`: the end of the window.
+        #[serde(default)]
+        to_s: Option<f64>,
     },
     /// Test with unmeasured forces, such as wind or traffic.
     Ambient {
@@ -103,6 +114,23 @@ impl ModesSettings {
             return Err(self.refused("validate_percent", why));
         }
         Ok(())
+    }
+
+    /// Refuses the first given setting among some that do not apply to `what`.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`].
+    pub(super) fn refuse(&self, what: &str, names: &[&'static str]) -> Result<(), AnalysisError> {
+        let given = [
+            ("near_hz", !self.near_hz.is_empty()),
+            ("force_at", !self.places.forces.is_empty()),
+            ("response_at", !self.places.responses.is_empty()),
+            ("validate_percent", self.validate > 0.0),
+        ];
+        match given.into_iter().find(|(name, given)| *given && names.contains(name)) {
+            Some((name, _)) => Err(self.refused(name, format!("it does not apply to {what}"))),
+            None => Ok(()),
+        }
     }
 
     /// Returns the error of a setting.

@@ -86,12 +86,24 @@ impl Recorded {
             };
             for block in &blocks {
                 let forces = Some(columns.forces(at, block)?);
-                parts.push(Part { forces, responses: responses_of(block)? });
+                parts.push(Part { forces, responses: all_responses(block)? });
             }
         }
         let responses = places.response_places(outputs.len())?;
         let driving_points = columns.driving_points(&responses);
         Ok(Self { parts, inputs: columns.names, outputs, driving_points, hits })
+    }
+
+    /// Reads the records of free decays, cut to the decay.
+    pub fn from_decays(blocks: &[Block], channels: &Channels) -> Result<Self, AnalysisError> {
+        let part = |block: &Block| Ok(Part { forces: None, responses: all_responses(block)? });
+        Ok(Self {
+            parts: blocks.iter().map(part).collect::<Result<_, AnalysisError>>()?,
+            inputs: Vec::new(),
+            outputs: outputs_of(channels),
+            driving_points: Vec::new(),
+            hits: Vec::new(),
+        })
     }
 
     /// Returns the band, in Hz, that the forces excite.
@@ -291,7 +303,7 @@ impl Places {
     }
 }
 
-/// Returns the responses of all quantities, in the order of [`responses_of`].
+/// Returns the responses of all quantities, in the order of [`all_responses`].
 pub(super) fn outputs_of(channels: &Channels) -> Vec<Output> {
     let outputs = |quantity| {
         let named = move |at| Output {
@@ -304,7 +316,7 @@ pub(super) fn outputs_of(channels: &Channels) -> Vec<Output> {
 }
 
 /// Returns all responses of a record, samples × outputs.
-pub(super) fn responses_of(block: &Block) -> Result<Record, AnalysisError> {
+pub(crate) fn all_responses(block: &Block) -> Result<Record, AnalysisError> {
     let kinds = block.responses();
     let columns: Vec<&[f64]> = kinds
         .iter()

@@ -8,7 +8,7 @@ use mechid_signal::{Window, message};
 use serde::Serialize;
 
 use super::diagrams::Diagrams;
-use super::settings::ModesSettings;
+use super::settings::{ModalTest, ModesSettings};
 use crate::hits::{self, HitRow};
 use crate::identify::rows::{CONFIDENCE, Uncertain, WindowRow};
 use crate::measurement::Block;
@@ -252,6 +252,9 @@ impl ModesSummary {
         };
         let [low, high] = self.band_hz.map(|hz| compact(hz, 5));
         let forces = match self.inputs.len() {
+            0 if matches!(self.analysis.test, ModalTest::Decay { .. }) => {
+                message::count(self.records.len(), "free decay")
+            }
             0 => "forces not measured".into(),
             count => message::count(count, "force"),
         };

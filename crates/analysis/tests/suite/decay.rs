@@ -2,8 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use mechid_analysis::modes::ModalTest;
 use mechid_analysis::{
-    AnalysisError, Channels, DecaySettings, Decayed, Measurement, ResponseQuantity, Window, decay,
+    AnalysisError, Channels, DecaySettings, Decayed, Measurement, ModesSettings, ResponseQuantity,
+    Window, decay, modes,
 };
 use mechid_signal::{Sampling, noise};
 use serde_json::Value;
@@ -64,6 +66,60 @@ fn modes_and_their_release_are_found() {
     assert!(summary.remarks.is_empty(), "{:?}", summary.remarks);
     let text = found.to_string();
     assert!(text.contains("2 modes; ± is one standard error"), "{text}");
+}
+
+/// Two decays after different releases, each of which hardly moves one of the modes of the other:
+/// together they give both modes. Of 20 pairs, 80 intervals of 95 % of frequency and damping ratio
+/// contain the true value 76 times on average, with a standard deviation of 2.
+#[test]
+fn several_decays_have_common_modes() {
+    let truth = [(6.0_f64, 0.01_f64), (30.0, 0.02)];
+    let sampling = Sampling::from_rate_hz(250.0, 1500).unwrap();
+    let channels = Channels::from_responses(ResponseQuantity::Acceleration, "x,y");
+    let shapes = [[1.0, -0.5], [0.4, 1.0]];
+    let one = |sizes: [f64; 2], seed: u64| {
+        let noise = noise::white(sampling, 2, 0.02, seed).unwrap();
+        let channel = |at: usize| -> Vec<f64> {
+            let value = |(k, t): (usize, f64)| {
+                let t = t - RELEASE;
+                let modes =
+                    truth.iter().zip(sizes).zip(shapes).map(|(((hz, zeta), size), shape)| {
+                        let omega = TAU * hz * (1.0 - zeta * zeta).sqrt();
+                        size * shape[at] * (-zeta * TAU * hz * t).exp() * (omega * t).cos()
+                    });
+                let moves = if t < 0.0 { 0.0 } else { modes.sum() };
+                moves + noise.channel(at)[k]
+            };
+            sampling.times().enumerate().map(value).collect()
+        };
+        let [x, y] = [channel(0), channel(1)];
+        let columns = [("x", x.as_slice()), ("y", y.as_slice())];
+        Measurement::from_columns(sampling, &columns, &channels).unwrap()
+    };
+    let settings = ModesSettings {
+        test: ModalTest::Decay { from_s: None, to_s: None },
+        ..ModesSettings::default()
+    };
+    let mut held = 0;
+    for seed in 0..20 {
+        let records = [one([1.0, 0.0], 2 * seed), one([0.0, 1.0], 2 * seed + 1)];
+        let found = modes(&records, &settings).unwrap();
+        let rows: Vec<_> = found.summary().modes.iter().map(|mode| &mode.mode).collect();
+        assert_eq!(rows.len(), 2, "{seed}: {found}");
+        for (at, (mode, (hz, zeta))) in rows.iter().zip(truth).enumerate() {
+            let contains = |interval: Option<[f64; 2]>, value: f64| {
+                usize::from(interval.is_some_and(|[low, high]| (low..=high).contains(&value)))
+            };
+            held += contains(mode.row.natural_frequency_hz.interval, hz);
+            held += contains(mode.row.damping_ratio.interval, zeta);
+            let other = mode.shape[1 - at].value[0];
+            assert!((other - [-0.5, 0.4][at]).abs() < 0.05, "{seed}: {found}");
+        }
+    }
+    assert!(held >= 70, "{held}");
+    let refused = ModesSettings { validate: 0.4, ..settings };
+    let error = modes(&[measurement()], &refused).unwrap_err().to_string();
+    assert!(error.contains("does not apply to free decays"), "{error}");
 }
 
 /// The settings in a result repeat the analysis, and unknown settings are refused.

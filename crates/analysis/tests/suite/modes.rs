@@ -201,6 +201,32 @@ fn a_wrong_gain_and_a_wrong_sign_are_named() {
     assert!(signs.contains(&"driving_point") && signs.contains(&"reciprocity"), "{found}");
 }
 
+/// A sensor of noise alone, a thousandth of the others, is named once; on right data every sensor
+/// passes, and no check has the words of a failure.
+#[test]
+fn a_sensor_that_moves_in_no_mode_is_named() {
+    let right = plain([1.0; 3], 5);
+    let found = modes(&right);
+    let passed = found.summary().checks.iter().filter(|check| check.passed);
+    let complaints = ["leave", "not measured", "negative modal", "wrong"];
+    assert!(passed.clone().any(|check| check.code == "idle_response"));
+    for check in passed {
+        assert!(complaints.iter().all(|words| !check.text.contains(words)), "{check:?}");
+    }
+    let mut table = right;
+    let mut rng = ChaCha20Rng::seed_from_u64(9);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    for function in table.functions.iter_mut().filter(|f| f.response == "2+Z") {
+        let size = 1e-3 * function.values.iter().map(|z| z.norm()).sum::<f64>();
+        let size = size / function.values.len() as f64;
+        function.values.iter_mut().for_each(|z| *z = C::new(normal(), normal()) * size);
+    }
+    let found = modes(&table);
+    let failed = failed(&found);
+    assert_eq!(failed.len(), 1, "{found}");
+    assert!(failed[0].code == "idle_response" && failed[0].text.contains("2+Z"), "{found}");
+}
+
 /// Reference: the closed form, with all displacements 1 ms late. Complex shapes take the place of
 /// the delay; the check of the driving points finds it, and the masses are those of the structure.
 #[test]

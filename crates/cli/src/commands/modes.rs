@@ -34,6 +34,7 @@ use crate::{options, repeat};
 /// --force-at). Frequencies, damping ratios and shapes are estimated by maximum likelihood on the
 /// spectral lines of the whole records, without windows; the number of modes is chosen, too.
 /// Without --force the record is a free decay, or with --ambient the response to unmeasured forces.
+/// Several free decays of one structure, each with its own initial state, have common modes.
 ///
 /// Without any column the file is a table of frequency responses: a universal file (datasets 58),
 /// or a table with the columns that `mechid frf --output` writes. A file in JSON is the description
@@ -51,6 +52,7 @@ use crate::{options, repeat};
   mechid modes frame.csv --force f1,f2 --acceleration a1,a2,a3,a4 --validate-percent 40
   mechid modes p1.csv p2.csv p3.csv --force f --force-at 1,2,3 --acceleration a --response-at 3 --hits
   mechid modes examples/decay.csv --acceleration a1,a2,a3
+  mechid modes pull1.csv pull2.csv --acceleration a1,a2,a3
   mechid modes bridge.csv --acceleration a1,a2,a3 --ambient --band-hz 0.5:20
   mechid modes table.unv --plot modes.html
   mechid modes before.json --compare after.json
@@ -84,8 +86,8 @@ pub struct ModesArgs {
     /// Maximum number of modes
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
     max_modes: Option<usize>,
-    /// Frequencies, in Hz, near which a mode is estimated even if it is weak; for a machine with
-    /// --modes, one frequency, whose nearest modes are computed
+    /// Frequencies, in Hz, of the modes to report, even if they are weak: the nearest ones, within
+    /// 2 %; for a machine with --modes, one frequency, whose nearest modes are computed
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
@@ -185,7 +187,10 @@ impl ModesArgs {
             return self.table_modes(words);
         }
         self.refuse("a record", &[("quantity", self.quantity.is_some())])?;
-        if channels.force.is_empty() && !self.unmeasured.ambient {
+        let is_decay = channels.force.is_empty() && !self.unmeasured.ambient;
+        if is_decay && !self.more.is_empty() {
+            self.refuse("free decays", &self.decay_refusals())?;
+        } else if is_decay {
             self.refuse("a free decay", &self.force_options())?;
             let decayed = mechid::decay(&self.input.open(&channels)?, &self.decay())?;
             let summary = decayed.summary();
@@ -198,6 +203,9 @@ impl ModesArgs {
             let outcome = Outcome::new(decayed.to_string(), &decayed)?;
             let drawn = (&decayed, decayed.summary());
             return self.drawn((outcome, words), drawn, &modes, &names);
+        }
+        if self.unmeasured.ambient {
+            self.refuse("an ambient record", &[("hits", self.hits.rule().is_some())])?;
         }
         let mut records = vec![self.input.open(&channels)?];
         for record in &self.more {
@@ -321,6 +329,18 @@ impl ModesArgs {
         ]
     }
 
+    /// Returns the options that several free decays do not have, and whether each was given.
+    fn decay_refusals(&self) -> Vec<(&'static str, bool)> {
+        let mut options = self.record_options();
+        options.extend([
+            ("quantity", self.quantity.is_some()),
+            ("diagrams", self.diagrams),
+            ("synthesis", self.synthesis.is_some()),
+            ("no_offset", self.unmeasured.no_offset),
+        ]);
+        options
+    }
+
     /// Returns the options of tests with forces, and whether each was given.
     fn force_options(&self) -> Vec<(&'static str, bool)> {
         let mut options = self.record_options();
@@ -337,6 +357,7 @@ impl ModesArgs {
     fn machine_modes(&self, path: &Path, words: &[OsString]) -> Result<Outcome, CliError> {
         let mut refused = self.force_options();
         refused.retain(|(name, _)| *name != "near_hz");
+        refused.push(("further files", !self.more.is_empty()));
         self.refuse("a machine", &refused)?;
         if self.modes.is_none() && !self.near_hz.is_empty() {
             let why = "for a machine it needs `modes`, the number of modes to find".into();
@@ -362,10 +383,14 @@ impl ModesArgs {
     }
 
     fn settings(&self) -> ModesSettings {
-        let UnmeasuredArgs { ambient, without_hz, without_harmonics, .. } = &self.unmeasured;
+        let UnmeasuredArgs { ambient, without_hz, without_harmonics, from, to, .. } =
+            &self.unmeasured;
+        let channels = self.channels.channels();
         let test = if *ambient {
             let (without_hz, without_harmonics) = (without_hz.clone(), *without_harmonics);
             ModalTest::Ambient { without_hz, without_harmonics }
+        } else if channels.force.is_empty() && channels.first_response().is_some() {
+            ModalTest::Decay { from_s: *from, to_s: *to }
         } else {
             ModalTest::Forced { hits: self.hits.rule() }
         };

@@ -12,7 +12,7 @@ use super::{mechid, refused};
 fn examples() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    for file in ["hammer-1.csv", "hammer-2.csv", "machine.json"] {
+    for file in ["decay.csv", "hammer-1.csv", "hammer-2.csv", "machine.json"] {
         std::fs::copy(examples.join(file), folder.path().join(file)).unwrap();
     }
     folder
@@ -142,7 +142,32 @@ fn faults_of_a_test_are_told_in_a_line_each() {
         path,
         "modes dead.csv --force f1,f2 --displacement a1 --sample-rate 256 --band-hz 90:120",
     );
-    assert!(silence.contains("no mode in") && silence.trim_end().lines().count() == 1, "{silence}");
+    assert!(
+        silence.contains("no mode from 90") && silence.trim_end().lines().count() == 1,
+        "{silence}"
+    );
+}
+
+/// Further files and options that a kind of data does not have are refused.
+#[test]
+fn what_does_not_apply_is_refused() {
+    let folder = examples();
+    let path = folder.path();
+    let both = "modes decay.csv decay.csv --acceleration a1,a2,a3";
+    let same = refused(path, both);
+    assert!(same.trim_end().lines().count() == 1, "{same}");
+    for (command, named) in [
+        ("modes machine.json decay.csv", "further files"),
+        ("modes decay.csv --acceleration a1,a2,a3 --ambient --near-hz 20", "near-hz"),
+        ("modes decay.csv --acceleration a1,a2,a3 --ambient --hits", "hits"),
+        ("modes decay.csv --acceleration a1,a2,a3 --ambient --validate-percent 20", "validate"),
+    ] {
+        let message = refused(path, command);
+        assert!(message.contains(named) && message.contains("does not apply"), "{message}");
+    }
+    let outside =
+        refused(path, "modes hammer-1.csv --force force --acceleration a1,a2 --near-hz 900");
+    assert!(outside.contains("900 Hz is not between"), "{outside}");
 }
 
 /// Reference: the machine behind the examples; the responses are averages of hits under an

@@ -714,6 +714,7 @@ def modes(
     response_at: Sequence[str | int] = (),
     hits: bool | str | Mapping[str, Any] = False,
     ambient: bool = False,
+    decay: bool = False,
     without_hz: Sequence[float] = (),
     without_harmonics: bool = False,
     validate: float = 0.0,
@@ -723,7 +724,7 @@ def modes(
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> Modes:
-    """Find the modes of a test with forces, of tables of frequency responses, or of an ambient record.
+    """Find the modes of a test with forces, of tables of frequency responses, free decays, or an ambient record.
 
     Parameters
     ----------
@@ -736,7 +737,8 @@ def modes(
     modes, max_modes : int, optional
         Number of modes, or its maximum. Default: as many as the record shows.
     near_hz : sequence of float
-        Frequencies, in Hz, near which a mode is estimated even if it is weak.
+        Frequencies, in Hz, of the modes to report, even if they are weak: the nearest ones, within
+        2 %. Other modes are part of the model, but not reported. Default: all modes.
     force_at, response_at : sequence of str or int
         Points of the force and response columns, such as ``3`` or ``"12+Z"``. If several records
         have one force column, of a roving hammer: the struck point of each record.
@@ -744,6 +746,9 @@ def modes(
         Find the hits of a hammer and use the good ones; those without a gap are one record.
     ambient : bool
         Whether forces act that are not measured, such as wind or traffic.
+    decay : bool
+        Whether no force acts: each record is a free decay from its own initial state, and all have
+        the same modes. For one record, `decay` says more.
     without_hz : sequence of float
         Frequencies of nearby machines in an ambient record, in Hz, whose lines are excluded.
     without_harmonics : bool
@@ -775,10 +780,14 @@ def modes(
     if sources and not record and all(isinstance(s, ResponseTable) or p for s, p in zip(sources, is_path)):
         tables = [one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in sources]  # type: ignore[arg-type]
     records = [] if tables else [one._inner for one in measurements(sources, "modes", record)]
+    if ambient and decay:
+        raise ValueError("`ambient` and `decay` exclude each other: forces act, or none does")
     if settings is None:
-        if ambient:
+        if decay:
+            test: dict[str, Any] = {"decay": {}}
+        elif ambient:
             excluded = [float(hz) for hz in without_hz]
-            test: dict[str, Any] = {
+            test = {
                 "ambient": {"without_hz": excluded, "without_harmonics": bool(without_harmonics)}
             }
         else:

@@ -53,7 +53,11 @@ pub(super) fn tests(
         Some(Tested {
             code: "delay",
             p_value,
-            text: format!(
+            passes: format!(
+                "the phases of the modes show no delay between force {} and {}",
+                inputs[input], outputs[output].name
+            ),
+            fails: format!(
                 "{} is {size} ms {direction} for force {}: at this point the phases of the modes are \
                  proportional to the frequency; a filter or a scanning converter delays one of \
                  the two channels",

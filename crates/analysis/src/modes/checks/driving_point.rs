@@ -35,7 +35,11 @@ pub(super) fn tests(
         Some(Tested {
             code: "driving_point",
             p_value,
-            text: format!(
+            passes: format!(
+                "no modal mass at {} under force {} is negative",
+                outputs[output].name, inputs[input]
+            ),
+            fails: format!(
                 "mode {number} ({hz:.4} Hz) has a negative modal mass at {} under force {}: one of the \
                  two channels has the wrong sign, or the two are not at the same point",
                 outputs[output].name, inputs[input]

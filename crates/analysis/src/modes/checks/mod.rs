@@ -3,7 +3,7 @@
 mod delay;
 mod driving_point;
 mod force_peak;
-mod idle_force;
+mod idle;
 mod reciprocity;
 mod table;
 mod tested;
@@ -12,6 +12,7 @@ use mechid_checks::Verdict;
 use mechid_modal::{IdentifiedMode, OutputDelay};
 
 pub(super) use self::force_peak::force_peak_check;
+pub(super) use self::idle::response_checks;
 pub(super) use self::table::table_checks;
 use self::tested::Tested;
 use super::sources::Output;
@@ -42,38 +43,36 @@ pub(super) fn channel_checks(
 
 /// Returns the check of the share of the variance of each response that the modes explain.
 pub(super) fn output_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
-    let text = |percent: f64, name: &str| {
-        format!(
-            "the modes explain {percent:.1} % of the variance of {name} in the band: the rest is \
-             noise, a nonlinearity, or forces that were not measured"
-        )
-    };
-    share_checks("explained", explained, names, text)
+    let words = [
+        "the modes explain",
+        "in the band",
+        ": the rest is noise, a nonlinearity, or forces that were not measured",
+    ];
+    share_checks("explained", explained, names, words)
 }
 
 /// Returns the check of the share of the variance of each response that is predicted where it was
 /// not fitted.
 pub(super) fn prediction_checks(predicted: &[f64], names: &[String]) -> Vec<ModalCheck> {
-    let text = |percent: f64, name: &str| {
-        format!(
-            "the modes predict {percent:.1} % of the variance of {name} in the part that was not fitted: \
-             what was fitted is not only the response of the structure to these forces"
-        )
-    };
-    share_checks("predicted", predicted, names, text)
+    let words = [
+        "the modes predict",
+        "in the part that was not fitted",
+        ": what was fitted is not only the response of the structure to these forces",
+    ];
+    share_checks("predicted", predicted, names, words)
 }
 
 fn share_checks(
     code: &'static str,
     shares: &[f64],
     names: &[String],
-    text: impl Fn(f64, &str) -> String,
+    [verb, place, why]: [&str; 3],
 ) -> Vec<ModalCheck> {
-    let row = |(share, name): (&f64, &String)| ModalCheck {
-        code,
-        passed: *share >= LEAST_EXPLAINED,
-        value: *share,
-        text: text(100.0 * share, name),
+    let row = |(&value, name): (&f64, &String)| {
+        let passed = value >= LEAST_EXPLAINED;
+        let share = format!("{verb} {:.1} % of the variance of {name} {place}", 100.0 * value);
+        let text = if passed { share } else { share + why };
+        ModalCheck { code, passed, value, text }
     };
     shares.iter().zip(names).map(row).collect()
 }
@@ -88,7 +87,7 @@ pub(super) fn mode_checks(
     driving_points: &[(usize, usize)],
     delays: &[OutputDelay],
 ) -> Vec<ModalCheck> {
-    let mut rows = idle_force::checks(modes, inputs);
+    let mut rows = idle::force_checks(modes, inputs);
     let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, driving_points);
     let has_delay = |output: usize| delays.get(output).is_some_and(|delay| delay.seconds != 0.0);
     let others: Vec<_> =

@@ -58,7 +58,11 @@ fn test(
     Some(Tested {
         code: "reciprocity",
         p_value: distribution.sf(statistic.min(f64::MAX)),
-        text: format!(
+        passes: format!(
+            "{} per {} and {} per {} agree",
+            outputs[point].name, inputs[other_force], outputs[other_point].name, inputs[force]
+        ),
+        fails: format!(
             "{} per {} and {} per {} differ, most in the mode at {hz:.4} Hz, by {:.2} %: a wrong \
              calibration or place, forces that are not the ones measured, or a structure that \
              is not reciprocal",

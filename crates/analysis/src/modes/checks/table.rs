@@ -42,15 +42,17 @@ fn units(table: &FrequencyResponses) -> Vec<ModalCheck> {
     findings.map(check).collect()
 }
 
-/// Checks the median coherence over the rows and functions of a table. The coherence is not a
-/// weight of the fit, which estimates noise and unmeasured forces from the residual.
+/// Checks the median coherence over the rows and functions of a table.
 fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
     let values = table.coherence.iter();
     let mut values: Vec<f64> = values.flat_map(|c| rows.iter().map(|row| c.values[*row])).collect();
     values.sort_by(f64::total_cmp);
     let median = *values.get(values.len() / 2)?;
     let impossible = values.iter().filter(|value| !(0.0..=1.0).contains(*value)).count();
-    let text = if impossible > 0 {
+    let passed = impossible == 0 && median >= 1.0 - INCOHERENCE_DOUBTFUL;
+    let text = if passed {
+        format!("{}: median coherence {median:.4} in the band", table.file)
+    } else if impossible > 0 {
         format!(
             "{}: {impossible} of {} values of the coherence are not between 0 and 1, so it is not a coherence",
             table.file,
@@ -62,7 +64,6 @@ fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
             table.file
         )
     };
-    let passed = impossible == 0 && median >= 1.0 - INCOHERENCE_DOUBTFUL;
     Some(ModalCheck { code: "coherence", passed, value: median, text })
 }
 
@@ -83,7 +84,10 @@ fn leakage(
     };
     let narrowest = modes.iter().min_by(|a, b| width(a).total_cmp(&width(b)))?;
     let lines = width(narrowest);
+    let passed = settled && lines >= RESONANCE_LINES;
     let why = match averaged {
+        Some(_) if passed => "a segment",
+        None if passed => "the table",
         Some(_) if settled => {
             "a segment: its damping follows from the bias of the window, and its intervals are not \
              reliable; use longer segments, or fit the record itself"
@@ -99,7 +103,7 @@ fn leakage(
     };
     Some(ModalCheck {
         code: "leakage",
-        passed: settled && lines >= RESONANCE_LINES,
+        passed,
         value: lines,
         text: format!(
             "{}: the half-power width of the resonance at {:.4} Hz is {} line spacings of {why}",

@@ -10,8 +10,10 @@ pub(super) struct Tested {
     pub code: &'static str,
     /// Probability of a larger statistic due to the errors of the modes alone.
     pub p_value: f64,
+    /// The finding if the test passes, in a sentence.
+    pub passes: String,
     /// The finding if the test fails, in a sentence.
-    pub text: String,
+    pub fails: String,
 }
 
 /// Converts tests to checks, with p-values adjusted for the number of tests.
@@ -26,11 +28,11 @@ pub(super) fn adjusted(mut tests: Vec<Tested>) -> Vec<ModalCheck> {
         least = least.max((tests.len() - rank) as f64 * tests[*at].p_value).min(1.0);
         tests[*at].p_value = least;
     }
-    let row = |Tested { code, p_value, text }: Tested| ModalCheck {
-        code,
-        passed: p_value >= MODAL_SIGNIFICANCE,
-        value: p_value,
-        text: format!("{text} (p = {})", significant(p_value, 2)),
+    let row = |Tested { code, p_value, passes, fails }: Tested| {
+        let passed = p_value >= MODAL_SIGNIFICANCE;
+        let text = if passed { passes } else { fails };
+        let text = format!("{text} (p = {})", significant(p_value, 2));
+        ModalCheck { code, passed, value: p_value, text }
     };
     tests.into_iter().map(row).collect()
 }
@@ -42,13 +44,13 @@ mod tests {
     /// The example of R's `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")`: 0.03, 0.06, 0.06, 0.02.
     #[test]
     fn p_values_are_those_of_holm() {
-        let test = |p_value| Tested { code: "a", p_value, text: String::new() };
+        let test = |p_value| Tested { code: "a", p_value, passes: "b".into(), fails: "c".into() };
         let checks = adjusted([0.01, 0.04, 0.03, 0.005].map(test).into());
         for (check, expected) in checks.iter().zip([0.03, 0.06, 0.06, 0.02]) {
             assert!((check.value - expected).abs() < 1e-12, "{} {expected}", check.value);
-            assert!(check.passed);
+            assert!(check.passed && check.text.starts_with("b "));
         }
         let [check] = adjusted(vec![test(0.001)]).try_into().unwrap();
-        assert!(!check.passed);
+        assert!(!check.passed && check.text.starts_with("c "));
     }
 }

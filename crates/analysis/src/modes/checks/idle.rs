@@ -1,0 +1,85 @@
+//! Tests of channels without a share in any mode: a shaker that is off, a sensor that is not
+//! connected.
+
+use mechid_modal::IdentifiedMode;
+use nalgebra::Complex;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::super::summary::{ModalCheck, ModalModeRow};
+use crate::limits::MODAL_SIGNIFICANCE;
+use crate::text::significant;
+
+/// Returns, for each of several forces, the check that it excites some mode, by a test of zero
+/// participations in all modes.
+///
+/// # Source
+/// Wald's test of the participations, with two degrees of freedom for each mode.
+pub(super) fn force_checks(modes: &[IdentifiedMode], inputs: &[String]) -> Vec<ModalCheck> {
+    let check = |(input, name): (usize, &String)| {
+        let squares = |mode: &IdentifiedMode| {
+            let value = mode.participation[input];
+            let error: Complex<f64> = mode.participation_standard_error[input];
+            (value.re / error.re).powi(2) + (value.im / error.im).powi(2)
+        };
+        let p_value = of_zero(modes.iter().map(squares))?;
+        let words = [
+            format!("force {name} drives a mode"),
+            format!(
+                "force {name} drives no mode beyond its errors (p = {}): is its shaker on, and \
+                 not driven by the signal of another? If no force of its own acts there, leave it out \
+                 of `force`",
+                significant(p_value, 2)
+            ),
+        ];
+        Some(row("idle_force", p_value, words))
+    };
+    several(inputs).filter_map(check).collect()
+}
+
+/// Returns, for each of several responses, the check that it moves in some mode, by a test of zero
+/// shapes in all modes with standard errors.
+///
+/// # Source
+/// Wald's test of the shapes, with two degrees of freedom for each mode.
+pub(in crate::modes) fn response_checks(
+    modes: &[ModalModeRow],
+    outputs: &[String],
+) -> Vec<ModalCheck> {
+    let check = |(output, name): (usize, &String)| {
+        let squares = modes.iter().filter_map(|mode| {
+            let entry = mode.mode.shape.get(output)?;
+            let pairs = entry.value.iter().zip(entry.standard_error?);
+            Some(pairs.map(|(value, error)| (value / error).powi(2)).sum())
+        });
+        let p_value = of_zero(squares)?;
+        let words = [
+            format!("{name} moves in a mode"),
+            format!(
+                "{name} moves in no mode beyond its errors (p = {}): is the sensor connected? \
+                 If it measures nothing, leave its column out",
+                significant(p_value, 2)
+            ),
+        ];
+        Some(row("idle_response", p_value, words))
+    };
+    several(outputs).filter_map(check).collect()
+}
+
+/// Returns the numbers and names of several channels; a single one is tested by the fit itself.
+fn several(names: &[String]) -> impl Iterator<Item = (usize, &String)> {
+    names.iter().enumerate().filter(|_| names.len() > 1)
+}
+
+/// Returns the probability that two numbers of each mode, which are zero but for their errors, have
+/// these sums of squares or more; `None` without a mode.
+fn of_zero(squares: impl Iterator<Item = f64>) -> Option<f64> {
+    let (modes, sum) = squares.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
+    let law = ChiSquared::new(2.0 * f64::from(modes)).ok()?;
+    // An entry that scales the shape has no error.
+    Some(if sum.is_nan() { 0.0 } else { law.sf(sum.min(f64::MAX)) })
+}
+
+fn row(code: &'static str, p_value: f64, [acts, is_idle]: [String; 2]) -> ModalCheck {
+    let passed = p_value < MODAL_SIGNIFICANCE;
+    ModalCheck { code, passed, value: p_value, text: if passed { acts } else { is_idle } }
+}

@@ -1,0 +1,33 @@
+//! Modes of several free decays, which share them.
+
+use super::forced::Test;
+use super::settings::ModesSettings;
+use super::sources::Recorded;
+use super::summary::RecordRow;
+use super::{Modes, checks};
+use crate::AnalysisError;
+use crate::decay::{DecaySettings, decaying_part};
+use crate::measurement::{Block, Measurement, check_distinct};
+
+/// Identifies the modes of free decays, one in each record, from `from_s` to `to_s`, in s from the
+/// first sample of the window; `None`: found.
+pub(super) fn modes(
+    measurements: &[Measurement],
+    settings: &ModesSettings,
+    [from_s, to_s]: [Option<f64>; 2],
+) -> Result<Modes, AnalysisError> {
+    settings.refuse("free decays", &["force_at", "response_at", "validate_percent"])?;
+    check_distinct(measurements)?;
+    let how = DecaySettings { from_s, to_s, ..DecaySettings::default() };
+    let cut = measurements.iter().map(|measurement| decaying_part(measurement, &how));
+    let cut = cut.collect::<Result<Vec<_>, _>>()?;
+    let first = cut.first().ok_or(AnalysisError::NoRecord)?;
+    settings.check_channels(first.channels())?;
+    let blocks: Vec<Block> = cut.iter().map(Measurement::whole_block).collect::<Result<_, _>>()?;
+    let recorded = Recorded::from_decays(&blocks, first.channels())?;
+    let nyquist_hz = 0.5 / first.sampling().dt();
+    let band_hz = settings.band_hz.unwrap_or([0.0, nyquist_hz]);
+    let records = blocks.iter().map(RecordRow::from_block).collect();
+    let checks = checks::channel_checks(&cut)?;
+    Test { recorded, band_hz }.modes(records, checks, settings)
+}
