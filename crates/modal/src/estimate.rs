@@ -20,7 +20,7 @@ use crate::mode::{DroppedCandidate, IdentifiedMode};
 use crate::mode_parameters::ModeParameters;
 use crate::model::ResidualPowers;
 use crate::noise::{Noise, shapes};
-use crate::order::removal_losses;
+use crate::order::{removal_losses, required_gain};
 use crate::results::identified_mode;
 use crate::search::Fit;
 use crate::synthesis::add_transients;
@@ -44,6 +44,7 @@ pub struct ModalEstimate {
     noise_level: Vec<f64>,
     noise_spectrum: Vec<Vec<f64>>,
     log_likelihood: f64,
+    required_gain: f64,
     iterations: usize,
 }
 
@@ -99,6 +100,7 @@ impl ModalEstimate {
             noise_level: noise.sensor.iter().map(level).collect(),
             noise_spectrum: noise.sensor.clone(),
             log_likelihood: log_likelihood(fit),
+            required_gain: required_gain(fit.lines),
             iterations: fit.steps,
         }
     }
@@ -219,6 +221,15 @@ impl ModalEstimate {
     /// Returns the log-likelihood at the weights of the fit, without constants.
     pub fn log_likelihood(&self) -> f64 {
         self.log_likelihood
+    }
+
+    /// Returns the decrease of −2 log L, a pure number, that a mode must cause to be significant:
+    /// the penalty of its parameters.
+    ///
+    /// # Source
+    /// Schwarz (1978), Annals of Statistics 6, 461–464.
+    pub fn required_gain(&self) -> f64 {
+        self.required_gain
     }
 
     /// Returns the powers of jω that represent modes outside the band.

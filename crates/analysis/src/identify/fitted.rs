@@ -203,8 +203,8 @@ impl Fitted {
         })
     }
 
-    /// Includes the disagreement of model and data that the checks show in the standard errors. With
-    /// nonlinear terms the errors remain.
+    /// Includes the disagreement of model and data that the checks show in the standard errors;
+    /// with nonlinear terms the errors remain.
     pub(super) fn count_disagreement(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
         let found = std::mem::take(&mut self.disagreement);
         if self.nonlinear.is_none() {

@@ -166,7 +166,8 @@ fn refitted(
     Some((fit.estimate, model))
 }
 
-/// Returns a fit to tables whose magnitudes are levels in dB with the given sign, and its responses.
+/// Returns a fit to tables whose magnitudes are levels in dB with the given sign, and its
+/// responses.
 fn level_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,

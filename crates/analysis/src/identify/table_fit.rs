@@ -179,7 +179,7 @@ impl CheckedFit {
     /// Checks a `fit` to the `data` of `measured` tables; `is_unscaled` if equations have no scale.
     ///
     /// # Errors
-    /// [`AnalysisError::NothingDetermined`] if the data determine nothing.
+    /// [`AnalysisError::NothingDetermined`] if the data determine no parameter.
     pub(super) fn new(
         fit: &TableFit,
         data: &FrequencyData,

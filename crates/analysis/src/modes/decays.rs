@@ -29,5 +29,5 @@ pub(super) fn modes(
     let band_hz = settings.band_hz.unwrap_or([0.0, nyquist_hz]);
     let records = blocks.iter().map(RecordRow::from_block).collect();
     let checks = checks::channel_checks(&cut)?;
-    Test { recorded, band_hz }.modes(records, checks, settings)
+    Test { recorded, struck_apart: None, band_hz }.modes(records, checks, settings)
 }

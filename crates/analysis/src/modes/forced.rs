@@ -27,6 +27,9 @@ use crate::text::significant;
 /// Records of a test, and the band of the fit.
 pub(super) struct Test {
     pub recorded: Recorded,
+    /// The same records with a force of its own in the first of them; `None` unless one force acts
+    /// in several records, at points that are not stated.
+    pub struck_apart: Option<Recorded>,
     pub band_hz: [f64; 2],
 }
 
@@ -63,7 +66,7 @@ impl Test {
         mut checks: Vec<ModalCheck>,
         settings: &ModesSettings,
     ) -> Result<Modes, AnalysisError> {
-        let Self { recorded, band_hz } = self;
+        let Self { recorded, struck_apart, band_hz } = self;
         let named = |error| named(error, &recorded.inputs, &recorded.outputs);
         let data = recorded.lines(band_hz)?;
         let engine = engine_settings(settings);
@@ -71,6 +74,8 @@ impl Test {
         let halves = Halves::new(&recorded, band_hz, &estimate, &engine);
         let estimate = estimate.with_error_scales(&halves.error_scales)?;
         checks.extend(halves.check);
+        let apart = struck_apart.and_then(|apart| apart.lines(band_hz).ok());
+        checks.extend(apart.and_then(|apart| checks::one_point_check(&apart, &estimate, &engine)));
         let predicted = match settings.validate {
             0.0 => None,
             share => Some(predicted(&recorded, band_hz, share, settings)?),
@@ -233,12 +238,12 @@ impl Context {
         let modes: Vec<ModalModeRow> =
             reported.iter().enumerate().map(|(at, mode)| row(mode, mass(at))).collect();
         let idle = checks::response_checks(&modes, &names);
-        let of_shares = checks::output_checks(&explained, &names);
-        // An idle sensor is told once.
-        let is_told = |at: usize| idle.get(at).is_some_and(|check| !check.passed);
-        let of_shares = of_shares.into_iter().enumerate().filter(|(at, _)| !is_told(*at));
-        rows.extend(of_shares.map(|(_, check)| check));
-        rows.extend(idle);
+        let of_outputs = checks::output_checks(&explained, &names).into_iter().enumerate();
+        rows.extend(of_outputs.map(|(at, share)| match idle.get(at) {
+            // Residual terms may explain a sensor that no mode moves.
+            Some(idle) if !share.passed && !idle.passed => idle.clone(),
+            _ => share,
+        }));
         let mut model = estimate.model().clone();
         for term in &mut model.terms {
             term.pole[0] += self.added_decay.unwrap_or(0.0);

@@ -1,5 +1,5 @@
-//! Modes of a structure from records under measured forces, from tables of frequency responses, from
-//! free decays, and from ambient records.
+//! Modes of a structure from records under measured forces, from tables of frequency responses,
+//! from free decays, and from ambient records.
 
 mod ambient;
 mod averaged;
@@ -112,7 +112,11 @@ pub fn modes(
     });
     let records = records.collect::<Result<Vec<_>, AnalysisError>>()?;
     let checks = checks::channel_checks(measurements)?;
-    Test { recorded, band_hz }.modes(records, checks, settings)
+    let is_one_point = settings.places.forces.is_empty() && recorded.inputs.len() == 1;
+    let struck_apart = (is_one_point && measurements.len() > 1)
+        .then(|| Recorded::struck_apart(measurements, hits.as_ref()))
+        .transpose()?;
+    Test { recorded, struck_apart, band_hz }.modes(records, checks, settings)
 }
 
 /// Identifies the modes of a structure from tables of its frequency responses, all together, with

@@ -163,6 +163,14 @@ pub(super) fn notes(estimate: &ModalEstimate, outputs: &[Output]) -> Vec<String>
                  forces reach further"
             ));
         }
+        if mode.gain < estimate.required_gain() {
+            notes.push(format!(
+                "mode {number} ({hz} Hz) is not significant, and may be noise: it improves the fit by \
+                 {} (−2 log L), but {} is needed; it is listed because it was asked for (`modes`, `near_hz`)",
+                significant(mode.gain, 3),
+                significant(estimate.required_gain(), 3)
+            ));
+        }
         if let Some(share) = mode.driven_share.filter(|share| 1.0 - share > NOTED_UNMEASURED) {
             notes.push(format!(
                 "{} % of the motion of mode {number} ({hz} Hz) is caused by forces that were not \

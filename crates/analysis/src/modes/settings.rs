@@ -21,7 +21,7 @@ pub struct ModesSettings {
     /// Maximum number of modes if the number is not given.
     pub max_modes: Option<usize>,
     /// Frequencies, in Hz, of the modes to report (the nearest within 2 %), even if they are weak;
-    /// other modes are part of the model, but not reported. Empty: all modes.
+    /// other modes are part of the model, but not reported. A list of any length; empty: all modes.
     pub near_hz: Vec<f64>,
     /// Quantity of the responses of tables that do not state it.
     #[serde(skip_serializing_if = "Option::is_none")]

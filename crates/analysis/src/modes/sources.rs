@@ -94,6 +94,17 @@ impl Recorded {
         Ok(Self { parts, inputs: columns.names, outputs, driving_points, hits })
     }
 
+    /// Reads records like [`Recorded::from_forced`], with one force in the first of them and
+    /// another one in all others.
+    pub fn struck_apart(
+        measurements: &[Measurement],
+        rule: Option<&HitRule>,
+    ) -> Result<Self, AnalysisError> {
+        let point = |at: usize| if at == 0 { "first" } else { "others" };
+        let forces = (0..measurements.len()).map(|at| point(at).to_owned()).collect();
+        Self::from_forced(measurements, rule, &Places { forces, responses: Vec::new() })
+    }
+
     /// Reads the records of free decays, cut to the decay.
     pub fn from_decays(blocks: &[Block], channels: &Channels) -> Result<Self, AnalysisError> {
         let part = |block: &Block| Ok(Part { forces: None, responses: all_responses(block)? });

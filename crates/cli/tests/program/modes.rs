@@ -148,6 +148,32 @@ fn faults_of_a_test_are_told_in_a_line_each() {
     );
 }
 
+/// Modes that noise alone gives, but that were asked for, are called what they are; so are struck
+/// points that were not stated.
+#[test]
+fn what_was_asked_for_may_be_noise() {
+    let folder = examples();
+    let notes = |arguments: &str| -> Vec<String> {
+        let report = modes(folder.path(), arguments);
+        let notes = report["notes"].as_array().unwrap().iter();
+        notes.map(|note| note.as_str().unwrap().to_owned()).collect()
+    };
+    let is_one_point = |arguments: &str| -> Option<bool> {
+        let report = modes(folder.path(), arguments);
+        let mut checks = report["checks"].as_array().unwrap().iter();
+        let check = checks.find(|check| check["code"] == "one_point")?;
+        check["passed"].as_bool()
+    };
+    let record = "hammer-1.csv --force force --acceleration a1,a2 --hits --band-hz 2:100";
+    let is_noise = |note: &&String| note.contains("is not significant, and may be noise");
+    assert_eq!(notes(record).iter().filter(is_noise).count(), 0);
+    assert_eq!(notes(&format!("{record} --modes 4")).iter().filter(is_noise).count(), 2);
+    let both = "hammer-1.csv hammer-2.csv --force force --acceleration a1 --hits --band-hz 2:100";
+    assert_eq!(is_one_point(both), Some(false));
+    assert_eq!(is_one_point(&format!("{both} --force-at 1,2")), None);
+    assert_eq!(is_one_point(record), None);
+}
+
 /// Further files and options that a kind of data does not have are refused.
 #[test]
 fn what_does_not_apply_is_refused() {

@@ -4,6 +4,7 @@ mod delay;
 mod driving_point;
 mod force_peak;
 mod idle;
+mod one_point;
 mod reciprocity;
 mod table;
 mod tested;
@@ -13,6 +14,7 @@ use mechid_modal::{IdentifiedMode, OutputDelay};
 
 pub(super) use self::force_peak::force_peak_check;
 pub(super) use self::idle::response_checks;
+pub(super) use self::one_point::one_point_check;
 pub(super) use self::table::table_checks;
 use self::tested::Tested;
 use super::sources::Output;

@@ -1,0 +1,37 @@
+//! Check that the force acts at the same point in all records.
+
+use mechid_modal::{ModalEstimate, ModalSettings, refit_modes};
+use mechid_spectra::LineData;
+
+use crate::modes::summary::ModalCheck;
+use crate::text::significant;
+
+/// Returns the check that one force in all records explains them as well as one force in the first
+/// record and another one in all others, whose lines are `apart`; `None` if the second fit fails.
+///
+/// # Source
+/// Schwarz (1978), Annals of Statistics 6, 461–464 (Bayesian information criterion).
+pub(in crate::modes) fn one_point_check(
+    apart: &LineData,
+    estimate: &ModalEstimate,
+    settings: &ModalSettings,
+) -> Option<ModalCheck> {
+    let other = refit_modes(apart, estimate, settings).ok()?;
+    let gain = 2.0 * (other.log_likelihood() - estimate.log_likelihood());
+    let unknowns = 2 * estimate.modes().len()
+        + apart.outputs().ncols() * estimate.residual_powers().forces.len();
+    let required = unknowns as f64 * (2.0 * apart.len() as f64).ln();
+    let passed = gain <= required;
+    let text = if passed {
+        "the force acts at the same point in all records".to_owned()
+    } else {
+        format!(
+            "a force at another point in the first record than in the others explains the records far better \
+             (−2 log L falls by {}, where {} is needed): state the points of a hammer that roves (`force_at`, \
+             one for each record)",
+            significant(gain, 3),
+            significant(required, 3)
+        )
+    };
+    Some(ModalCheck { code: "one_point", passed, value: gain, text })
+}
