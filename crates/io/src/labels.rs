@@ -2,25 +2,92 @@
 
 use std::collections::HashMap;
 
-use crate::contents::Contents;
+use crate::contents::{Column, Contents};
 use crate::table::is_time;
 
-/// Names, in lower case, of a field that states a unit.
-const UNITS: [&str; 5] = ["unit", "units", "yunit", "y_unit", "eu"];
+/// Names, in lower case and without other signs than letters, of a field or an attribute that
+/// states a unit without the word.
+const UNITS: [&str; 2] = ["eu", "uom"];
+
+/// Parts of names of units of an axis, and of names in which a unit is a device.
+const OTHER_UNITS: [&str; 10] =
+    ["xunit", "unitx", "xaxis", "time", "number", "serial", "name", "count", "test", "under"];
 
 /// Names, in lower case, of a field that states the name of a channel.
 const NAMES: [&str; 5] = ["name", "label", "channel", "channelname", "description"];
 
+/// Returns whether a field or an attribute of this name states the unit of values: `units`,
+/// `y_unit_label`, `NI_UnitDescription`, `uom`.
+pub(crate) fn states_unit(name: &str) -> bool {
+    let letters: String = name.chars().filter(|c| c.is_alphabetic()).collect();
+    let letters = letters.to_lowercase();
+    let is_device = letters.starts_with("id") || letters.ends_with("id");
+    UNITS.contains(&letters.as_str())
+        || (letters.contains("unit")
+            && !is_device
+            && !OTHER_UNITS.iter().any(|other| letters.contains(other)))
+}
+
+/// Assigns to the channels of an array the units of a list beside it, if there are as many; a list
+/// without such an array is a remark.
+fn with_listed_units(mut contents: Contents) -> Contents {
+    let mut lists: Vec<(String, Vec<String>)> = Vec::new();
+    for (path, text) in &contents.texts {
+        let Some((list, number)) = path.split_once('{') else { continue };
+        let leaf = list.rsplit_once('.').map_or(list, |(_, leaf)| leaf);
+        if !states_unit(leaf) || number.strip_suffix('}').is_none_or(|n| n.parse::<u32>().is_err())
+        {
+            continue;
+        }
+        match lists.last_mut().filter(|(last, _)| last == list) {
+            Some((_, units)) => units.push(text.clone()),
+            None => lists.push((list.to_owned(), vec![text.clone()])),
+        }
+    }
+    for (list, units) in lists {
+        let place = list.rsplit_once('.').map(|(place, _)| place);
+        let array_of = |column: &Column| {
+            let (array, number) = column.name.strip_suffix(']')?.split_once('[')?;
+            let is_beside = array.rsplit_once('.').map(|(place, _)| place) == place;
+            let channel = number.parse::<usize>().ok()?.checked_sub(1)?;
+            is_beside.then(|| (array.to_owned(), channel))
+        };
+        let channels: Vec<Option<(String, usize)>> =
+            contents.columns.iter().map(array_of).collect();
+        let count = |array: &str| channels.iter().flatten().filter(|(a, _)| a == array).count();
+        let mut is_used = false;
+        for (column, channel) in contents.columns.iter_mut().zip(&channels) {
+            let Some((array, channel)) = channel else { continue };
+            if count(array) == units.len() && column.unit.is_empty() {
+                (column.unit, is_used) = (units[*channel].clone(), true);
+            }
+        }
+        if !is_used {
+            contents.remarks.push(format!(
+                "{list} lists {} units ({}), but no array beside it has as many channels: they were not used (state them with `unit`)",
+                units.len(),
+                units.join(", ")
+            ));
+        }
+    }
+    contents
+}
+
 /// Assigns to the columns of a struct the unit and the name that its text fields state.
-pub(crate) fn with_labels(mut contents: Contents) -> Contents {
+pub(crate) fn with_labels(contents: Contents) -> Contents {
+    let mut contents = with_listed_units(contents);
     let mut labels: HashMap<&str, [&str; 2]> = HashMap::new();
     for (path, text) in &contents.texts {
-        let Some((place, leaf)) = path.rsplit_once('.') else { continue };
+        // The element of a list belongs to one channel.
+        let Some((place, leaf)) = path.rsplit_once('.').filter(|_| !path.ends_with('}')) else {
+            continue;
+        };
         let leaf = leaf.to_lowercase();
-        for (label, words) in labels.entry(place).or_default().iter_mut().zip([UNITS, NAMES]) {
-            if words.contains(&leaf.as_str()) {
-                *label = text;
-            }
+        let [unit, name] = labels.entry(place).or_default();
+        if states_unit(&leaf) {
+            *unit = text;
+        } else if NAMES.contains(&leaf.as_str()) {
+            *name = text;
         }
     }
     for column in &mut contents.columns {
@@ -39,4 +106,43 @@ pub(crate) fn with_labels(mut contents: Contents) -> Contents {
         }
     }
     contents
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_units_are_known() {
+        for name in
+            ["units", "Unit", "y_unit_label", "NI_UnitDescription", "uom", "EngineeringUnits"]
+        {
+            assert!(states_unit(name), "{name}");
+        }
+        for name in ["x_units", "time_unit", "unit_id", "UnitUnderTest", "unit_number", "acc"] {
+            assert!(!states_unit(name), "{name}");
+        }
+    }
+
+    /// A cell array of units beside a matrix has the units of its columns; one that fits no matrix
+    /// is a remark.
+    #[test]
+    fn a_list_of_units_belongs_to_the_matrix_beside_it() {
+        let column = |name: &str| Column::from_numbers(name.into(), vec![1.0, 2.0]);
+        let text = |name: &str, text: &str| (name.to_owned(), text.to_owned());
+        let contents = || Contents {
+            columns: ["rec.data[1]", "rec.data[2]", "rec.other[1]"].map(column).into(),
+            texts: vec![text("rec.units{1}", "kN"), text("rec.units{2}", "g")],
+            ..Contents::default()
+        };
+        let read = with_labels(contents());
+        let units: Vec<&str> = read.columns.iter().map(|column| column.unit.as_str()).collect();
+        assert_eq!(units, ["kN", "g", ""]);
+        assert!(read.remarks.is_empty());
+        let mut elsewhere = contents();
+        elsewhere.columns.truncate(1);
+        let read = with_labels(elsewhere);
+        assert!(read.columns[0].unit.is_empty());
+        assert!(read.remarks[0].contains("rec.units lists 2 units (kN, g)"), "{:?}", read.remarks);
+    }
 }

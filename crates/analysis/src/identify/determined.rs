@@ -4,7 +4,7 @@ use mechid_checks::Finding;
 use mechid_estimate::{Estimate, IdentifiedMode};
 use mechid_signal::message;
 
-use super::checks::CheckRow;
+use super::checks::{CheckRow, When};
 use super::rows::CONFIDENCE;
 use crate::AnalysisError;
 use crate::text::significant;
@@ -13,10 +13,11 @@ use crate::text::significant;
 const NAMED: usize = 6;
 
 /// Refuses a fit of a linear system that is singular to rounding, that explains no more of the
-/// response than chance does, or in which the interval of every parameter contains zero, unless
-/// another finding already explains the failure. With several degrees of freedom the modes may
-/// still be determined; with one, the response is then indistinguishable from noise, and so is its
-/// mode. An estimate that noise biases may explain none of a response that is mostly signal.
+/// response than chance does, or in which the interval of every parameter contains zero, unless a
+/// fault of the channels or another model explains the failure. With several degrees of freedom the
+/// modes may still be determined; with one, the response is then indistinguishable from noise, and
+/// so is its mode. An estimate that noise biases may explain none of a response that is mostly
+/// signal.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -28,7 +29,10 @@ pub(super) fn check(
 ) -> Result<(), AnalysisError> {
     let refused = |why: String| Err(AnalysisError::NothingDetermined { why });
     let is_unrelated = |check: &&CheckRow| matches!(check.finding, Finding::Unrelated(_));
-    if checks.iter().any(|check| check.is_bad() && !is_unrelated(&check)) {
+    // A fault of the channels, or a delay, explains the failure.
+    let explains =
+        |check: &CheckRow| check.is_bad() && check.when == When::Before || check.is_explanation();
+    if checks.iter().any(explains) {
         return Ok(());
     }
     if let Some(check) = checks.iter().find(is_unrelated)

@@ -2,22 +2,7 @@
 
 use hdf5_pure::{AttrValue, Dataset, Group};
 
-/// Names, in lower case, of an attribute with a unit: in NeXus, SEP 5, netCDF and analyser
-/// programs.
-const UNITS: [&str; 12] = [
-    "units",
-    "unit",
-    "unit_str",
-    "unit_string",
-    "y_unit",
-    "yunit",
-    "unit_y",
-    "y_unit_label",
-    "eu",
-    "engineering_units",
-    "engineering_unit",
-    "engineeringunits",
-];
+use crate::labels::states_unit;
 
 /// Names, in lower case, of an attribute that multiplies the stored numbers: in netCDF and in
 /// NeXus.
@@ -121,7 +106,7 @@ impl Attributes {
     /// Returns the unit of a channel, counted from 0.
     pub fn unit(&self, channel: usize) -> Option<String> {
         let texts = self.0.iter().find_map(|(name, value)| match value {
-            Value::Texts(texts) if UNITS.contains(&name.to_lowercase().as_str()) => Some(texts),
+            Value::Texts(texts) if states_unit(name) => Some(texts),
             _ => None,
         })?;
         texts.get(channel).or(texts.first().filter(|_| texts.len() == 1)).cloned()

@@ -105,6 +105,11 @@ fn add(
             }
         }
         Value::Elements { kind, elements } if !elements.iter().any(Array::has_numbers) => {
+            let texts = elements.into_iter().filter_map(|element| match element.value {
+                Value::Text(text) => Some((name.clone() + &element.name, text)),
+                _ => None,
+            });
+            contents.texts.extend(texts);
             contents.columns.push(Column::unusable(name, kind));
         }
         Value::Elements { elements, .. } => {
