@@ -4,19 +4,40 @@ use crate::contents::{Column, Override};
 use crate::units::{Evidence, Quantity, StatedUnit, Unit, stated, without_unit};
 
 /// Names of a time column, without its unit and in lower case.
-const NAMES: [&str; 12] = [
-    "time",
+const NAMES: [&str; 8] = [
     "t",
-    "zeit",
     "timestamp",
     "time stamp",
     "time_stamp",
-    "elapsed time",
+    "elapsed",
     "x_value",
     "messzeit",
-    "temps",
-    "tiempo",
-    "tempo",
+    "versuchszeit",
+];
+
+/// Words for time, in lower case.
+const WORDS: [&str; 5] = ["time", "zeit", "temps", "tiempo", "tempo"];
+
+/// Words beside a word for time, in lower case, that leave it the time of the samples.
+const BESIDE: [&str; 18] = [
+    "absolute",
+    "acquisition",
+    "axis",
+    "daq",
+    "data",
+    "elapsed",
+    "measurement",
+    "record",
+    "recording",
+    "rel",
+    "relative",
+    "run",
+    "sample",
+    "since",
+    "start",
+    "test",
+    "vector",
+    "x",
 ];
 
 /// Returns the unit of a time column, in s: from its name or else the line of units; seconds if
@@ -55,7 +76,10 @@ pub(super) fn is_called_time(name: &str) -> bool {
     let bare = without_unit(name).to_lowercase();
     // The last part is the name, in a path of an HDF5 file or a struct.
     let last = bare.rsplit(['/', '.']).next().unwrap_or(&bare);
-    NAMES.contains(&bare.as_str()) || NAMES.contains(&last.trim())
+    let words = last.split([' ', '_', '-', '(', ')', ':']).filter(|word| !word.is_empty());
+    let (times, others): (Vec<&str>, Vec<&str>) = words.partition(|word| WORDS.contains(word));
+    let is_time = times.len() == 1 && others.iter().all(|word| BESIDE.contains(word));
+    is_time || NAMES.contains(&bare.as_str()) || NAMES.contains(&last.trim())
 }
 
 /// Returns the text of a unit of another quantity that a time column states.
@@ -85,12 +109,14 @@ pub(super) fn doubtful(column: &Column) -> Option<StatedUnit> {
     }
 }
 
-/// Returns whether a text is a pattern for clock times or dates, such as `hh:mm:ss.fff`, or a time
-/// zone.
+/// Returns whether a text is a pattern for clock times or dates, such as `hh:mm:ss.fff`, a time
+/// zone, or the beginning of a time.
 fn is_clock(text: &str) -> bool {
     let lower = text.to_lowercase();
     let pattern = lower.contains(':') && lower.chars().all(|c| "hmsf0yd:./- t'".contains(c));
-    pattern || ["utc", "gmt", "local", "iso", "iso 8601", "iso8601"].contains(&lower.as_str())
+    pattern
+        || ["utc", "gmt", "local", "iso", "iso 8601", "iso8601"].contains(&lower.as_str())
+        || ["relative", "rel", "absolute", "abs", "elapsed"].contains(&lower.as_str())
 }
 
 #[cfg(test)]
@@ -116,13 +142,31 @@ mod tests {
             ("Time (days)", 86_400.0),
             ("Time [hh:mm:ss]", 1.0),
             ("X_Value", 1.0),
+            ("Relative Time [ms]", 1e-3),
+            ("Elapsed (s)", 1.0),
+            ("elapsed_time_ms", 1e-3),
+            ("Time (relative)", 1.0),
+            ("Test Time, s", 1.0),
+            ("time since start [s]", 1.0),
         ] {
             assert!(is_time(name), "{name}");
             assert_eq!(unit(&Column::from_numbers(name.into(), vec![0.0])), seconds, "{name}");
         }
-        for name in
-            ["", "force", "times", "time_of_flight", "t_ref", "ms", "time [mm]", "time [samples]"]
-        {
+        for name in [
+            "",
+            "force",
+            "times",
+            "time_of_flight",
+            "t_ref",
+            "ms",
+            "time [mm]",
+            "time [samples]",
+            "rise time [s]",
+            "response_time",
+            "dead time",
+            "relative",
+            "start",
+        ] {
             assert!(!is_time(name), "{name}");
         }
         let samples = Column::from_numbers("time [samples]".into(), vec![0.0]);

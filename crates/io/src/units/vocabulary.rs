@@ -220,6 +220,9 @@ pub(super) const VOCABULARY: &[Entry] = &[
     entry(&["mmps", "mms"], D::VELOCITY, 1e-3),
     entry(&["ips", "inps"], D::VELOCITY, INCH),
     entry(&["fps", "ftps"], D::VELOCITY, 12.0 * INCH),
+    entry(&["kmh", "kph", "kmph"], D::VELOCITY, 1.0 / 3.6),
+    entry(&["mph"], D::VELOCITY, 5280.0 * 12.0 * INCH / 3600.0),
+    entry(&["knot", "knots", "kts"], D::VELOCITY, 1852.0 / 3600.0),
     // Acceleration.
     entry(&["mps2", "mpss"], D::ACCELERATION, 1.0),
     entry(&["mmps2"], D::ACCELERATION, 1e-3),
