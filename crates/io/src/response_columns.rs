@@ -70,7 +70,9 @@ impl Heading {
                 points.push(original(name, word));
             }
         }
-        let notes: Vec<String> = reference.into_iter().chain(label_notes(name)).collect();
+        let is_unit = |note: &String| !is_symbol(note);
+        let notes = label_notes(name).into_iter().filter(is_unit);
+        let notes: Vec<String> = reference.into_iter().chain(notes).collect();
         let is_level = notes.iter().any(|note| level(note).is_some());
         heading.part = part.or(is_level.then_some(Part::Level))?;
         heading.points = match points_in_notes(&label_notes(name)) {
@@ -134,7 +136,7 @@ impl Heading {
             {
                 self.part = Part::Level;
                 self.take_unit(number_and_rest(reference).unwrap_or((1.0, reference)));
-            } else if !self.take_unit((1.0, &note)) && !matches!(self.part, Part::Phase(_)) {
+            } else if !self.take_unit((1.0, &note)) {
                 let evidence = Evidence::Unused;
                 self.doubt.get_or_insert(StatedUnit { text: note, unit: None, evidence });
             }
@@ -202,11 +204,25 @@ fn without_level(name: &str) -> (&str, Option<String>) {
     }
 }
 
+/// Returns whether a text in brackets is the symbol of a response or its argument, as in `Re(H)` and
+/// `H(jω)`.
+fn is_symbol(note: &str) -> bool {
+    let lower = note.trim().to_lowercase();
+    let is_response = lower
+        .strip_prefix('h')
+        .is_some_and(|rest| rest.is_empty() || rest.bytes().all(|b| b.is_ascii_digit()));
+    is_response
+        || ["frf", "tf", "jω", "iω", "jw", "iw", "ω", "omega", "f"].contains(&lower.as_str())
+}
+
 /// Returns the size of a unit of angle, in rad.
 fn angle(text: &str) -> Option<f64> {
     match text.trim() {
         "rad" | "radian" | "radians" => Some(1.0),
+        "mrad" => Some(1e-3),
         "deg" | "degree" | "degrees" | "°" | "grad" => Some(1_f64.to_radians()),
+        "gon" => Some(std::f64::consts::PI / 200.0),
+        "rev" | "turn" | "turns" | "cycle" | "cycles" => Some(std::f64::consts::TAU),
         _ => None,
     }
 }
@@ -310,6 +326,16 @@ fn function<'a>(
             let second = other(&|part| part == Part::Imaginary)
                 .ok_or_else(|| missing(table, first, "imaginary part"))?;
             let imaginary = table.values(second.column)?;
+            if let (Some((one, text)), Some((other, other_text))) = (&first.unit, &second.unit)
+                && one != other
+            {
+                let [real, imaginary] = [first, second].map(|part| table.label(part.column));
+                let (text, other_text) = (escaped(text), escaped(other_text));
+                let what = format!(
+                    "column {real} is in {text} and column {imaginary} in {other_text}: state one unit for both parts of a response"
+                );
+                return Err(IoError::Description { file: table.file().into(), what });
+            }
             let in_si = if second.in_si == 1.0 { first.in_si } else { second.in_si };
             let pairs = values.iter().zip(imaginary);
             pairs.map(|(re, im)| Complex::new(re * first.in_si, im * in_si)).collect::<Vec<_>>()
@@ -348,6 +374,20 @@ fn polar<'a>(
         Part::Level => without_phase(table, first),
         _ => missing(table, first, "phase"),
     })?;
+    if let Some(doubt) = &second.doubt {
+        let (column, text) = (table.label(second.column), escaped(&doubt.text));
+        let what = format!(
+            "column {column} is a phase in {text}, which is no known unit of angle: deg, rad, mrad, gon"
+        );
+        return Err(IoError::Description { file: table.file().into(), what });
+    }
+    if first.part == Part::Magnitude && magnitude.iter().any(|value| *value < 0.0) {
+        let column = table.label(first.column);
+        let what = format!(
+            "column {column} has negative numbers, so it is no magnitude: if these are levels, state \"dB\" with its reference, such as \"dB re 1 g/N\""
+        );
+        return Err(IoError::Description { file: table.file().into(), what });
+    }
     let phase = table.values(second.column)?;
     let largest = phase.iter().fold(0.0_f64, |largest, phase| largest.max(phase.abs()));
     let unit = match second.part {

@@ -8,6 +8,7 @@ use nalgebra::Complex;
 
 use crate::limits::ReadOptions;
 use crate::table::source::{Kind, Source};
+use crate::units::{label_notes, name_without_brackets};
 use crate::{
     IoError, Quantity, StatedUnit, Table, escaped, response_arrays, response_axis,
     response_columns, uff,
@@ -71,6 +72,28 @@ pub struct FrequencyResponses {
     /// Columns whose headers have a text that may be a unit: number and name of the column, the
     /// text, and the quantity needed.
     pub doubts: Vec<(String, StatedUnit, Quantity)>,
+}
+
+/// Returns the coherence in a column of this name (`coherence_2_1`, `coherence [%]`); `None` for
+/// another column.
+fn coherence(
+    table: &Table,
+    column: usize,
+    name: &str,
+) -> Result<Option<CoherenceFunction>, IoError> {
+    let bare = name_without_brackets(name);
+    let is_coherence = bare.to_lowercase().starts_with("coherence");
+    let Some(points) = bare.trim().get("coherence".len()..).filter(|_| is_coherence) else {
+        return Ok(None);
+    };
+    let row = table.unit_text(column).trim().trim_matches(['[', ']', '(', ')']).to_owned();
+    let is_percent = label_notes(name).into_iter().chain([row]).any(|unit| unit == "%");
+    let unit = if is_percent { 0.01 } else { 1.0 };
+    let mut points = points.split('_').skip(1).map(|point| point.trim().to_owned());
+    let response = points.next().filter(|point| !point.is_empty());
+    let response = response.unwrap_or_else(|| ALONE.into());
+    let values = table.values(column)?.iter().map(|value| value * unit).collect();
+    Ok(Some(CoherenceFunction { response, reference: points.next(), values }))
 }
 
 /// Segments of a record over which frequency responses were averaged.
@@ -199,15 +222,8 @@ impl FrequencyResponses {
             [] => response_columns::add_functions(table, &mut responses)?,
             arrays => response_arrays::add_functions(table, arrays, &mut responses)?,
         }
-        for name in table.names() {
-            let name = name.trim();
-            let is_coherence = name.to_lowercase().starts_with("coherence");
-            if let Some(points) = name.get("coherence".len()..).filter(|_| is_coherence) {
-                let mut points = points.split('_').skip(1).map(str::to_owned);
-                let response = points.next().unwrap_or_else(|| ALONE.into());
-                let (reference, values) = (points.next(), table.column(name)?.to_vec());
-                responses.coherence.push(CoherenceFunction { response, reference, values });
-            }
+        for (column, name) in table.names().iter().enumerate() {
+            responses.coherence.extend(coherence(table, column, name.trim())?);
         }
         if responses.functions.is_empty() {
             let (file, available) = (responses.file, table.available());

@@ -436,3 +436,39 @@ fn levels_in_decibels_are_read_with_their_reference() {
         assert!(why.contains("decibels") && why.contains("phase is missing"), "{columns}: {why}");
     }
 }
+
+/// Angles in any unit, a coherence in per cent, and symbols in brackets; what cannot be right is
+/// refused.
+#[test]
+fn units_of_phases_and_coherences_are_read_or_refused() {
+    let value = |header: &str, row: &str| {
+        let text = format!("frequency_hz,{header}\n1,{row}\n2,{row}\n");
+        parse(&text).map(|read| (read.functions[0].values[0], read.coherence.first().cloned()))
+    };
+    let quarter = std::f64::consts::FRAC_PI_4;
+    for (unit, phase) in [
+        ("deg", "45".to_owned()),
+        ("mrad", (1e3 * quarter).to_string()),
+        ("gon", "50".to_owned()),
+        ("turns", "0.125".to_owned()),
+    ] {
+        let found = value(&format!("magnitude [g/N],phase [{unit}]"), &format!("1,{phase}"));
+        let (found, _) = found.unwrap();
+        assert!((found.arg() - quarter).abs() < 1e-12, "{unit}: {found}");
+        assert!((found.norm() / 9.806_65 - 1.0).abs() < 1e-12, "{unit}: {found}");
+    }
+    let (found, coherence) =
+        value("Re(H) [mm/s/N],Im(H) [mm/s/N],coherence [%]", "1,2,98").unwrap();
+    assert!((found - Complex::new(1e-3, 2e-3)).norm() < 1e-18, "{found}");
+    assert!((coherence.unwrap().values[0] - 0.98).abs() < 1e-15);
+    let text = "frequency_hz,Re(H) [mm/s/N],Im(H) [mm/s/N]\n1,1,2\n2,1,2\n";
+    assert!(parse(text).unwrap().doubts.is_empty());
+    for (header, row, named) in [
+        ("magnitude [g/N],phase [furlong]", "1,45", "no known unit of angle"),
+        ("real [g/N],imaginary [m/s^2/N]", "1,2", "state one unit for both parts"),
+        ("magnitude [g/N],phase [deg]", "-40,45", "it is no magnitude"),
+    ] {
+        let error = value(header, row).unwrap_err().to_string();
+        assert!(error.contains(named), "{error}");
+    }
+}
