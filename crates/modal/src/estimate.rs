@@ -45,6 +45,8 @@ pub struct ModalEstimate {
     noise_spectrum: Vec<Vec<f64>>,
     log_likelihood: f64,
     required_gain: f64,
+    /// Variance of the unmeasured force on each mode, for its shape as reported.
+    unmeasured_variance: Vec<f64>,
     iterations: usize,
 }
 
@@ -86,6 +88,11 @@ impl ModalEstimate {
         } else {
             groups_of_one(&parameters_of_modes)
         };
+        let unmeasured_variance = requested.iter().zip(&modes).map(|(mode, identified)| {
+            let power = |shape: &[C]| shape.iter().map(|z| z.norm_sqr()).sum::<f64>();
+            noise.process[*mode] * power(&shapes[*mode]) / power(&identified.shape)
+        });
+        let unmeasured_variance = unmeasured_variance.collect();
         let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
         Self {
             modes,
@@ -101,6 +108,7 @@ impl ModalEstimate {
             noise_spectrum: noise.sensor.clone(),
             log_likelihood: log_likelihood(fit),
             required_gain: required_gain(fit.lines),
+            unmeasured_variance,
             iterations: fit.steps,
         }
     }
@@ -216,6 +224,11 @@ impl ModalEstimate {
     /// Returns the variance of each sensor's own noise on every line: `[output][line]`.
     pub fn noise_spectra(&self) -> &[Vec<f64>] {
         &self.noise_spectrum
+    }
+
+    /// Returns the variance of the unmeasured force on each mode, for its shape as reported.
+    pub(crate) fn unmeasured_variance(&self) -> &[f64] {
+        &self.unmeasured_variance
     }
 
     /// Returns the log-likelihood at the weights of the fit, without constants.

@@ -49,6 +49,7 @@ mod projection;
 mod residues;
 mod results;
 mod rules;
+mod scatter;
 mod scores;
 mod search;
 pub mod stabilisation;

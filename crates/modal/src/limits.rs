@@ -132,3 +132,6 @@ pub(crate) const LEAST_DELAY_INFORMATION: f64 = 0.5;
 pub(crate) const MAX_DELAY_STEP: f64 = 0.1;
 /// Step of a delay, in standard errors, that ends the steps.
 pub(crate) const DELAY_SETTLED: f64 = 0.1;
+/// Minimum number of lines, weighted by their information, at a resonance for the scatter of the
+/// residual along the shape.
+pub const LEAST_SCATTER_LINES: f64 = 3.0;

@@ -604,3 +604,22 @@ def test_every_scheme_of_the_program_is_offered() -> None:
         mechid.integrate(ONE, np.zeros(8), 100.0, scheme="guess")  # type: ignore[arg-type]
     known = set(re.findall("`([a-z0-9-]+)`", str(caught.value).split("expected one of")[1]))
     assert known == {*SCHEMES, "exact"} == set(typing.get_args(Scheme))
+
+
+def test_several_decays_have_common_modes(tmp_path: Path) -> None:
+    """Each of two releases moves one of the two modes."""
+    t = np.arange(1500) / 250.0
+    rng = np.random.default_rng(3)
+    records = []
+    for hz, ratio, shape in [(6.0, 0.01, [1.0, -0.5]), (30.0, 0.02, [0.4, 1.0])]:
+        decay = np.exp(-ratio * 2 * np.pi * hz * t) * np.cos(2 * np.pi * hz * np.sqrt(1 - ratio**2) * t)
+        moved = np.outer(decay, shape) + rng.normal(scale=0.02, size=(len(t), 2))
+        records.append(tmp_path / f"{hz}.csv")
+        np.savetxt(records[-1], np.column_stack([t, moved]), delimiter=",", header="time,a1,a2", comments="")
+    found = mechid.modes(*records, acceleration="a1,a2", decay=True)
+    assert len(found.modes) == 2
+    for mode, hz in zip(found.modes, [6.0, 30.0]):
+        low, high = mode.natural_frequency_hz.interval or (0, 0)
+        assert high - low < 0.1 and abs(0.5 * (low + high) - hz) < 2 * (high - low)
+    with pytest.raises(ValueError, match="exclude each other"):
+        mechid.modes(*records, acceleration="a1,a2", decay=True, ambient=True)

@@ -116,7 +116,15 @@ pub(super) fn modes_of_tables(
             },
         )?;
     let Sharpened { data, estimate, settled } = fit;
-    let scales = vec![tables.error_inflation(); estimate.modes().len()];
+    let scatter = if tables.is_smoothed() {
+        estimate.scatter_along_shapes(&data)?
+    } else {
+        vec![None; estimate.modes().len()]
+    };
+    // Errors of independent outputs are the least.
+    let scale =
+        |ratio: Option<f64>| tables.error_inflation() * ratio.unwrap_or(1.0).max(1.0).sqrt();
+    let scales: Vec<f64> = scatter.into_iter().map(scale).collect();
     let estimate = estimate.with_error_scales(&scales)?;
     let decay = tables.added_decay.unwrap_or(0.0);
     let modes: Vec<IdentifiedMode> =

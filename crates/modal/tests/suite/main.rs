@@ -9,5 +9,6 @@ mod measured;
 mod parts;
 mod refusals;
 mod responses;
+mod scatter;
 mod score;
 mod sources;

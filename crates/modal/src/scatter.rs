@@ -1,0 +1,51 @@
+//! Scatter of the residual along the shapes of the modes, beside that of independent sensors.
+
+use mechid_spectra::LineData;
+use nalgebra::Complex;
+
+use crate::limits::LEAST_SCATTER_LINES;
+use crate::{IdentifiedMode, ModalError, ModalEstimate};
+
+impl ModalEstimate {
+    /// Returns for each mode the ratio of the residual power along its shape, near its resonance, to
+    /// that of independent noise of the outputs and of the unmeasured force on the mode, corrected
+    /// for the unknowns that the fit absorbs; `None` with too few lines at the resonance.
+    ///
+    /// Leakage of averaged responses moves all outputs together, along the shape of the mode: the
+    /// variance of frequency and damping ratio is larger than that of independent outputs by this
+    /// ratio.
+    ///
+    /// # Errors
+    /// As [`ModalEstimate::synthesis`].
+    ///
+    /// # Source
+    /// White (1980), Econometrica 48, 817–838 (variance from the residuals).
+    pub fn scatter_along_shapes(&self, data: &LineData) -> Result<Vec<Option<f64>>, ModalError> {
+        let residual = data.outputs() - self.synthesis(data)?;
+        let noise = self.noise_spectra();
+        let ratio = |(mode, unmeasured): (&IdentifiedMode, &f64)| {
+            let (mut sum, mut weights, mut squares) = (0.0, 0.0, 0.0);
+            for (row, omega) in data.omega().iter().enumerate() {
+                let force: Complex<f64> = (0..data.inputs().ncols())
+                    .map(|q| mode.participation[q] * data.inputs()[(row, q)])
+                    .sum();
+                let gain = (Complex::new(0.0, *omega) - mode.pole).norm_sqr().recip();
+                let outputs = mode.shape.iter().enumerate();
+                let along: Complex<f64> = outputs
+                    .clone()
+                    .map(|(k, shape)| shape.conj() * residual[(row, k)] / noise[k][row])
+                    .sum();
+                let size: f64 = outputs.map(|(k, shape)| shape.norm_sqr() / noise[k][row]).sum();
+                // Information of the line about the pole.
+                let weight = force.norm_sqr() * gain * gain * size;
+                sum += weight * along.norm_sqr() / (size * (1.0 + unmeasured * gain * size));
+                weights += weight;
+                squares += weight * weight;
+            }
+            let lines = weights * weights / squares;
+            // The pole and the entry of the shape along itself absorb two complex numbers.
+            (lines > LEAST_SCATTER_LINES).then(|| sum / weights / (1.0 - 2.0 / lines))
+        };
+        Ok(self.modes().iter().zip(self.unmeasured_variance()).map(ratio).collect())
+    }
+}
