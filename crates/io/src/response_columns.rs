@@ -204,8 +204,8 @@ fn without_level(name: &str) -> (&str, Option<String>) {
     }
 }
 
-/// Returns whether a text in brackets is the symbol of a response or its argument, as in `Re(H)` and
-/// `H(jω)`.
+/// Returns whether a text in brackets is the symbol of a response or its argument, as in `Re(H)`
+/// and `H(jω)`.
 fn is_symbol(note: &str) -> bool {
     let lower = note.trim().to_lowercase();
     let is_response = lower

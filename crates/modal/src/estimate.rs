@@ -88,11 +88,10 @@ impl ModalEstimate {
         } else {
             groups_of_one(&parameters_of_modes)
         };
-        let unmeasured_variance = requested.iter().zip(&modes).map(|(mode, identified)| {
-            let power = |shape: &[C]| shape.iter().map(|z| z.norm_sqr()).sum::<f64>();
+        let variance = |(mode, identified): (&usize, &IdentifiedMode)| {
             noise.process[*mode] * power(&shapes[*mode]) / power(&identified.shape)
-        });
-        let unmeasured_variance = unmeasured_variance.collect();
+        };
+        let unmeasured_variance = requested.iter().zip(&modes).map(variance).collect();
         let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
         Self {
             modes,
@@ -400,4 +399,9 @@ pub(crate) fn log_likelihood(fit: &Fit<'_>) -> f64 {
     let shapes: f64 = fit.weights.shape.iter().map(|value| value.ln()).sum();
     let levels: f64 = fit.weights.level.iter().map(|value| value.ln()).sum();
     -(fit.cost() / 2.0 + 2.0 * (outputs * shapes + lines * levels))
+}
+
+/// Returns the sum of the squares of the entries of a shape.
+fn power(shape: &[C]) -> f64 {
+    shape.iter().map(|z| z.norm_sqr()).sum()
 }

@@ -576,11 +576,12 @@ impl<'a> Identification<'a> {
         if !stated.contains(&true) {
             return Err(self.no_mode());
         }
-        let others = poles.iter().zip(&stated).filter(|(pole, stated)| {
+        let unlisted = poles.iter().zip(&stated).filter(|(pole, stated)| {
             !**stated && !self.settings.near_hz.is_empty() && self.lines.contains(**pole)
         });
-        let others = others.map(|(pole, _)| DroppedCandidate::new(*pole, DropReason::NotStated));
-        self.dropped.extend(others);
+        let unlisted =
+            unlisted.map(|(pole, _)| DroppedCandidate::new(*pole, DropReason::NotStated));
+        self.dropped.extend(unlisted);
         let constraints = &self.settings.constraints;
         let (fit, noise) = (&self.fit, &self.noise);
         Ok(ModalEstimate::new(fit, noise, &covariance, self.dropped, &stated, constraints))

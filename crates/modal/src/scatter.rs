@@ -7,9 +7,9 @@ use crate::limits::LEAST_SCATTER_LINES;
 use crate::{IdentifiedMode, ModalError, ModalEstimate};
 
 impl ModalEstimate {
-    /// Returns for each mode the ratio of the residual power along its shape, near its resonance, to
-    /// that of independent noise of the outputs and of the unmeasured force on the mode, corrected
-    /// for the unknowns that the fit absorbs; `None` with too few lines at the resonance.
+    /// Returns for each mode the ratio of the residual power along its shape, near its resonance,
+    /// to that of independent noise of the outputs and of the unmeasured force on the mode,
+    /// corrected for the unknowns that the fit absorbs; `None` with too few lines at the resonance.
     ///
     /// Leakage of averaged responses moves all outputs together, along the shape of the mode: the
     /// variance of frequency and damping ratio is larger than that of independent outputs by this

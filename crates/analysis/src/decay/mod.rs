@@ -173,9 +173,9 @@ pub(crate) fn decaying_part(
     let part = how.part(measurement)?;
     let record = all_responses(&part.whole_block()?)?;
     let begin = if how.from_s.is_some() { 0 } else { release(&record) };
-    let rest = record.window(begin, record.len() - begin)?;
-    let last = if how.to_s.is_none() { last_shown(&rest) } else { None };
-    let samples = last.map_or(rest.len(), |last| last.samples);
+    let decay = record.window(begin, record.len() - begin)?;
+    let last = if how.to_s.is_none() { last_shown(&decay) } else { None };
+    let samples = last.map_or(decay.len(), |last| last.samples);
     let start = part.span()?.0 + begin + 1;
     measurement.clone().window(Window { start, period: Some(samples), periods: Some(1) })
 }

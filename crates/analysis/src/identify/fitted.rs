@@ -206,9 +206,9 @@ impl Fitted {
     /// Includes the disagreement of model and data that the checks show in the standard errors;
     /// with nonlinear terms the errors remain.
     pub(super) fn count_disagreement(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
-        let found = std::mem::take(&mut self.disagreement);
+        let unjudged = std::mem::take(&mut self.disagreement);
         if self.nonlinear.is_none() {
-            self.disagreement = found.warned_of(checks, self.estimate.degrees_of_freedom());
+            self.disagreement = unjudged.warned_of(checks, self.estimate.degrees_of_freedom());
             self.estimate = self.disagreement.included_in(self.estimate.clone())?;
         }
         Ok(())

@@ -15,7 +15,7 @@ use super::halves::Halves;
 use super::settings::ModesSettings;
 use super::sources::{Output, all_responses, outputs_of};
 use super::summary::{
-    DroppedRow, HarmonicRow, LEVEL, ModalModeRow, ModesSummary, OutputRow, RecordRow,
+    DroppedRow, HarmonicRow, LEVEL, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
 };
 use super::{Modes, ModesSpectrum};
 use crate::AnalysisError;
@@ -61,9 +61,7 @@ pub(super) fn modes(
     let estimate = estimate.with_error_scales(&halves.error_scales);
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
     let modes: Vec<ModalModeRow> = estimate.modes.iter().map(row).collect();
-    let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
-    let of_modes = halves.check.into_iter().chain(checks::force_peak_check(&modes));
-    let of_modes = of_modes.chain(checks::response_checks(&modes, &names));
+    let of_modes = halves.check.into_iter().chain(ambient_checks(&modes, &outputs));
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
     let summary = ModesSummary {
         records: vec![RecordRow::from_block(&block)],
@@ -88,6 +86,13 @@ pub(super) fn modes(
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
     let source = DiagramData::Ambient(estimate.stabilisation);
     Ok(Modes { summary, spectrum: spectrum(&data), source })
+}
+
+/// Returns the checks of the modes themselves.
+fn ambient_checks(modes: &[ModalModeRow], outputs: &[Output]) -> Vec<ModalCheck> {
+    let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
+    let idle = checks::response_checks(modes, &names);
+    checks::force_peak_check(modes).into_iter().chain(idle).collect()
 }
 
 fn harmonic_row(harmonic: &Harmonic) -> HarmonicRow {

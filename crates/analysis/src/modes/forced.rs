@@ -245,13 +245,7 @@ impl Context {
         let mass = |at| modal_mass(&estimate, at, &self.outputs, &self.driving_points);
         let modes: Vec<ModalModeRow> =
             reported.iter().enumerate().map(|(at, mode)| row(mode, mass(at))).collect();
-        let idle = checks::response_checks(&modes, &names);
-        let of_outputs = checks::output_checks(&explained, &names).into_iter().enumerate();
-        rows.extend(of_outputs.map(|(at, share)| match idle.get(at) {
-            // Residual terms may explain a sensor that no mode moves.
-            Some(idle) if !share.passed && !idle.passed => idle.clone(),
-            _ => share,
-        }));
+        rows.extend(checks::output_checks(&explained, &modes, &names));
         let mut model = estimate.model().clone();
         for term in &mut model.terms {
             term.pole[0] += self.added_decay.unwrap_or(0.0);

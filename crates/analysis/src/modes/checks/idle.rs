@@ -21,7 +21,7 @@ pub(super) fn force_checks(modes: &[IdentifiedMode], inputs: &[String]) -> Vec<M
             let error: Complex<f64> = mode.participation_standard_error[input];
             (value.re / error.re).powi(2) + (value.im / error.im).powi(2)
         };
-        let p_value = of_zero(modes.iter().map(squares))?;
+        let p_value = zero_p_value(modes.iter().map(squares))?;
         let words = [
             format!("force {name} drives a mode"),
             format!(
@@ -51,7 +51,7 @@ pub(in crate::modes) fn response_checks(
             let pairs = entry.value.iter().zip(entry.standard_error?);
             Some(pairs.map(|(value, error)| (value / error).powi(2)).sum())
         });
-        let p_value = of_zero(squares)?;
+        let p_value = zero_p_value(squares)?;
         let words = [
             format!("{name} moves in a mode"),
             format!(
@@ -72,7 +72,7 @@ fn several(names: &[String]) -> impl Iterator<Item = (usize, &String)> {
 
 /// Returns the probability that two numbers of each mode, which are zero but for their errors, have
 /// these sums of squares or more; `None` without a mode.
-fn of_zero(squares: impl Iterator<Item = f64>) -> Option<f64> {
+fn zero_p_value(squares: impl Iterator<Item = f64>) -> Option<f64> {
     let (modes, sum) = squares.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
     let law = ChiSquared::new(2.0 * f64::from(modes)).ok()?;
     // An entry that scales the shape has no error.

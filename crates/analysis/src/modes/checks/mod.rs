@@ -18,7 +18,7 @@ pub(super) use self::one_point::one_point_check;
 pub(super) use self::table::table_checks;
 use self::tested::Tested;
 use super::sources::Output;
-use super::summary::ModalCheck;
+use super::summary::{ModalCheck, ModalModeRow};
 use crate::AnalysisError;
 use crate::identify::checks;
 use crate::limits::LEAST_EXPLAINED;
@@ -43,8 +43,24 @@ pub(super) fn channel_checks(
     Ok(rows)
 }
 
-/// Returns the check of the share of the variance of each response that the modes explain.
-pub(super) fn output_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
+/// Returns the check of the share of the variance of each response that the modes explain, or the
+/// failed check that a mode moves it.
+pub(super) fn output_checks(
+    explained: &[f64],
+    modes: &[ModalModeRow],
+    names: &[String],
+) -> Vec<ModalCheck> {
+    let idle = response_checks(modes, names);
+    let shares = explained_checks(explained, names).into_iter().enumerate();
+    let row = |(at, share): (usize, ModalCheck)| match idle.get(at) {
+        // Residual terms may explain a sensor that no mode moves.
+        Some(idle) if !share.passed && !idle.passed => idle.clone(),
+        _ => share,
+    };
+    shares.map(row).collect()
+}
+
+fn explained_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
     let words = [
         "the modes explain",
         "in the band",

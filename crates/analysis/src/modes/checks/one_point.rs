@@ -16,8 +16,8 @@ pub(in crate::modes) fn one_point_check(
     estimate: &ModalEstimate,
     settings: &ModalSettings,
 ) -> Option<ModalCheck> {
-    let other = refit_modes(apart, estimate, settings).ok()?;
-    let gain = 2.0 * (other.log_likelihood() - estimate.log_likelihood());
+    let second = refit_modes(apart, estimate, settings).ok()?;
+    let gain = 2.0 * (second.log_likelihood() - estimate.log_likelihood());
     let unknowns = 2 * estimate.modes().len()
         + apart.outputs().ncols() * estimate.residual_powers().forces.len();
     let required = unknowns as f64 * (2.0 * apart.len() as f64).ln();
