@@ -46,17 +46,8 @@ pub(super) fn modes(
     }
     let block = measurement.whole_block()?;
     let record = all_responses(&block)?;
-    let usual = AmbientSettings::default();
-    let estimate = identify_ambient(
-        &record,
-        &AmbientSettings {
-            band_hz: settings.band_hz,
-            modes: settings.modes,
-            max_modes: settings.max_modes.unwrap_or(usual.max_modes),
-            without_hz: without_hz.to_vec(),
-            exclude_harmonics: without_harmonics,
-        },
-    )?;
+    let engine = engine_settings(settings, without_hz, without_harmonics);
+    let estimate = identify_ambient(&record, &engine)?;
     let halves = Halves::of_ambient(&record, &estimate);
     let estimate = estimate.with_error_scales(&halves.error_scales);
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
@@ -86,6 +77,21 @@ pub(super) fn modes(
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
     let source = DiagramData::Ambient(estimate.stabilisation);
     Ok(Modes { summary, spectrum: spectrum(&data), source })
+}
+
+fn engine_settings(
+    settings: &ModesSettings,
+    without_hz: &[f64],
+    without_harmonics: bool,
+) -> AmbientSettings {
+    let usual = AmbientSettings::default();
+    AmbientSettings {
+        band_hz: settings.band_hz,
+        modes: settings.modes,
+        max_modes: settings.max_modes.unwrap_or(usual.max_modes),
+        without_hz: without_hz.to_vec(),
+        exclude_harmonics: without_harmonics,
+    }
 }
 
 /// Returns the checks of the modes themselves.
