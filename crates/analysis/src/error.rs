@@ -171,6 +171,15 @@ pub enum AnalysisError {
         /// Names of the forces.
         columns: String,
     },
+    /// A record does not decay.
+    #[error(
+        "{file} does not decay: the second half of the response has more power than the first: an unstable \
+         system, a force that still acts, or a record that begins before the release"
+    )]
+    NoDecay {
+        /// The record.
+        file: String,
+    },
     /// No candidate is a mode.
     #[error("no mode from {from_hz:.6} to {to_hz:.6} Hz{candidates}")]
     NoMode {

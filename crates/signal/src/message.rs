@@ -35,6 +35,7 @@ pub fn number_to(value: f64, decimals: usize) -> impl fmt::Display {
 ///
 /// assert_eq!(message::count(1, "sample"), "1 sample");
 /// assert_eq!(message::count(0, "entry"), "0 entries");
+/// assert_eq!(message::count(2, "decay"), "2 decays");
 /// assert_eq!(message::count(2, "degree of freedom"), "2 degrees of freedom");
 /// ```
 pub fn count(count: usize, thing: &str) -> String {
@@ -42,7 +43,8 @@ pub fn count(count: usize, thing: &str) -> String {
         return format!("1 {thing}");
     }
     let (first, rest) = thing.find(" of ").map_or((thing, ""), |at| thing.split_at(at));
-    match first.strip_suffix('y') {
+    let stem = first.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'o', 'u']));
+    match stem {
         Some(stem) => format!("{count} {stem}ies{rest}"),
         None => format!("{count} {first}s{rest}"),
     }

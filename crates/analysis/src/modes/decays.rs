@@ -1,12 +1,15 @@
 //! Modes of several free decays, which share them.
 
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
 use super::forced::Test;
 use super::settings::ModesSettings;
-use super::sources::Recorded;
+use super::sources::{Recorded, all_responses};
 use super::summary::RecordRow;
 use super::{Modes, checks};
 use crate::AnalysisError;
 use crate::decay::{DecaySettings, decaying_part};
+use crate::limits::MODAL_SIGNIFICANCE;
 use crate::measurement::{Block, Measurement, check_distinct};
 
 /// Identifies the modes of free decays, one in each record, from `from_s` to `to_s`, in s from the
@@ -24,10 +27,33 @@ pub(super) fn modes(
     let first = cut.first().ok_or(AnalysisError::NoRecord)?;
     settings.check_channels(first.channels())?;
     let blocks: Vec<Block> = cut.iter().map(Measurement::whole_block).collect::<Result<_, _>>()?;
+    if let Some(block) = blocks.iter().find(|block| grows(block)) {
+        return Err(AnalysisError::NoDecay { file: block.file.clone() });
+    }
     let recorded = Recorded::from_decays(&blocks, first.channels())?;
     let nyquist_hz = 0.5 / first.sampling().dt();
     let band_hz = settings.band_hz.unwrap_or([0.0, nyquist_hz]);
     let records = blocks.iter().map(RecordRow::from_block).collect();
     let checks = checks::channel_checks(&cut)?;
     Test { recorded, struck_apart: None, band_hz }.modes(records, checks, settings)
+}
+
+/// Returns whether the second half of a response has more power than the first, all channels
+/// divided by their power, beyond what noise of constant power does.
+///
+/// # Source
+/// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1 (F test).
+fn grows(block: &Block) -> bool {
+    let Ok(responses) = all_responses(block) else { return false };
+    let half = responses.len() / 2;
+    let power = |channel: usize, first: usize| {
+        let part = &responses.channel(channel)[first..first + half];
+        part.iter().map(|x| x * x).sum::<f64>() / responses.column(channel).norm_squared()
+    };
+    let channels = 0..responses.channels();
+    let [first, second] =
+        [0, half].map(|first| channels.clone().map(|channel| power(channel, first)).sum::<f64>());
+    let freedom = (half * responses.channels()) as f64;
+    let law = FisherSnedecor::new(freedom, freedom);
+    law.is_ok_and(|law| law.sf(second / first) < MODAL_SIGNIFICANCE)
 }

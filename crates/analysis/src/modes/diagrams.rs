@@ -84,7 +84,9 @@ impl DiagramData {
                 let stabilisation = mechid_modal::stabilisation_of(data)?;
                 Diagrams {
                     stabilisation: StabilisationRows::new(&stabilisation),
-                    mode_indicator: Some(ModeIndicator::new(data, estimate, *is_table)?),
+                    mode_indicator: (data.inputs().ncols() > 0)
+                        .then(|| ModeIndicator::new(data, estimate, *is_table))
+                        .transpose()?,
                 }
             }
         })

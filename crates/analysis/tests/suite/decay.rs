@@ -117,6 +117,12 @@ fn several_decays_have_common_modes() {
         }
     }
     assert!(held >= 70, "{held}");
+    let (x, sampling) = (|t: f64| (0.5 * t).exp() * (TAU * 6.0 * t).sin(), sampling);
+    let growing: Vec<f64> = sampling.times().map(x).collect();
+    let columns = [("x", growing.as_slice()), ("y", growing.as_slice())];
+    let growing = Measurement::from_columns(sampling, &columns, &channels).unwrap();
+    let error = modes(&[one([1.0, 1.0], 1), growing], &settings).unwrap_err();
+    assert!(matches!(error, AnalysisError::NoDecay { .. }), "{error}");
     let refused = ModesSettings { validate: 0.4, ..settings };
     let error = modes(&[measurement()], &refused).unwrap_err().to_string();
     assert!(error.contains("does not apply to free decays"), "{error}");

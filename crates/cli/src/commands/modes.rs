@@ -334,7 +334,6 @@ impl ModesArgs {
         let mut options = self.record_options();
         options.extend([
             ("quantity", self.quantity.is_some()),
-            ("diagrams", self.diagrams),
             ("synthesis", self.synthesis.is_some()),
             ("no_offset", self.unmeasured.no_offset),
         ]);
