@@ -54,12 +54,18 @@ fn with_listed_units(mut contents: Contents) -> Contents {
         };
         let channels: Vec<Option<(String, usize)>> =
             contents.columns.iter().map(array_of).collect();
-        let count = |array: &str| channels.iter().flatten().filter(|(a, _)| a == array).count();
+        let mut counts: HashMap<&str, usize> = HashMap::new();
+        for (array, _) in channels.iter().flatten() {
+            *counts.entry(array).or_default() += 1;
+        }
         let mut is_used = false;
         for (column, channel) in contents.columns.iter_mut().zip(&channels) {
             let Some((array, channel)) = channel else { continue };
-            if count(array) == units.len() && column.unit.is_empty() {
-                (column.unit, is_used) = (units[*channel].clone(), true);
+            let is_whole = counts.get(array.as_str()) == Some(&units.len());
+            // A name in a file may have any number.
+            let unit = units.get(*channel).filter(|_| is_whole && column.unit.is_empty());
+            if let Some(unit) = unit {
+                (column.unit, is_used) = (unit.clone(), true);
             }
         }
         if !is_used {
@@ -139,6 +145,11 @@ mod tests {
         let units: Vec<&str> = read.columns.iter().map(|column| column.unit.as_str()).collect();
         assert_eq!(units, ["kN", "g", ""]);
         assert!(read.remarks.is_empty());
+        // Names with gaps in their numbers.
+        let mut gaps = contents();
+        gaps.columns[1].name = "rec.data[9]".into();
+        let units: Vec<String> = with_labels(gaps).columns.into_iter().map(|c| c.unit).collect();
+        assert_eq!(units, ["kN", "", ""]);
         let mut elsewhere = contents();
         elsewhere.columns.truncate(1);
         let read = with_labels(elsewhere);

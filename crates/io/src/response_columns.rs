@@ -126,8 +126,10 @@ impl Heading {
     /// Reads the texts in brackets and in the line of units.
     fn take_notes(&mut self, table: &Table, column: usize, notes: Vec<String>) {
         let row = label_notes(&format!("[{}]", table.unit_text(column)));
+        let is_phase = matches!(self.part, Part::Phase(_));
         let notes = notes.into_iter().filter(|note| points_in_note(note).is_none());
-        for note in notes.chain(row).filter(|note| !note.is_empty()) {
+        let notes = notes.chain(row).filter(|note| !(is_phase && describes_phase(note)));
+        for note in notes.filter(|note| !note.is_empty()) {
             let lower = note.to_lowercase();
             if let (Part::Phase(_), Some(unit)) = (self.part, angle(&lower)) {
                 self.part = Part::Phase(Some(unit));
@@ -213,6 +215,11 @@ fn is_symbol(note: &str) -> bool {
         .is_some_and(|rest| rest.is_empty() || rest.bytes().all(|b| b.is_ascii_digit()));
     is_response
         || ["frf", "tf", "jω", "iω", "jw", "iw", "ω", "omega", "f"].contains(&lower.as_str())
+}
+
+/// Returns whether a text in brackets describes a phase without its unit: `Phase (unwrapped)`.
+fn describes_phase(note: &str) -> bool {
+    ["unwrapped", "wrapped", "continuous", "-"].contains(&note.trim().to_lowercase().as_str())
 }
 
 /// Returns the size of a unit of angle, in rad.
@@ -374,7 +381,7 @@ fn polar<'a>(
         Part::Level => without_phase(table, first),
         _ => missing(table, first, "phase"),
     })?;
-    if let Some(doubt) = &second.doubt {
+    if let (Part::Phase(None), Some(doubt)) = (second.part, &second.doubt) {
         let (column, text) = (table.label(second.column), escaped(&doubt.text));
         let what = format!(
             "column {column} is a phase in {text}, which is no known unit of angle: deg, rad, mrad, gon"

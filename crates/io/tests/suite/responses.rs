@@ -451,6 +451,9 @@ fn units_of_phases_and_coherences_are_read_or_refused() {
         ("mrad", (1e3 * quarter).to_string()),
         ("gon", "50".to_owned()),
         ("turns", "0.125".to_owned()),
+        ("unwrapped] [deg", "45".to_owned()),
+        ("H11/F1] [deg", "45".to_owned()),
+        ("unwrapped", "0.7853981633974483".to_owned()),
     ] {
         let found = value(&format!("magnitude [g/N],phase [{unit}]"), &format!("1,{phase}"));
         let (found, _) = found.unwrap();
