@@ -133,6 +133,8 @@ findings! {
     Misfit in misfit,
     /// Term that the model omits and that the residual indicates.
     TermLeftOut in omitted,
+    /// Nonlinear terms that a fit with others lacks.
+    NonlinearTermsLeftOut in omitted,
     /// Agreement between parts of the data.
     PartsAgreement in parts,
     /// Agreement of the prior of a parameter with its estimate from the data.

@@ -118,7 +118,7 @@ pub use mass::negative_mass;
 pub use mechid_estimate::frequency_domain::{OmittedTerm, Power};
 pub use misfit::{Concentration, Misfit, NoiseSource};
 pub use no_logarithm::NoLogarithm;
-pub use omitted::{ChangeByTerm, TermLeftOut, omitted_term};
+pub use omitted::{ChangeByTerm, NamedChange, NonlinearTermsLeftOut, TermLeftOut, omitted_term};
 pub use p_value::{CorrelationTest, PValue};
 pub use parts::{DataPart, PartsAgreement, RowParts, agreement_of_parts};
 pub use period::claimed_period;

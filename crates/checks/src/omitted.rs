@@ -74,6 +74,35 @@ pub fn omitted_term(
     Some((finding, omitted))
 }
 
+/// Nonlinear terms that a fit with others lacks.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct NonlinearTermsLeftOut {
+    /// Laws of the terms, such as `x1^5`.
+    pub laws: Vec<String>,
+    /// Fraction of the power of the unexplained force that the terms explain.
+    pub explained: f64,
+    /// Probability that noise alone makes one of the candidates differ as much from zero.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+    /// Changes by the terms, parameter by parameter (unit of the parameter).
+    pub changes: Vec<NamedChange>,
+}
+
+/// Change of a named parameter by omitted terms.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct NamedChange {
+    /// Name of the parameter.
+    pub parameter: String,
+    /// SI unit of the parameter.
+    pub unit: String,
+    /// Change (unit of the parameter).
+    pub by: f64,
+    /// Change over the standard error of the parameter without the terms (pure number).
+    pub in_errors: f64,
+}
+
 impl TermLeftOut {
     fn write_term(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         let name = |dof| names.response(ResponseQuantity::Displacement, dof);
@@ -121,19 +150,13 @@ impl Check for TermLeftOut {
         self.write_term(names, f)?;
         let percent = three_digits(100.0 * self.explained);
         write!(f, " explains {percent} % of the residual power ({}); with it", self.p_value)?;
-        let mut largest: Vec<&ChangeByTerm> = self.changes.iter().collect();
-        largest.sort_by(|a, b| b.in_errors.abs().total_cmp(&a.in_errors.abs()));
-        for (at, change) in largest.iter().take(LISTED_CHANGES).enumerate() {
-            let ChangeByTerm { parameter, by, in_errors, .. } = change;
-            let unit = parameter.matrix().unit();
-            let sign = if *by < 0.0 { '−' } else { '+' };
-            let (by, errors) = (three_digits(by.abs()), three_digits(in_errors.abs()));
-            let comma = if at > 0 { "," } else { "" };
-            write!(
-                f,
-                "{comma} {parameter} changes by {sign}{by} {unit} ({errors} standard errors)"
-            )?;
-        }
+        let changes = self.changes.iter().map(|change| NamedChange {
+            parameter: change.parameter.to_string(),
+            unit: change.parameter.matrix().unit().to_owned(),
+            by: change.by,
+            in_errors: change.in_errors,
+        });
+        write_changes(changes.collect(), f)?;
         f.write_str(match self.term {
             OmittedTerm::Nonlinear { .. } => {
                 ": the machine is nonlinear at this level of the force; fit the term, too (`nonlinear`)"
@@ -147,4 +170,51 @@ impl Check for TermLeftOut {
             _ => ": choose a narrower band (`band_hz`), or measure more degrees of freedom",
         })
     }
+}
+
+impl Check for NonlinearTermsLeftOut {
+    fn subject(&self) -> Subject {
+        Subject::Alternative
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let laws = self.laws.join(", ");
+        let percent = three_digits(100.0 * self.explained);
+        let (term, verb, name) = match self.laws.len() {
+            1 => ("the further term ", "explains", "it"),
+            _ => ("the further terms ", "explain", "them"),
+        };
+        let p_value = self.p_value;
+        write!(
+            f,
+            "{term}{laws} {verb} {percent} % of the power of the force that the model leaves ({p_value}); with {name}"
+        )?;
+        write_changes(self.changes.clone(), f)?;
+        write!(f, ": fit {name}, too (`nonlinear`), or measure at a lower level of the force")
+    }
+}
+
+/// Writes the largest changes, in standard errors.
+fn write_changes(mut changes: Vec<NamedChange>, f: &mut Formatter<'_>) -> fmt::Result {
+    changes.sort_by(|a, b| b.in_errors.abs().total_cmp(&a.in_errors.abs()));
+    for (at, change) in changes.iter().take(LISTED_CHANGES).enumerate() {
+        let NamedChange { parameter, unit, by, in_errors } = change;
+        let sign = if *by < 0.0 { '−' } else { '+' };
+        let (by, errors) = (three_digits(by.abs()), three_digits(in_errors.abs()));
+        let comma = if at > 0 { "," } else { "" };
+        write!(f, "{comma} {parameter} changes by {sign}{by} {unit} ({errors} standard errors)")?;
+    }
+    Ok(())
 }

@@ -71,7 +71,7 @@ pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
 pub use mechid_numerics::{RealSchur, linear_algebra};
 pub use modes::{EIGENVALUE_ROUNDING, Instability, Mode};
 pub use nonlinear::{
-    BackbonePoint, Constant, Coordinate, Law, NonlinearParameter, NonlinearSystem, Power,
+    BackbonePoint, Constant, Coordinate, Friction, Law, NonlinearParameter, NonlinearSystem, Power,
     QuadraticDamping, SaturatingDamping, Term, Terms, UncertainNonlinearSystem,
 };
 pub use parameter::Parameter;

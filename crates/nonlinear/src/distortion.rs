@@ -4,7 +4,7 @@
 use std::fmt;
 
 use mechid_estimate::{EstimateError, Unknowns};
-use mechid_model::{Coordinate, Power, QuadraticDamping, ResponseQuantity, Term, Terms};
+use mechid_model::{ResponseQuantity, Term, Terms};
 use mechid_numerics::least_squares::LeastSquares;
 use mechid_signal::Record;
 use mechid_spectra::{Lines, Pooling, RepeatedPeriods};
@@ -12,10 +12,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::equation_error::weighted;
 use super::equations::Equations;
+use super::kinds::tested_kinds;
 use super::shape::{Shape, ShapeConstants};
 use super::weighting::as_response;
 use super::{SteadyExperiments, Weighting};
-use crate::limits::{DISTORTION_DRIVEN, DISTORTION_PAIRS, DISTORTION_SIGNIFICANT};
+use crate::limits::{DISTORTION_DRIVEN, DISTORTION_SIGNIFICANT};
 
 /// Response on lines without force, relative to the response on lines with force.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,15 +59,6 @@ pub struct Distortion {
     /// Kinds of terms, by decreasing explained share.
     pub kinds: Vec<Kind>,
 }
-
-/// Kinds of terms that are tested: exponents of displacement and velocity (none for quadratic
-/// damping), and name.
-const KINDS: [(Option<[u32; 2]>, &str); 4] = [
-    (Some([2, 0]), "quadratic stiffness"),
-    (Some([3, 0]), "cubic stiffness"),
-    (None, "quadratic damping"),
-    (Some([0, 3]), "cubic damping"),
-];
 
 /// Detects even and odd distortion, and finds the single term that explains most of the residual of
 /// a linear model, in whole periods of force (N) and response of one or several experiments at the
@@ -177,7 +169,7 @@ fn level(
 /// Returns the share of the force that a linear model does not explain, and the kinds of terms by
 /// decreasing explained share.
 fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind>), EstimateError> {
-    let (terms, names) = candidates(data.dof())?;
+    let (terms, names) = tested_kinds(data.dof())?;
     // The explained share uses weights as responses; its p-value uses the most likely weights.
     let size = OneByOne::new(data, unknowns, &terms, Weighting::Response)?;
     let chance = OneByOne::new(data, unknowns, &terms, Weighting::Automatic)?;
@@ -254,26 +246,6 @@ impl OneByOne {
         let last = chosen.len().checked_sub(1).map_or(0.0, |at| solution.coefficients[(at, 0)]);
         Ok((solution.residuals.norm_squared(), last))
     }
-}
-
-fn candidates(dof: usize) -> Result<(Terms, Vec<String>), EstimateError> {
-    let single = (0..dof).map(Coordinate::Dof);
-    let pairs = (0..dof).flat_map(|i| (i + 1..dof).map(move |j| Coordinate::Difference(i, j)));
-    let (mut terms, mut names) = (Vec::new(), Vec::new());
-    for coordinate in single.chain(pairs.filter(|_| dof <= DISTORTION_PAIRS)) {
-        for (exponents, name) in KINDS {
-            let coefficient = format!("t_{}", terms.len() + 1);
-            terms.push(match exponents {
-                Some([p, r]) => Term::new(coefficient, coordinate, Power::new(p, r)?)?,
-                None => Term::new(coefficient, coordinate, QuadraticDamping)?,
-            });
-            names.push(match coordinate {
-                Coordinate::Dof(i) => format!("{name} of x{}", i + 1),
-                Coordinate::Difference(i, j) => format!("{name} between x{} and x{}", i + 1, j + 1),
-            });
-        }
-    }
-    Ok((Terms::new(terms)?, names))
 }
 
 impl Distortion {

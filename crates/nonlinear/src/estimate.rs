@@ -30,6 +30,9 @@ pub enum StandardErrors {
     /// Scatter of the scores over this number of blocks of time: the errors hold for a residual of
     /// any spectrum, also if the model does not explain part of the response.
     Blocks(usize),
+    /// White noise on the samples of force and response, whose sizes the residual shows: the errors
+    /// hold if the residual is consistent with it.
+    Noise,
     /// Size of the weighted residual, assumed white: the record is too short for blocks.
     White,
 }
@@ -215,6 +218,24 @@ impl NonlinearEstimate {
             Uncertain { value, standard_error: variance.max(0.0).sqrt(), degrees_of_freedom }
         };
         Ok((0..n).map(force_of).collect())
+    }
+
+    /// Returns the estimate with a mean square error added to its covariance, both in the products
+    /// of the units of [`NonlinearEstimate::parameters`] (parameters × parameters).
+    ///
+    /// # Errors
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of
+    /// parameters.
+    pub fn with_mean_square(mut self, beside: &DMatrix<f64>) -> Result<Self, EstimateError> {
+        check_size("parameters", self.parameters.len(), beside.nrows())?;
+        self.covariance += beside;
+        for (at, parameter) in self.parameters.iter_mut().enumerate() {
+            parameter.estimate.standard_error = self.covariance[(at, at)].sqrt();
+        }
+        let free = self.linear.unknowns().free().len();
+        let of_linear = beside.view((0, 0), (free, free)).into_owned();
+        self.linear = self.linear.with_mean_square(&of_linear)?;
+        Ok(self)
     }
 
     /// Returns the number of real equations of the fit.

@@ -24,6 +24,10 @@ pub(crate) const DISTORTION_SIGNIFICANT: f64 = 1e-3;
 /// Maximum number of degrees of freedom for which terms between any two of them are tested.
 pub(crate) const DISTORTION_PAIRS: usize = 4;
 
+/// Velocity below which the friction creeps that is tried as a missing term, relative to the
+/// largest velocity: a narrower step needs more harmonics than a record has.
+pub(crate) const FRICTION_WIDTH: f64 = 0.05;
+
 /// Maximum number of weighting rounds.
 pub(crate) const WEIGHTING_ROUNDS: usize = 12;
 
@@ -101,3 +105,20 @@ pub(crate) const OPEN_WINDOWS: usize = 16;
 /// Maximum scatter of the periods of a record, relative to its RMS, that counts as rounding and not
 /// as noise.
 pub(crate) const SCATTER_ROUNDING: f64 = 1e-9;
+
+/// Largest logarithm of the ratio of a noise variance to its initial value: beyond, one of the
+/// kinds of noise is negligible.
+pub(crate) const NOISE_SPAN: f64 = 14.0;
+
+/// First step of the search for the noise variances, in the logarithm of a ratio.
+pub(crate) const NOISE_STEP: f64 = 2.0;
+
+/// Change of twice the logarithm of the likelihood below which the search for the noise variances
+/// ends: a hundredth of the change that their own uncertainty makes.
+pub(crate) const NOISE_SETTLED: f64 = 0.01;
+
+/// Maximum number of rounds of the search for the noise variances.
+pub(crate) const NOISE_ROUNDS: usize = 200;
+
+/// Maximum number of lags of the test for a white residual.
+pub(crate) const WHITE_LAGS: usize = 25;

@@ -32,7 +32,7 @@ impl<'a> Propagation<'a> {
 
     /// Returns the derivatives of the measured response with respect to the state at a sample, n ×
     /// 2n.
-    fn output(&self, sample: usize) -> DMatrix<f64> {
+    pub(super) fn output(&self, sample: usize) -> DMatrix<f64> {
         let n = self.dof();
         let part = |first: usize| {
             DMatrix::from_fn(n, 2 * n, |row, column| f64::from(column == first + row))
@@ -42,6 +42,30 @@ impl<'a> Propagation<'a> {
             ResponseQuantity::Velocity => part(n),
             ResponseQuantity::Acceleration => self.transitions[sample].acceleration.clone(),
         }
+    }
+
+    /// Returns the number of samples.
+    pub(super) fn len(&self) -> usize {
+        self.transitions.len()
+    }
+
+    /// Returns the derivatives of the state at the next sample with respect to that at a sample.
+    pub(super) fn transition(&self, sample: usize) -> &DMatrix<f64> {
+        &self.transitions[sample].state
+    }
+
+    /// Returns the change of the state by half of a force sample, 2n × n.
+    pub(super) fn half_push(&self) -> DMatrix<f64> {
+        let n = self.dof();
+        let mut push = DMatrix::zeros(2 * n, n);
+        push.rows_mut(n, n).copy_from(&(self.inverse_mass * (0.5 * self.dt)));
+        push
+    }
+
+    /// Returns the change of the measured response by a force at the same instant, n × n: zero but
+    /// for accelerations.
+    pub(super) fn direct(&self) -> DMatrix<f64> {
+        self.inverse_mass * f64::from(u8::from(self.is_acceleration()))
     }
 
     fn is_acceleration(&self) -> bool {

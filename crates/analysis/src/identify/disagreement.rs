@@ -2,6 +2,7 @@
 
 use mechid_checks::Finding;
 use mechid_estimate::Estimate;
+use mechid_nonlinear::NonlinearEstimate;
 use nalgebra::{DMatrix, DVector};
 
 use super::checks::CheckRow;
@@ -79,12 +80,19 @@ impl Disagreement {
         let warns = |is_of: fn(&CheckRow) -> bool| {
             checks.iter().any(|check| check.is_conspicuous() && is_of(check))
         };
-        let is_left_out = |check: &CheckRow| matches!(check.finding, Finding::TermLeftOut(_));
+        let is_left_out = |check: &CheckRow| {
+            matches!(check.finding, Finding::TermLeftOut(_) | Finding::NonlinearTermsLeftOut(_))
+        };
         Self {
             omitted: self.omitted.filter(|_| warns(is_left_out)),
             explained: self.explained.filter(|_| warns(CheckRow::is_explanation)),
             scale: ErrorScale::from_checks(checks, spare),
         }
+    }
+
+    /// Returns the additions without a scale, for standard errors that follow from the residual.
+    pub(super) fn without_scale(self) -> Self {
+        Self { scale: None, ..self }
     }
 
     /// Returns an estimate whose covariance includes the additions.
@@ -98,6 +106,21 @@ impl Disagreement {
         };
         let squares = self.omitted.iter().chain(&self.explained);
         squares.into_iter().try_fold(scaled, |sum, square| Ok(sum.with_mean_square(square)?))
+    }
+
+    /// Returns an estimate with nonlinear terms whose covariance includes the omitted terms; its
+    /// standard errors follow from the residual and are not scaled.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Estimate`] for another number of parameters.
+    pub(super) fn with_omitted(
+        &self,
+        estimate: NonlinearEstimate,
+    ) -> Result<NonlinearEstimate, AnalysisError> {
+        Ok(match &self.omitted {
+            Some(square) => estimate.with_mean_square(square)?,
+            None => estimate,
+        })
     }
 
     /// Ratio of the standard errors to those that follow from the noise.

@@ -204,12 +204,20 @@ impl Fitted {
     }
 
     /// Includes the disagreement of model and data that the checks show in the standard errors;
-    /// with nonlinear terms the errors remain.
+    /// with nonlinear terms, only further terms: the errors follow from the residual.
     pub(super) fn count_disagreement(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
         let unjudged = std::mem::take(&mut self.disagreement);
-        if self.nonlinear.is_none() {
-            self.disagreement = unjudged.warned_of(checks, self.estimate.degrees_of_freedom());
-            self.estimate = self.disagreement.included_in(self.estimate.clone())?;
+        let judged = unjudged.warned_of(checks, self.estimate.degrees_of_freedom());
+        match &mut self.nonlinear {
+            Some(fitted) => {
+                self.disagreement = judged.without_scale();
+                fitted.estimate = self.disagreement.with_omitted(fitted.estimate.clone())?;
+                self.estimate = fitted.estimate.linear().clone();
+            }
+            None => {
+                self.estimate = judged.included_in(self.estimate.clone())?;
+                self.disagreement = judged;
+            }
         }
         Ok(())
     }

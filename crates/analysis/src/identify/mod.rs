@@ -8,6 +8,7 @@
 //! | `open_records` | open records (windows that are not whole periods), with their transients |
 //! | `tables`, `tabulated`, `table_fit` | tables of frequency responses that were measured elsewhere, their conversion to data, and their fit with its checks |
 //! | `nonlinear`, `open_terms` | whole periods and open records with nonlinear terms |
+//! | `further_terms` | nonlinear terms that a fit lacks |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
 //! | `counts` | equations and memory that a fit needs, before any work |
@@ -36,6 +37,7 @@ mod disagreement;
 pub(crate) mod fitted;
 mod fitted_lines;
 mod force_noise;
+mod further_terms;
 mod keywords;
 pub mod left_out;
 pub mod lines;

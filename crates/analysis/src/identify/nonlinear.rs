@@ -12,13 +12,15 @@ use mechid_signal::{Extent, Record};
 use mechid_spectra::{FrequencyData, Lines};
 use serde::Serialize;
 
+use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Misfit, Residual, SampleResidual, WithTerms};
+use super::further_terms::FurtherTerms;
 use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
 use super::lines::LineChoice;
 use super::open_terms;
 use super::options::{Nonlinear, TermEstimator, TermFit};
-use super::prediction::{Model, Prediction};
+use super::prediction::Prediction;
 use super::remarks::one_motion_of;
 use super::rows::Uncertain;
 use super::selection::SelectionSummary;
@@ -162,22 +164,23 @@ fn fitted(
     }
     let mut selection = select(&data, unknowns, how)?;
     let (name, stepped) = stepped(records, *estimator)?;
-    let estimated = estimated(&data, unknowns, how, &stepped, &mut selection)?;
+    let (estimated, white) = estimated(&data, unknowns, how, &stepped, &mut selection)?;
     let experiments: Vec<[&Record; 2]> =
         records.iter().map(|r| [&r.held.force, r.held.response().0]).collect();
     let distortion_levels = distortion(&band, &experiments, kind, unknowns)?;
-    let model = Model::Nonlinear { system: estimated.system()?, channels: estimated.channels() };
     let (before, spectra) = driven_spectra(records, &band, rule)?;
     let before_all = match &spectra {
         Some(data) => before_spectral_fit(data, unknowns)?,
         None => Vec::new(),
     };
     let misfit = estimated.misfit();
-    // Noise on the force colours the residual of the mean period; the scatter of the periods
-    // already includes it.
+    let further = FurtherTerms::of_periods(&data, unknowns, how, &stepped, &estimated);
+    let (omitted, squared_change) =
+        further.map(|further| (further.finding, further.squared_change)).unzip();
+    // Several periods show their noise, with which the misfit compares the residual.
     let residuals = match misfit {
         Some(_) => Vec::new(),
-        None => steady_residuals(records, &model)?,
+        None => white_residuals(records, &white),
     };
     let restoring = estimated.restoring_forces(&data)?.swap_remove(0);
     let linear = estimated.linear().clone();
@@ -187,7 +190,8 @@ fn fitted(
         before_all,
         before,
         after: vec![Vec::new(); records.len()],
-        after_all: misfit.map(finding).into_iter().collect(),
+        after_all: misfit.map(finding).into_iter().chain(omitted).collect(),
+        disagreement: Disagreement::new(squared_change, None),
         misfit: misfit
             .map(|misfit| Misfit { ratio: misfit.ratio, noise: "estimated from the periods" }),
         residuals,
@@ -273,21 +277,17 @@ fn select(
     Ok(Some(select_terms(data, unknowns, terms, candidates, *criterion, *weighting)?))
 }
 
-/// Returns, record by record, the residual of the steady state under the measured force, without
-/// its mean.
-fn steady_residuals(records: &[Windowed], model: &Model) -> Result<Vec<Residual>, AnalysisError> {
-    let mut residuals = Vec::new();
-    for Windowed { held, .. } in records {
-        let fitted = held.response().0.without_mean();
-        let predicted = Prediction::Steady.predict(model, held)?.swap_remove(0).predicted;
-        residuals.push(Residual::Samples(SampleResidual {
-            samples: Record::new(fitted.sampling(), fitted.data() - predicted.data())?,
-            fitted,
+/// Returns the residuals of output error, made white for the most likely noise, with their records.
+pub(super) fn white_residuals(records: &[Windowed], residuals: &[Record]) -> Vec<Residual> {
+    let residual = |(Windowed { held, .. }, samples): (&Windowed, &Record)| {
+        Residual::Samples(SampleResidual {
+            samples: samples.clone(),
+            fitted: held.response().0.clone(),
             force: held.force.clone(),
             noise_span: 0,
-        }));
-    }
-    Ok(residuals)
+        })
+    };
+    records.iter().zip(residuals).map(residual).collect()
 }
 
 fn whole_periods(held: &Block) -> Result<SteppedRecord, AnalysisError> {
@@ -298,20 +298,21 @@ fn whole_periods(held: &Block) -> Result<SteppedRecord, AnalysisError> {
 }
 
 /// Estimates the terms, by output error if `stepped` has records, and removes uncertain candidates:
-/// the least squares that selected them is biased by noise on the response.
-fn estimated(
+/// the least squares that selected them is biased by noise on the response. Also returns the
+/// residuals of output error; none of least squares, whose residual is that of the force.
+pub(super) fn estimated(
     data: &SteadyExperiments,
     unknowns: &Unknowns,
     how: &Nonlinear,
     stepped: &[SteppedRecord],
     selection: &mut Option<Selection>,
-) -> Result<NonlinearEstimate, AnalysisError> {
+) -> Result<(NonlinearEstimate, Vec<Record>), AnalysisError> {
     let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
     loop {
         let terms = selection.as_ref().map_or(&how.terms, |selection| &selection.terms);
         let start = equation_error(data, unknowns, terms, &options)?;
-        let estimate = match stepped {
-            [] => start,
+        let (estimate, residuals) = match stepped {
+            [] => (start, Vec::new()),
             _ => {
                 // A constant inside a law may differ much from its given value.
                 let shape = ShapeConstants { laws: true, ..how.search };
@@ -322,7 +323,8 @@ fn estimated(
                     is_open.then(|| equation_error(data, unknowns, terms, &options).ok());
                 let starts: Vec<_> =
                     [start].into_iter().chain(from_equation_error.flatten()).collect();
-                best_output_error(stepped, data.measured(), &starts)?.estimate
+                let fit = best_output_error(stepped, data.measured(), &starts)?;
+                (fit.estimate, fit.residuals)
             }
         };
         let uncertain = match how.criterion {
@@ -331,7 +333,7 @@ fn estimated(
         };
         match (selection.as_mut(), uncertain) {
             (Some(selection), Some(name)) => selection.remove(name)?,
-            _ => return Ok(estimate),
+            _ => return Ok((estimate, residuals)),
         }
     }
 }

@@ -4,14 +4,17 @@ use mechid_checks::{Verdict, steady_periods};
 use mechid_estimate::Unknowns;
 use mechid_model::Discretisation;
 use mechid_nonlinear::{NonlinearEstimate, SteppedRecord, output_error_of_open_records};
-use mechid_signal::{Extent, Record};
+use mechid_signal::Extent;
 
 use super::acquisition::Acquisition;
-use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
+use super::disagreement::Disagreement;
+use super::fitted::{Fitted, WithTerms};
+use super::further_terms::FurtherTerms;
 use super::keywords::Domain;
+use super::nonlinear::white_residuals;
 use super::open_records::{self, Excitation};
 use super::options::{Nonlinear, OpenNoise, TermFit};
-use super::prediction::{Model, Prediction};
+use super::prediction::Prediction;
 use super::remarks::one_motion_of;
 use crate::AnalysisError;
 use crate::measurement::Windowed;
@@ -51,7 +54,12 @@ pub(super) fn fit(
         })
         .collect();
     let kind = records[0].held.response().1;
-    let estimate = output_error_of_open_records(&stepped, kind, &linear.estimate, terms)?.estimate;
+    let fit = output_error_of_open_records(&stepped, kind, &linear.estimate, terms)?;
+    let further = FurtherTerms::of_open_records(&stepped, kind, &fit);
+    let (omitted, squared_change) =
+        further.map(|further| (further.finding, further.squared_change)).unzip();
+    let residuals = white_residuals(records, &fit.residuals);
+    let estimate = fit.estimate;
     let prediction = Prediction::Sampled {
         discretisation: Discretisation::FirstOrderHold,
         extent: Extent::Open,
@@ -62,7 +70,9 @@ pub(super) fn fit(
         before_all: linear.before_all,
         before: linear.before,
         after: vec![Vec::new(); records.len()],
-        residuals: residuals(records, &estimate, prediction)?,
+        after_all: omitted.into_iter().collect(),
+        residuals,
+        disagreement: Disagreement::new(squared_change, None),
         remarks: one_motion_of(&records[0].held).into_iter().chain([of_start.to_owned()]).collect(),
         frequency: linear.frequency,
         drawn: linear.drawn,
@@ -83,31 +93,6 @@ impl Fitted {
             Some(WithTerms { estimate, distortion: None, restoring: None, selection: None });
         self
     }
-}
-
-/// Returns, record by record, the residual of the simulated response.
-fn residuals(
-    records: &[Windowed],
-    estimate: &NonlinearEstimate,
-    prediction: Prediction,
-) -> Result<Vec<Residual>, AnalysisError> {
-    let model = Model::Nonlinear { system: estimate.system()?, channels: estimate.channels() };
-    let mut residuals = Vec::new();
-    for Windowed { held, .. } in records {
-        let fitted = held.response().0.clone();
-        let kind = held.response().1;
-        let compared = prediction.predict(&model, held)?;
-        let Some(predicted) = compared.into_iter().find(|compared| compared.kind == kind) else {
-            continue;
-        };
-        residuals.push(Residual::Samples(SampleResidual {
-            samples: Record::new(fitted.sampling(), fitted.data() - predicted.predicted.data())?,
-            fitted,
-            force: held.force.clone(),
-            noise_span: 0,
-        }));
-    }
-    Ok(residuals)
 }
 
 /// Returns the reason why windows whose extent is not given cannot be treated as periods.

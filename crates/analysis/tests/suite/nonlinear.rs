@@ -1,12 +1,14 @@
 //! Machines with nonlinear terms in all kinds of analysis. The response is prescribed, and the
 //! force follows from the equation of motion in closed form.
 
+use mechid_analysis::identify::checks::CheckRow;
 use mechid_analysis::identify::{Nonlinear, Source, TermEstimator, TermFit};
 use mechid_analysis::reconstruct::reconstruct_in_chunks;
 use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Machine, Measurement, ModalSummary, Predict,
     Reconstruct, ResponseQuantity, identify, predict, reconstruct,
 };
+use mechid_checks::Finding;
 use mechid_model::{NonlinearSystem, Response, Sdof, Terms, UncertainNonlinearSystem};
 use mechid_nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_signal::{Record, Sampling, Spectrum, noise};
@@ -538,6 +540,57 @@ fn terms_are_found_in_open_records() {
     // Without the setting for open records, a window must be a period.
     let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
     assert!(refused(how).contains("unless `extent` is open"));
+}
+
+/// Judge: the machine of the periods, whose quadratic spring the model lacks, and the sweep with
+/// friction that it lacks. The change by the terms that explain the residual is part of the
+/// intervals; the model with all terms has no such finding.
+#[test]
+fn intervals_of_a_model_that_lacks_a_term_hold() {
+    let (force, x) = steady_state();
+    let level = noise::NoiseLevel::FractionOfRms(0.005);
+    let noisy = |record: &Record, seed| {
+        noise::add_white(&record.repeated(3).unwrap(), level, seed).unwrap()
+    };
+    let periods = |seed: u64| {
+        let test = test_of(&noisy(&force, 2 * seed), &noisy(&x, 2 * seed + 1));
+        test.period(PERIOD).unwrap()
+    };
+    let friction = |x: f64, v: f64| 6e6 * x.powi(3) + 8.0 * (v / 0.05).tanh();
+    let drag = |x: f64, v: f64| 6e6 * x.powi(3) + 60.0 * v.abs() * v;
+    let cubic = |x: f64, _: f64| 6e6 * x.powi(3);
+    let of_periods = |terms: &str| Identify::nonlinear(terms.parse().unwrap());
+    let of_sweep = |terms: &str| open(terms.parse().unwrap());
+    let wrong = |test: &dyn Fn(u64) -> Measurement, how: &Identify| {
+        for seed in 0..6 {
+            let found = identify(&[test(seed)], how).unwrap();
+            let is_named = |check: &&CheckRow| {
+                check.is_conspicuous() && matches!(check.finding, Finding::NonlinearTermsLeftOut(_))
+            };
+            assert!(found.checks().iter().any(|check| is_named(&check)), "{seed}: {found}");
+            for (name, truth) in [("m", 10.0), ("c", 40.0), ("k", 5000.0)] {
+                let estimate = found.nonlinear().unwrap().parameter(name).unwrap().estimate;
+                let [low, high] = estimate.interval(0.95).unwrap();
+                assert!(low <= truth && truth <= high, "{seed}, {name}: {estimate:?}");
+                let linear = found.estimate().parameter(name).unwrap();
+                assert_eq!(linear.standard_error, estimate.standard_error, "{name}");
+            }
+            assert!(found.to_string().contains("include the effect of the omitted term"));
+        }
+    };
+    wrong(&periods, &of_periods("k3: x1^3"));
+    wrong(&|seed| sweep(friction, seed), &of_sweep("k3: x1^3"));
+    wrong(&|seed| sweep(drag, seed), &of_sweep("k3: x1^3"));
+    let warns = |test: Measurement, how: &Identify| {
+        let found = identify(&[test], how).unwrap();
+        usize::from(found.checks().iter().any(|check| check.is_conspicuous()))
+    };
+    let (of_periods, of_sweep) = (of_periods("k2: x1^2, k3: x1^3"), of_sweep("k3: x1^3"));
+    let right = (0..30)
+        .into_par_iter()
+        .map(|seed| warns(periods(seed), &of_periods) + warns(sweep(cubic, seed), &of_sweep));
+    let right: usize = right.sum();
+    assert!(right <= 2, "{right} of 60");
 }
 
 /// A million terms for 256 samples are refused within a time that does not grow with the square of

@@ -1,5 +1,6 @@
 //! Output error: the simulated response fitted to the measured one.
 
+mod further;
 mod open;
 mod record;
 mod starts;
@@ -14,6 +15,7 @@ use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+pub use self::further::{FurtherFit, further_output_error};
 pub use self::open::output_error_of_open_records;
 pub use self::record::SteppedRecord;
 pub use self::starts::best_output_error;
@@ -23,6 +25,7 @@ use super::estimate::{NamedParameter, NonlinearEstimate};
 use super::limits::SEARCH_STEPS;
 use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
+use super::whitening::{Filter, NoisePath};
 use crate::limits::OUTPUT_FORGOTTEN;
 
 /// [`NonlinearEstimate`] by output error, with the initial states and the residuals.
@@ -34,6 +37,9 @@ pub struct NonlinearFit {
     pub starts: Vec<InitialState>,
     /// RMS of the residual of each channel over all records, in the unit of the response.
     pub rmse: Vec<f64>,
+    /// Residual of each record, in the unit of the response, made white for the most likely noise
+    /// on force and response if a record has one period.
+    pub residuals: Vec<Record>,
     /// Number of Gauss–Newton steps.
     pub steps: usize,
 }
@@ -50,8 +56,10 @@ pub struct NonlinearFit {
 ///
 /// The standard errors follow from the noise of force and response in several periods
 /// ([`Periods`](super::StandardErrors::Periods)), propagated through the system, if the residual
-/// does not exceed that noise ([`NonlinearEstimate::misfit`]). Otherwise they allow for the
-/// spectrum of the residual ([`Blocks`](super::StandardErrors::Blocks)): if the damping of a
+/// does not exceed that noise ([`NonlinearEstimate::misfit`]). For single periods and open records,
+/// the residual shows how much white noise force and response have; the fit is then the most likely
+/// one under this noise ([`Noise`](super::StandardErrors::Noise)). Otherwise the errors allow for
+/// the spectrum of the residual ([`Blocks`](super::StandardErrors::Blocks)): if the damping of a
 /// resonance is slightly wrong, the formula for a white residual gives errors several times too
 /// small.
 ///
@@ -71,6 +79,26 @@ pub fn output_error(
     measured: ResponseQuantity,
     start: &NonlinearEstimate,
 ) -> Result<NonlinearFit, EstimateError> {
+    search(records, measured, start, Weights::Noise)
+}
+
+/// Weights of the samples after a first search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Weights {
+    /// One for each channel, by the size of its residual.
+    Levels,
+    /// The inverse of the noise on force and response that makes the residual most likely, if a
+    /// record has one period.
+    Noise,
+}
+
+/// Returns the [`output_error`] with these weights.
+fn search(
+    records: &[SteppedRecord],
+    measured: ResponseQuantity,
+    start: &NonlinearEstimate,
+    weights: Weights,
+) -> Result<NonlinearFit, EstimateError> {
     let system = start.system()?;
     let n = system.dof();
     for record in records {
@@ -86,7 +114,7 @@ pub fn output_error(
     }
     let mut steps = 0;
     let mut theta = theta;
-    // The weights of several channels need the residuals of a first search.
+    // The weights need the residuals of a first search.
     for round in 0..2 {
         let lost = |steps| EstimateError::NotConverged { searches: 1, steps };
         let minimum = minimise_residuals(&mut problem, theta, SEARCH_STEPS).ok_or(lost(steps))?;
@@ -96,10 +124,17 @@ pub fn output_error(
         if !minimum.converged {
             return Err(lost(minimum.steps));
         }
-        if n == 1 || round == 1 {
+        if round == 1 {
             break;
         }
         problem.levels = problem.residual_rms();
+        problem.noise = match weights {
+            Weights::Noise => problem.noise(&theta),
+            Weights::Levels => None,
+        };
+        if n == 1 && problem.noise.is_none() {
+            break;
+        }
     }
     problem.finish(&theta, start, steps)
 }
@@ -126,6 +161,8 @@ struct Problem<'a> {
     /// RMS of the residual of each channel.
     levels: Vec<f64>,
     courses: Vec<Course>,
+    /// Filters that make the residuals of the records white; `None` for weights by `levels`.
+    noise: Option<Vec<(NoisePath, Filter)>>,
 }
 
 impl<'a> Problem<'a> {
@@ -162,6 +199,7 @@ impl<'a> Problem<'a> {
             shared,
             levels: vec![1.0; system.dof()],
             courses: Vec::new(),
+            noise: None,
         };
         let measured = |dof| problem.rms(|_, record| record.response.column(dof).into_owned());
         problem.levels = (0..system.dof()).map(measured).collect();
@@ -195,19 +233,58 @@ impl<'a> Problem<'a> {
         record.response.column(dof) - self.courses[at].state.column(column)
     }
 
+    /// Returns the free entries, the coefficients and the constants of a system.
+    fn shared_parameters(&self, system: &NonlinearSystem) -> Vec<f64> {
+        let linear = system.linear();
+        let entries = self.free.iter().map(|p| linear.matrix(p.matrix())[(p.row(), p.column())]);
+        let constants = self.terms.iter().flat_map(|term| term.law().constants());
+        entries
+            .chain(system.coefficients().iter().copied())
+            .chain(constants.map(|constant| constant.value))
+            .collect()
+    }
+
+    /// Returns the parameters of a system that begins with the initial states of a fit.
+    fn parameters_at(&self, fit: &NonlinearFit, system: &NonlinearSystem) -> DVector<f64> {
+        let mut theta = self.shared_parameters(system);
+        for state in &fit.starts {
+            theta.extend(state.displacement().iter().chain(state.velocity().iter()));
+        }
+        theta.into()
+    }
+
+    /// Returns the residuals of a record, samples × channels.
+    fn gaps(&self, at: usize, record: &Prepared) -> DMatrix<f64> {
+        let gaps: Vec<_> = (0..self.dof()).map(|dof| self.gap(at, record, dof)).collect();
+        DMatrix::from_columns(&gaps)
+    }
+
+    /// Returns the residuals of a record, or derivatives of them, with their weights.
+    fn weighted(&self, at: usize, mut values: DMatrix<f64>) -> DMatrix<f64> {
+        match &self.noise {
+            Some(noise) => noise[at].0.whiten(&noise[at].1, &mut values),
+            None => values
+                .column_iter_mut()
+                .zip(&self.levels)
+                .for_each(|(mut column, level)| column /= *level),
+        }
+        values
+    }
+
+    /// Computes the weighted residuals of all records at the last evaluation.
+    fn weigh(&self, residual: &mut DVector<f64>) {
+        let mut at = 0;
+        for (number, record) in self.records.iter().enumerate() {
+            let gaps = self.weighted(number, self.gaps(number, record));
+            residual.rows_mut(at, gaps.len()).copy_from_slice(gaps.as_slice());
+            at += gaps.len();
+        }
+    }
+
     /// Returns the initial parameters, with the initial states that fit the records best.
     fn start(&self, system: &NonlinearSystem) -> Result<DVector<f64>, EstimateError> {
-        let linear = system.linear();
-        let mut theta: Vec<f64> =
-            self.free.iter().map(|p| linear.matrix(p.matrix())[(p.row(), p.column())]).collect();
-        let rate = slowest_decay(self.unknowns, &theta);
-        theta.extend(system.coefficients());
-        theta.extend(
-            self.terms
-                .iter()
-                .flat_map(|term| term.law().constants())
-                .map(|constant| constant.value),
-        );
+        let mut theta = self.shared_parameters(system);
+        let rate = slowest_decay(self.unknowns, &theta[..self.free.len()]);
         let state = |record: &Prepared| {
             let samples = OUTPUT_FORGOTTEN / (rate * record.response.sampling().dt());
             let len = (samples.min(1e9) as usize).clamp(16, record.response.len().max(16));
@@ -260,16 +337,18 @@ impl<'a> Problem<'a> {
     /// Returns the largest |q| (m) and |q̇| (m/s) of the coordinate of each term in the simulated
     /// responses.
     fn ranges(&self, system: &NonlinearSystem) -> Vec<[f64; 2]> {
+        system.terms().iter().map(|term| self.range_of(term)).collect()
+    }
+
+    /// Returns the largest |q| (m) and |q̇| (m/s) of the coordinate of a term.
+    fn range_of(&self, term: &Term) -> [f64; 2] {
         let n = self.dof();
-        let largest = |term: &Term, part: usize| {
-            let amplitude = |course: &Course| {
-                let columns = course.state.columns(part * n, n);
-                let signs = DVector::from_fn(n, |dof, _| term.coordinate().sign(dof));
-                (columns * signs).amax()
-            };
-            self.courses.iter().map(amplitude).fold(0.0, f64::max)
+        let signs = DVector::from_fn(n, |dof, _| term.coordinate().sign(dof));
+        let amplitude = |part: usize| {
+            let of_course = |course: &Course| (course.state.columns(part * n, n) * &signs).amax();
+            self.courses.iter().map(of_course).fold(0.0, f64::max)
         };
-        system.terms().iter().map(|term| [0, 1].map(|part| largest(term, part))).collect()
+        [0, 1].map(amplitude)
     }
 
     /// Returns the shared parameters with their names, units and standard errors.
@@ -296,6 +375,19 @@ impl<'a> Problem<'a> {
             NamedParameter { name, unit, estimate }
         });
         parameters.collect()
+    }
+
+    /// Returns the weighted residuals of each record, with these RMS values of the channels.
+    fn white_residuals(&self, rmse: &[f64]) -> Result<Vec<Record>, EstimateError> {
+        let residuals = self.records.iter().enumerate().map(|(at, record)| {
+            let mut residuals = self.weighted(at, self.gaps(at, record));
+            for (mut column, rmse) in residuals.column_iter_mut().zip(rmse) {
+                let size = (column.norm_squared() / column.len() as f64).sqrt();
+                column *= if size > 0.0 { rmse / size } else { 0.0 };
+            }
+            Ok(Record::new(record.response.sampling(), residuals)?)
+        });
+        residuals.collect()
     }
 
     fn finish(
@@ -332,6 +424,7 @@ impl<'a> Problem<'a> {
         let starts = (0..self.records.len()).map(|at| self.initial(theta, at).ok_or(wrong.clone()));
         Ok(NonlinearFit {
             starts: starts.collect::<Result<_, _>>()?,
+            residuals: self.white_residuals(&rmse)?,
             rmse,
             steps,
             estimate: NonlinearEstimate {
@@ -371,14 +464,7 @@ impl Residuals for Problem<'_> {
         let courses: Option<Vec<Course>> = self.records.par_iter().enumerate().map(run).collect();
         let Some(courses) = courses else { return false };
         self.courses = courses;
-        let mut at = 0;
-        for (number, record) in self.records.iter().enumerate() {
-            for dof in 0..self.dof() {
-                let gap = self.gap(number, record, dof) / self.levels[dof];
-                residual.rows_mut(at, gap.len()).copy_from(&gap);
-                at += gap.len();
-            }
-        }
+        self.weigh(residual);
         true
     }
 
@@ -387,16 +473,17 @@ impl Residuals for Problem<'_> {
         let (n, order) = (self.dof(), self.measured.derivative_order());
         let mut at = 0;
         for (number, course) in self.courses.iter().enumerate() {
-            let len = course.state.nrows();
-            for dof in 0..n {
-                for (d, derivative) in course.derivatives.iter().enumerate() {
-                    let sensitivity = derivative.column(order * n + dof) / -self.levels[dof];
-                    jacobian
-                        .view_mut((at, self.parameter_index(number, d)), (len, 1))
-                        .copy_from(&sensitivity);
-                }
-                at += len;
+            let len = n * course.state.nrows();
+            let weighted = |derivative: &DMatrix<f64>| {
+                self.weighted(number, -derivative.columns(order * n, n))
+            };
+            let sensitivities: Vec<_> = course.derivatives.par_iter().map(weighted).collect();
+            for (d, sensitivity) in sensitivities.iter().enumerate() {
+                let column = self.parameter_index(number, d);
+                let mut to = jacobian.view_mut((at, column), (len, 1));
+                to.copy_from_slice(sensitivity.as_slice());
             }
+            at += len;
         }
     }
 }

@@ -4,7 +4,8 @@ use mechid_estimate::{Estimate, EstimateError};
 use mechid_model::{ResponseQuantity, Terms};
 use mechid_signal::Extent;
 
-use super::{NonlinearFit, SteppedRecord, best_output_error, output_error};
+use super::starts::best_search;
+use super::{NonlinearFit, SteppedRecord, Weights, output_error};
 use crate::estimate::NonlinearEstimate;
 use crate::limits::{OPEN_WINDOWS, OUTPUT_FORGOTTEN};
 
@@ -33,7 +34,7 @@ pub fn output_error_of_open_records(
     let scaled = factors(terms).iter().filter_map(|factor| scaled(terms, *factor));
     let starts = scaled.map(|terms| NonlinearEstimate::without_force(linear, &terms));
     let starts: Vec<_> = starts.collect::<Result<_, _>>()?;
-    let start = best_output_error(&windows(records)?, measured, &starts)?.estimate;
+    let start = best_search(&windows(records)?, measured, &starts, Weights::Levels)?.estimate;
     output_error(records, measured, &start)
 }
 

@@ -3,7 +3,7 @@
 use mechid_estimate::EstimateError;
 use mechid_model::ResponseQuantity;
 
-use super::{NonlinearFit, SteppedRecord, output_error};
+use super::{NonlinearFit, SteppedRecord, Weights, search};
 use crate::estimate::NonlinearEstimate;
 
 /// Returns the [`output_error`] with the smallest residual from several initial estimates:
@@ -20,12 +20,22 @@ pub fn best_output_error(
     measured: ResponseQuantity,
     starts: &[NonlinearEstimate],
 ) -> Result<NonlinearFit, EstimateError> {
+    best_search(records, measured, starts, Weights::Noise)
+}
+
+/// Returns the [`best_output_error`] with these weights.
+pub(super) fn best_search(
+    records: &[SteppedRecord],
+    measured: ResponseQuantity,
+    starts: &[NonlinearEstimate],
+    weights: Weights,
+) -> Result<NonlinearFit, EstimateError> {
     let mut best = Err(EstimateError::NotConverged { searches: starts.len(), steps: 0 });
     for (at, start) in starts.iter().enumerate() {
         let residual_power = |fit: &NonlinearFit| -> f64 {
             fit.estimate.unexplained().iter().map(|part| part * part).sum()
         };
-        match (output_error(records, measured, start), &best) {
+        match (search(records, measured, start, weights), &best) {
             (Ok(fit), Ok(other)) if residual_power(&fit) >= residual_power(other) => {}
             (Err(_), _) if at > 0 => {}
             (fit, _) => best = fit,

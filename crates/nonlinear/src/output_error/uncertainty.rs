@@ -6,17 +6,20 @@ use mechid_numerics::NumericsError;
 use mechid_numerics::gauss_newton::Residuals;
 use mechid_numerics::least_squares::LeastSquares;
 use mechid_numerics::triangular::TriangularFactor;
+use mechid_signal::correlation::whiteness;
 use mechid_signal::{Record, Spectrum, message};
 use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::{Prepared, Problem};
 use crate::covariance::{BlockScores, ByPeriods, InTime, Uncertainty, block_count};
 use crate::equation_error::slowest_decay;
 use crate::estimate::StandardErrors;
-use crate::limits::FEWEST;
+use crate::limits::{FEWEST, SIGNIFICANT, WHITE_LAGS};
 use crate::propagation::Propagation;
 use crate::scatter::{Line, PeriodScatter, Powers};
 use crate::simulate::{Direction, Tangent};
+use crate::whitening::{Filter, NoisePath, most_likely};
 
 impl Problem<'_> {
     /// Returns (JᵀJ)⁻¹ of all parameters at the last evaluation of the residual.
@@ -153,43 +156,87 @@ impl Problem<'_> {
         Some(())
     }
 
+    /// Returns the most likely noise of the records about the motion at these parameters; `None` if
+    /// their periods show it, or if it cannot be found.
+    pub(super) fn noise(&self, theta: &DVector<f64>) -> Option<Vec<(NoisePath, Filter)>> {
+        if self.records.iter().all(|record| !record.deviations.is_empty()) {
+            return None;
+        }
+        let (system, n) = (self.system(theta)?, self.dof());
+        let inverse_mass = system.linear().mass().clone().lu().solve(&DMatrix::identity(n, n))?;
+        let directions: Vec<Direction> = (0..2 * n).map(Direction::Initial).collect();
+        let whitened = |(at, record): (usize, &Prepared)| {
+            let start = self.initial(theta, at)?;
+            let transitions =
+                Tangent::new(&system, &directions).transitions(&record.force, &start)?;
+            let dt = record.response.sampling().dt();
+            let motion = Propagation::new(&transitions, &inverse_mass, dt, self.measured);
+            let path = NoisePath::new(&motion);
+            let varies = |force: &[f64]| force.iter().any(|value| *value != force[0]);
+            let driven: Vec<bool> = (0..n).map(|dof| varies(record.plain.channel(dof))).collect();
+            let variances = most_likely(&path, &self.gaps(at, record), &driven)?;
+            let filter = path.filter(&variances)?;
+            Some((path, filter))
+        };
+        self.records.par_iter().enumerate().map(whitened).collect()
+    }
+
     fn by_residual(
         &self,
         theta: &DVector<f64>,
         inverse: &DMatrix<f64>,
     ) -> (DMatrix<f64>, StandardErrors, usize) {
-        let n = self.dof();
+        let mut jacobian = DMatrix::zeros(self.len(), theta.len());
+        self.jacobian(&mut jacobian);
+        let residuals: Vec<DMatrix<f64>> = (self.records.iter().enumerate())
+            .map(|(at, record)| self.weighted(at, self.gaps(at, record)))
+            .collect();
+        let square: f64 = residuals.iter().map(DMatrix::norm_squared).sum();
+        let freedom = self.len().saturating_sub(theta.len());
+        let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
+        if self.noise.is_some() && are_white(&residuals) {
+            return (inverse * variance, StandardErrors::Noise, freedom);
+        }
         let rate = slowest_decay(self.unknowns, &theta.as_slice()[..self.free.len()]);
         let blocks = |record: &Prepared| block_count(record.response.sampling().duration(), rate);
-        let order = self.measured.derivative_order();
         if self.records.iter().map(blocks).sum::<usize>() >= FEWEST {
             let mut scores = BlockScores::new(theta.len());
-            for (at, (record, course)) in self.records.iter().zip(&self.courses).enumerate() {
+            let mut first = 0;
+            for (at, (record, residual)) in self.records.iter().zip(&residuals).enumerate() {
                 let part = |dof: usize| {
-                    let weight = 1.0 / self.levels[dof];
-                    let derivatives = course.derivatives.iter().enumerate();
-                    let regressors = derivatives.map(|(d, derivative)| {
-                        let column = derivative.column(order * n + dof) * weight;
-                        (self.parameter_index(at, d), column.as_slice().to_vec())
+                    let rows = (first + dof * residual.nrows(), residual.nrows());
+                    let regressors = (0..self.courses[at].derivatives.len()).map(|direction| {
+                        let index = self.parameter_index(at, direction);
+                        let column = jacobian.view((rows.0, index), (rows.1, 1));
+                        (index, column.iter().map(|value| -value).collect())
                     });
-                    let gap = self.gap(at, record, dof) * weight;
-                    InTime { regressors: regressors.collect(), residual: gap.as_slice().to_vec() }
+                    let regressors = regressors.collect();
+                    InTime { regressors, residual: residual.column(dof).as_slice().to_vec() }
                 };
-                scores.push(blocks(record), &(0..n).map(part).collect::<Vec<_>>());
+                scores.push(blocks(record), &(0..self.dof()).map(part).collect::<Vec<_>>());
+                first += residual.len();
             }
             let count = scores.count();
             if let Some((covariance, freedom)) = scores.covariance(inverse, self.shared.len()) {
                 return (covariance, StandardErrors::Blocks(count), freedom);
             }
         }
-        let square: f64 = (0..n)
-            .flat_map(|dof| self.records.iter().enumerate().map(move |(at, r)| (dof, at, r)))
-            .map(|(dof, at, record)| (self.gap(at, record, dof) / self.levels[dof]).norm_squared())
-            .sum();
-        let freedom = self.len().saturating_sub(theta.len());
-        let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
         (inverse * variance, StandardErrors::White, freedom)
     }
+}
+
+/// Returns whether every channel of every residual (samples × channels) is consistent with white
+/// noise.
+fn are_white(residuals: &[DMatrix<f64>]) -> bool {
+    let channels: usize = residuals.iter().map(DMatrix::ncols).sum();
+    let is_white = |residual: &DMatrix<f64>| {
+        let lags = WHITE_LAGS.min(residual.nrows() / 4);
+        residual.column_iter().all(|column| {
+            whiteness(column.as_slice(), lags)
+                .is_ok_and(|test| test.p_value >= SIGNIFICANT / channels as f64)
+        })
+    };
+    residuals.iter().all(is_white)
 }
 
 /// Returns the spectrum of samples on the time axis of a record, lines × channels; `None` if they

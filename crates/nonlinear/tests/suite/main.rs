@@ -2,6 +2,7 @@
 
 mod exact;
 mod gap;
+mod open;
 mod periods;
 mod silverbox;
 mod stepped;

@@ -1,0 +1,208 @@
+//! Terms that an output-error fit lacks.
+
+use mechid_estimate::{Estimate, EstimateError, EstimateParts};
+use mechid_model::{ResponseQuantity, Term, Terms};
+use mechid_numerics::NumericsError;
+use mechid_numerics::gauss_newton::Residuals;
+use mechid_numerics::least_squares::solve_compressed;
+use mechid_numerics::triangular::TriangularFactor;
+use nalgebra::{DMatrix, DVector};
+
+use super::{NonlinearFit, Problem, SteppedRecord, output_error};
+use crate::estimate::NonlinearEstimate;
+use crate::kinds::further_terms_up_to;
+use crate::selection::{least_certain, without};
+
+/// Output-error fit with further terms.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FurtherFit {
+    /// The fit, whose last terms are the further ones.
+    pub fit: NonlinearFit,
+    /// Fraction of the residual power that the further terms explain.
+    pub explained: f64,
+    /// Number of candidates.
+    pub candidates: usize,
+}
+
+/// Adds terms of the usual kinds to an output-error fit, as long as the information criterion falls
+/// and their coefficients differ from zero ([`least_certain`]); `None` if there are no such terms.
+///
+/// The candidates are selected in the fit linearised at its parameters: their forces of no size
+/// change the simulated response by known amounts. The selected terms are then fitted with all
+/// parameters.
+///
+/// # Errors
+/// As [`output_error`].
+///
+/// # Source
+/// Billings, *Nonlinear System Identification: NARMAX Methods* (2013), chapter 3 (forward
+/// selection); Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44,
+/// 50–57 (tests at the estimate without the parameters that are added).
+pub fn further_output_error(
+    records: &[SteppedRecord],
+    measured: ResponseQuantity,
+    fit: &NonlinearFit,
+) -> Result<Option<FurtherFit>, EstimateError> {
+    let linearised = Linearised::new(records, measured, fit)?;
+    let Some(mut start) = linearised.start()? else { return Ok(None) };
+    let candidates = &linearised.candidates;
+    loop {
+        let larger = output_error(records, measured, &start)?;
+        let Some(name) = least_certain(&larger.estimate, candidates)? else {
+            let ratios = larger.rmse.iter().zip(&fit.rmse).map(|(after, before)| after / before);
+            let remaining = ratios.map(|r| r * r).sum::<f64>() / fit.rmse.len() as f64;
+            let candidates = candidates.len();
+            return Ok(Some(FurtherFit { fit: larger, explained: 1.0 - remaining, candidates }));
+        };
+        let terms = without(&larger.estimate.terms, &name)?;
+        if terms.len() == fit.estimate.terms.len() {
+            return Ok(None);
+        }
+        let remains = |(term, _): &(&Term, &f64)| term.name() != name;
+        let pairs = larger.estimate.terms.iter().zip(&larger.estimate.coefficients);
+        let coefficients = pairs.filter(remains).map(|(_, coefficient)| *coefficient).collect();
+        start = NonlinearEstimate { terms, coefficients, ..larger.estimate };
+    }
+}
+
+/// A fit with candidates of no size, linearised at its parameters.
+struct Linearised<'a> {
+    fit: &'a NonlinearFit,
+    /// Terms that are tried.
+    candidates: Terms,
+    /// Triangular factor of the derivatives of the residual with respect to the parameters of the
+    /// fit, then to the coefficients of the candidates, and of the residual.
+    triangle: DMatrix<f64>,
+    /// Number of parameters of the fit.
+    parameters: usize,
+    /// Number of samples of all records and channels.
+    samples: usize,
+}
+
+impl<'a> Linearised<'a> {
+    fn new(
+        records: &[SteppedRecord],
+        measured: ResponseQuantity,
+        fit: &'a NonlinearFit,
+    ) -> Result<Self, EstimateError> {
+        let estimate = &fit.estimate;
+        let candidates = candidates(records, measured, fit)?;
+        let terms = Terms::new(estimate.terms.iter().chain(candidates.iter()).cloned().collect())?;
+        let coefficients = [&estimate.coefficients[..], &vec![0.0; candidates.len()]].concat();
+        let all = NonlinearEstimate { terms, coefficients, ..estimate.clone() };
+        let system = all.system()?;
+        let mut problem = Problem::new(records, measured, &all, &system)?;
+        problem.levels = fit.rmse.iter().map(|e| if *e > 0.0 { *e } else { 1.0 }).collect();
+        let theta = problem.parameters_at(fit, &system);
+        let (samples, count) = (problem.len(), theta.len());
+        let mut residual = DVector::zeros(samples);
+        if !problem.residual(&theta, &mut residual) {
+            return Err(EstimateError::Diverged { len: samples });
+        }
+        problem.noise = problem.noise(&theta);
+        problem.weigh(&mut residual);
+        let mut jacobian = DMatrix::zeros(samples, count);
+        problem.jacobian(&mut jacobian);
+        // Free entries, terms, candidates, constants, initial states; candidates have no constants.
+        let first = problem.free.len() + estimate.terms.len();
+        let tried = first..first + candidates.len();
+        let of_fit: Vec<usize> = (0..first).chain(tried.end..count).collect();
+        let columns: Vec<usize> = of_fit.iter().copied().chain(tried).collect();
+        let jacobian = jacobian.select_columns(&columns);
+        let mut factor = TriangularFactor::new(columns.len() + 1);
+        let residual = DMatrix::from_column_slice(samples, 1, residual.as_slice());
+        if !factor.push(&[jacobian.as_view(), residual.as_view()]) {
+            return Err(NumericsError::Overflow.into());
+        }
+        let (triangle, parameters) = (factor.r().clone(), of_fit.len());
+        Ok(Self { fit, candidates, triangle, parameters, samples })
+    }
+
+    /// Returns the change of the parameters with some of the candidates, and the residual power.
+    fn with(&self, chosen: &[usize]) -> Result<(DVector<f64>, f64), EstimateError> {
+        let columns: Vec<usize> =
+            (0..self.parameters).chain(chosen.iter().map(|at| self.parameters + at)).collect();
+        let regressors = self.triangle.select_columns(&columns);
+        let target = self.triangle.columns(self.triangle.ncols() - 1, 1);
+        let solution = solve_compressed(regressors.as_view(), target, self.samples)?;
+        let change: DVector<f64> = solution.coefficients.column(0).into_owned();
+        let power = (target - regressors * &change).norm_squared();
+        Ok((-change, power))
+    }
+
+    /// Returns the start of a fit with the candidates that the information criterion adds; `None`
+    /// if it adds none.
+    ///
+    /// # Source
+    /// Chen & Chen (2008), Biometrika 95, 759–771 (extended Bayesian information criterion).
+    fn start(&self) -> Result<Option<NonlinearEstimate>, EstimateError> {
+        let n = self.samples as f64;
+        let price = n.ln() + 2.0 * (self.candidates.len().max(1) as f64).ln();
+        let mut chosen: Vec<usize> = Vec::new();
+        let (mut change, mut power) = self.with(&chosen)?;
+        loop {
+            let mut best: Option<(usize, DVector<f64>, f64)> = None;
+            for at in (0..self.candidates.len()).filter(|at| !chosen.contains(at)) {
+                let (change, power) = self.with(&[&chosen[..], &[at]].concat())?;
+                if best.as_ref().is_none_or(|(_, _, least)| power < *least) {
+                    best = Some((at, change, power));
+                }
+            }
+            let Some((at, next, least)) = best else { break };
+            if n * (power / least).ln() <= price {
+                break;
+            }
+            chosen.push(at);
+            (change, power) = (next, least);
+        }
+        if chosen.is_empty() { Ok(None) } else { self.moved(&chosen, &change).map(Some) }
+    }
+
+    /// Returns the fit with some of the candidates and its parameters moved by a change.
+    fn moved(
+        &self,
+        chosen: &[usize],
+        change: &DVector<f64>,
+    ) -> Result<NonlinearEstimate, EstimateError> {
+        let estimate = &self.fit.estimate;
+        let linear = &estimate.linear;
+        let free = linear.unknowns().free().len();
+        let values = linear.parameters().zip(change.iter()).map(|(p, by)| p.value + by).collect();
+        let linear = Estimate::new(EstimateParts {
+            unknowns: linear.unknowns().clone(),
+            values,
+            covariance: linear.covariance().into(),
+            degrees_of_freedom: linear.degrees_of_freedom(),
+            residual_nrmse: linear.residual_nrmse().to_vec(),
+            condition: linear.condition(),
+            undetermined: Vec::new(),
+        })?;
+        let pairs = estimate.coefficients.iter().zip(change.iter().skip(free));
+        let moved = pairs.map(|(coefficient, by)| coefficient + by);
+        let added = change.iter().skip(self.parameters);
+        let all: Vec<&Term> = self.candidates.iter().collect();
+        let terms = estimate.terms.iter().chain(chosen.iter().map(|at| all[*at])).cloned();
+        Ok(NonlinearEstimate {
+            linear,
+            terms: Terms::new(terms.collect())?,
+            coefficients: moved.chain(added.copied()).collect(),
+            ..estimate.clone()
+        })
+    }
+}
+
+/// Returns the terms that a fit lacks, with friction up to the velocities that it simulates.
+fn candidates(
+    records: &[SteppedRecord],
+    measured: ResponseQuantity,
+    fit: &NonlinearFit,
+) -> Result<Terms, EstimateError> {
+    let system = fit.estimate.system()?;
+    let mut problem = Problem::new(records, measured, &fit.estimate, &system)?;
+    let theta = problem.parameters_at(fit, &system);
+    let samples = problem.len();
+    if !problem.residual(&theta, &mut DVector::zeros(samples)) {
+        return Err(EstimateError::Diverged { len: samples });
+    }
+    further_terms_up_to(&fit.estimate, |term| problem.range_of(term)[1])
+}
