@@ -1,7 +1,9 @@
 //! Refusal of fits in which the data determine no parameter.
 
-use mechid_checks::Finding;
+use mechid_checks::{Finding, unrelated_response};
 use mechid_estimate::{Estimate, IdentifiedMode};
+use mechid_nonlinear::{NamedParameter, NonlinearEstimate};
+use mechid_numerics::Uncertain;
 use mechid_signal::message;
 
 use super::checks::{CheckRow, When};
@@ -57,6 +59,44 @@ pub(super) fn check(
         return refused(format!("{} contain zero, {modes}", intervals(estimate)));
     }
     Ok(())
+}
+
+/// Refuses a fit with nonlinear terms that explains no more of the force, or by output error of the
+/// response, than chance does, or in which the interval of every parameter contains zero.
+///
+/// # Errors
+/// [`AnalysisError::NothingDetermined`].
+pub(super) fn check_nonlinear(fit: &NonlinearEstimate) -> Result<(), AnalysisError> {
+    let left = fit.linear().residual_nrmse();
+    let unexplained = (left.iter().map(|e| e * e).sum::<f64>() / left.len() as f64).sqrt();
+    let dof = fit.linear().dof();
+    let [equations, unknowns] = [fit.equations() / dof, fit.parameters().len().div_ceil(dof)];
+    if let Some(Finding::Unrelated(unrelated)) =
+        unrelated_response(unexplained, equations, unknowns)
+    {
+        let percent = significant(100.0 * unrelated.explained, 3);
+        let why = format!(
+            "the model explains {percent} % of what is fitted, as it would by chance; if noise biases least \
+             squares, use several periods or maximum likelihood (`method`)"
+        );
+        return Err(AnalysisError::NothingDetermined { why });
+    }
+    let contains_zero = |parameter: &NamedParameter| {
+        let interval = parameter.estimate.interval(CONFIDENCE);
+        interval.is_ok_and(|[low, high]| low <= 0.0 && high >= 0.0 && low < high)
+    };
+    if fit.parameters().is_empty() || !fit.parameters().iter().all(contains_zero) {
+        return Ok(());
+    }
+    let named = |parameter: &NamedParameter| {
+        let Uncertain { value, standard_error, .. } = parameter.estimate;
+        let (value, error) = (significant(value, 3), significant(standard_error, 2));
+        format!("{} = {value} ± {error} {}", parameter.name, parameter.unit)
+    };
+    let all: Vec<String> = fit.parameters().iter().map(named).collect();
+    let all = message::list(&all, ", ", NAMED);
+    let why = format!("the intervals of all parameters ({all}) contain zero");
+    Err(AnalysisError::NothingDetermined { why })
 }
 
 /// Returns the remark on a fit that determines modes but no parameter.

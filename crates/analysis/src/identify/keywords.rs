@@ -320,7 +320,9 @@ impl Keywords {
             search,
             weighting: self.weighting.unwrap_or_default(),
         };
-        Ok(Source::Terms(TermFit { terms, estimator, extent: self.extent, lines }))
+        // Least squares on the equation of motion is for whole periods.
+        let periods = (self.method == Some(Method::LeastSquares)).then_some(Extent::WholePeriod);
+        Ok(Source::Terms(TermFit { terms, estimator, extent: self.extent.or(periods), lines }))
     }
 
     fn lines(&self) -> SpectralLines {
@@ -411,7 +413,7 @@ impl From<Source> for Keywords {
             }
             Source::Terms(TermFit { terms, estimator, extent, lines }) => {
                 let method = match (estimator, extent) {
-                    (_, Some(Extent::Open)) => None,
+                    (_, Some(Extent::Open)) | (TermEstimator::EquationError, None) => None,
                     (TermEstimator::EquationError, _) => Some(Method::LeastSquares),
                     (TermEstimator::OutputError, _) => Some(Method::MaximumLikelihood),
                 };

@@ -131,15 +131,20 @@ pub struct DistortionRow {
 }
 
 /// Fits records with nonlinear terms. Whole periods: least squares on the equation of motion,
-/// optionally followed by output error. Open records: output error, started from a linear fit.
+/// optionally followed by output error. Open records, and records whose period is not given unless
+/// a setting needs periods: output error, started from a linear fit.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     how: &TermFit,
     period_given: bool,
 ) -> Result<Fitted, AnalysisError> {
+    let Nonlinear { candidates, search, weighting, .. } = &how.terms;
+    let is_weighted = *weighting != Weighting::default();
+    let needs_periods = !candidates.is_empty() || search.delay || search.phase || is_weighted;
     match how.extent {
         Some(Extent::Open) => open_terms::fit(records, unknowns, how),
+        None if !period_given && !needs_periods => open_terms::fit(records, unknowns, how),
         None if !period_given => match open_terms::no_period(records)? {
             Some(refusal) => Err(refusal),
             None => fitted(records, unknowns, how),

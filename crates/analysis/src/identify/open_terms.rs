@@ -101,8 +101,8 @@ pub(super) fn no_period(records: &[Windowed]) -> Result<Option<AnalysisError>, A
         let looked = steady_periods(&held.force, held.response().0, held.period)?;
         if looked.iter().any(|finding| finding.verdict() > Verdict::Good) {
             let why = format!(
-                "nonlinear terms are fitted to whole periods unless `extent` is open, but {} is not \
-                 whole periods: its end does not meet its beginning",
+                "candidates, delay, phase and weights of lines are for whole periods, but {} is not whole \
+                 periods: its end does not meet its beginning",
                 held.file
             );
             return Ok(Some(AnalysisError::Setting { setting: "nonlinear", why }));

@@ -146,7 +146,8 @@ pub struct TermFit {
     pub terms: Nonlinear,
     /// Estimator for whole periods; open records use output error.
     pub estimator: TermEstimator,
-    /// Extent of the windows; `None`: whole periods, refused if the record does not repeat.
+    /// Extent of the windows; `None`: whole periods if their length is given or a setting needs
+    /// them, otherwise open records.
     pub extent: Option<Extent>,
     /// Spectral lines; for open records, the lines of the linear fit that starts the search.
     pub lines: SpectralLines,

@@ -157,9 +157,12 @@ impl IdentificationSummary {
         };
         let modes = fitted.estimate.modes()?;
         let checks = checks::rows(fitted, &modes, &records, scope)?;
-        if fitted.nonlinear.is_none() {
-            let is_biased = fitted.least_squares || how.is_least_squares();
-            determined::check(&fitted.estimate, &modes, &checks, is_biased)?;
+        match &fitted.nonlinear {
+            Some(fit) => determined::check_nonlinear(&fit.estimate)?,
+            None => {
+                let is_biased = fitted.least_squares || how.is_least_squares();
+                determined::check(&fitted.estimate, &modes, &checks, is_biased)?;
+            }
         }
         fitted.count_disagreement(&checks)?;
         let (fitted, estimate) = (&*fitted, &fitted.estimate);

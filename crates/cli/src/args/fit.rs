@@ -61,7 +61,8 @@ pub struct FitArgs {
     force_noise: Vec<f64>,
     /// Extent of the window: open (any part of a response; its transient is estimated with the
     /// machine) or period (whole periods) [default: period with --period; otherwise period unless a
-    /// transient is found; in the time domain open, except for spectral derivatives]
+    /// transient is found; with nonlinear terms open; in the time domain open, except for spectral
+    /// derivatives]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
     /// Assumed force between the samples. For open records, hits and the time domain: held (as by
@@ -144,8 +145,8 @@ struct NonlinearArgs {
     /// powers of x1 and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and
     /// (v1-v2), |v1| v1, v1^3/(1 + (v1/b)^2) with a number for b, gap(x1, 0.001) for a stop with
     /// that clearance (m) on either side, tanh(v1/0.01) for friction smoothed below that velocity
-    /// (m/s), x1^0 for a constant force. They are fitted to whole periods or, with --extent open,
-    /// to any record
+    /// (m/s), x1^0 for a constant force. They are fitted to whole periods if --period states their
+    /// length, otherwise to any record
     #[arg(long, value_name = "TERMS")]
     nonlinear: Option<Terms>,
     /// Candidate terms, written as for --nonlinear: the most useful ones are added one by one, as

@@ -58,10 +58,10 @@ pub struct NonlinearFit {
 /// ([`Periods`](super::StandardErrors::Periods)), propagated through the system, if the residual
 /// does not exceed that noise ([`NonlinearEstimate::misfit`]). For single periods and open records,
 /// the residual shows how much white noise force and response have; the fit is then the most likely
-/// one under this noise ([`Noise`](super::StandardErrors::Noise)). Otherwise the errors allow for
-/// the spectrum of the residual ([`Blocks`](super::StandardErrors::Blocks)): if the damping of a
-/// resonance is slightly wrong, the formula for a white residual gives errors several times too
-/// small.
+/// one under this noise ([`Noise`](super::StandardErrors::Noise)), if the residual is consistent
+/// with it. Otherwise the errors allow for the spectrum of the residual
+/// ([`Blocks`](super::StandardErrors::Blocks)): if the damping of a resonance is slightly wrong,
+/// the formula for a white residual gives errors several times too small.
 ///
 /// # Errors
 /// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not match the system,
@@ -107,36 +107,33 @@ fn search(
     }
     let mut problem = Problem::new(records, measured, start, &system)?;
     let theta = problem.start(&system)?;
-    let mut residual = DVector::zeros(problem.len());
-    if !problem.residual(&theta, &mut residual) {
+    if !problem.residual(&theta, &mut DVector::zeros(problem.len())) {
         let len = problem.records.iter().map(|record| record.response.len()).max().unwrap_or(0);
         return Err(EstimateError::Diverged { len });
     }
-    let mut steps = 0;
-    let mut theta = theta;
     // The weights need the residuals of a first search.
-    for round in 0..2 {
-        let lost = |steps| EstimateError::NotConverged { searches: 1, steps };
-        let minimum = minimise_residuals(&mut problem, theta, SEARCH_STEPS).ok_or(lost(steps))?;
-        steps += minimum.steps;
-        theta = minimum.parameters;
-        problem.residual(&theta, &mut residual);
-        if !minimum.converged {
-            return Err(lost(minimum.steps));
-        }
-        if round == 1 {
-            break;
-        }
-        problem.levels = problem.residual_rms();
-        problem.noise = match weights {
-            Weights::Noise => problem.noise(&theta),
-            Weights::Levels => None,
-        };
-        if n == 1 && problem.noise.is_none() {
-            break;
+    let (first, mut steps) = problem.minimum(theta)?;
+    problem.levels = problem.residual_rms();
+    problem.noise = match weights {
+        Weights::Noise => problem.noise(&first),
+        Weights::Levels => None,
+    };
+    if problem.noise.is_some() {
+        match problem.minimum(first.clone()) {
+            Ok((theta, more)) if problem.is_white() => {
+                return problem.finish(&theta, start, steps + more);
+            }
+            // The residual is not that noise: the fit that leaves the least of it is the best.
+            _ => problem.noise = None,
         }
     }
-    problem.finish(&theta, start, steps)
+    if n > 1 {
+        let (theta, more) = problem.minimum(first)?;
+        steps += more;
+        return problem.finish(&theta, start, steps);
+    }
+    problem.residual(&first, &mut DVector::zeros(problem.len()));
+    problem.finish(&first, start, steps)
 }
 
 /// Record with its interpolated force, and the deviations of its periods from their mean.
@@ -269,6 +266,19 @@ impl<'a> Problem<'a> {
                 .for_each(|(mut column, level)| column /= *level),
         }
         values
+    }
+
+    /// Searches the minimum of the weighted residual from some parameters, and evaluates the
+    /// residual there; also returns the number of steps.
+    fn minimum(&mut self, start: DVector<f64>) -> Result<(DVector<f64>, usize), EstimateError> {
+        let lost = |steps| EstimateError::NotConverged { searches: 1, steps };
+        let minimum = minimise_residuals(self, start, SEARCH_STEPS).ok_or(lost(0))?;
+        if !minimum.converged {
+            return Err(lost(minimum.steps));
+        }
+        let mut residual = DVector::zeros(self.len());
+        self.residual(&minimum.parameters, &mut residual);
+        Ok((minimum.parameters, minimum.steps))
     }
 
     /// Computes the weighted residuals of all records at the last evaluation.

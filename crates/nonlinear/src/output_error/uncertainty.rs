@@ -181,6 +181,18 @@ impl Problem<'_> {
         self.records.par_iter().enumerate().map(whitened).collect()
     }
 
+    /// Returns whether every channel of every weighted residual is consistent with white noise.
+    pub(super) fn is_white(&self) -> bool {
+        let level = SIGNIFICANT / (self.records.len() * self.dof()) as f64;
+        self.records.iter().enumerate().all(|(at, record)| {
+            let residual = self.weighted(at, self.gaps(at, record));
+            let lags = WHITE_LAGS.min(residual.nrows() / 4);
+            residual.column_iter().all(|column| {
+                whiteness(column.as_slice(), lags).is_ok_and(|test| test.p_value >= level)
+            })
+        })
+    }
+
     fn by_residual(
         &self,
         theta: &DVector<f64>,
@@ -194,7 +206,7 @@ impl Problem<'_> {
         let square: f64 = residuals.iter().map(DMatrix::norm_squared).sum();
         let freedom = self.len().saturating_sub(theta.len());
         let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
-        if self.noise.is_some() && are_white(&residuals) {
+        if self.noise.is_some() {
             return (inverse * variance, StandardErrors::Noise, freedom);
         }
         let rate = slowest_decay(self.unknowns, &theta.as_slice()[..self.free.len()]);
@@ -223,20 +235,6 @@ impl Problem<'_> {
         }
         (inverse * variance, StandardErrors::White, freedom)
     }
-}
-
-/// Returns whether every channel of every residual (samples × channels) is consistent with white
-/// noise.
-fn are_white(residuals: &[DMatrix<f64>]) -> bool {
-    let channels: usize = residuals.iter().map(DMatrix::ncols).sum();
-    let is_white = |residual: &DMatrix<f64>| {
-        let lags = WHITE_LAGS.min(residual.nrows() / 4);
-        residual.column_iter().all(|column| {
-            whiteness(column.as_slice(), lags)
-                .is_ok_and(|test| test.p_value >= SIGNIFICANT / channels as f64)
-        })
-    };
-    residuals.iter().all(is_white)
 }
 
 /// Returns the spectrum of samples on the time axis of a record, lines × channels; `None` if they

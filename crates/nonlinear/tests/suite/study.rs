@@ -82,7 +82,7 @@ fn identify(
 }
 
 /// Coverage of the 95 % interval, and bias in standard deviations, of each parameter.
-fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String, f64, f64, f64)> {
+pub fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String, f64, f64, f64)> {
     let runs = found.len() as f64;
     truth
         .iter()
@@ -103,7 +103,7 @@ fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String, f64
 }
 
 #[track_caller]
-fn assert_honest(judged: &[(String, f64, f64, f64)], runs: u64) {
+pub fn assert_honest(judged: &[(String, f64, f64, f64)], runs: u64) {
     // The limits are three standard deviations of a share, and of a mean.
     let slack = 3.0 * (0.05 * 0.95 / runs as f64).sqrt();
     for (name, coverage, bias, stated) in judged {

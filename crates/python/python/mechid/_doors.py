@@ -170,7 +170,7 @@ def identify(
     extent : {"open", "period"}, optional
         Extent of the window: open (any part of a response; its transient is estimated with the
         machine) or period (whole periods). Default: a period if `period` is given, otherwise a
-        period unless a transient is found; in the time domain open.
+        period unless a transient is found; in the time domain, and with nonlinear terms, open.
     hits : bool or str or dict, optional
         Divide the records of a hammer test into hits, exclude bad ones and fit each of the others
         as a separate record. A text such as ``"trigger=0.5,double=5"`` changes the rule, or a dict
