@@ -79,9 +79,7 @@ pub fn identify_modes(
     let lines = Lines::new(data);
     lines.check()?;
     check_near(&settings.near_hz, &lines)?;
-    for constraint in &settings.constraints {
-        constraint.check(lines.outputs.len(), lines.inputs())?;
-    }
+    check_constraints(settings, &lines)?;
     let poles = initial_poles(&lines)?;
     let delays = apparent_delays(&lines, &poles);
     let plain = Identification::selected(&lines, settings, poles);
@@ -115,6 +113,7 @@ pub fn refit_modes(
     let settings = ModalSettings { residual_powers, modes: None, ..settings.clone() };
     let lines = Lines::new(data);
     lines.check()?;
+    check_constraints(&settings, &lines)?;
     let known = estimate.delays();
     if !known.is_empty() && known.len() != lines.outputs.len() {
         let (inputs, outputs) = (lines.inputs(), lines.outputs.len());
@@ -126,6 +125,11 @@ pub fn refit_modes(
     let mut search = Identification::from_poles(&lines, &settings, estimate.poles());
     search.apply_rules();
     search.finish()
+}
+
+fn check_constraints(settings: &ModalSettings, lines: &Lines) -> Result<(), ModalError> {
+    let (outputs, inputs) = (lines.outputs.len(), lines.inputs());
+    settings.constraints.iter().try_for_each(|constraint| constraint.check(outputs, inputs))
 }
 
 fn check_settings(settings: &ModalSettings) -> Result<(), ModalError> {

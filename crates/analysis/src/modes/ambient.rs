@@ -38,8 +38,10 @@ pub(super) fn modes(
         );
         return Err(settings.refused("ambient", why));
     };
-    settings
-        .refuse("an ambient record", &["near_hz", "force_at", "response_at", "validate_percent"])?;
+    settings.refuse(
+        "an ambient record",
+        &["near_hz", "force_at", "response_at", "validate_percent", "real_shapes", "reciprocal"],
+    )?;
     let outputs = outputs_of(measurement.channels());
     if outputs.is_empty() {
         return Err(AnalysisError::NoMotion);

@@ -19,7 +19,8 @@ pub(super) fn modes(
     settings: &ModesSettings,
     [from_s, to_s]: [Option<f64>; 2],
 ) -> Result<Modes, AnalysisError> {
-    settings.refuse("free decays", &["force_at", "response_at", "validate_percent"])?;
+    let refused = ["force_at", "response_at", "validate_percent", "real_shapes", "reciprocal"];
+    settings.refuse("free decays", &refused)?;
     check_distinct(measurements)?;
     let how = DecaySettings { from_s, to_s, ..DecaySettings::default() };
     let cut = measurements.iter().map(|measurement| decaying_part(measurement, &how));

@@ -69,8 +69,15 @@ impl Test {
         let Self { recorded, struck_apart, band_hz } = self;
         let named = |error| named(error, &recorded.inputs, &recorded.outputs);
         let data = recorded.lines(band_hz)?;
-        let engine = engine_settings(settings);
-        let estimate = identify_modes(&data, &engine).map_err(named)?;
+        let points = (&recorded.outputs[..], &recorded.driving_points[..]);
+        let (estimate, engine, of_properties) = settings.properties.imposed(
+            settings,
+            points,
+            engine_settings(settings),
+            |engine| identify_modes(&data, engine).map_err(named),
+            |estimate| estimate,
+        )?;
+        checks.extend(of_properties);
         let halves = Halves::new(&recorded, band_hz, &estimate, &engine);
         let estimate = estimate.with_error_scales(&halves.error_scales)?;
         checks.extend(halves.check);
@@ -78,7 +85,7 @@ impl Test {
         checks.extend(apart.and_then(|apart| checks::one_point_check(&apart, &estimate, &engine)));
         let predicted = match settings.validate {
             0.0 => None,
-            share => Some(predicted(&recorded, band_hz, share, settings)?),
+            share => Some(predicted(&recorded, band_hz, share, &engine)?),
         };
         let Recorded { inputs, outputs, driving_points, hits, .. } = recorded;
         let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
@@ -108,13 +115,18 @@ pub(super) fn modes_of_tables(
     settings: &ModesSettings,
 ) -> Result<Modes, AnalysisError> {
     let outputs = tables.outputs();
-    let fit =
-        Sharpened::new(tables, band_hz, &engine_settings(settings)).map_err(
-            |error| match error {
-                AnalysisError::Modal(error) => named(error, &tables.forces, &outputs),
-                other => other,
-            },
-        )?;
+    let driving_points = tables.driving_points();
+    let named = |error| match error {
+        AnalysisError::Modal(error) => named(error, &tables.forces, &outputs),
+        other => other,
+    };
+    let (fit, _, of_properties) = settings.properties.imposed(
+        settings,
+        (&outputs, &driving_points),
+        engine_settings(settings),
+        |engine| Sharpened::new(tables, band_hz, engine).map_err(named),
+        |fit| &fit.estimate,
+    )?;
     let Sharpened { data, estimate, settled } = fit;
     let scatter = if tables.is_smoothed() {
         estimate.scatter_along_shapes(&data)?
@@ -145,14 +157,15 @@ pub(super) fn modes_of_tables(
     }
     let remarks = tables.with_segments().flat_map(|(table, _)| table.remarks.iter().cloned());
     notes.extend(remarks);
+    let of_tables = checks::table_checks(tables, band_hz, &modes, settled);
     let context = Context {
         records: tables.with_segments().map(|(table, _)| RecordRow::from_table(table)).collect(),
         hits: Vec::new(),
         inputs: tables.forces.clone(),
-        driving_points: tables.driving_points(),
+        driving_points,
         outputs,
         band_hz,
-        checks: checks::table_checks(tables, band_hz, &modes, settled),
+        checks: of_tables.into_iter().chain(of_properties).collect(),
         notes,
         predicted: None,
         is_table: true,
@@ -219,10 +232,10 @@ fn predicted(
     recorded: &Recorded,
     band_hz: [f64; 2],
     share: f64,
-    settings: &ModesSettings,
+    engine: &ModalSettings,
 ) -> Result<Vec<f64>, AnalysisError> {
     let beginning = recorded.between(0.0, 1.0 - share)?;
-    let fitted = identify_modes(&beginning.lines(band_hz)?, &engine_settings(settings))?;
+    let fitted = identify_modes(&beginning.lines(band_hz)?, engine)?;
     let end = recorded.between(1.0 - share, 1.0)?.lines(band_hz)?;
     let model = fitted.synthesis(&end)?;
     Ok(explained(end.outputs(), &model))
@@ -240,6 +253,7 @@ impl Context {
             &self.outputs,
             &self.driving_points,
             estimate.delays(),
+            settings.properties.reciprocal,
         ));
         // The masses are those of the fitted modes, with the decay of an exponential window.
         let mass = |at| modal_mass(&estimate, at, &self.outputs, &self.driving_points);

@@ -12,6 +12,7 @@ mod halves;
 mod initial_motion;
 mod mode_set;
 mod prediction;
+mod properties;
 pub(crate) mod resonances;
 mod rows;
 mod saved;
@@ -34,6 +35,7 @@ pub use self::diagrams::{Diagrams, ModeIndicator, StabilisationRows};
 use self::forced::Test;
 pub use self::mode_set::ModeSet;
 pub use self::prediction::predict_with_modes;
+pub use self::properties::Properties;
 pub use self::saved::{
     SavedBackbone, SavedCandidate, SavedCheck, SavedMode, SavedModes, SavedRecord, SavedResponse,
 };

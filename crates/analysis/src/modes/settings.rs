@@ -4,6 +4,7 @@ use mechid_model::ResponseQuantity;
 use mechid_signal::HitRule;
 use serde::{Deserialize, Serialize};
 
+use super::properties::Properties;
 use crate::AnalysisError;
 use crate::limits::MOST_VALIDATED;
 use crate::measurement::Channels;
@@ -29,6 +30,9 @@ pub struct ModesSettings {
     /// Points of the forces (one per record for a roving hammer) and of the responses, which define
     /// the driving points; empty: not stated.
     pub places: Places,
+    /// Known properties of the structure; none by default.
+    #[serde(skip_serializing_if = "Properties::is_empty")]
+    pub properties: Properties,
     /// Share of each record, from 0 to 0.8, at its end, that a second fit excludes and predicts; 0
     /// for no such validation.
     pub validate: f64,
@@ -126,6 +130,8 @@ impl ModesSettings {
             ("force_at", !self.places.forces.is_empty()),
             ("response_at", !self.places.responses.is_empty()),
             ("validate_percent", self.validate > 0.0),
+            ("real_shapes", self.properties.real_shapes),
+            ("reciprocal", self.properties.reciprocal),
         ];
         match given.into_iter().find(|(name, given)| *given && names.contains(name)) {
             Some((name, _)) => Err(self.refused(name, format!("it does not apply to {what}"))),

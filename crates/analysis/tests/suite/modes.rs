@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mechid_analysis::modes::{ModalCheck, ModalModeRow, ModalTest};
+use mechid_analysis::modes::{ModalCheck, ModalModeRow, ModalTest, Properties};
 use mechid_analysis::{
     Channels, HitRule, Measurement, ModeSet, Modes, ModesSettings, SavedAnalysis, compare_modes,
     modes_of_responses,
@@ -293,6 +293,67 @@ fn right_tables_rarely_fail_the_tests() {
         let named: Vec<_> = failed(&found).into_iter().map(|check| &check.text).collect();
         assert!(named.is_empty(), "{seed}: {named:?}");
     }
+}
+
+/// Returns the modes of a table with the properties imposed.
+fn with_properties(table: &FrequencyResponses) -> Modes {
+    let properties = Properties { real_shapes: true, reciprocal: true };
+    let settings = ModesSettings { properties, ..ModesSettings::default() };
+    modes_of_responses(std::slice::from_ref(table), &settings).unwrap()
+}
+
+/// Reference: the masses of [`SHAPES`], whose damping is proportional. On right tables both
+/// properties agree, the intervals of the masses hold, and the errors are smaller; a phase of one
+/// sensor contradicts real shapes, a wrong gain reciprocity, and neither is imposed then.
+#[test]
+fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them() {
+    let noisy = |seed: u64, change: &dyn Fn(usize) -> C| {
+        let mut table = table(Acceleration, 0.1, 0.2, seed, |omega| {
+            let s = C::new(0.0, omega);
+            receptance(s, [1.0; 3]) * (s * s)
+        });
+        for (at, function) in table.functions.iter_mut().enumerate() {
+            function.values.iter_mut().for_each(|value| *value *= change(at % 4));
+        }
+        table
+    };
+    let (mut failed_checks, mut inside, mut ratios) = (0, 0, Vec::new());
+    for seed in 0..20 {
+        let table = noisy(seed, &|_| C::from(1.0));
+        let (free, imposed) = (modes(&table), with_properties(&table));
+        failed_checks += ["real_shapes", "reciprocity"]
+            .into_iter()
+            .filter(|code| !check(&imposed, code).passed)
+            .count();
+        let rows = free.summary().modes.iter().zip(&imposed.summary().modes);
+        for ((free, imposed), shape) in rows.zip(SHAPES) {
+            let largest = shape.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+            let [before, error] = [free, imposed].map(|row| row.modal_mass_standard_error.unwrap());
+            let mass = imposed.modal_mass.unwrap();
+            inside += usize::from((mass - 1.0 / (largest * largest)).abs() < 1.96 * error);
+            ratios.push(error / before);
+        }
+    }
+    assert!(failed_checks <= 1, "{failed_checks} of 40");
+    // Three standard deviations of the share of 60.
+    assert!(inside >= 52, "{inside} of 60");
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    assert!(mean < 0.95 && ratios.iter().all(|ratio| *ratio < 1.02), "{mean}, {ratios:?}");
+
+    let table = noisy(30, &|point| C::from_polar(1.0, if point == 1 { 0.1 } else { 0.0 }));
+    let phased = with_properties(&table);
+    assert!(!check(&phased, "real_shapes").passed && check(&phased, "reciprocity").passed);
+    let table = noisy(31, &|point| C::from(if point == 3 { 1.1 } else { 1.0 }));
+    let wrong_gain = with_properties(&table);
+    assert!(check(&wrong_gain, "real_shapes").passed && !check(&wrong_gain, "reciprocity").passed);
+    let settings = ModesSettings {
+        properties: Properties { reciprocal: true, ..Properties::default() },
+        ..ModesSettings::default()
+    };
+    let mut table = noisy(32, &|_| C::from(1.0));
+    table.functions.truncate(4);
+    let error = modes_of_responses(&[table], &settings).unwrap_err().to_string();
+    assert!(error.contains("`reciprocal`") && error.contains("there are 1"), "{error}");
 }
 
 #[test]

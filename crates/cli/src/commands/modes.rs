@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use mechid::analysis::identify::Band;
 use mechid::analysis::modal::ShapedMode;
-use mechid::analysis::modes::{ModalTest, ModesSettings, Places, SavedModes};
+use mechid::analysis::modes::{ModalTest, ModesSettings, Places, Properties, SavedModes};
 use mechid::analysis::{AnalysisError, Machine, ModalSummary, ResponseQuantity};
 use mechid::integrate::ModeSearch;
 use mechid::io::{FrequencyResponses, IoError, input_name, read_sparse_system};
@@ -91,6 +91,14 @@ pub struct ModesArgs {
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
+    /// Impose real shapes: damping is proportional, so that all points of a mode move in phase or in
+    /// opposite phase. Modes that contradict it are named, and it is then not imposed
+    #[arg(long)]
+    real_shapes: bool,
+    /// Impose reciprocity: between two points with force and response, the response is the same in
+    /// both directions. Modes that contradict it are named, and it is then not imposed
+    #[arg(long)]
+    reciprocal: bool,
     /// Fit once more without this percentage at the end of each record, and predict the excluded
     /// part
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
@@ -323,6 +331,8 @@ impl ModesArgs {
             ("force_at", !self.force_at.is_empty()),
             ("response_at", !self.response_at.is_empty()),
             ("validate_percent", self.validate_percent.is_some()),
+            ("real_shapes", self.real_shapes),
+            ("reciprocal", self.reciprocal),
             ("validate", self.validate.is_some()),
             ("hits", self.hits.rule().is_some()),
             ("ambient", self.unmeasured.ambient),
@@ -400,6 +410,7 @@ impl ModesArgs {
             max_modes: self.max_modes,
             near_hz: self.near_hz.clone(),
             quantity: self.quantity,
+            properties: Properties { real_shapes: self.real_shapes, reciprocal: self.reciprocal },
             places: Places { forces: self.force_at.clone(), responses: self.response_at.clone() },
             validate: self.validate_percent.unwrap_or(0.0) / 100.0,
         }

@@ -73,6 +73,38 @@ fn a_hammer_that_roves_gives_the_shapes() {
     }
 }
 
+/// Reference: the machine behind the examples, which has proportional damping and is reciprocal.
+/// The hits on one point are in one half of the records: a half lacks one of the forces.
+#[test]
+fn known_properties_are_imposed() {
+    let folder = examples();
+    let arguments = "hammer-1.csv hammer-2.csv --force force --force-at 1,2 --acceleration a1,a2 \
+                     --response-at 1,2 --hits --band-hz 2:100";
+    let free = modes(folder.path(), arguments);
+    let imposed = modes(folder.path(), &format!("{arguments} --real-shapes --reciprocal"));
+    are_those_of_the_machine(&imposed);
+    let checks = imposed["checks"].as_array().unwrap();
+    for code in ["real_shapes", "reciprocity"] {
+        let of_code: Vec<&Value> = checks.iter().filter(|check| check["code"] == code).collect();
+        assert!(of_code.len() == 1 && of_code[0]["passed"] == true, "{of_code:?}");
+    }
+    let error = |report: &Value, mode: usize| {
+        report["modes"][mode]["modal_mass_standard_error"].as_f64().unwrap()
+    };
+    for mode in 0..2 {
+        assert!(error(&imposed, mode) < error(&free, mode), "{mode}");
+        // A real shape per force has two phases.
+        let shape = &imposed["modes"][mode]["shape"];
+        let part = |entry: usize| {
+            let value = &shape[entry]["value"];
+            value[1].as_f64().unwrap() / value[0].as_f64().unwrap()
+        };
+        assert!((part(0) - part(1)).abs() < 1e-9, "{shape}");
+    }
+    let settings = imposed["analysis"]["properties"].clone();
+    assert_eq!(settings, serde_json::json!({ "real_shapes": true, "reciprocal": true }));
+}
+
 #[test]
 fn what_means_nothing_is_refused() {
     let folder = examples();
@@ -83,6 +115,14 @@ fn what_means_nothing_is_refused() {
             "--force-at: it does not apply to a free decay",
         ),
         ("hammer-1.csv --force force --acceleration a1 --band-hz 300:400", "no spectral line"),
+        (
+            "hammer-1.csv --force force --acceleration a1,a2 --reciprocal",
+            "--reciprocal: it needs at least two driving points",
+        ),
+        (
+            "decay.csv --displacement displacement --real-shapes",
+            "it does not apply to a free decay",
+        ),
         (
             "hammer-1.csv --force force --force-at 1,2 --acceleration a1",
             "2 places for 1 force column",

@@ -6,15 +6,15 @@ use mechid_model::ResponseQuantity;
 use super::{NonlinearFit, SteppedRecord, Weights, search};
 use crate::estimate::NonlinearEstimate;
 
-/// Returns the [`output_error`] with the smallest residual from several initial estimates:
+/// Returns the output-error fit with the smallest residual from several initial estimates:
 /// constants inside the laws, such as a clearance, cause several minima.
 ///
 /// # Errors
-/// As [`output_error`] from the first initial estimate if none leads to a minimum, and
-/// [`EstimateError::NotConverged`] without an initial estimate.
+/// As [`output_error`](super::output_error()) from the first initial estimate if none leads to a
+/// minimum, and [`EstimateError::NotConverged`] without an initial estimate.
 ///
 /// # Source
-/// As [`output_error`].
+/// As [`output_error`](super::output_error()).
 pub fn best_output_error(
     records: &[SteppedRecord],
     measured: ResponseQuantity,

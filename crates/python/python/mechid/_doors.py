@@ -717,6 +717,8 @@ def modes(
     decay: bool = False,
     without_hz: Sequence[float] = (),
     without_harmonics: bool = False,
+    real_shapes: bool = False,
+    reciprocal: bool = False,
     validate: float = 0.0,
     quantity: Literal["displacement", "velocity", "acceleration"] | None = None,
     diagrams: bool = False,
@@ -753,6 +755,12 @@ def modes(
         Frequencies of nearby machines in an ambient record, in Hz, whose lines are excluded.
     without_harmonics : bool
         Whether the lines of the harmonics that are found in an ambient record are excluded, too.
+    real_shapes : bool
+        Whether damping is proportional, so that all points of a mode move in phase or in opposite
+        phase. It is imposed unless the modes contradict it.
+    reciprocal : bool
+        Whether the response between two points with force and response is the same in both
+        directions. It is imposed unless the modes contradict it.
     validate : float
         Share at the end of each record that a second fit excludes and predicts. Default: no such
         validation.
@@ -803,6 +811,7 @@ def modes(
                 "forces": [str(place) for place in force_at],
                 "responses": [str(place) for place in response_at],
             },
+            "properties": {"real_shapes": bool(real_shapes), "reciprocal": bool(reciprocal)},
             "validate": float(validate),
         }
     given = [table._inner for table in tables]

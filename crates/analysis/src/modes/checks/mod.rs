@@ -16,7 +16,7 @@ pub(super) use self::force_peak::force_peak_check;
 pub(super) use self::idle::response_checks;
 pub(super) use self::one_point::one_point_check;
 pub(super) use self::table::table_checks;
-use self::tested::Tested;
+pub(super) use self::tested::{Tested, adjusted};
 use super::sources::Output;
 use super::summary::{ModalCheck, ModalModeRow};
 use crate::AnalysisError;
@@ -96,14 +96,15 @@ fn share_checks(
 }
 
 /// Returns the checks of the modes: unexcited inputs, modal masses and delays at driving points,
-/// and reciprocity between driving points. Outputs with a delay in the model are not tested for
-/// one.
+/// and reciprocity between driving points unless it is imposed. Outputs with a delay in the model
+/// are not tested for one.
 pub(super) fn mode_checks(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
     driving_points: &[(usize, usize)],
     delays: &[OutputDelay],
+    is_reciprocal: bool,
 ) -> Vec<ModalCheck> {
     let mut rows = idle::force_checks(modes, inputs);
     let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, driving_points);
@@ -111,7 +112,9 @@ pub(super) fn mode_checks(
     let others: Vec<_> =
         driving_points.iter().copied().filter(|(_, output)| !has_delay(*output)).collect();
     tests.extend(delay::tests(modes, inputs, outputs, &others));
-    tests.extend(reciprocity::tests(modes, inputs, outputs, driving_points));
-    rows.extend(tested::adjusted(tests));
+    if !is_reciprocal {
+        tests.extend(reciprocity::tests(modes, inputs, outputs, driving_points));
+    }
+    rows.extend(adjusted(tests));
     rows
 }

@@ -5,7 +5,7 @@ use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
 /// Test of a property of modes that every structure with constant M, C and K has.
-pub(super) struct Tested {
+pub struct Tested {
     /// Name of the check, in snake case.
     pub code: &'static str,
     /// Probability of a larger statistic due to the errors of the modes alone.
@@ -20,7 +20,7 @@ pub(super) struct Tested {
 ///
 /// # Source
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
-pub(super) fn adjusted(mut tests: Vec<Tested>) -> Vec<ModalCheck> {
+pub fn adjusted(mut tests: Vec<Tested>) -> Vec<ModalCheck> {
     let mut order: Vec<usize> = (0..tests.len()).collect();
     order.sort_by(|a, b| tests[*a].p_value.total_cmp(&tests[*b].p_value));
     let mut least = 0.0_f64;
