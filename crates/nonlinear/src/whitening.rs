@@ -17,7 +17,7 @@
 //! on state and output).
 
 use mechid_numerics::nelder_mead;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix, RawStorage};
 
 use super::propagation::Propagation;
 use crate::limits::{NOISE_ROUNDS, NOISE_SETTLED, NOISE_SPAN, NOISE_STEP};
@@ -39,8 +39,11 @@ struct NoiseStep {
 
 /// Filter that makes the residual of one record white.
 pub(super) struct Filter {
-    /// Gain and inverse of the triangular factor of the innovation's covariance, at each sample.
-    gains: Vec<[DMatrix<f64>; 2]>,
+    /// Gains of all samples side by side, 2n × n each.
+    gains: DMatrix<f64>,
+    /// Inverses of the triangular factors of the covariances of the innovations of all samples side
+    /// by side, n × n each.
+    inverses: DMatrix<f64>,
     /// Sum of the logarithms of the determinants of the covariances.
     log_determinant: f64,
 }
@@ -70,26 +73,51 @@ impl NoisePath {
 
     /// Returns the filter for these variances; `None` if a covariance is singular or not finite.
     pub(super) fn filter(&self, variances: &NoiseVariances) -> Option<Filter> {
-        let n = self.channels();
-        let [of_force, of_response] =
-            [&variances.force, &variances.response].map(DMatrix::from_diagonal);
-        let mut spread = DMatrix::zeros(2 * n, 2 * n);
-        let mut filter = Filter { gains: Vec::with_capacity(self.0.len()), log_determinant: 0.0 };
-        for NoiseStep { state, input, output, direct } in &self.0 {
-            let seen = &spread * output.transpose();
-            let direct_noise = direct * &of_force;
-            let covariance: DMatrix<f64> =
-                output * &seen + &direct_noise * direct.transpose() + &of_response;
+        let (n, samples) = (self.channels(), self.0.len());
+        let mut filter = Filter {
+            gains: DMatrix::zeros(2 * n, n * samples),
+            inverses: DMatrix::zeros(n, n * samples),
+            log_determinant: 0.0,
+        };
+        let zeros = DMatrix::zeros;
+        let (mut seen, mut cross) = (zeros(2 * n, n), zeros(2 * n, n));
+        let (mut pushed, mut at_once) = (zeros(2 * n, n), zeros(n, n));
+        let (mut covariance, mut gain) = (zeros(n, n), zeros(2 * n, n));
+        let (mut spread, mut next) = (zeros(2 * n, 2 * n), zeros(2 * n, 2 * n));
+        for (sample, NoiseStep { state, input, output, direct }) in self.0.iter().enumerate() {
+            // G and H times the standard deviations of the force noise.
+            pushed.copy_from(input);
+            at_once.copy_from(direct);
+            for (force, variance) in variances.force.iter().enumerate() {
+                pushed.column_mut(force).scale_mut(variance.sqrt());
+                at_once.column_mut(force).scale_mut(variance.sqrt());
+            }
+            seen.fill(0.0);
+            add_product(&mut seen, 1.0, &spread, output);
+            covariance.gemm(1.0, output, &seen, 0.0);
+            add_product(&mut covariance, 1.0, &at_once, &at_once);
+            for (channel, variance) in variances.response.iter().enumerate() {
+                covariance[(channel, channel)] += variance;
+            }
             let factor = covariance.cholesky()?;
-            let cross: DMatrix<f64> = state * seen + input * direct_noise.transpose();
-            let gain = factor.solve(&cross.transpose()).transpose();
-            spread = state * spread * state.transpose() + input * &of_force * input.transpose()
-                - &gain * cross.transpose();
-            // Rounding makes the matrix slightly asymmetric.
-            spread = (&spread + spread.transpose()) * 0.5;
-            let inverse = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+            let mut inverse = filter.inverses.columns_mut(sample * n, n);
+            inverse.fill_with_identity();
+            factor.l_dirty().solve_lower_triangular_mut(&mut inverse);
             filter.log_determinant -= 2.0 * inverse.diagonal().map(f64::ln).sum();
-            filter.gains.push([gain, inverse]);
+            covariance = factor.unpack_dirty();
+            cross.gemm(1.0, state, &seen, 0.0);
+            add_product(&mut cross, 1.0, &pushed, &at_once);
+            // K = (cross L⁻ᵀ) L⁻¹.
+            let inverse = filter.inverses.columns(sample * n, n);
+            seen.fill(0.0);
+            add_product(&mut seen, 1.0, &cross, &inverse);
+            gain.gemm(1.0, &seen, &inverse, 0.0);
+            filter.gains.columns_mut(sample * n, n).copy_from(&gain);
+            next.gemm(1.0, state, &spread, 0.0);
+            spread.fill(0.0);
+            add_product(&mut spread, 1.0, &next, state);
+            add_product(&mut spread, 1.0, &pushed, &pushed);
+            add_product(&mut spread, -1.0, &seen, &seen);
         }
         filter.log_determinant.is_finite().then_some(filter)
     }
@@ -114,19 +142,33 @@ impl NoisePath {
         let n = values.ncols();
         let (mut state, mut next) = (DVector::zeros(2 * n), DVector::zeros(2 * n));
         let (mut innovation, mut white) = (DVector::zeros(n), DVector::zeros(n));
-        for (sample, (step, [gain, inverse])) in self.0.iter().zip(&filter.gains).enumerate() {
+        for (sample, step) in self.0.iter().enumerate() {
+            let gain = filter.gains.columns(sample * n, n);
+            let inverse = filter.inverses.columns(sample * n, n);
             for channel in 0..n {
                 innovation[channel] = values[(sample, channel)];
             }
             innovation.gemv(-1.0, &step.output, &state, 1.0);
-            white.gemv(1.0, inverse, &innovation, 0.0);
+            white.gemv(1.0, &inverse, &innovation, 0.0);
             next.gemv(1.0, &step.state, &state, 0.0);
-            next.gemv(1.0, gain, &innovation, 1.0);
+            next.gemv(1.0, &gain, &innovation, 1.0);
             std::mem::swap(&mut state, &mut next);
             for channel in 0..n {
                 values[(sample, channel)] = white[channel];
             }
         }
+    }
+}
+
+/// Adds `factor` A Bᵀ to a matrix, without an allocation.
+fn add_product(
+    to: &mut DMatrix<f64>,
+    factor: f64,
+    a: &DMatrix<f64>,
+    b: &Matrix<f64, Dyn, Dyn, impl RawStorage<f64, Dyn, Dyn>>,
+) {
+    for (a, b) in a.column_iter().zip(b.column_iter()) {
+        to.ger(factor, &a, &b, 1.0);
     }
 }
 

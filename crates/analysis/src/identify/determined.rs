@@ -93,9 +93,9 @@ pub(super) fn check_nonlinear(fit: &NonlinearEstimate) -> Result<(), AnalysisErr
         let (value, error) = (significant(value, 3), significant(standard_error, 2));
         format!("{} = {value} ± {error} {}", parameter.name, parameter.unit)
     };
-    let all: Vec<String> = fit.parameters().iter().map(named).collect();
-    let all = message::list(&all, ", ", NAMED);
-    let why = format!("the intervals of all parameters ({all}) contain zero");
+    let parameters: Vec<String> = fit.parameters().iter().map(named).collect();
+    let parameters = message::list(&parameters, ", ", NAMED);
+    let why = format!("the intervals of all parameters ({parameters}) contain zero");
     Err(AnalysisError::NothingDetermined { why })
 }
 

@@ -30,7 +30,7 @@ impl FurtherTerms {
     /// criterion falls and their coefficients differ from zero; `None` if there are no such terms,
     /// or if a fit with them fails. The fit with them uses the estimator of `fit` or, if it fails,
     /// least squares on the equation of motion with and without them.
-    pub(super) fn of_periods(
+    pub(super) fn from_periods(
         data: &SteadyExperiments,
         unknowns: &Unknowns,
         how: &Nonlinear,
@@ -56,8 +56,8 @@ impl FurtherTerms {
     }
 
     /// Adds terms of the usual kinds to a fit of open records as
-    /// [`FurtherTerms::of_periods`] does, by output error.
-    pub(super) fn of_open_records(
+    /// [`FurtherTerms::from_periods`] does, by output error.
+    pub(super) fn from_open_records(
         records: &[SteppedRecord],
         measured: ResponseQuantity,
         fit: &NonlinearFit,

@@ -179,7 +179,7 @@ fn fitted(
         None => Vec::new(),
     };
     let misfit = estimated.misfit();
-    let further = FurtherTerms::of_periods(&data, unknowns, how, &stepped, &estimated);
+    let further = FurtherTerms::from_periods(&data, unknowns, how, &stepped, &estimated);
     let (omitted, squared_change) =
         further.map(|further| (further.finding, further.squared_change)).unzip();
     // Several periods show their noise, with which the misfit compares the residual.

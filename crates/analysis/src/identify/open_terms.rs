@@ -55,7 +55,7 @@ pub(super) fn fit(
         .collect();
     let kind = records[0].held.response().1;
     let fit = output_error_of_open_records(&stepped, kind, &linear.estimate, terms)?;
-    let further = FurtherTerms::of_open_records(&stepped, kind, &fit);
+    let further = FurtherTerms::from_open_records(&stepped, kind, &fit);
     let (omitted, squared_change) =
         further.map(|further| (further.finding, further.squared_change)).unzip();
     let residuals = white_residuals(records, &fit.residuals);

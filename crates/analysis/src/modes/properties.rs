@@ -81,8 +81,8 @@ impl Properties {
         if checks.iter().all(|check| check.passed) {
             return Ok((fitted, engine, checks));
         }
-        let kept = engine.constraints.iter().zip(&checks).filter(|(_, check)| check.passed);
-        let constraints = kept.map(|(constraint, _)| constraint.clone()).collect();
+        let agreeing = engine.constraints.iter().zip(&checks).filter(|(_, check)| check.passed);
+        let constraints = agreeing.map(|(constraint, _)| constraint.clone()).collect();
         let engine = ModalSettings { constraints, ..engine };
         Ok((fit(&engine)?, engine, checks))
     }

@@ -447,10 +447,10 @@ fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
 fn a_window_without_a_period_is_an_open_record() {
     let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
     for seed in 0..6 {
-        let found = identify(&[random_motion(3e7, seed)], &how).unwrap();
-        assert!(!found.checks().iter().any(|check| check.is_conspicuous()), "{seed}: {found}");
+        let fit = identify(&[random_motion(3e7, seed)], &how).unwrap();
+        assert!(!fit.checks().iter().any(|check| check.is_conspicuous()), "{seed}: {fit}");
         for (name, truth) in [("m", 10.0), ("c", 40.0), ("k", 5000.0), ("k3", 3e7)] {
-            let got = found.nonlinear().unwrap().parameter(name).unwrap().estimate;
+            let got = fit.nonlinear().unwrap().parameter(name).unwrap().estimate;
             assert!(
                 (got.value - truth).abs() < 4.0 * got.standard_error,
                 "{seed}, {name}: {got:?}"
@@ -479,8 +479,8 @@ fn a_nonlinear_fit_that_explains_nothing_is_refused() {
     };
     for seed in 0..4 {
         let noise = test_of(&record(seed, 10.0), &record(seed + 10, 1e-3));
-        let found = identify(&[noise], &open("k3: x1^3".parse().unwrap()));
-        let error = found.map(|found| found.to_string()).unwrap_err();
+        let fit = identify(&[noise], &open("k3: x1^3".parse().unwrap()));
+        let error = fit.map(|fit| fit.to_string()).unwrap_err();
         assert!(!matches!(error, AnalysisError::Setting { .. }), "{error}");
     }
     let lines =
@@ -591,27 +591,27 @@ fn intervals_of_a_model_that_lacks_a_term_hold() {
     let of_sweep = |terms: &str| open(terms.parse().unwrap());
     let wrong = |test: &dyn Fn(u64) -> Measurement, how: &Identify| {
         for seed in 0..6 {
-            let found = identify(&[test(seed)], how).unwrap();
+            let fit = identify(&[test(seed)], how).unwrap();
             let is_named = |check: &&CheckRow| {
                 check.is_conspicuous() && matches!(check.finding, Finding::NonlinearTermsLeftOut(_))
             };
-            assert!(found.checks().iter().any(|check| is_named(&check)), "{seed}: {found}");
+            assert!(fit.checks().iter().any(|check| is_named(&check)), "{seed}: {fit}");
             for (name, truth) in [("m", 10.0), ("c", 40.0), ("k", 5000.0)] {
-                let estimate = found.nonlinear().unwrap().parameter(name).unwrap().estimate;
+                let estimate = fit.nonlinear().unwrap().parameter(name).unwrap().estimate;
                 let [low, high] = estimate.interval(0.95).unwrap();
                 assert!(low <= truth && truth <= high, "{seed}, {name}: {estimate:?}");
-                let linear = found.estimate().parameter(name).unwrap();
+                let linear = fit.estimate().parameter(name).unwrap();
                 assert_eq!(linear.standard_error, estimate.standard_error, "{name}");
             }
-            assert!(found.to_string().contains("include the effect of the omitted term"));
+            assert!(fit.to_string().contains("include the effect of the omitted term"));
         }
     };
     wrong(&periods, &of_periods("k3: x1^3"));
     wrong(&|seed| sweep(friction, seed), &of_sweep("k3: x1^3"));
     wrong(&|seed| sweep(drag, seed), &of_sweep("k3: x1^3"));
     let warns = |test: Measurement, how: &Identify| {
-        let found = identify(&[test], how).unwrap();
-        usize::from(found.checks().iter().any(|check| check.is_conspicuous()))
+        let fit = identify(&[test], how).unwrap();
+        usize::from(fit.checks().iter().any(|check| check.is_conspicuous()))
     };
     let (of_periods, of_sweep) = (of_periods("k2: x1^2, k3: x1^3"), of_sweep("k3: x1^3"));
     let right = (0..30)

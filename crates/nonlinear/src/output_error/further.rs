@@ -89,9 +89,9 @@ impl<'a> Linearised<'a> {
         let candidates = candidates(records, measured, fit)?;
         let terms = Terms::new(estimate.terms.iter().chain(candidates.iter()).cloned().collect())?;
         let coefficients = [&estimate.coefficients[..], &vec![0.0; candidates.len()]].concat();
-        let all = NonlinearEstimate { terms, coefficients, ..estimate.clone() };
-        let system = all.system()?;
-        let mut problem = Problem::new(records, measured, &all, &system)?;
+        let larger = NonlinearEstimate { terms, coefficients, ..estimate.clone() };
+        let system = larger.system()?;
+        let mut problem = Problem::new(records, measured, &larger, &system)?;
         problem.levels = fit.rmse.iter().map(|e| if *e > 0.0 { *e } else { 1.0 }).collect();
         let theta = problem.parameters_at(fit, &system);
         let (samples, count) = (problem.len(), theta.len());
@@ -180,8 +180,8 @@ impl<'a> Linearised<'a> {
         let pairs = estimate.coefficients.iter().zip(change.iter().skip(free));
         let moved = pairs.map(|(coefficient, by)| coefficient + by);
         let added = change.iter().skip(self.parameters);
-        let all: Vec<&Term> = self.candidates.iter().collect();
-        let terms = estimate.terms.iter().chain(chosen.iter().map(|at| all[*at])).cloned();
+        let candidates: Vec<&Term> = self.candidates.iter().collect();
+        let terms = estimate.terms.iter().chain(chosen.iter().map(|at| candidates[*at])).cloned();
         Ok(NonlinearEstimate {
             linear,
             terms: Terms::new(terms.collect())?,

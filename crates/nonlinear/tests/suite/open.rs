@@ -55,14 +55,14 @@ fn fitted(record: &SteppedRecord) -> NonlinearFit {
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn intervals_of_open_records_hold_with_noise_on_the_force() {
     let runs = runs(60);
-    let found: Vec<_> =
+    let fits: Vec<_> =
         (0..runs).into_par_iter().map(|seed| fitted(&from_rest(|_, _| 0.0, seed))).collect();
     let by_noise =
-        found.iter().filter(|fit| fit.estimate.standard_errors() == StandardErrors::Noise).count();
+        fits.iter().filter(|fit| fit.estimate.standard_errors() == StandardErrors::Noise).count();
     // The test for white noise fails in one of a hundred records.
     assert!(by_noise as f64 >= 0.95 * runs as f64, "{by_noise} of {runs}");
-    let found: Vec<_> = found.into_iter().map(|fit| fit.estimate).collect();
-    let judged = judge(&found, &TRUTH);
+    let fits: Vec<_> = fits.into_iter().map(|fit| fit.estimate).collect();
+    let judged = judge(&fits, &TRUTH);
     eprintln!("{runs} runs: {judged:.3?}");
     assert_honest(&judged, runs);
 }
