@@ -165,7 +165,7 @@ pub fn least_certain(
 }
 
 /// Returns the terms without one.
-pub(super) fn without(terms: &Terms, name: &str) -> Result<Terms, EstimateError> {
+fn without(terms: &Terms, name: &str) -> Result<Terms, EstimateError> {
     let mut remaining = terms.iter().filter(|term| term.name() != name).cloned();
     Ok(remaining.try_fold(Terms::none(), |remaining, term| remaining.and(term))?)
 }

@@ -41,7 +41,9 @@ impl FurtherTerms {
         let with_terms = |stepped: &[SteppedRecord], fit: &NonlinearEstimate| {
             let larger = with_terms(data, unknowns, how, stepped, fit, &candidates)?;
             Ok(larger.and_then(|(larger, explained)| {
-                Self::new(fit, &larger, explained, candidates.len())
+                let further = larger.terms().iter().skip(fit.terms().len());
+                let p_value = least_p_value(&larger, further.map(Term::name)).ok()?;
+                Self::new(fit, &larger, explained, (candidates.len() as f64 * p_value).min(1.0))
             }))
         };
         let with_equation_error = |_: AnalysisError| {
@@ -63,20 +65,19 @@ impl FurtherTerms {
         fit: &NonlinearFit,
     ) -> Option<Self> {
         let further = further_output_error(records, measured, fit).ok().flatten()?;
-        let FurtherFit { fit: larger, explained, candidates } = further;
-        Self::new(&fit.estimate, &larger.estimate, explained, candidates)
+        let FurtherFit { fit: larger, explained, p_value } = further;
+        Self::new(&fit.estimate, &larger.estimate, explained, p_value)
     }
 
-    /// Compares a fit with a larger one, whose last terms are the further ones, chosen from a
-    /// number of candidates; `None` if it has no more.
+    /// Compares a fit with a larger one, whose last terms are the further ones; `None` if it has no
+    /// more. Noise alone makes further terms as certain with the probability `p_value`.
     fn new(
         fit: &NonlinearEstimate,
         larger: &NonlinearEstimate,
         explained: f64,
-        candidates: usize,
+        p_value: f64,
     ) -> Option<Self> {
         let further = || larger.terms().iter().skip(fit.terms().len());
-        let p_value = least_p_value(larger, further().map(Term::name)).ok()?;
         let changes = changes(fit, larger).ok().filter(|_| further().len() > 0)?;
         let change = DVector::from_iterator(changes.len(), changes.iter().map(|change| change.by));
         let law = |term: &Term| {
@@ -86,7 +87,7 @@ impl FurtherTerms {
         let finding = Finding::NonlinearTermsLeftOut(NonlinearTermsLeftOut {
             laws: further().map(law).collect(),
             explained,
-            p_value: PValue::new((candidates as f64 * p_value).min(1.0)),
+            p_value: PValue::new(p_value),
             changes,
         });
         Some(Self { finding, squared_change: &change * change.transpose() })

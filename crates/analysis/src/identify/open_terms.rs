@@ -1,7 +1,7 @@
 //! Fits of open records, such as sweeps, with nonlinear terms in addition to M, C and K.
 
 use mechid_checks::{Verdict, steady_periods};
-use mechid_estimate::Unknowns;
+use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_nonlinear::{NonlinearEstimate, SteppedRecord, output_error_of_open_records};
 use mechid_signal::Extent;
@@ -37,6 +37,7 @@ pub(super) fn fit(
     if search.delay || search.phase {
         return refuse("search", "delay and phase of the channels are found from whole periods");
     }
+    terms.check_dof(unknowns.dof()).map_err(EstimateError::from)?;
     let how = open_records::How {
         rule: lines.rule(),
         noise: &OpenNoise::default(),

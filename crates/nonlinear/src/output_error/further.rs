@@ -7,11 +7,11 @@ use mechid_numerics::gauss_newton::Residuals;
 use mechid_numerics::least_squares::solve_compressed;
 use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::{NonlinearFit, Problem, SteppedRecord, output_error};
+use super::{NonlinearFit, Problem, SteppedRecord, Weights, output_error, search};
 use crate::estimate::NonlinearEstimate;
 use crate::kinds::further_terms_up_to;
-use crate::selection::{least_certain, without};
 
 /// Output-error fit with further terms.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,12 +20,13 @@ pub struct FurtherFit {
     pub fit: NonlinearFit,
     /// Fraction of the residual power that the further terms explain.
     pub explained: f64,
-    /// Number of candidates.
-    pub candidates: usize,
+    /// Probability that noise alone makes one of the candidates explain as much as the first of the
+    /// further terms.
+    pub p_value: f64,
 }
 
-/// Adds terms of the usual kinds to an output-error fit, as long as the information criterion falls
-/// and their coefficients differ from zero ([`least_certain`]); `None` if there are no such terms.
+/// Adds terms of the usual kinds to an output-error fit, as long as the information criterion
+/// falls; `None` if there are no such terms.
 ///
 /// The candidates are selected in the fit linearised at its parameters: their forces of no size
 /// change the simulated response by known amounts. The selected terms are then fitted with all
@@ -43,26 +44,14 @@ pub fn further_output_error(
     measured: ResponseQuantity,
     fit: &NonlinearFit,
 ) -> Result<Option<FurtherFit>, EstimateError> {
-    let linearised = Linearised::new(records, measured, fit)?;
-    let Some(mut start) = linearised.start()? else { return Ok(None) };
-    let candidates = &linearised.candidates;
-    loop {
-        let larger = output_error(records, measured, &start)?;
-        let Some(name) = least_certain(&larger.estimate, candidates)? else {
-            let ratios = larger.rmse.iter().zip(&fit.rmse).map(|(after, before)| after / before);
-            let remaining = ratios.map(|r| r * r).sum::<f64>() / fit.rmse.len() as f64;
-            let candidates = candidates.len();
-            return Ok(Some(FurtherFit { fit: larger, explained: 1.0 - remaining, candidates }));
-        };
-        let terms = without(&larger.estimate.terms, &name)?;
-        if terms.len() == fit.estimate.terms.len() {
-            return Ok(None);
-        }
-        let remains = |(term, _): &(&Term, &f64)| term.name() != name;
-        let pairs = larger.estimate.terms.iter().zip(&larger.estimate.coefficients);
-        let coefficients = pairs.filter(remains).map(|(_, coefficient)| *coefficient).collect();
-        start = NonlinearEstimate { terms, coefficients, ..larger.estimate };
-    }
+    // Under its noise, a model that lacks a term leaves a residual that shows the term best.
+    let weighted = search(records, measured, &fit.estimate, Weights::AnyNoise)?;
+    let linearised = Linearised::new(records, measured, &weighted)?;
+    let Some((start, p_value)) = linearised.start()? else { return Ok(None) };
+    let larger = output_error(records, measured, &start)?;
+    let ratios = larger.rmse.iter().zip(&fit.rmse).map(|(after, before)| after / before);
+    let remaining = ratios.map(|ratio| ratio * ratio).sum::<f64>() / fit.rmse.len() as f64;
+    Ok(Some(FurtherFit { fit: larger, explained: 1.0 - remaining, p_value }))
 }
 
 /// A fit with candidates of no size, linearised at its parameters.
@@ -130,13 +119,14 @@ impl<'a> Linearised<'a> {
         Ok((-change, power))
     }
 
-    /// Returns the start of a fit with the candidates that the information criterion adds; `None`
-    /// if it adds none.
+    /// Returns the start of a fit with the candidates that the information criterion adds, and the
+    /// p-value of the first: an F test, times the number of candidates. `None` if it adds none.
     ///
     /// # Source
     /// Chen & Chen (2008), Biometrika 95, 759–771 (extended Bayesian information criterion).
-    fn start(&self) -> Result<Option<NonlinearEstimate>, EstimateError> {
+    fn start(&self) -> Result<Option<(NonlinearEstimate, f64)>, EstimateError> {
         let n = self.samples as f64;
+        let mut p_value = None;
         let price = n.ln() + 2.0 * (self.candidates.len().max(1) as f64).ln();
         let mut chosen: Vec<usize> = Vec::new();
         let (mut change, mut power) = self.with(&chosen)?;
@@ -152,10 +142,15 @@ impl<'a> Linearised<'a> {
             if n * (power / least).ln() <= price {
                 break;
             }
+            let freedom = self.samples.saturating_sub(self.parameters + 1) as f64;
+            let tail = FisherSnedecor::new(1.0, freedom)
+                .map_or(1.0, |law| law.sf((power / least - 1.0) * freedom));
+            p_value = p_value.or(Some((self.candidates.len() as f64 * tail).min(1.0)));
             chosen.push(at);
             (change, power) = (next, least);
         }
-        if chosen.is_empty() { Ok(None) } else { self.moved(&chosen, &change).map(Some) }
+        let Some(p_value) = p_value else { return Ok(None) };
+        Ok(Some((self.moved(&chosen, &change)?, p_value)))
     }
 
     /// Returns the fit with some of the candidates and its parameters moved by a change.

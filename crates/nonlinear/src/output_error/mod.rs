@@ -88,8 +88,10 @@ enum Weights {
     /// One for each channel, by the size of its residual.
     Levels,
     /// The inverse of the noise on force and response that makes the residual most likely, if a
-    /// record has one period.
+    /// record has one period and the residual is consistent with this noise.
     Noise,
+    /// As `Noise`, even if the residual is not consistent with it.
+    AnyNoise,
 }
 
 /// Returns the [`output_error`] with these weights.
@@ -115,12 +117,12 @@ fn search(
     let (first, mut steps) = problem.minimum(theta)?;
     problem.levels = problem.residual_rms();
     problem.noise = match weights {
-        Weights::Noise => problem.noise(&first),
+        Weights::Noise | Weights::AnyNoise => problem.noise(&first),
         Weights::Levels => None,
     };
     if problem.noise.is_some() {
         match problem.minimum(first.clone()) {
-            Ok((theta, more)) if problem.is_white() => {
+            Ok((theta, more)) if weights == Weights::AnyNoise || problem.is_white() => {
                 return problem.finish(&theta, start, steps + more);
             }
             // The residual is not that noise: the fit that leaves the least of it is the best.
