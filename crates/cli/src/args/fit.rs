@@ -60,9 +60,9 @@ pub struct FitArgs {
     #[arg(long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true)]
     force_noise: Vec<f64>,
     /// Extent of the window: open (any part of a response; its transient is estimated with the
-    /// machine) or period (whole periods) [default: period with --period; otherwise period unless a
-    /// transient is found; with nonlinear terms open; in the time domain open, except for spectral
-    /// derivatives]
+    /// machine) or period (whole periods) [default: period with --period; otherwise open for
+    /// nonlinear terms and in the time domain (except for spectral derivatives), and period
+    /// unless a transient is found]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
     /// Assumed force between the samples. For open records, hits and the time domain: held (as by

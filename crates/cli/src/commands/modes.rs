@@ -91,8 +91,8 @@ pub struct ModesArgs {
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
-    /// Impose real shapes: damping is proportional, so that all points of a mode move in phase or in
-    /// opposite phase. Modes that contradict it are named, and it is then not imposed
+    /// Impose real shapes: damping is proportional, so that all points of a mode move in phase or
+    /// in opposite phase. Modes that contradict it are named, and it is then not imposed
     #[arg(long)]
     real_shapes: bool,
     /// Impose reciprocity: between two points with force and response, the response is the same in

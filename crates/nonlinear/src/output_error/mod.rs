@@ -90,7 +90,7 @@ enum Weights {
     /// The inverse of the noise on force and response that makes the residual most likely, if a
     /// record has one period and the residual is consistent with this noise.
     Noise,
-    /// As `Noise`, even if the residual is not consistent with it.
+    /// The same inverse, even if the residual is not consistent with the noise.
     AnyNoise,
 }
 
