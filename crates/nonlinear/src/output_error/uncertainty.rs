@@ -198,8 +198,6 @@ impl Problem<'_> {
         theta: &DVector<f64>,
         inverse: &DMatrix<f64>,
     ) -> (DMatrix<f64>, StandardErrors, usize) {
-        let mut jacobian = DMatrix::zeros(self.len(), theta.len());
-        self.jacobian(&mut jacobian);
         let residuals: Vec<DMatrix<f64>> = (self.records.iter().enumerate())
             .map(|(at, record)| self.weighted(at, self.gaps(at, record)))
             .collect();
@@ -212,6 +210,8 @@ impl Problem<'_> {
         let rate = slowest_decay(self.unknowns, &theta.as_slice()[..self.free.len()]);
         let blocks = |record: &Prepared| block_count(record.response.sampling().duration(), rate);
         if self.records.iter().map(blocks).sum::<usize>() >= FEWEST {
+            let mut jacobian = DMatrix::zeros(self.len(), theta.len());
+            self.jacobian(&mut jacobian);
             let mut scores = BlockScores::new(theta.len());
             let mut first = 0;
             for (at, (record, residual)) in self.records.iter().zip(&residuals).enumerate() {
