@@ -270,6 +270,13 @@ pub enum IoError {
         /// The factor given.
         factor: f64,
     },
+    /// A column has two units, two factors, or both.
+    #[error("{}", Message(format_args!("column {column} has two units or scales that were set: a `unit` or a `scale`, the \
+        factor to SI units, is enough")))]
+    TwoUnits {
+        /// Number and name of the column.
+        column: String,
+    },
     /// A sample is NaN or infinite.
     #[error("{}", Message(format_args!("{file}, {at}, column {column}: {value} is not a finite number", value = message::number(*value))))]
     NotFinite {

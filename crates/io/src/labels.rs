@@ -22,9 +22,13 @@ pub(crate) fn states_unit(name: &str) -> bool {
     let letters: String = name.chars().filter(|c| c.is_alphabetic()).collect();
     let letters = letters.to_lowercase();
     let is_device = letters.starts_with("id") || letters.ends_with("id");
+    // The end of a word such as community, but not of `unit_y` and `unitY`.
+    let mut words = name.split(|c: char| !c.is_alphabetic());
+    let is_word = words.any(|word| word.contains("unity") || word.contains("UNITY"));
     UNITS.contains(&letters.as_str())
         || (letters.contains("unit")
             && !is_device
+            && !is_word
             && !OTHER_UNITS.iter().any(|other| letters.contains(other)))
 }
 
@@ -88,11 +92,10 @@ pub(crate) fn with_labels(contents: Contents) -> Contents {
         let Some((place, leaf)) = path.rsplit_once('.').filter(|_| !path.ends_with('}')) else {
             continue;
         };
-        let leaf = leaf.to_lowercase();
         let [unit, name] = labels.entry(place).or_default();
-        if states_unit(&leaf) {
+        if states_unit(leaf) {
             *unit = text;
-        } else if NAMES.contains(&leaf.as_str()) {
+        } else if NAMES.contains(&leaf.to_lowercase().as_str()) {
             *name = text;
         }
     }
@@ -120,12 +123,28 @@ mod tests {
 
     #[test]
     fn names_of_units_are_known() {
-        for name in
-            ["units", "Unit", "y_unit_label", "NI_UnitDescription", "uom", "EngineeringUnits"]
-        {
+        for name in [
+            "units",
+            "Unit",
+            "y_unit_label",
+            "unit_y",
+            "unitY",
+            "NI_UnitDescription",
+            "uom",
+            "EngineeringUnits",
+        ] {
             assert!(states_unit(name), "{name}");
         }
-        for name in ["x_units", "time_unit", "unit_id", "UnitUnderTest", "unit_number", "acc"] {
+        for name in [
+            "x_units",
+            "time_unit",
+            "unit_id",
+            "UnitUnderTest",
+            "unit_number",
+            "acc",
+            "community",
+            "UNITY",
+        ] {
             assert!(!states_unit(name), "{name}");
         }
     }

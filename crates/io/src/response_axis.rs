@@ -150,19 +150,26 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
 }
 
 /// Returns how many of the last values, in rising order, mirror the first ones: the lines above
-/// half the sampling rate.
+/// half the sampling rate. The table may lack the line at 0 Hz.
 fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
     /// Maximum relative difference between a value and its mirror image, from the rounding of
     /// printed numbers.
     const SAME: f64 = 1e-6;
-    let len = order.len();
-    if len < 4 || responses.frequency_hz[order[0]] != 0.0 {
+    /// Minimum number of lines besides 0 Hz.
+    const MIN_LINES: usize = 3;
+    let hz = |at: usize| responses.frequency_hz[at];
+    let lines = order.iter().copied().filter(|at| hz(*at) > 0.0).collect::<Vec<_>>();
+    if lines.len() < MIN_LINES {
         return 0;
     }
+    // Lines from the first multiple of the step on have the sampling rate as sum of each pair.
+    let step = hz(lines[1]) - hz(lines[0]);
+    let is_complete = lines.len() < order.len() || (hz(lines[0]) / step - 1.0).abs() <= SAME;
+    let pairs = || lines.iter().zip(lines.iter().rev());
     let is_mirrored = responses.functions.iter().all(|function| {
-        let value = |at: usize| function.values[order[at]];
-        let size = (1..len).map(|at| value(at).norm()).fold(0.0, f64::max);
-        (1..len).all(|at| (value(len - at).conj() - value(at)).norm() <= SAME * size)
+        let value = |at: usize| function.values[at];
+        let size = lines.iter().map(|at| value(*at).norm()).fold(0.0, f64::max);
+        pairs().all(|(at, image)| (value(*image).conj() - value(*at)).norm() <= SAME * size)
     });
-    if is_mirrored { (len - 1) / 2 } else { 0 }
+    if is_complete && is_mirrored { lines.len() / 2 } else { 0 }
 }

@@ -6,6 +6,7 @@
 
 mod attributes;
 mod objects;
+mod soft_links;
 mod values;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -63,8 +64,9 @@ struct Reader {
 }
 
 impl Reader {
-    fn read(bytes: Vec<u8>, is_matlab: bool, budget: Budget) -> Result<Contents, Fault> {
+    fn read(mut bytes: Vec<u8>, is_matlab: bool, budget: Budget) -> Result<Contents, Fault> {
         let len = bytes.len() as u64;
+        soft_links::remove(&mut bytes);
         let file = File::from_bytes(bytes).map_err(damaged)?;
         let format = if is_matlab { "MATLAB 7.3 (HDF5)" } else { "HDF5" };
         let contents = Contents { format: format.into(), ..Contents::default() };

@@ -4,6 +4,8 @@ use std::ops::RangeInclusive;
 
 use mechid_signal::message;
 
+use super::aligned::{by_wide_blanks, with_brackets_joined};
+use super::definitions::{Definitions, is_by_number};
 use super::delimiter::{Delimiter, is_comment};
 use super::dialect::is_data;
 use super::fields::{Fields, Layout};
@@ -31,6 +33,9 @@ pub(super) struct Comments {
     lines: Vec<CommentLine>,
     /// Comments with names or units whose number is not that of the columns, the nearest first.
     unfitting: Vec<Unfitting>,
+    definitions: Definitions,
+    /// Names of the columns, if each has a definition with a unit.
+    defined_names: Option<Vec<String>>,
 }
 
 /// Comment with names or units whose number is not that of the columns.
@@ -59,10 +64,23 @@ impl Comments {
         let mut lines = above.split(|b| *b == layout.terminator).rev().map(<[u8]>::trim_ascii_end);
         // The text ends with a terminator, after which there is no line.
         lines.next();
+        let lines = lines.take(MOST_LINES).filter(|line| is_comment(line, layout.delimiter));
+        let without_sign = |text: String| text.trim_matches(COMMENT_SIGNS).to_owned();
+        let texts: Vec<String> = lines.map(|line| without_sign(text_of(line))).collect();
+        let definitions = Definitions::new(texts.iter().rev().map(String::as_str));
+        let numbered = definitions.numbered(&widths);
+        let names = definitions.names(&widths);
+        let is_complete = [names.is_some(), numbered.is_some()];
+        let is_read =
+            |text: &str| is_by_number(text).is_some_and(|number| is_complete[usize::from(number)]);
         let (mut comments, mut is_adjacent) = (Self::default(), true);
-        for line in lines.take(MOST_LINES).filter(|line| is_comment(line, layout.delimiter)) {
-            let text = text_of(line.trim_ascii());
-            if !text.contains(char::is_alphanumeric) {
+        comments.lines.extend(numbered.map(|fields| CommentLine {
+            are_units: are_units(&fields),
+            fields,
+            is_adjacent,
+        }));
+        for text in texts {
+            if !text.contains(char::is_alphanumeric) || is_read(&text) {
                 continue;
             }
             let fitting = CommentLine::new(&text, &widths, layout, is_adjacent);
@@ -72,7 +90,17 @@ impl Comments {
             is_adjacent &= fitting.as_ref().is_some_and(|line| line.are_units);
             comments.lines.extend(fitting);
         }
-        comments
+        Self { definitions, defined_names: names, ..comments }
+    }
+
+    /// Returns the names of the columns, if each has a definition with a unit in a line of its own.
+    pub fn defined_names(&self) -> Option<Vec<String>> {
+        self.defined_names.clone()
+    }
+
+    /// Returns the units that the columns with these names have in their definitions.
+    pub fn defined_units(&self, names: &[String]) -> Vec<String> {
+        self.definitions.units(names)
     }
 
     /// Returns the index of the line with the names: the line in which most fields name a quantity
@@ -130,8 +158,7 @@ impl Unfitting {
     /// Detects names or units in a comment whose number of fields is not that of the columns: a
     /// word says so, at least half of the fields have a unit or the name of a quantity, or the
     /// comment directly above the table has only single words between delimiters.
-    fn new(comment: &str, layout: Layout, is_adjacent: bool) -> Option<Self> {
-        let text = comment.trim_start_matches(COMMENT_SIGNS);
+    fn new(text: &str, layout: Layout, is_adjacent: bool) -> Option<Self> {
         let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
         let stated = names.or(units);
         if stated.is_none() && !is_adjacent {
@@ -147,18 +174,17 @@ impl Unfitting {
         let is_stated = stated.is_some() || is_table && !by_blanks;
         let has_units = units.is_some() || 2 * with_units >= fields.len();
         let fields = fields.len();
-        is_stated.then(|| Self { text: text.trim().into(), fields, has_units })
+        is_stated.then(|| Self { text: text.into(), fields, has_units })
     }
 }
 
 impl CommentLine {
     fn new(
-        comment: &str,
+        text: &str,
         widths: &RangeInclusive<usize>,
         layout: Layout,
         is_adjacent: bool,
     ) -> Option<Self> {
-        let text = comment.trim_start_matches(COMMENT_SIGNS);
         let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
         let (fields, by_blanks) = fields_of(names.or(units).unwrap_or(text), widths, layout)?;
         // Words of a sentence may be units, too: `sampled in s`.
@@ -186,10 +212,6 @@ fn fields_of(
         fields.split(text.as_bytes(), delimiter);
         fields.iter().map(text_of).collect()
     };
-    let by_wide_blanks = || -> Vec<String> {
-        let parts = text.split("  ").map(str::trim).filter(|part| !part.is_empty());
-        parts.map(str::to_owned).collect()
-    };
     let of_table = match layout.delimiter {
         Delimiter::Byte(byte) => split(Delimiter::Byte(byte)),
         Delimiter::Blanks => Vec::new(),
@@ -199,8 +221,8 @@ fn fields_of(
         (split(Delimiter::Byte(b',')), false),
         (split(Delimiter::Byte(b';')), false),
         (split(Delimiter::Byte(b'\t')), false),
-        (by_wide_blanks(), false),
-        (with_brackets_joined(split(Delimiter::Blanks)), true),
+        (by_wide_blanks(text), false),
+        (with_brackets_joined(text), true),
         (split(Delimiter::Blanks), true),
     ];
     let is_word = |field: &String| !is_data(field.as_bytes(), layout.delimiter);
@@ -209,19 +231,4 @@ fn fields_of(
             && fields.iter().all(is_word)
             && fields.iter().any(|field| !field.is_empty())
     })
-}
-
-/// Joins words in brackets with the word before them: `time [s] acc [m/s^2]`.
-fn with_brackets_joined(words: Vec<String>) -> Vec<String> {
-    let mut joined: Vec<String> = Vec::new();
-    for word in words {
-        match joined.last_mut() {
-            Some(last) if word.starts_with(['[', '(', '{']) => {
-                last.push(' ');
-                last.push_str(&word);
-            }
-            _ => joined.push(word),
-        }
-    }
-    joined
 }

@@ -149,9 +149,18 @@ impl State {
 pub(crate) struct Fields {
     text: Vec<u8>,
     ranges: Vec<Range<usize>>,
+    /// `true` if blanks separate the fields and some of them contain blanks.
+    pub is_joined: bool,
 }
 
 impl Fields {
+    /// Makes fields of names that may contain blanks.
+    pub fn joined(names: &[String]) -> Self {
+        let mut fields = Self { is_joined: true, ..Self::default() };
+        names.iter().for_each(|name| fields.push(name.as_bytes()));
+        fields
+    }
+
     /// Splits a row.
     pub fn split(&mut self, row: &[u8], delimiter: Delimiter) {
         self.text.clear();

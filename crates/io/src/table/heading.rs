@@ -1,5 +1,6 @@
 //! Names and units above a table: in several rows, below channel numbers, or in comments.
 
+use super::aligned;
 use super::comments::{Comments, units_of};
 use super::dialect::is_data;
 use super::fields::{Fields, Layout, Row, RowIter};
@@ -48,12 +49,14 @@ pub(super) struct Beginning<'a> {
 
 /// Returns the first rows of a text.
 pub(super) fn first_rows(text: &[u8], layout: Layout) -> Vec<Beginning<'_>> {
-    let rows = RowIter::new(text, layout).map(|row| {
+    let has_fields = |row: &Row<'_>| {
         let mut fields = Fields::default();
         fields.split(row.text, layout.delimiter);
-        Beginning { row, fields }
-    });
-    rows.filter(|row| row.fields.filled() > 0).take(ROWS).collect()
+        fields.filled() > 0
+    };
+    let rows: Vec<Row<'_>> = RowIter::new(text, layout).filter(has_fields).take(ROWS).collect();
+    let fields = aligned::split(&rows, layout);
+    rows.into_iter().zip(fields).map(|(row, fields)| Beginning { row, fields }).collect()
 }
 
 /// Numbers of fields in the rows of a table that are not empty.
@@ -118,6 +121,11 @@ impl Above {
         let comment = names.as_ref().and_then(|names| names.comment);
         let mut further_units: Vec<Vec<String>> = comments.units(comment).collect();
         let has_names = names.is_some() || !above.is_empty();
+        let names_of_columns = match &names {
+            Some(names) => names.names.clone(),
+            None => above.first().map_or(Vec::new(), texts),
+        };
+        further_units.push(comments.defined_units(&names_of_columns));
         let remarks = comments.remarks(filled.first, has_names).collect();
         let heading = names.map(|Names { names, units, row, further_units: of_rows, .. }| {
             further_units.extend(of_rows);
@@ -155,7 +163,11 @@ impl Names {
             ..Self::default()
         };
         match above {
-            [] => comments.names_line().or(comments.units_line()).map(of_comment),
+            [] => {
+                let of_line = comments.names_line().or(comments.units_line()).map(of_comment);
+                let defined = || Some(Self { names: comments.defined_names()?, ..Self::default() });
+                of_line.or_else(defined)
+            }
             [units] if is_units(units, layout) => {
                 let names = of_comment(comments.names_line()?);
                 Some(Self { units: texts(units), row: Some(0), ..names })
@@ -187,14 +199,20 @@ impl NamesAndUnits {
         match above {
             [names] => {
                 let is_longer = filled.is_longer(names) && filled.usual == filled.first;
-                (is_longer && numbers(names, layout) == 0).then_some(Self { names: 0, units: None })
+                let is_unusual = is_longer || names.fields.is_joined;
+                (is_unusual && numbers(names, layout) == 0)
+                    .then_some(Self { names: 0, units: None })
             }
             [first, second] if is_units(second, layout) || !is_channels(first, layout) => {
                 let is_swapped = is_units(first, layout) && !is_units(second, layout);
-                let is_longer = filled.is_longer(first) && is_units(second, layout);
-                match (is_swapped, is_longer) {
+                let is_unusual =
+                    filled.is_longer(first) || first.fields.is_joined || second.fields.is_joined;
+                match (is_swapped, is_unusual && is_units(second, layout)) {
                     (true, _) => Some(Self { names: 1, units: Some(0) }),
                     (_, true) => Some(Self { names: 0, units: Some(1) }),
+                    _ if first.fields.is_joined || second.fields.is_joined => {
+                        Self::in_several_rows(above, layout)
+                    }
                     _ => None,
                 }
             }

@@ -1,8 +1,10 @@
 //! Table of the columns of a record file.
 
+mod aligned;
 mod batch;
 mod blocks;
 mod comments;
+mod definitions;
 mod delimiter;
 mod dialect;
 mod fields;
@@ -295,27 +297,34 @@ impl Table {
     /// [`Table::find`].
     ///
     /// # Errors
-    /// [`IoError::NoUnit`] if the text is not a unit of a force, a response or a time, and those of
+    /// [`IoError::NoUnit`] if the text is not a unit of a force, a response or a time,
+    /// [`IoError::TwoUnits`] if the column already has a unit or a scale that was set, and those of
     /// [`Table::find`].
     pub fn set_unit(&mut self, column: &str, unit: &str) -> Result<(), IoError> {
         let at = self.find(column)?;
         let unit = Unit::parse(unit).ok_or_else(|| IoError::NoUnit { text: unit.into() })?;
-        self.contents.columns[at].overriding = Some(Override::Unit(unit));
-        Ok(())
+        self.override_unit(at, Override::Unit(unit))
     }
 
     /// Sets the factor that converts a column to SI units, in SI units per unit of the column; the
     /// column is chosen as in [`Table::find`].
     ///
     /// # Errors
-    /// [`IoError::NoScale`] unless the factor is finite and not 0, and the errors of
-    /// [`Table::find`].
+    /// [`IoError::NoScale`] unless the factor is finite and not 0, [`IoError::TwoUnits`] if the
+    /// column already has a unit or a scale that was set, and those of [`Table::find`].
     pub fn set_scale(&mut self, column: &str, factor: f64) -> Result<(), IoError> {
         let at = self.find(column)?;
         if !factor.is_normal() {
             return Err(IoError::NoScale { factor });
         }
-        self.contents.columns[at].overriding = Some(Override::Scale(factor));
+        self.override_unit(at, Override::Scale(factor))
+    }
+
+    fn override_unit(&mut self, at: usize, overriding: Override) -> Result<(), IoError> {
+        if self.contents.columns[at].overriding.is_some() {
+            return Err(IoError::TwoUnits { column: self.label(at) });
+        }
+        self.contents.columns[at].overriding = Some(overriding);
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! Detection of the line at which a table begins below other text.
 
+use super::aligned;
 use super::delimiter::is_comment;
 use super::dialect::{detect, is_data};
 use super::fields::{Fields, Layout, Row, RowIter};
@@ -56,12 +57,8 @@ fn first_rows(text: &[u8], layout: Layout) -> Vec<Fields> {
     if first.trim_ascii().is_empty() || is_comment(first.trim_ascii(), layout.delimiter) {
         return Vec::new();
     }
-    let fields = |row: Row<'_>| {
-        let mut fields = Fields::default();
-        fields.split(row.text, layout.delimiter);
-        fields
-    };
-    RowIter::new(text, layout).take(ROWS).map(fields).collect()
+    let rows: Vec<Row<'_>> = RowIter::new(text, layout).take(ROWS).collect();
+    aligned::split(&rows, layout)
 }
 
 #[cfg(test)]
@@ -76,6 +73,8 @@ mod tests {
             ("Rig 4\nt,f\n0,1\n1,2\n", 2, 2),
             ("Rig: 4, left\nGain;3\n\nt;f;x\ns;N;m\n0;1,5;2\n1;2,5;3\n", 4, 3),
             ("Serial 1\nRate 100 Hz\n\n0 1 2 3\n1 2 3 4\n", 4, 4),
+            ("Rig 4\nTime (s)  Force (kN)\n  0  1\n  1  2\n", 2, 2),
+            ("Rig 4\nTime  Hammer force\n  s  kN\n  0  1\n  1  2\n", 2, 2),
         ] {
             assert_eq!(table(text.as_bytes(), b'\n'), Some(Beginning { line, fields }), "{text}");
         }

@@ -31,6 +31,17 @@ with h5py.File("groups.h5", "w") as file:
     file.create_dataset("cube", data=np.ones((2, 3, 4)))
     file.create_dataset("nothing", shape=(0,), dtype=float)
 
+# Groups of the format before HDF5 1.8, the default of h5py: one of objects and links, one of links only.
+with h5py.File("links.h5", "w", libver="earliest") as file:
+    file.attrs["fs"] = 4.0
+    run = file.create_group("run")
+    run["force"], run["x"] = force, x
+    file["first"] = h5py.SoftLink("/run/force")
+    run["before"] = h5py.SoftLink("/run/x")
+    run["missing"] = h5py.SoftLink("/nowhere")
+    run["zero"] = -x
+    file.create_group("links")["x"] = h5py.SoftLink("/run/x")
+
 
 def matlab(place, name, value, kind="double"):
     data = np.atleast_2d(value)

