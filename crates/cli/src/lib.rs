@@ -16,7 +16,7 @@ mod repeat;
 mod worker;
 
 use std::ffi::OsString;
-use std::io::{Write as _, stderr};
+use std::io::{ErrorKind, Write as _, stderr};
 use std::process::ExitCode;
 
 use clap::Parser as _;
@@ -51,11 +51,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(message) => {
             // Help and version go to standard output and are no failure.
-            let failed = message.use_stderr() || message.print().is_err();
-            if message.use_stderr() {
-                let _ = message.print();
-            }
-            return if failed { ExitCode::from(FAILURE) } else { ExitCode::SUCCESS };
+            let printed = message.print();
+            return match printed {
+                _ if message.use_stderr() => ExitCode::from(FAILURE),
+                Ok(()) => ExitCode::SUCCESS,
+                Err(error) if error.kind() == ErrorKind::BrokenPipe => ExitCode::from(BROKEN_PIPE),
+                Err(_) => ExitCode::from(FAILURE),
+            };
         }
     };
     match outcome(&cli, arguments.get(1..).unwrap_or_default()) {

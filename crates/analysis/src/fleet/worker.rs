@@ -80,6 +80,22 @@ impl Isolation {
         }
         Ok(())
     }
+
+    /// Returns the memory that a record may take, in bytes: the limit, or what the system leaves
+    /// this process (`ulimit -v`) if that is less.
+    fn memory_bytes(&self) -> u64 {
+        // The conversion saturates, at a size above any address space.
+        let bytes = (self.record_memory_gb * 1e9) as u64;
+        #[cfg(target_os = "linux")]
+        let bytes = {
+            use rustix::process::{Resource, getrlimit};
+
+            let of_system = getrlimit(Resource::As);
+            let limits = [of_system.current, of_system.maximum];
+            limits.into_iter().flatten().fold(bytes, u64::min)
+        };
+        bytes
+    }
 }
 
 /// Identifies records in a separate process, and starts a new process if a record has ended it.
@@ -175,7 +191,7 @@ impl Worker {
                     return Ok(Some(AnalysisError::RecordProcess { how }));
                 }
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Ok(Some(running.cause_of_end(self.isolation.record_memory_gb)));
+                    return Ok(Some(running.cause_of_end(self.isolation.memory_bytes())));
                 }
             }
         }
@@ -184,7 +200,7 @@ impl Worker {
     }
 
     fn start(&self) -> Result<Running, AnalysisError> {
-        let Isolation { program, arguments, record_memory_gb, .. } = &self.isolation;
+        let Isolation { program, arguments, .. } = &self.isolation;
         let failed = |error: io::Error| AnalysisError::RecordProcess {
             how: format!("{} cannot be started: {error}", path_text(program)),
         };
@@ -228,14 +244,13 @@ impl Worker {
             let _ = child.wait();
             failed(error)
         })?;
-        // The conversion saturates, at a size above any address space.
-        let memory_bytes = Some((record_memory_gb * 1e9) as u64);
-        let task = Task { analysis: self.analysis.clone(), memory_bytes };
+        let memory_bytes = self.isolation.memory_bytes();
+        let task = Task { analysis: self.analysis.clone(), memory_bytes: Some(memory_bytes) };
         let _ = frames::write(&mut orders, &serde_json::to_vec(&task).unwrap_or_default());
         let running = Running { child, orders: Some(orders), rows, said };
         match running.rows.recv_timeout(START) {
             Ok(ready) if ready == READY => Ok(running),
-            _ => Err(running.cause_of_end(*record_memory_gb)),
+            _ => Err(running.cause_of_end(memory_bytes)),
         }
     }
 }
@@ -256,8 +271,8 @@ impl Running {
         (status, self.said.join().unwrap_or_default())
     }
 
-    /// Returns the reason for the end of a process that may use `memory_gb` GB of memory.
-    fn cause_of_end(mut self, memory_gb: f64) -> AnalysisError {
+    /// Returns the reason for the end of a process that may use this memory, in bytes.
+    fn cause_of_end(mut self, memory_bytes: u64) -> AnalysisError {
         // No further orders: the process ends at the end of its input.
         self.orders = None;
         let begun = Instant::now();
@@ -266,7 +281,7 @@ impl Running {
         }
         let (status, said) = self.end();
         if said.contains(OUT_OF_MEMORY) {
-            return AnalysisError::RecordMemory { gb: memory_gb };
+            return AnalysisError::RecordMemory { gb: memory_bytes as f64 / 1e9 };
         }
         let status = status.map_or_else(|error| error.to_string(), |status| status.to_string());
         let said = said.lines().next_back().unwrap_or_default();

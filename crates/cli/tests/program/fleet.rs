@@ -202,6 +202,23 @@ fn records_that_end_their_process_become_rows() {
     assert_eq!((&again["computed_records"], &again["failed"]), (&0.into(), &2.into()));
 }
 
+/// The default memory of a record is more than this system allows a process.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_that_the_system_allows_is_enough_for_a_fleet() {
+    let home = tempfile::tempdir().unwrap();
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
+    fs::copy(rig, home.path().join("a.csv")).unwrap();
+    let analysis = r#"{"channels": {"force": ["force"], "displacement": ["displacement"]}}"#;
+    fs::write(home.path().join("analysis.json"), analysis).unwrap();
+    let line =
+        "ulimit -v 4000000; exec \"$0\" fleet a.csv --analysis analysis.json --output results";
+    let mut bash = std::process::Command::new("bash");
+    bash.current_dir(home.path()).args(["-c", line, env!("CARGO_BIN_EXE_mechid")]);
+    let done = bash.output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+}
+
 #[test]
 fn results_among_the_records_are_refused() {
     let home = tempfile::tempdir().unwrap();

@@ -205,6 +205,7 @@ fn a_full_stream_is_told_by_the_exit_code() {
             0,
         ),
         (format!("{info} | true; exit ${{PIPESTATUS[0]}}"), 141),
+        ("mechid identify --help | head -1; exit ${PIPESTATUS[0]}".to_owned(), 141),
     ] {
         let run = shell(folder.path(), &line);
         // The report may be written to the pipe before its reader ends.
