@@ -11,7 +11,7 @@ use super::alternative::{Alternative, Cause};
 use super::finding::{Channel, Finding, Quantity};
 use super::limits::{
     ACQUISITION_ROUNDS, CORNER_WIDTHS, DELAY_REMAINING, HIGH_PASS_STEP, LINEARITY_NEIGHBOURS,
-    STANDARD_ERRORS,
+    MAX_SENSITIVITIES, STANDARD_ERRORS,
 };
 use super::open_fit::{joined, minimum_near, residuals_of_fit};
 use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
@@ -251,6 +251,62 @@ pub fn fault_of_acquisition(
         }
     }
     Ok(best.map(|(_, finding)| finding))
+}
+
+/// Finds a force held or linear between samples `dt` (s) apart that explains the residual of a
+/// maximum-likelihood `fit` to open records ([`Finding::Alternative`]), by new fits: the estimate
+/// may be too far from the truth for [`fault_of_acquisition`]. `records` are the data of the fit,
+/// `closed` those without the transients, and `after` the residuals. `None` unless such a force
+/// changes the residual significantly and at most a quarter of its power remains, or its tests warn
+/// without such a force and pass with it.
+///
+/// # Source
+/// Rao's score test; maximum likelihood with each of the two forces in turn.
+pub fn force_between_samples(
+    records: &[FrequencyData],
+    closed: &[FrequencyData],
+    dt: f64,
+    fit: &OutputErrorFit,
+    after: &[SpectralResidual],
+) -> Option<Finding> {
+    let (estimate, unknowns) = (&fit.estimate, fit.estimate.unknowns());
+    let (of_fit, parameters) = (estimate.system().ok()?, unknowns.independent());
+    let joint = joined(records).filter(|_| after.len() == closed.len())?;
+    let is_rounding = after.iter().any(SpectralResidual::is_rounding);
+    if is_rounding || 2 * joint.len() * joint.dof() * parameters > MAX_SENSITIVITIES {
+        return None;
+    }
+    let weighing = &Weighing::new(closed, estimate, Extent::Open)?;
+    let residuals = Residuals { records: closed, after, weighing, system: &of_fit, dt, parameters };
+    let refitted = |between: Discretisation| -> Option<(f64, Discretisation)> {
+        let score = residuals.score(Fault::Between(between), 0.0)?;
+        if score.amount.abs() <= STANDARD_ERRORS * score.error {
+            return None;
+        }
+        let mut likelihood = ChangedRecords::from_fit(&joint, unknowns, fit)?;
+        let undisturbed = likelihood.cost(&joint)?;
+        let mut system = of_fit.clone();
+        likelihood.search(&equivalent_force(&joint, &system, dt, between)?)?;
+        let mut least = undisturbed;
+        for _ in 0..ACQUISITION_ROUNDS {
+            system = likelihood.system()?;
+            least = likelihood.cost(&equivalent_force(&joint, &system, dt, between)?)?;
+        }
+        let remaining = least / undisturbed;
+        let becomes_noise = || {
+            let without = records.iter().map(|data| equivalent_force(data, &system, dt, between));
+            Some(is_noise(&residuals_of_fit(&without.collect::<Option<Vec<_>>>()?, unknowns)?))
+        };
+        let explains =
+            remaining <= DELAY_REMAINING || remaining < 1.0 && !is_noise(after) && becomes_noise()?;
+        explains.then_some((remaining, between))
+    };
+    let kinds = [Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold];
+    let best = kinds.into_iter().filter_map(refitted).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(remaining, between_samples)| {
+        let cause = Cause::BetweenSamples { between_samples };
+        Finding::Alternative(Alternative { cause, remaining })
+    })
 }
 
 /// Finds AC coupling that explains the residual of a maximum-likelihood `fit` to hits

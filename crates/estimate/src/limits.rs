@@ -18,6 +18,16 @@ pub(crate) const STEPS_MORE: usize = 60;
 /// Maximum number of Gauss–Newton steps in resampled data, where the search need not converge.
 pub(crate) const STEPS_RESAMPLED: usize = 15;
 
+/// Minimum number of lines per parameter on which searches after the first one begin.
+pub(crate) const THIN_LINES: usize = 20;
+
+/// Largest ratio of the number of all lines to that on which searches after the first one begin.
+pub(crate) const THIN_STEP: usize = 10;
+
+/// Largest ratio of the sum of squares at the end of a search on fewer lines to that of the best
+/// minimum for the search to continue on all lines: on fewer lines the minima differ a little.
+pub(crate) const THIN_NEAR: f64 = 2.0;
+
 /// Largest relative difference of the sums of squares of two searches that count as one minimum.
 pub(crate) const RESTART_SAME: f64 = 1e-6;
 
@@ -105,7 +115,7 @@ pub(crate) const WEIGHT_TOLERANCE: f64 = 1e-3;
 pub(crate) const RESIDUAL_ROUNDING: f64 = 1e-12;
 
 /// Maximum number of rounds of weighting by noise levels; three nearly always suffice.
-pub(crate) const MAX_ROUNDS: usize = 10;
+pub(crate) const MAX_ROUNDS: usize = 40;
 
 /// Maximum number of rounds of weighting by a noise spectrum: the first is already efficient, the
 /// others refine the shape of the spectrum.

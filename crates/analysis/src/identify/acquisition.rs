@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 use std::str::FromStr;
 
-use mechid_estimate::frequency_domain::{OutputErrorFit, equivalent_force, output_error_pooling};
+use mechid_estimate::frequency_domain::{
+    OutputErrorFit, equivalent_force, output_error_from, output_error_pooling,
+};
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::Discretisation;
 use mechid_spectra::{FrequencyData, Pooling};
@@ -109,7 +111,7 @@ impl Acquisition {
     ) -> Result<(OutputErrorFit, Vec<FrequencyData>), AnalysisError> {
         let mut last = (fit, records.to_vec());
         let Some(between) = self.between_samples else { return Ok(last) };
-        for _ in 0..ACQUISITION_ROUNDS {
+        for round in 0..ACQUISITION_ROUNDS {
             let system = last.0.estimate.system()?;
             let equivalent =
                 records.iter().map(|record| equivalent_force(record, &system, dt, between));
@@ -117,7 +119,13 @@ impl Acquisition {
                 let why = "the response of the identified system to a force that is held or linear between its samples cannot be computed: leave this setting out, or check the fit".to_owned();
                 return Err(AnalysisError::Setting { setting: "between_samples", why });
             };
-            let fit = output_error_pooling(&joined(&equivalent)?, unknowns, pooling)?;
+            let data = joined(&equivalent)?;
+            // The band-limited force may have led to a wrong minimum.
+            let fit = match round {
+                0 => output_error_pooling(&data, unknowns, pooling),
+                _ => output_error_from(&data, unknowns, &last.0, pooling)
+                    .or_else(|_| output_error_pooling(&data, unknowns, pooling)),
+            }?;
             let change = largest_change(&last.0.estimate, &fit.estimate);
             last = (fit, equivalent);
             if change < ACQUISITION_SETTLED {

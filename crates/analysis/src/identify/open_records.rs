@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use mechid_checks::{
     AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, after_spectral_fit,
     before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition,
-    fault_of_hits, fitted_band, linearity_of_open_record,
+    fault_of_hits, fitted_band, force_between_samples, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
@@ -153,16 +153,14 @@ pub(super) fn fit(
     let (closed, alone) = without_transients(&fit, &data)?;
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
-    let late = delay_of_open_records(&with_pulses, dt, unknowns, &fit, &residuals);
+    let tested =
+        Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
+    let likelier = tested.cause(dt, unknowns, excitation)?;
     let compared = agreement(&data, &fit, &residuals, excitation)?;
-    let fault = match excitation {
-        Excitation::Hits(_) => fault_of_hits(&with_pulses, &closed, dt, &fit, &residuals),
-        _ => fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?,
-    };
-    let likelier = likelier(late, fault);
     let Compared { parts, omitted } = compared.beside(likelier.as_ref().map(remaining));
     let quantity = records[0].held.response().1;
-    let refit = |finding| refitted_with(finding, &with_pulses, quantity, unknowns, noise.response);
+    let refit =
+        |finding| refitted_with(finding, (&with_pulses, &fit), quantity, unknowns, noise.response);
     let explained = likelier.as_ref().and_then(refit);
     let explained = explained.map(|other| squared_change(&fit.estimate, &other));
     let sinusoids = sinusoid_rows(records, &fit);
@@ -243,6 +241,42 @@ fn agreement(
     }))
 }
 
+/// Open records with their fit.
+struct Tested<'a> {
+    records: &'a [FrequencyData],
+    /// The records without transients and errors of pulses.
+    closed: &'a [FrequencyData],
+    fit: &'a OutputErrorFit,
+    residuals: &'a [SpectralResidual],
+}
+
+impl Tested<'_> {
+    /// Finds a delay or a fault of the acquisition that explains the residual.
+    fn cause(
+        &self,
+        dt: f64,
+        unknowns: &Unknowns,
+        excitation: Excitation<'_>,
+    ) -> Result<Option<Finding>, AnalysisError> {
+        let Self { records, closed, fit, residuals } = *self;
+        let late = delay_of_open_records(records, dt, unknowns, fit, residuals);
+        if let Excitation::Hits(_) = excitation {
+            return Ok(likelier(late, fault_of_hits(records, closed, dt, fit, residuals)));
+        }
+        let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
+        let is_between = |finding: &Finding| {
+            let Finding::Alternative(alternative) = finding else { return false };
+            matches!(alternative.cause, Cause::BetweenSamples { .. })
+        };
+        let between = if fault.as_ref().is_some_and(is_between) {
+            None
+        } else {
+            force_between_samples(records, closed, dt, fit, residuals)
+        };
+        Ok(likelier(likelier(late, fault), between))
+    }
+}
+
 /// Returns the explanation of a residual that reduces its power most.
 fn likelier(one: Option<Finding>, other: Option<Finding>) -> Option<Finding> {
     one.into_iter().chain(other).min_by(|a, b| remaining(a).total_cmp(&remaining(b)))
@@ -258,10 +292,11 @@ fn remaining(finding: &Finding) -> f64 {
 }
 
 /// Returns the estimate with a delay or a fault of the acquisition that a finding names, for
-/// responses of the given quantity; `None` for another finding, or if the fit fails.
+/// records with their fit and responses of the given quantity; `None` for another finding, or if
+/// the fit fails.
 fn refitted_with(
     finding: &Finding,
-    records: &[FrequencyData],
+    (records, before): (&[FrequencyData], &OutputErrorFit),
     quantity: ResponseQuantity,
     unknowns: &Unknowns,
     pooling: Pooling,
@@ -292,7 +327,7 @@ fn refitted_with(
             let acquisition =
                 Acquisition { between_samples: Some(*between_samples), ..Acquisition::default() };
             let dt = records[0].open_record(0)?.sampling.dt();
-            acquisition.refitted(fit(records)?, records, dt, unknowns, pooling).ok()?.0
+            acquisition.refitted(before.clone(), records, dt, unknowns, pooling).ok()?.0
         }
         _ => return None,
     };

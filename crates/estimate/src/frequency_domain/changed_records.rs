@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use mechid_model::SecondOrderSystem;
 use mechid_numerics::gauss_newton::minimise;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::DVector;
@@ -9,13 +10,12 @@ use nalgebra::DVector;
 use super::OutputErrorFit;
 use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
-use super::multi_start::search;
-use super::output_error_fit::{plausible, spare};
+use super::multi_start::{search, thinned};
+use super::output_error_fit::{entries, plausible, spare};
 use super::pulse_fit::PulseFit;
 use super::unknown_noise::white_noise_at;
 use crate::Unknowns;
 use crate::limits::DELAY_STEPS;
-use crate::relations::Relations;
 
 /// Maximum likelihood for the lines of open records with changed channels, such as a delayed force;
 /// each change has its own estimate of the transients and of the errors of pulses.
@@ -38,17 +38,19 @@ impl<'a> ChangedRecords<'a> {
         unknowns: &'a Unknowns,
         fit: &OutputErrorFit,
     ) -> Option<Self> {
-        let entries: Vec<f64> = fit.estimate.parameters().map(|p| p.value).collect();
-        let mut theta = match Relations::from_unknowns(unknowns) {
-            None => entries,
-            Some(relations) => relations.unknowns(&entries).as_slice().to_vec(),
-        };
-        theta.extend_from_slice(fit.ends.as_ref()?.loads());
-        let theta = DVector::from_vec(theta);
+        fit.ends.as_ref()?;
+        let theta = fit.theta(unknowns);
         let amplitudes = fit.pulse_amplitudes.clone();
         let exact = corrected(data, &amplitudes)?;
         let noise = white_noise_at(exact.as_ref(), unknowns, &theta).ok()?;
         Some(Self { unknowns, noise, spare: spare(data, unknowns), theta, amplitudes })
+    }
+
+    /// Returns the system of the last estimate; `None` if its matrices are not finite.
+    pub fn system(&self) -> Option<SecondOrderSystem> {
+        let independent = &self.theta.as_slice()[..self.unknowns.independent()];
+        let [m, c, k] = self.unknowns.assemble(entries(self.unknowns, independent).as_slice());
+        SecondOrderSystem::new(m, c, k).ok()
     }
 
     /// Number of real equations minus the number of unknowns.
@@ -62,7 +64,11 @@ impl<'a> ChangedRecords<'a> {
         let mut misfit = Misfit::new(&changed, self.unknowns, &self.noise).ok()?;
         let starts = InitialEstimates::new(&changed, self.unknowns, &self.noise);
         let spare = self.spare as f64;
-        let global = search(&mut misfit, &starts, plausible(None, spare, spare)).ok()?;
+        let fewer = thinned(&changed, self.unknowns, &self.noise);
+        let thin = fewer.as_ref().map(|(data, noise)| Misfit::new(data, self.unknowns, noise));
+        let mut thin = thin.transpose().ok()?;
+        let plausible = plausible(None, spare, spare);
+        let global = search(&mut misfit, thin.as_mut(), &starts, plausible).ok()?;
         self.theta = global.minimum.parameters;
         Some(())
     }

@@ -75,7 +75,7 @@ pub use instrumental::instrumental_variables;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use output_error::in_units_of_noise;
 pub use output_error::{
-    output_error, output_error_near, output_error_of_table, output_error_pooling,
+    output_error, output_error_from, output_error_near, output_error_of_table, output_error_pooling,
 };
 pub use output_error_fit::{EndLoads, OutputErrorFit};
 pub use parts::{

@@ -1,16 +1,17 @@
 //! Global minimum from searches with several initial estimates.
 
 use mechid_numerics::gauss_newton::{Minimum, minimise};
+use mechid_spectra::{FrequencyData, NoiseSpectrum, transient};
 use nalgebra::DVector;
 
 use super::initial_estimates::InitialEstimates;
 use super::search::Restartable;
-use crate::EstimateError;
 use crate::limits::{
     CONFIRMED_OTHERWISE, LINEAR_ROUNDS, MAX_RESTARTS, RESTART_ALIKE, RESTART_CONFIRMED,
     RESTART_EXACT, RESTART_RESTARTED, RESTART_RESTARTS, RESTART_SAME, RESTARTS_AMONG_MANY,
-    SEARCH_STEPS, STEPS_MORE, STEPS_RESAMPLED,
+    SEARCH_STEPS, STEPS_MORE, STEPS_RESAMPLED, THIN_LINES, THIN_NEAR, THIN_STEP,
 };
+use crate::{EstimateError, Unknowns};
 
 /// Range of sums of squares that the noise explains.
 #[derive(Debug, Clone, Copy)]
@@ -38,23 +39,35 @@ pub(super) struct GlobalMinimum {
 /// the original data, until several successive restarts have not found a better minimum. Local
 /// minima due to the noise change with the weights; the global one hardly moves.
 ///
+/// Searches after the first one begin on the lines of `thin`, the same problem with fewer lines, if
+/// there is one. They continue on all lines if they end near the best minimum so far or below it.
+///
 /// # Errors
 /// [`EstimateError::NotConverged`] if no search ends at a minimum.
 ///
 /// # Source
 /// Wood (2001), Biometrics 57, 240–244 (bootstrap restarting); the weights vary more than those of
 /// a bootstrap and escape from minima where a bootstrap does not.
-pub(super) fn search(
+pub(super) fn search<P: Restartable>(
     problem: &mut impl Restartable,
+    mut thin: Option<&mut P>,
     starts: &InitialEstimates<'_>,
     plausible: Plausible,
 ) -> Result<GlobalMinimum, EstimateError> {
     let mut ends = Ends { plausible, searches: 0, distinct: Vec::new() };
     for start in in_order(problem, starts.families()) {
         log::debug!("search {}", ends.searches + 1);
-        let steps = if ends.searches == 0 { SEARCH_STEPS } else { STEPS_MORE };
-        let start = linear_rounds(problem, start, &plausible);
-        ends.push(start.and_then(|start| minimise(problem, start, steps)));
+        let best = ends.distinct.first().map(|end| end.minimum.clone());
+        let steps = if best.is_none() { SEARCH_STEPS } else { STEPS_MORE };
+        let start = match (&mut thin, best) {
+            (Some(thin), Some(best)) => search_thin(*thin, start, &best, &plausible),
+            _ => linear_rounds(problem, start, &plausible).map(Start::Near),
+        };
+        ends.push(match start {
+            Some(Start::Near(start)) => minimise(problem, start, steps),
+            Some(Start::Far(end)) => Some(end),
+            None => None,
+        });
         let needed = if ends.explained() { RESTART_CONFIRMED } else { CONFIRMED_OTHERWISE };
         if ends.searches >= needed && !ends.many() {
             break;
@@ -71,6 +84,44 @@ pub(super) fn search(
     problem.try_at(&best.minimum.parameters);
     problem.accept();
     Ok(GlobalMinimum { minimum: best.minimum, searches: ends.searches, agreeing: best.count })
+}
+
+/// Start of a search on all lines.
+enum Start {
+    Near(DVector<f64>),
+    /// The search on fewer lines has ended far above the best minimum; its end, with the sum of
+    /// squares that all lines would have.
+    Far(Minimum),
+}
+
+/// Searches on fewer lines.
+fn search_thin(
+    thin: &mut impl Restartable,
+    start: DVector<f64>,
+    best: &Minimum,
+    plausible: &Plausible,
+) -> Option<Start> {
+    let of_best = thin.try_at(&best.parameters)?;
+    let start = linear_rounds(thin, start, plausible)?;
+    let end = minimise(thin, start, STEPS_MORE)?;
+    Some(if end.cost <= THIN_NEAR * of_best {
+        Start::Near(end.parameters)
+    } else {
+        let cost = end.cost * best.cost / of_best;
+        Start::Far(Minimum { cost, converged: false, ..end })
+    })
+}
+
+/// Returns the data and the noise on fewer lines, for the beginning of searches; `None` if there
+/// are few already.
+pub(super) fn thinned(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    noise: &NoiseSpectrum,
+) -> Option<(FrequencyData, NoiseSpectrum)> {
+    let parameters = unknowns.independent() + transient::len(data);
+    let step = (data.len() / (THIN_LINES * parameters).max(1)).min(THIN_STEP);
+    (step > 1).then(|| data.thinned(step).zip(noise.thinned(step))).flatten()
 }
 
 /// Restarts the search from the best minima so far, moved by a few steps in resampled data.

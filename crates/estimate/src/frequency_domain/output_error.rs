@@ -11,7 +11,7 @@ use super::equation_error;
 use super::initial_estimates::InitialEstimates;
 use super::line_correlation::variance_ratio;
 use super::misfit::Misfit;
-use super::multi_start::search;
+use super::multi_start::{search, thinned};
 use super::output_error_fit::{
     OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare, uncertain_weights,
 };
@@ -115,6 +115,24 @@ pub fn output_error_of_table(
     Ok(fit)
 }
 
+/// Estimates as [`output_error_pooling`] where the data state no noise, from the result of a `fit`
+/// to nearly the same data as the only initial estimate.
+///
+/// # Errors
+/// As [`output_error_pooling`].
+///
+/// # Source
+/// As [`output_error`].
+pub fn output_error_from(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    fit: &OutputErrorFit,
+    residual: Pooling,
+) -> Result<OutputErrorFit, EstimateError> {
+    equation_error(data, unknowns)?.check_determined()?;
+    with_unknown_noise(data, unknowns, None, Some(fit.minimum(unknowns)), residual)
+}
+
 fn search_near(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -125,7 +143,7 @@ fn search_near(
     equation_error(data, unknowns)?.check_determined()?;
     match data.noise() {
         Some(noise) => with_known_noise(data, unknowns, noise, nominal),
-        None => with_unknown_noise(data, unknowns, nominal, residual),
+        None => with_unknown_noise(data, unknowns, nominal, None, residual),
     }
 }
 
@@ -142,7 +160,9 @@ fn with_known_noise(
     // Weights from a sampled covariance are on average too large by the factor ν/(ν − n).
     let expected = spare * noise.mean_inverse_ratio(data.dof());
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
-    let best = search(&mut misfit, &starts, plausible)?;
+    let fewer = thinned(data, unknowns, noise);
+    let thin = fewer.as_ref().map(|(data, noise)| Misfit::new(data, unknowns, noise));
+    let best = search(&mut misfit, thin.transpose()?.as_mut(), &starts, plausible)?;
     let scale = Scale {
         level: 1.0,
         inflation,

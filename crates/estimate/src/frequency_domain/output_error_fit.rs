@@ -1,7 +1,7 @@
 //! Result of maximum likelihood, from the minimum of its search.
 
 use mechid_model::SecondOrderSystem;
-use mechid_numerics::gauss_newton::SumOfSquares;
+use mechid_numerics::gauss_newton::{Minimum, SumOfSquares};
 use mechid_numerics::{NumericsError, check_size};
 use mechid_spectra::SpectraError;
 use mechid_spectra::noise::pulse::PulseErrors;
@@ -62,6 +62,28 @@ pub struct OutputErrorFit {
 }
 
 impl OutputErrorFit {
+    /// Returns the independent unknowns, followed by the loads of the transients.
+    pub(super) fn theta(&self, unknowns: &Unknowns) -> DVector<f64> {
+        let entries: Vec<f64> = self.estimate.parameters().map(|p| p.value).collect();
+        let mut theta = match Relations::from_unknowns(unknowns) {
+            None => entries,
+            Some(relations) => relations.unknowns(&entries).as_slice().to_vec(),
+        };
+        theta.extend_from_slice(self.ends.as_ref().map_or(&[], EndLoads::loads));
+        theta.into()
+    }
+
+    /// Returns the minimum of the fit; its sum of squares is not known any more.
+    pub(super) fn minimum(&self, unknowns: &Unknowns) -> GlobalMinimum {
+        let minimum = Minimum {
+            parameters: self.theta(unknowns),
+            cost: f64::INFINITY,
+            steps: self.steps,
+            converged: true,
+        };
+        GlobalMinimum { minimum, searches: self.searches, agreeing: self.agreeing }
+    }
+
     /// Returns the fitted records, each without the most likely errors of the pulses of its forces.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::Whitened;
 use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
-use super::multi_start::{GlobalMinimum, search};
+use super::multi_start::{GlobalMinimum, search, thinned};
 use super::output_error_fit::{
     OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
     uncertain_weights,
@@ -37,16 +37,18 @@ struct Weighted {
 
 /// Estimates the parameters and, in alternation, the noise of each channel of the motion: white of
 /// unknown level, or with a spectrum from the residual. The noise of the forces is the stated one.
+/// The search begins at a minimum `from` of nearly the same data, or at all initial estimates.
 pub(super) fn with_unknown_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
     nominal: Option<&SecondOrderSystem>,
+    from: Option<GlobalMinimum>,
     pooling: Pooling,
 ) -> Result<OutputErrorFit, EstimateError> {
     if pooling == Pooling::PerLine {
         return Err(SpectraError::TooFewAverages { got: 1, needed: 2 }.into());
     }
-    let (white, is_rounding) = with_white_noise(data, unknowns, nominal, None)?;
+    let (white, is_rounding) = with_white_noise(data, unknowns, nominal, from)?;
     let pulses = if is_rounding { None } else { without_pulses(data, unknowns, &white) };
     let (corrected, white, is_rounding) = match &pulses {
         Some(pulses) => (&pulses.data, pulses.white.clone(), pulses.is_rounding),
@@ -311,7 +313,10 @@ fn with_white_noise(
             None => {
                 let starts = InitialEstimates::new(data, unknowns, &noise).with_nominal(nominal);
                 let spare = spare(data, unknowns) as f64;
-                search(&mut misfit, &starts, plausible(None, spare, spare))?
+                let fewer = thinned(data, unknowns, &noise);
+                let thin = fewer.as_ref().map(|(data, noise)| Misfit::new(data, unknowns, noise));
+                let plausible = plausible(None, spare, spare);
+                search(&mut misfit, thin.transpose()?.as_mut(), &starts, plausible)?
             }
             Some(before) => before.followed(&mut misfit)?,
         };

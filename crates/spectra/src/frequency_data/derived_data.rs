@@ -22,6 +22,26 @@ impl FrequencyData {
         closed
     }
 
+    /// Returns every `step`-th row, without the noise; `None` for data with errors of pulses, which
+    /// are common to all rows, and for a step of 0.
+    pub fn thinned(&self, step: usize) -> Option<Self> {
+        if step == 0 || !self.pulses.is_empty() {
+            return None;
+        }
+        let rows: Vec<usize> = (0..self.len()).step_by(step).collect();
+        Some(Self {
+            omega: rows.iter().map(|row| self.omega[*row]).collect(),
+            force: self.force.select_rows(&rows),
+            displacement: self.displacement.select_rows(&rows),
+            measured: self.measured,
+            noise: None,
+            force_variance: self.force_variance.select_rows(&rows),
+            transient: self.transient.select_rows(&rows),
+            open: self.open.clone(),
+            pulses: Vec::new(),
+        })
+    }
+
     /// Returns the same data with other forces (N), rows × n.
     #[must_use]
     pub fn with_force(&self, force: DMatrix<Complex<f64>>) -> Self {

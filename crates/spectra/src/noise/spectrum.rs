@@ -76,6 +76,13 @@ impl NoiseSpectrum {
         })
     }
 
+    /// Returns the covariances of every `step`-th row, as known ones; `None` for a step of 0.
+    pub fn thinned(&self, step: usize) -> Option<Self> {
+        let rows = (step > 0).then(|| (0..self.omega.len()).step_by(step))?;
+        let omega = rows.clone().map(|row| self.omega[row]).collect();
+        Self::new(omega, rows.map(|row| self.covariance[row].clone()).collect()).ok()
+    }
+
     /// Creates white noise of known standard deviation on the samples of every response channel (in
     /// the measured unit) and force channel (N), on the spectral lines of one period: E|X_n|² = 4
     /// s²/N. For the mean of P periods divide both by √P.
