@@ -115,7 +115,7 @@ pub(crate) const WEIGHT_TOLERANCE: f64 = 1e-3;
 pub(crate) const RESIDUAL_ROUNDING: f64 = 1e-12;
 
 /// Maximum number of rounds of weighting by noise levels; three nearly always suffice.
-pub(crate) const MAX_ROUNDS: usize = 40;
+pub(crate) const MAX_ROUNDS: usize = 10;
 
 /// Maximum number of rounds of weighting by a noise spectrum: the first is already efficient, the
 /// others refine the shape of the spectrum.

@@ -304,9 +304,10 @@ fn with_white_noise(
 ) -> Result<(Weighted, bool), EstimateError> {
     let measured = measured_size(data, data.displacement());
     let known_force = data.force_variance().iter().all(|variance| *variance == 0.0);
-    let mut levels = measured.clone();
-    let mut last = from;
-    for _ in 0..MAX_ROUNDS {
+    let (mut levels, mut last) = (measured.clone(), from);
+    let mut rounds = 0;
+    loop {
+        rounds += 1;
         let noise = white_noise(data, &levels)?;
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         let fit = match last {
@@ -328,7 +329,9 @@ fn with_white_noise(
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
         // The level of rounding errors does not converge.
         let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= RESIDUAL_ROUNDING * x);
-        if settled || exact || (known_force && data.dof() == 1) {
+        // With a wrong model the level of a channel may fall without end: the fit is a minimum for
+        // its weights, and the residual shows the error of the model.
+        if settled || exact || (known_force && data.dof() == 1) || rounds == MAX_ROUNDS {
             drop(misfit);
             return Ok((Weighted { fit, noise }, exact));
         }
@@ -337,8 +340,6 @@ fn with_white_noise(
         let least = sizes.iter().zip(&levels).map(|(f, l)| f / l).fold(0.0, f64::max) * 1e-6;
         levels = sizes.iter().zip(&levels).map(|(f, l)| f.max(l * least)).collect();
     }
-    let (searches, steps) = last.map_or((0, 0), |fit| (fit.searches, fit.minimum.steps));
-    Err(EstimateError::NotConverged { searches, steps })
 }
 
 /// Fits with the noise that `next` estimates from the residual of the previous fit; `None` if this
