@@ -155,7 +155,7 @@ fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
     /// Maximum relative difference between a value and its mirror image, from the rounding of
     /// printed numbers.
     const SAME: f64 = 1e-6;
-    /// Minimum number of lines besides 0 Hz.
+    /// Minimum number of lines above 0 Hz.
     const MIN_LINES: usize = 3;
     let hz = |at: usize| responses.frequency_hz[at];
     let lines = order.iter().copied().filter(|at| hz(*at) > 0.0).collect::<Vec<_>>();
