@@ -7,6 +7,7 @@ use mechid_analysis::identify::{Acquisition, Form, OpenFit, Source, Structure};
 use mechid_analysis::{Identified, Identify, Measurement, ResponseQuantity, identify};
 use mechid_checks::{Alternative, Cause, Finding};
 use mechid_model::{Discretisation, Sdof};
+use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_problems::RandomTest;
 use mechid_signal::{NoiseLevel, Record, Sampling, Spectrum, noise};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -105,7 +106,7 @@ fn tower(samples: usize) -> (Measurement, [f64; 5]) {
     });
     let root = |i: usize| f64::sqrt(masses[i]);
     let scaled = DMatrix::from_fn(5, 5, |i, j| stiffness[(i, j)] / (root(i) * root(j)));
-    let modes = scaled.symmetric_eigen();
+    let modes = hermitian_eigen(scaled).unwrap();
     let sampling = Sampling::from_rate_hz(100.0, samples).unwrap();
     let white = noise::white(sampling, 1, 100.0, 5).unwrap();
     let mut accelerations = DMatrix::zeros(samples, 5);
