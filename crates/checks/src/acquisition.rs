@@ -11,7 +11,7 @@ use super::alternative::{Alternative, Cause};
 use super::finding::{Channel, Finding, Quantity};
 use super::limits::{
     ACQUISITION_ROUNDS, CORNER_WIDTHS, DELAY_REMAINING, HIGH_PASS_STEP, LINEARITY_NEIGHBOURS,
-    MAX_SENSITIVITIES, STANDARD_ERRORS,
+    STANDARD_ERRORS,
 };
 use super::open_fit::{joined, minimum_near, residuals_of_fit};
 use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
@@ -253,60 +253,35 @@ pub fn fault_of_acquisition(
     Ok(best.map(|(_, finding)| finding))
 }
 
-/// Finds a force held or linear between samples `dt` (s) apart that explains the residual of a
-/// maximum-likelihood `fit` to open records ([`Finding::Alternative`]), by new fits: the estimate
-/// may be too far from the truth for [`fault_of_acquisition`]. `records` are the data of the fit,
-/// `closed` those without the transients, and `after` the residuals. `None` unless such a force
-/// changes the residual significantly and at most a quarter of its power remains, or its tests warn
-/// without such a force and pass with it.
+/// Returns the kinds of a force between samples `dt` (s) apart, held or linear, that change the
+/// residual of an `estimate` significantly: a new fit shows which of them explains it. `records`
+/// are open records without their transients, and `after` the residuals.
 ///
 /// # Source
-/// Rao's score test; maximum likelihood with each of the two forces in turn.
-pub fn force_between_samples(
+/// Rao's score test.
+pub fn forces_between_samples(
     records: &[FrequencyData],
-    closed: &[FrequencyData],
     dt: f64,
-    fit: &OutputErrorFit,
+    estimate: &Estimate,
     after: &[SpectralResidual],
-) -> Option<Finding> {
-    let (estimate, unknowns) = (&fit.estimate, fit.estimate.unknowns());
-    let (of_fit, parameters) = (estimate.system().ok()?, unknowns.independent());
-    let joint = joined(records).filter(|_| after.len() == closed.len())?;
-    let is_rounding = after.iter().any(SpectralResidual::is_rounding);
-    if is_rounding || 2 * joint.len() * joint.dof() * parameters > MAX_SENSITIVITIES {
-        return None;
+) -> Vec<Discretisation> {
+    let (Some(weighing), Ok(system)) =
+        (Weighing::new(records, estimate, Extent::Open), estimate.system())
+    else {
+        return Vec::new();
+    };
+    if after.len() != records.len() || after.iter().any(SpectralResidual::is_rounding) {
+        return Vec::new();
     }
-    let weighing = &Weighing::new(closed, estimate, Extent::Open)?;
-    let residuals = Residuals { records: closed, after, weighing, system: &of_fit, dt, parameters };
-    let refitted = |between: Discretisation| -> Option<(f64, Discretisation)> {
-        let score = residuals.score(Fault::Between(between), 0.0)?;
-        if score.amount.abs() <= STANDARD_ERRORS * score.error {
-            return None;
-        }
-        let mut likelihood = ChangedRecords::from_fit(&joint, unknowns, fit)?;
-        let undisturbed = likelihood.cost(&joint)?;
-        let mut system = of_fit.clone();
-        likelihood.search(&equivalent_force(&joint, &system, dt, between)?)?;
-        let mut least = undisturbed;
-        for _ in 0..ACQUISITION_ROUNDS {
-            system = likelihood.system()?;
-            least = likelihood.cost(&equivalent_force(&joint, &system, dt, between)?)?;
-        }
-        let remaining = least / undisturbed;
-        let becomes_noise = || {
-            let without = records.iter().map(|data| equivalent_force(data, &system, dt, between));
-            Some(is_noise(&residuals_of_fit(&without.collect::<Option<Vec<_>>>()?, unknowns)?))
-        };
-        let explains =
-            remaining <= DELAY_REMAINING || remaining < 1.0 && !is_noise(after) && becomes_noise()?;
-        explains.then_some((remaining, between))
+    let (weighing, system) = (&weighing, &system);
+    let parameters = estimate.unknowns().independent();
+    let residuals = Residuals { records, after, weighing, system, dt, parameters };
+    let is_significant = |between: &Discretisation| {
+        let score = residuals.score(Fault::Between(*between), 0.0);
+        score.is_some_and(|score| score.amount.abs() > STANDARD_ERRORS * score.error)
     };
     let kinds = [Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold];
-    let best = kinds.into_iter().filter_map(refitted).min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(remaining, between_samples)| {
-        let cause = Cause::BetweenSamples { between_samples };
-        Finding::Alternative(Alternative { cause, remaining })
-    })
+    kinds.into_iter().filter(is_significant).collect()
 }
 
 /// Finds AC coupling that explains the residual of a maximum-likelihood `fit` to hits

@@ -79,7 +79,7 @@ mod whiteness;
 
 use std::fmt;
 
-pub use acquisition::{fault_of_acquisition, fault_of_hits, force_between_samples};
+pub use acquisition::{fault_of_acquisition, fault_of_hits, forces_between_samples};
 pub use after::after_fit;
 pub use alternative::{Alternative, Cause, ModelledResponses, better_model};
 pub use before::{before_equation_of_motion, before_fit};

@@ -284,8 +284,7 @@ pub const DROP_OUT_MOTION: f64 = 10.0;
 /// smaller probabilities.
 pub const DROP_OUT_LEVEL: f64 = 1e-4;
 
-/// Maximum number of rounds in which the corner frequency of an AC-coupled channel, or a force held
-/// or linear between its samples, is refined.
+/// Maximum number of rounds in which the corner frequency of an AC-coupled channel is refined.
 pub(crate) const ACQUISITION_ROUNDS: usize = 4;
 
 /// Half width of the first and of the last parabola through the sums of squares around a corner

@@ -7,13 +7,14 @@ use mechid_estimate::frequency_domain::{
     OutputErrorFit, equivalent_force, output_error_from, output_error_pooling,
 };
 use mechid_estimate::{Estimate, Unknowns};
-use mechid_model::Discretisation;
+use mechid_model::{Discretisation, SecondOrderSystem};
 use mechid_spectra::{FrequencyData, Pooling};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::open_records::joined;
 use crate::AnalysisError;
-use crate::limits::{ACQUISITION_ROUNDS, ACQUISITION_SETTLED};
+use crate::limits::{ACQUISITION_ROUNDS, ACQUISITION_SETTLED, LINES_PER_UNKNOWN};
 use crate::measurement::Block;
 
 /// Properties of the acquisition that the fit of open records takes into account.
@@ -134,6 +135,56 @@ impl Acquisition {
         }
         Ok(last)
     }
+}
+
+/// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best, and the
+/// fraction of the residual power of a `fit` with a band-limited force that remains with it: the
+/// geometric mean over the channels, as in the likelihood of white noise. Long records are fitted
+/// on a part of their lines. `None` without kinds, or if no fit succeeds.
+///
+/// # Source
+/// Maximum likelihood with the levels of the channels eliminated.
+pub(super) fn between_samples(
+    records: &[FrequencyData],
+    kinds: &[Discretisation],
+    dt: f64,
+    fit: &OutputErrorFit,
+    pooling: Pooling,
+) -> Option<(Discretisation, f64)> {
+    let unknowns = fit.estimate.unknowns();
+    let lines: usize = records.iter().map(FrequencyData::len).sum();
+    let step = (lines / (LINES_PER_UNKNOWN * unknowns.independent())).max(1);
+    let thinned: Option<Vec<_>> = records.iter().map(|record| record.thinned(step)).collect();
+    let thinned = thinned.filter(|_| !kinds.is_empty())?;
+    let level = |fit: &OutputErrorFit, records: &[FrequencyData]| -> Option<f64> {
+        let closed = fit.ends.as_ref()?.without_transients(records).ok()?;
+        let system = fit.estimate.system().ok()?;
+        let powers = closed.iter().map(|record| residual_powers(record, &system));
+        let sum = powers.reduce(|sum, powers| sum + powers)?;
+        Some(sum.map(f64::ln).mean())
+    };
+    let usual = output_error_from(&joined(&thinned).ok()?, unknowns, fit, pooling).ok()?;
+    let before = level(&usual, &thinned)?;
+    let refitted = kinds.iter().filter_map(|kind| {
+        let acquisition = Acquisition { between_samples: Some(*kind), ..Acquisition::default() };
+        let (fit, equivalent) =
+            acquisition.refitted(usual.clone(), &thinned, dt, unknowns, pooling).ok()?;
+        Some((*kind, (level(&fit, &equivalent)? - before).exp()))
+    });
+    refitted.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Returns the power of the residual of each channel, in the squared unit of the measured quantity.
+fn residual_powers(record: &FrequencyData, system: &SecondOrderSystem) -> DVector<f64> {
+    let mut powers = DVector::zeros(record.dof());
+    for (row, &omega) in record.omega().iter().enumerate() {
+        let measured = record.displacement().row(row).transpose();
+        let force = record.force().row(row).transpose();
+        let Some(modelled) = system.dynamic_stiffness(omega).lu().solve(&force) else { continue };
+        let scale = record.measured().per_displacement(omega).norm_sqr();
+        powers += (measured - modelled).map(|error| scale * error.norm_sqr());
+    }
+    powers
 }
 
 /// Largest change of a parameter, in standard errors.

@@ -2,10 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use mechid_checks::limits::DELAY_REMAINING;
 use mechid_checks::{
-    AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, after_spectral_fit,
-    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition,
-    fault_of_hits, fitted_band, force_between_samples, linearity_of_open_record,
+    AfterSpectralFit, Alternative, Cause, Finding, Quantity, RowParts, SpectralResidual,
+    after_spectral_fit, before_spectral_fit, delay_of_lines, delay_of_open_records,
+    fault_of_acquisition, fault_of_hits, fitted_band, forces_between_samples,
+    linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
@@ -15,7 +17,7 @@ use mechid_model::{Discretisation, ResponseQuantity};
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
 
-use super::acquisition::Acquisition;
+use super::acquisition::{Acquisition, between_samples};
 use super::compared::{Compared, rows_of};
 use super::disagreement::{Disagreement, squared_change};
 use super::fitted::{Fitted, Residual};
@@ -155,7 +157,7 @@ pub(super) fn fit(
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let tested =
         Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
-    let likelier = tested.cause(dt, unknowns, excitation)?;
+    let likelier = tested.cause(dt, unknowns, noise.response, excitation)?;
     let compared = agreement(&data, &fit, &residuals, excitation)?;
     let Compared { parts, omitted } = compared.beside(likelier.as_ref().map(remaining));
     let quantity = records[0].held.response().1;
@@ -256,6 +258,7 @@ impl Tested<'_> {
         &self,
         dt: f64,
         unknowns: &Unknowns,
+        pooling: Pooling,
         excitation: Excitation<'_>,
     ) -> Result<Option<Finding>, AnalysisError> {
         let Self { records, closed, fit, residuals } = *self;
@@ -264,16 +267,27 @@ impl Tested<'_> {
             return Ok(likelier(late, fault_of_hits(records, closed, dt, fit, residuals)));
         }
         let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
-        let is_between = |finding: &Finding| {
+        let is_known = |finding: &Finding| {
             let Finding::Alternative(alternative) = finding else { return false };
-            matches!(alternative.cause, Cause::BetweenSamples { .. })
+            let is_between = matches!(alternative.cause, Cause::BetweenSamples { .. });
+            is_between && alternative.remaining <= DELAY_REMAINING
         };
-        let between = if fault.as_ref().is_some_and(is_between) {
-            None
-        } else {
-            force_between_samples(records, closed, dt, fit, residuals)
-        };
-        Ok(likelier(likelier(late, fault), between))
+        let mut named = likelier(late, fault);
+        if !named.as_ref().is_some_and(is_known) {
+            let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
+            let between = between_samples(records, &kinds, dt, fit, pooling);
+            let is_likelier = |(_, left): &(Discretisation, f64)| {
+                *left < named.as_ref().map_or(DELAY_REMAINING, remaining)
+            };
+            named = match between.filter(is_likelier) {
+                Some((between_samples, remaining)) => {
+                    let cause = Cause::BetweenSamples { between_samples };
+                    Some(Finding::Alternative(Alternative { cause, remaining }))
+                }
+                None => named,
+            };
+        }
+        Ok(named)
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use mechid_model::SecondOrderSystem;
 use mechid_numerics::gauss_newton::minimise;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::DVector;
@@ -11,7 +10,7 @@ use super::OutputErrorFit;
 use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
 use super::multi_start::{search, thinned};
-use super::output_error_fit::{entries, plausible, spare};
+use super::output_error_fit::{plausible, spare};
 use super::pulse_fit::PulseFit;
 use super::unknown_noise::white_noise_at;
 use crate::Unknowns;
@@ -44,13 +43,6 @@ impl<'a> ChangedRecords<'a> {
         let exact = corrected(data, &amplitudes)?;
         let noise = white_noise_at(exact.as_ref(), unknowns, &theta).ok()?;
         Some(Self { unknowns, noise, spare: spare(data, unknowns), theta, amplitudes })
-    }
-
-    /// Returns the system of the last estimate; `None` if its matrices are not finite.
-    pub fn system(&self) -> Option<SecondOrderSystem> {
-        let independent = &self.theta.as_slice()[..self.unknowns.independent()];
-        let [m, c, k] = self.unknowns.assemble(entries(self.unknowns, independent).as_slice());
-        SecondOrderSystem::new(m, c, k).ok()
     }
 
     /// Number of real equations minus the number of unknowns.
