@@ -101,7 +101,7 @@ impl Definition {
     }
 
     /// Returns the text of the unit, as in a header of the name and the text; empty if there is
-    /// none, or only that of a range.
+    /// none, or only that of a range or a sensitivity (`5 kN`, `10 mV/g`).
     fn unit(&self) -> String {
         let text = match &self.key {
             Key::Name(name) => format!("{name} {}", self.text),
@@ -109,7 +109,8 @@ impl Definition {
         };
         let unit = unit_text(&text);
         let before = text.rfind(&unit).map_or("", |at| text[..at].trim_end());
-        if before.ends_with(|c: char| c.is_ascii_digit()) { String::new() } else { unit }
+        let is_of_number = before.ends_with(|c: char| c.is_ascii_digit() || c == '/');
+        if is_of_number { String::new() } else { unit }
     }
 }
 

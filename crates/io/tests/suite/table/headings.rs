@@ -116,7 +116,11 @@ fn definitions_of_columns_in_lines_of_their_own_are_read() {
         assert!((si - 9.80665).abs() < 1e-12, "{text}");
     }
     // Numbers that are not those of the columns, and ranges.
-    for above in ["# 2 force [kN]\n# 3 acc [g]\n", "# force: range 5 kN\n# acc: 50 g\n"] {
+    for above in [
+        "# 2 force [kN]\n# 3 acc [g]\n",
+        "# force: range 5 kN\n# acc: 50 g\n",
+        "# force: 11.2 mV/kN\n# acc: sensor 352, 10 mV/g\n",
+    ] {
         let table = three(&format!("{above}time,force,acc\n{ROWS}"));
         assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1.0, "{above}");
         assert_eq!(table.to_si(2, Quantity::ACCELERATION).unwrap(), 1.0, "{above}");
