@@ -247,6 +247,11 @@ fn stroke(name: &str) -> Option<(&str, Expression)> {
     if split_words(name).iter().any(is_unit_word) {
         return None;
     }
+    // The stroke of `acc 100 mV/g` belongs to a sensitivity.
+    let last_word = before.rsplit_once([' ', '_']).and_then(|(_, word)| Expression::parse(word));
+    if last_word.is_some_and(|unit| unit.dimension.is_electric()) {
+        return None;
+    }
     // `v/mm/s` is not a voltage divided by a velocity.
     let is_unit_alone = Expression::parse(name).is_some_and(|unit| !unit.dimension.is_electric());
     let is_name = !is_unit_alone && !before.trim().is_empty();

@@ -176,6 +176,8 @@ fn generated_headers_have_the_right_factor_or_a_finding() {
 fn a_text_that_is_not_understood_or_may_be_a_unit_is_reported() {
     for (name, quantity, factor) in [
         ("Force [mV]", Quantity::Force, None),
+        ("Force 11.2 mV/N", Quantity::Force, None),
+        ("acc_100_mV/g", Quantity::ACCELERATION, None),
         ("Force_mV", Quantity::Force, None),
         ("acc counts", Quantity::ACCELERATION, None),
         ("Disp [dB re 1 m]", Quantity::DISPLACEMENT, None),
