@@ -8,6 +8,7 @@ use nalgebra::{Complex, DMatrix};
 use super::FrequencyData;
 use crate::SpectraError;
 use crate::noise::pulse::PulseErrors;
+use crate::thinning::thinned_rows;
 
 impl FrequencyData {
     fn no_longer_open(&mut self) {
@@ -22,13 +23,13 @@ impl FrequencyData {
         closed
     }
 
-    /// Returns every `step`-th row, without the noise; `None` for data with errors of pulses, which
-    /// are common to all rows, and for a step of 0.
+    /// Returns one of every `step` rows, without the noise; `None` for data with errors of pulses,
+    /// which are common to all rows, and for a step of 0.
     pub fn thinned(&self, step: usize) -> Option<Self> {
         if step == 0 || !self.pulses.is_empty() {
             return None;
         }
-        let rows: Vec<usize> = (0..self.len()).step_by(step).collect();
+        let rows = thinned_rows(self.len(), step);
         Some(Self {
             omega: rows.iter().map(|row| self.omega[*row]).collect(),
             force: self.force.select_rows(&rows),

@@ -7,6 +7,7 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::SpectraError;
 use crate::noise::pooling::{NoiseModel, Pooled, Pooling, pooled};
+use crate::thinning::thinned_rows;
 
 /// Covariance of the measured displacement and force amplitudes, one matrix per row of data.
 ///
@@ -76,11 +77,13 @@ impl NoiseSpectrum {
         })
     }
 
-    /// Returns the covariances of every `step`-th row, as known ones; `None` for a step of 0.
+    /// Returns the covariances of one of every `step` rows, those of
+    /// [`FrequencyData::thinned`](crate::FrequencyData::thinned), as known ones; `None` for a step
+    /// of 0.
     pub fn thinned(&self, step: usize) -> Option<Self> {
-        let rows = (step > 0).then(|| (0..self.omega.len()).step_by(step))?;
-        let omega = rows.clone().map(|row| self.omega[row]).collect();
-        Self::new(omega, rows.map(|row| self.covariance[row].clone()).collect()).ok()
+        let rows = thinned_rows(self.omega.len(), step);
+        let omega = rows.iter().map(|row| self.omega[*row]).collect();
+        Self::new(omega, rows.iter().map(|row| self.covariance[*row].clone()).collect()).ok()
     }
 
     /// Creates white noise of known standard deviation on the samples of every response channel (in
