@@ -35,7 +35,7 @@ pub mod noise;
 pub mod open_record;
 mod periods;
 pub mod sinusoids;
-mod thinning;
+pub mod thinning;
 pub mod transient;
 
 pub use error::SpectraError;

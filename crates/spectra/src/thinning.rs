@@ -5,7 +5,15 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Returns one of every `step` rows of `len`, in ascending order; none for a step of 0. The row
 /// within the step changes without a period, because forces may act on every other row.
-pub(crate) fn thinned_rows(len: usize, step: usize) -> Vec<usize> {
+///
+/// # Source
+/// Weyl (1916), Mathematische Annalen 77, 313–352 (multiples of an irrational number are spread
+/// evenly).
+///
+/// ```
+/// assert_eq!(mechid_spectra::thinning::thinned_rows(10, 5), [0, 8]);
+/// ```
+pub fn thinned_rows(len: usize, step: usize) -> Vec<usize> {
     let groups = (0..len).step_by(step.max(1)).take_while(|_| step > 0);
     let row = |(group, first): (usize, usize)| {
         let size = step.min(len - first);

@@ -1,6 +1,7 @@
 //! One of every n lines of the data, for the first steps of a search.
 
 use mechid_spectra::LineData;
+use mechid_spectra::thinning::thinned_rows;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::limits::SEARCH_NUMBERS;
@@ -15,13 +16,9 @@ pub(super) struct Thinned<'a, M> {
     omega: Vec<f64>,
 }
 
-/// Fraction of the golden ratio, whose multiples are spread evenly and without a period.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
-
 impl<'a, M: ResponseModel> Thinned<'a, M> {
     /// Takes one of every n lines of each record, so that about [`SEARCH_NUMBERS`] numbers per
-    /// unknown remain; all lines if there are fewer. The line within the n changes without a
-    /// period, because forces may act on every other line.
+    /// unknown remain; all lines if there are fewer.
     pub(super) fn new(residual: &Residual<'a, M>) -> Self {
         let Residual { model, data, .. } = residual;
         let dimensions = model.dimensions();
@@ -33,10 +30,7 @@ impl<'a, M: ResponseModel> Thinned<'a, M> {
             let of_transient = transient::len(*kind, dimensions.outputs, dimensions.states);
             let least = (SEARCH_NUMBERS * of_transient).div_ceil(2 * dimensions.outputs.max(1));
             let every = every.min(range.len() / least.max(1)).max(1);
-            for (group, first) in range.clone().step_by(every).enumerate() {
-                let size = every.min(range.end - first);
-                rows.push(first + ((GOLDEN * group as f64).fract() * size as f64) as usize);
-            }
+            rows.extend(thinned_rows(range.len(), every).into_iter().map(|row| range.start + row));
         }
         let omega = rows.iter().map(|row| data.omega()[*row]).collect();
         Self { model, rows, omega }
