@@ -8,6 +8,7 @@
 //! | the triangular factor of any number of rows | [`triangular`] |
 //! | the Cholesky factor of a large matrix | [`cholesky`] |
 //! | products of tall matrices | [`products`] |
+//! | Gram matrices of rows that are Kronecker products | [`kronecker`] |
 //! | singular values, Hermitian eigenvalues, exponential, always finite | [`linear_algebra`] |
 //! | eigenvalues of any matrix, equal ones too | [`real_schur`] |
 //! | linear equations and largest eigenvalues of operators given by products | [`krylov`] |
@@ -27,7 +28,9 @@
 pub mod cholesky;
 mod error;
 pub mod gauss_newton;
+pub mod kronecker;
 pub mod krylov;
+mod lanes;
 pub mod least_squares;
 mod limits;
 pub mod linear_algebra;

@@ -55,3 +55,11 @@ pub(crate) const SWEEPS: usize = 100;
 /// Number of rows of a block of a tall matrix that is multiplied at a time: a block of a hundred
 /// columns then fits in the cache of a core.
 pub(crate) const PRODUCT_ROWS: usize = 1024;
+
+/// Number of columns of weights that a product with pairs of regressors uses at a time: with 256
+/// lines they fit in the fastest cache of a core.
+pub(crate) const PRODUCT_COLUMNS: usize = 16;
+
+/// Number of rows of a tall matrix that are multiplied by their weights at a time: they stay in the
+/// fastest cache of a core.
+pub(crate) const WEIGHTED_ROWS: usize = 512;

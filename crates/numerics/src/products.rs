@@ -1,9 +1,11 @@
 //! Products of matrices with many more rows than columns.
 
 use nalgebra::{DMatrix, DMatrixView};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::limits::PRODUCT_ROWS;
+use crate::lanes::dot;
+use crate::limits::{PRODUCT_ROWS, WEIGHTED_ROWS};
 
 /// Returns AᵀB (columns of A × columns of B, in the product of their units), for two matrices with
 /// the same number of rows.
@@ -37,9 +39,75 @@ pub fn transposed_product(a: DMatrixView<'_, f64>, b: DMatrixView<'_, f64>) -> D
     products.into_iter().fold(zero, |sum, product| sum + product)
 }
 
+/// Returns AᵀWA (columns × columns, in the squared unit of A times that of W) for a diagonal W that
+/// is given by its diagonal. The result does not depend on the width of the vector registers.
+///
+/// # Panics
+/// Panics if there is not one weight for every row.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 1.3 (block matrices).
+///
+/// ```
+/// use mechid_numerics::products::weighted_gram;
+/// use nalgebra::dmatrix;
+///
+/// let a = dmatrix![1.0, 2.0; 3.0, 4.0];
+/// assert_eq!(weighted_gram(a.as_view(), &[1.0, 10.0]), dmatrix![91.0, 122.0; 122.0, 164.0]);
+/// ```
+pub fn weighted_gram(a: DMatrixView<'_, f64>, weights: &[f64]) -> DMatrix<f64> {
+    assert_eq!(a.nrows(), weights.len(), "one weight for every row");
+    let mut gram = DMatrix::zeros(a.ncols(), a.ncols());
+    Arch::new().dispatch(WeightedGram { a, weights, gram: &mut gram });
+    gram.fill_upper_triangle_with_lower_triangle();
+    gram
+}
+
+/// Arguments of the function that `pulp` compiles for each width of vector registers.
+struct WeightedGram<'a> {
+    a: DMatrixView<'a, f64>,
+    weights: &'a [f64],
+    gram: &'a mut DMatrix<f64>,
+}
+
+impl WithSimd for WeightedGram<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { a, weights, gram } = self;
+        let mut weighted = [0.0; WEIGHTED_ROWS];
+        for (block, weights) in weights.chunks(WEIGHTED_ROWS).enumerate() {
+            let (first, len) = (block * WEIGHTED_ROWS, weights.len());
+            for column in 0..a.ncols() {
+                let own = &a.column(column).data.into_slice()[first..first + len];
+                for ((to, a), weight) in weighted.iter_mut().zip(own).zip(weights) {
+                    *to = a * weight;
+                }
+                for row in column..a.ncols() {
+                    let other = &a.column(row).data.into_slice()[first..first + len];
+                    gram[(row, column)] += dot(&weighted[..len], other);
+                }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn weighted_products_of_several_blocks_are_the_dot_products() {
+        let number = |at: usize| ((at * 7919 + 13) % 101) as f64 / 50.0 - 1.0;
+        let rows = 3 * WEIGHTED_ROWS + 17;
+        let a = DMatrix::from_fn(rows, 4, |row, column| number(3 * row + column));
+        let weights: Vec<f64> = (0..rows).map(|row| number(5 * row + 1)).collect();
+        let gram = weighted_gram(a.as_view(), &weights);
+        let expected = a.tr_mul(&(DMatrix::from_diagonal(&weights.clone().into()) * &a));
+        assert!((gram - expected).norm() < 1e-13 * a.norm_squared());
+        assert_eq!(weighted_gram(DMatrix::zeros(0, 2).as_view(), &[]), DMatrix::zeros(2, 2));
+    }
 
     #[test]
     fn products_of_several_blocks_are_the_dot_products() {

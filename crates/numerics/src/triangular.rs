@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DMatrixView};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use crate::lanes::{LANES, dot, rest, total};
 use crate::limits::SMALLEST_NORM;
 
 /// Number of rows reduced at a time: a block of a dozen columns fits into the first-level cache.
@@ -223,23 +224,6 @@ impl Reflection {
     }
 }
 
-/// Number of partial sums of a product: enough to avoid waiting for the previous addition.
-const LANES: usize = 16;
-
-/// Returns xᵀy.
-#[inline(always)]
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    let (xs, x_rest) = x.as_chunks::<LANES>();
-    let (ys, y_rest) = y.as_chunks::<LANES>();
-    for (a, b) in xs.iter().zip(ys) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    total(sums) + rest(x_rest, y_rest)
-}
-
 /// Returns x1ᵀy and x2ᵀy in one sweep.
 #[inline(always)]
 fn dots(x1: &[f64], x2: &[f64], y: &[f64]) -> [f64; 2] {
@@ -255,25 +239,6 @@ fn dots(x1: &[f64], x2: &[f64], y: &[f64]) -> [f64; 2] {
         }
     }
     [total(first) + rest(x1_rest, y_rest), total(second) + rest(x2_rest, y_rest)]
-}
-
-/// Returns the sum of all partial sums, by repeatedly adding one half of them to the other.
-#[inline(always)]
-fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
-    let mut half = N / 2;
-    while half > 0 {
-        for lane in 0..half {
-            sums[lane] += sums[lane + half];
-        }
-        half /= 2;
-    }
-    sums[0]
-}
-
-/// Returns xᵀy of the entries that remain after the last full group of `LANES` entries.
-#[inline(always)]
-fn rest(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(a, b)| a * b).sum()
 }
 
 /// Computes y ← y − f1·x1 − f2·x2.

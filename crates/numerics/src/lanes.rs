@@ -1,0 +1,37 @@
+//! Sums of products in an order that every width of vector registers keeps.
+
+/// Number of partial sums of a product: enough to avoid waiting for the previous addition.
+pub(crate) const LANES: usize = 16;
+
+/// Returns xᵀy.
+#[inline(always)]
+pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (xs, x_rest) = x.as_chunks::<LANES>();
+    let (ys, y_rest) = y.as_chunks::<LANES>();
+    for (a, b) in xs.iter().zip(ys) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    total(sums) + rest(x_rest, y_rest)
+}
+
+/// Returns the sum of all partial sums, by repeatedly adding one half of them to the other.
+#[inline(always)]
+pub(crate) fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
+    let mut half = N / 2;
+    while half > 0 {
+        for lane in 0..half {
+            sums[lane] += sums[lane + half];
+        }
+        half /= 2;
+    }
+    sums[0]
+}
+
+/// Returns xᵀy of the entries that remain after the last full group of [`LANES`] entries.
+#[inline(always)]
+pub(crate) fn rest(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(a, b)| a * b).sum()
+}
