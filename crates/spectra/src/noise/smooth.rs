@@ -4,6 +4,7 @@ mod bump;
 
 use std::ops::Range;
 
+use mechid_numerics::products::weighted_gram;
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use rayon::prelude::*;
 
@@ -325,8 +326,6 @@ fn most_likely(
     let mut misfit = deviance(&log_power, variances, &mut ratio);
     let tolerance = tolerance * (variances.len() as f64).sqrt();
     let mut next_ratio = ratio.clone();
-    let (transposed, mut weighted) = (basis.transpose(), basis.clone());
-    let mut information = DMatrix::zeros(basis.ncols(), basis.ncols());
     let mut factors: Option<Cholesky<f64, Dyn>> = None;
     let mut previous = f64::INFINITY;
     for _ in 0..SMOOTH_STEPS {
@@ -336,11 +335,7 @@ fn most_likely(
         let mut step = match reused.filter(|step| step.norm() <= HESSIAN_REUSED * previous) {
             Some(step) => step,
             None => {
-                for (mut column, own) in weighted.column_iter_mut().zip(basis.column_iter()) {
-                    column.zip_zip_apply(&own, &ratio, |w, own, ratio| *w = own * ratio);
-                }
-                information.gemm(1.0, &transposed, &weighted, 0.0);
-                factors = information.clone().cholesky();
+                factors = weighted_gram(basis.as_view(), ratio.as_slice()).cholesky();
                 // If the Hessian is not positive definite, the expected information, which is the
                 // identity matrix, replaces it in Newton's step.
                 factors.as_ref().map_or_else(|| slope.clone(), |factors| factors.solve(&slope))

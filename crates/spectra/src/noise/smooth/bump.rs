@@ -218,34 +218,79 @@ impl FlatGains {
 
     /// Returns the largest gain of the bands of a width, and its band.
     fn best_of_width(&self, width: usize) -> Option<(f64, Range<usize>)> {
-        let lines = self.below.nrows() - 1;
+        let bounds = self.bounds(width);
         let mut best: Option<(f64, usize)> = None;
-        for start in 0..=lines - width {
+        for (start, bound) in bounds.into_iter().enumerate() {
             let least = best.map_or(f64::NEG_INFINITY, |(gain, _)| gain);
-            let gain = self.gain_above(least, start, width).filter(|gain| *gain >= least);
-            best = gain.map(|gain| (gain, start)).or(best);
+            // Most bands are excluded without a logarithm.
+            if bound >= least {
+                let gain = Some(self.gain(start, width)).filter(|gain| *gain >= least);
+                best = gain.map(|gain| (gain, start)).or(best);
+            }
         }
         best.map(|(gain, start)| (gain, start..start + width))
     }
 
-    /// Returns the gain of a band, or `None` if it is less than `least`.
-    fn gain_above(&self, least: f64, start: usize, width: usize) -> Option<f64> {
+    /// Returns an upper bound of the gain of each band of a width: ln x ≤ x − 1.
+    fn bounds(&self, width: usize) -> Vec<f64> {
         let lines = self.below.nrows() - 1;
-        let (count, others) = (width as f64, (lines - width) as f64);
-        let ratios = self.below.column_iter().map(|below| {
-            let inside = below[start + width] - below[start];
-            let total = below[lines];
-            let [mean, inside, other] =
-                [total / (count + others), inside / count, (total - inside) / others]
-                    .map(|level: f64| level.max(SMOOTH_FLOOR));
-            let counts = inside > other || count * self.nu >= QUIET_DEVIATIONS;
-            if counts { [mean / inside, mean / other] } else { [1.0, 1.0] }
+        let mut bounds = vec![0.0; lines + 1 - width];
+        for below in self.below.as_slice().chunks_exact(lines + 1) {
+            let levels = Levels::new(below, width, self.nu);
+            for ((bound, first), last) in bounds.iter_mut().zip(below).zip(&below[width..]) {
+                let [inside, other] = levels.ratios(last - first);
+                *bound += levels.count * (inside - 1.0) + levels.others * (other - 1.0);
+            }
+        }
+        bounds
+    }
+
+    /// Returns the gain of a band.
+    fn gain(&self, start: usize, width: usize) -> f64 {
+        let lines = self.below.nrows() - 1;
+        let gains = self.below.as_slice().chunks_exact(lines + 1).map(|below| {
+            let levels = Levels::new(below, width, self.nu);
+            let [inside, other] = levels.ratios(below[start + width] - below[start]);
+            levels.count * inside.ln() + levels.others * other.ln()
         });
-        // Most bands are excluded without a logarithm, because ln x ≤ x − 1.
-        let bound = |[inside, other]: [f64; 2]| count * (inside - 1.0) + others * (other - 1.0);
-        let gain = |[inside, other]: [f64; 2]| count * inside.ln() + others * other.ln();
-        let possible = ratios.clone().map(bound).sum::<f64>() >= least;
-        possible.then(|| ratios.map(gain).sum::<f64>())
+        gains.sum()
+    }
+}
+
+/// Levels of a channel for bands of one width.
+struct Levels {
+    /// Number of lines of a band.
+    count: f64,
+    /// Number of all other lines.
+    others: f64,
+    /// Sum over all lines.
+    total: f64,
+    mean: f64,
+    /// Whether the band is wide enough to be quieter than all other lines.
+    may_be_quiet: bool,
+}
+
+impl Levels {
+    fn new(below: &[f64], width: usize, nu: f64) -> Self {
+        let lines = below.len() - 1;
+        let (count, total) = (width as f64, below[lines]);
+        Self {
+            count,
+            others: (lines - width) as f64,
+            total,
+            mean: (total / lines as f64).max(SMOOTH_FLOOR),
+            may_be_quiet: count * nu >= QUIET_DEVIATIONS,
+        }
+    }
+
+    /// Returns the mean of all lines over that of a band with this sum, and over that of all other
+    /// lines; 1 for a quiet band that is too narrow.
+    #[inline]
+    fn ratios(&self, inside: f64) -> [f64; 2] {
+        let other = ((self.total - inside) / self.others).max(SMOOTH_FLOOR);
+        let inside = (inside / self.count).max(SMOOTH_FLOOR);
+        let counts = self.may_be_quiet | (inside > other);
+        [inside, other].map(|level| if counts { self.mean / level } else { 1.0 })
     }
 }
 
