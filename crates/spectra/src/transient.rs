@@ -2,7 +2,7 @@
 //! on its lines, written as a load.
 
 use mechid_model::Matrix;
-use nalgebra::{Complex, DVector};
+use nalgebra::{Complex, DMatrix};
 
 use crate::frequency_data::FrequencyData;
 
@@ -28,29 +28,30 @@ impl<'a> TransientLoad<'a> {
         Self { data, tau }
     }
 
-    /// Subtracts (τ₀ + τ₁ s + …) Z of a row from forces, in N.
-    pub fn subtract(&self, row: usize, force: &mut [Complex<f64>]) {
+    /// Subtracts (τ₀ + τ₁ s + …) Z of every row from forces, degrees of freedom × rows, in N.
+    ///
+    /// # Panics
+    /// If the forces do not have one column for every row of the data.
+    pub fn subtract_from(&self, forces: &mut DMatrix<Complex<f64>>) {
         let n = self.data.dof();
-        let powers = powers(self.data.omega()[row]);
-        for (column, z) in self.data.transient().row(row).iter().enumerate() {
-            // The transients of all other records are zero on this line.
-            if *z == Complex::default() {
-                continue;
-            }
-            for matrix in Matrix::ALL {
-                let z = z * powers[matrix as usize];
-                for (dof, force) in force.iter_mut().enumerate() {
-                    *force -= z * self.tau[index(n, column, matrix, dof)];
+        assert_eq!(forces.shape(), (n, self.data.len()), "forces of every row");
+        for (column, transient) in self.data.transient().column_iter().enumerate() {
+            for ((z, omega), mut force) in
+                transient.iter().zip(self.data.omega()).zip(forces.column_iter_mut())
+            {
+                // The transient of a record is zero on the lines of all other records.
+                if *z == Complex::ZERO {
+                    continue;
+                }
+                let powers = powers(*omega);
+                for matrix in Matrix::ALL {
+                    let z = z * powers[matrix as usize];
+                    for (dof, force) in force.iter_mut().enumerate() {
+                        *force -= z * self.tau[index(n, column, matrix, dof)];
+                    }
                 }
             }
         }
-    }
-
-    /// Returns the loads of a row, in N.
-    pub fn load(&self, row: usize) -> DVector<Complex<f64>> {
-        let mut force = DVector::zeros(self.data.dof());
-        self.subtract(row, force.as_mut_slice());
-        -force
     }
 }
 
@@ -82,12 +83,8 @@ impl FrequencyData {
     #[must_use]
     pub fn without_transient(&self, tau: &[f64]) -> Self {
         let transient = TransientLoad::new(self, tau);
-        let mut force = self.force().clone();
-        for row in 0..self.len() {
-            let mut forces = force.row(row).transpose();
-            transient.subtract(row, forces.as_mut_slice());
-            force.row_mut(row).copy_from(&forces.transpose());
-        }
-        self.with_closed_force(force)
+        let mut forces = self.force().transpose();
+        transient.subtract_from(&mut forces);
+        self.with_closed_force(forces.transpose())
     }
 }

@@ -10,24 +10,35 @@ use crate::limits::GRAM_LINES;
 
 /// Lines whose products are computed together, and the columns that are nonzero on at least one of
 /// them. The transient of a record has nonzero columns on the lines of this record only.
+#[derive(Clone)]
 pub(super) struct LineBlock {
     pub(super) lines: Range<usize>,
     /// Columns of the layout, in rising order.
     pub(super) columns: Vec<usize>,
 }
 
+/// Factors of the rows √2 φ_l ⊗ W_l of a Jacobian, for the lines of a block.
+pub(super) struct BlockFactors {
+    pub(super) block: LineBlock,
+    /// φ_l, 2 lines × columns of the block, real parts first.
+    pub(super) regressors: DMatrix<f64>,
+    /// W_lᴴW_l, lines × dof², in the layout of [`gram`](mechid_numerics::kronecker::gram()).
+    pub(super) weights: DMatrix<f64>,
+    /// W_lᴴr_l, 2 lines × dof, real parts first.
+    pub(super) residuals: DMatrix<f64>,
+}
+
 impl LineBlock {
-    /// Returns all blocks of regressors, columns of the layout × 2 lines.
-    pub(super) fn all(regressors: &DMatrix<f64>) -> Vec<Self> {
-        let lines = regressors.ncols() / 2;
+    /// Returns the blocks of all lines, given which lines use which of the columns.
+    pub(super) fn all(
+        lines: usize,
+        columns: usize,
+        is_used: impl Fn(usize, usize) -> bool,
+    ) -> Vec<Self> {
         let block = |start: usize| {
             let range = start..lines.min(start + GRAM_LINES);
-            let both = [range.start, lines + range.start];
-            let parts = both.map(|first| regressors.columns(first, range.len()));
-            let is_used = |column: &usize| {
-                parts.iter().any(|part| part.row(*column).iter().any(|value| *value != 0.0))
-            };
-            Self { columns: (0..regressors.nrows()).filter(is_used).collect(), lines: range }
+            let on_any = |column: &usize| range.clone().any(|line| is_used(line, *column));
+            Self { columns: (0..columns).filter(on_any).collect(), lines: range }
         };
         (0..lines).step_by(GRAM_LINES).map(block).collect()
     }
@@ -51,17 +62,61 @@ impl LineBlock {
         r.select_rows(&self.columns).select_columns(&self.columns)
     }
 
+    /// Returns rows of the columns of this block as rows of the columns of a `wider` one.
+    fn widened(&self, wider: &Self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut widened = DMatrix::zeros(rows.nrows(), wider.columns.len());
+        for (from, column) in rows.column_iter().zip(&self.columns) {
+            let to = wider.columns.binary_search(column).expect("a column of the wider block");
+            widened.column_mut(to).copy_from(&from);
+        }
+        widened
+    }
+
     /// Rotates rows with the columns of the block into a triangular factor; `None` if a value is
     /// not finite.
     pub(super) fn push(&self, r: &mut DMatrix<f64>, rows: &DMatrix<f64>) -> Option<()> {
-        let mut factor = TriangularFactor::new(self.columns.len());
-        let finite = factor.push(&[self.triangle(r).as_view()]) && factor.push(&[rows.as_view()]);
+        let mut closed = self.clone();
+        closed.close(r);
+        let rows = self.widened(&closed, rows);
+        let mut factor = TriangularFactor::new(closed.columns.len());
+        let finite = factor.push(&[closed.triangle(r).as_view()]) && factor.push(&[rows.as_view()]);
         finite.then_some(())?;
-        for (part, &column) in factor.r().column_iter().zip(&self.columns) {
-            for (value, &row) in part.iter().zip(&self.columns) {
+        for (part, &column) in factor.r().column_iter().zip(&closed.columns) {
+            for (value, &row) in part.iter().zip(&closed.columns) {
                 r[(row, column)] = *value;
             }
         }
+        Some(())
+    }
+}
+
+impl BlockFactors {
+    /// Returns the triangular factor of the regressors, each line weighted by the size of its W:
+    /// columns × columns of the block. `None` if a value is not finite.
+    pub(super) fn triangle(&self, dof: usize) -> Option<DMatrix<f64>> {
+        let diagonal = (0..dof).map(|i| self.weights.column(i * (dof + 1)));
+        let power = diagonal.fold(self.weights.column(0) * 0.0, |sum, part| sum + part);
+        let size = power.map(f64::sqrt);
+        let mut rows = self.regressors.clone();
+        for mut column in rows.column_iter_mut() {
+            let (mut re, mut im) = column.rows_range_pair_mut(..size.len(), size.len()..);
+            re.component_mul_assign(&size);
+            im.component_mul_assign(&size);
+        }
+        let mut factor = TriangularFactor::new(rows.ncols());
+        factor.push(&[rows.as_view()]).then(|| factor.r().clone())
+    }
+
+    /// Replaces the regressors φ by R⁻ᵀφ; `None` if the triangular factor R of all columns is
+    /// singular.
+    pub(super) fn orthonormalise(&mut self, r: &DMatrix<f64>) -> Option<()> {
+        let mut closed = self.block.clone();
+        closed.close(r);
+        let count = closed.columns.len();
+        let identity = DMatrix::identity(count, count);
+        let inverse = closed.triangle(r).solve_upper_triangular(&identity)?;
+        self.regressors = self.block.widened(&closed, &self.regressors) * inverse;
+        self.block = closed;
         Some(())
     }
 }

@@ -5,13 +5,14 @@ use std::rc::Rc;
 
 use mechid_model::Matrix;
 use mechid_numerics::cholesky::Cholesky;
+use mechid_numerics::kronecker;
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_numerics::triangular::TriangularFactor;
 use mechid_spectra::transient;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::line_block::LineBlock;
+use super::line_block::{BlockFactors, LineBlock};
 use crate::Unknowns;
 use crate::limits::{GRAM_DEPENDENT, GRAM_LANCZOS, GRAM_RIDGE};
 
@@ -40,6 +41,8 @@ struct Equation {
 /// Gram matrix of unit diagonal. For related entries they are coordinates of the independent
 /// unknowns.
 pub(super) struct Coordinates {
+    /// Number of columns of the layout.
+    columns: usize,
     blocks: Vec<Block>,
     scale: DVector<f64>,
     related: Option<Related>,
@@ -67,16 +70,6 @@ pub(super) struct NormalEquations {
     /// Jᵀr.
     pub gradient: DVector<f64>,
     pub coordinates: Coordinates,
-}
-
-/// Factors of a Jacobian √2 φ_l ⊗ W_l, row block by row block.
-pub(super) struct Factors {
-    /// φ_l, columns of the layout × 2 lines, real parts first.
-    pub regressors: DMatrix<f64>,
-    /// W_lᴴW_l, 2 lines × dof², real parts first, columns in the order of a matrix.
-    pub weights: DMatrix<f64>,
-    /// W_lᴴr_l, 2 lines × dof, real parts first.
-    pub residuals: DMatrix<f64>,
 }
 
 impl Layout {
@@ -130,17 +123,17 @@ impl Layout {
     /// unknowns are the independent ones.
     pub(super) fn normal_equations(
         &self,
-        factors: &mut Factors,
+        factors: &mut [BlockFactors],
         tangent: Option<&DMatrix<f64>>,
     ) -> Option<NormalEquations> {
-        let mut lines = LineBlock::all(&factors.regressors);
-        let triangle = self.orthonormalise(factors, &mut lines, tangent.is_some())?;
+        let triangle = self.orthonormalise(factors, tangent.is_some())?;
         let mut coordinates = Coordinates {
+            columns: self.columns.len(),
             blocks: self.blocks(triangle),
             scale: DVector::from_element(self.unknowns, 1.0),
             related: None,
         };
-        let mut gram = self.gram(&self.products(factors, &lines), &coordinates);
+        let mut gram = self.gram(&self.products(factors), &coordinates);
         for at in 0..self.unknowns {
             let length = gram[(at, at)].sqrt();
             coordinates.scale[at] = if length > 0.0 { length } else { 1.0 };
@@ -152,7 +145,7 @@ impl Layout {
         if let Some(tangent) = tangent {
             gram = coordinates.relate(tangent, &gram)?;
         }
-        let gradient = coordinates.project(&factors.regressors, &factors.residuals);
+        let gradient = coordinates.project(factors.iter().map(|block| (block, &block.residuals)));
         let finite = gram.iter().chain(gradient.iter()).all(|v| v.is_finite());
         finite.then_some(NormalEquations { gram, gradient, coordinates })
     }
@@ -161,52 +154,31 @@ impl Layout {
     /// its W, and replaces them by R⁻ᵀφ. Dependent regressors are allowed for `related` entries: a
     /// degree of freedom without force has dependent regressors, but its relations determine its
     /// entries.
-    fn orthonormalise(
-        &self,
-        factors: &mut Factors,
-        blocks: &mut [LineBlock],
-        related: bool,
-    ) -> Option<DMatrix<f64>> {
-        let lines = factors.weights.nrows() / 2;
-        let diagonal = (0..self.dof).map(|i| factors.weights.column(i * (self.dof + 1)));
-        let power = diagonal.fold(DVector::zeros(2 * lines), |sum, part| sum + part);
+    ///
+    /// # Source
+    /// Demmel, Grigori, Hoemmen & Langou (2012), SIAM J. Sci. Comput. 34, A206–A239 (tall matrices).
+    fn orthonormalise(&self, factors: &mut [BlockFactors], related: bool) -> Option<DMatrix<f64>> {
+        let of_blocks: Vec<Option<DMatrix<f64>>> =
+            factors.par_iter().map(|block| block.triangle(self.dof)).collect();
         let mut r = DMatrix::zeros(self.columns.len(), self.columns.len());
-        for block in blocks.iter_mut() {
-            block.close(&r);
-            let rows = DMatrix::from_fn(2 * block.lines.len(), block.columns.len(), |row, at| {
-                let line = block.lines.start + row / 2;
-                let value = factors.regressors[(block.columns[at], line + lines * (row % 2))];
-                value * power[line].sqrt()
-            });
-            block.push(&mut r, &rows)?;
+        // The rows have the same order for any number of threads.
+        for (BlockFactors { block, .. }, triangle) in factors.iter().zip(of_blocks) {
+            block.push(&mut r, &triangle?)?;
         }
         if related {
             for at in 0..self.columns.len() {
-                let mut row = LineBlock { lines: 0..0, columns: vec![at] };
-                row.close(&r);
-                let mut ridge = DMatrix::zeros(1, row.columns.len());
-                ridge[0] = GRAM_RIDGE * r.column(at).norm();
-                row.push(&mut r, &ridge)?;
+                let row = LineBlock { lines: 0..0, columns: vec![at] };
+                let ridge = GRAM_RIDGE * r.column(at).norm();
+                row.push(&mut r, &DMatrix::from_element(1, 1, ridge))?;
             }
         }
         let independent = |at: usize| r[(at, at)].abs() > GRAM_DEPENDENT * r.column(at).norm();
         if !(0..self.columns.len()).all(independent) {
             return None;
         }
-        for block in blocks {
-            block.close(&r);
-            let triangle = block.triangle(&r);
-            for first in [block.lines.start, lines + block.lines.start] {
-                let part = factors.regressors.columns(first, block.lines.len());
-                let mut part = part.select_rows(&block.columns).transpose();
-                divide(&mut part, &triangle).then_some(())?;
-                let mut to = factors.regressors.columns_mut(first, block.lines.len());
-                for (values, &column) in part.column_iter().zip(&block.columns) {
-                    to.row_mut(column).tr_copy_from(&values);
-                }
-            }
-        }
-        Some(r)
+        let replaced: Option<Vec<()>> =
+            factors.par_iter_mut().map(|block| block.orthonormalise(&r)).collect();
+        replaced.map(|_| r)
     }
 
     fn blocks(&self, triangle: DMatrix<f64>) -> Vec<Block> {
@@ -229,14 +201,16 @@ impl Layout {
     }
 
     /// Returns 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
-    fn products(&self, factors: &Factors, blocks: &[LineBlock]) -> DMatrix<f64> {
+    fn products(&self, factors: &[BlockFactors]) -> DMatrix<f64> {
+        let product = |of: &BlockFactors| {
+            kronecker::gram(of.regressors.as_view(), of.weights.as_view(), self.dof)
+        };
         // The sum has the same order for any number of threads.
-        let parts: Vec<DMatrix<f64>> =
-            blocks.par_iter().map(|block| self.products_of_lines(factors, block)).collect();
+        let parts: Vec<DMatrix<f64>> = factors.par_iter().map(product).collect();
         let pair = |a: usize, b: usize| b * (b + 1) / 2 + a;
         let count = self.columns.len();
         let mut sums = DMatrix::zeros(pair(0, count), self.dof * self.dof);
-        for (block, part) in blocks.iter().zip(parts) {
+        for (BlockFactors { block, .. }, part) in factors.iter().zip(parts) {
             let columns = block.columns.iter().enumerate();
             let pairs =
                 columns.flat_map(|(at, &b)| block.columns[..=at].iter().map(move |&a| pair(a, b)));
@@ -244,33 +218,6 @@ impl Layout {
                 let mut to = sums.row_mut(place);
                 to += row;
             }
-        }
-        sums
-    }
-
-    /// Returns the sums over a block, for pairs of its columns.
-    fn products_of_lines(&self, factors: &Factors, block: &LineBlock) -> DMatrix<f64> {
-        let LineBlock { lines: range, columns } = block;
-        let (q, lines) = (columns.len(), factors.weights.nrows() / 2);
-        let parts = [range.start, lines + range.start]
-            .map(|first| factors.regressors.columns(first, range.len()).select_rows(columns));
-        let mut sums = DMatrix::zeros(q * (q + 1) / 2, self.dof * self.dof);
-        let mut pairs = DMatrix::zeros(sums.nrows(), range.len());
-        for imaginary in [false, true] {
-            for (line, mut column) in pairs.column_iter_mut().enumerate() {
-                let [re, im] = [0, 1].map(|at| &parts[at].as_slice()[q * line..][..q]);
-                let mut rest = column.as_mut_slice();
-                for b in 0..q {
-                    let (pairs_of_b, next) = rest.split_at_mut(b + 1);
-                    let (re_b, im_b) = (2.0 * re[b], 2.0 * im[b]);
-                    for ((to, re), im) in pairs_of_b.iter_mut().zip(re).zip(im) {
-                        *to = if imaginary { im * re_b - re * im_b } else { re * re_b + im * im_b };
-                    }
-                    rest = next;
-                }
-            }
-            let first = if imaginary { lines + range.start } else { range.start };
-            sums.gemm(1.0, &pairs, &factors.weights.rows(first, range.len()), 1.0);
         }
         sums
     }
@@ -407,13 +354,22 @@ impl Coordinates {
     }
 
     /// Returns 2 Re Σ φ̄ y for every unknown: Jᵀ applied to values whose W_lᴴ-weighted form is y, 2
-    /// lines × dof.
-    pub(super) fn project(
+    /// lines × dof of each block, real parts first.
+    pub(super) fn project<'b>(
         &self,
-        regressors: &DMatrix<f64>,
-        weighted: &DMatrix<f64>,
+        weighted: impl Iterator<Item = (&'b BlockFactors, &'b DMatrix<f64>)>,
     ) -> DVector<f64> {
-        let products = (regressors * weighted) * 2.0;
+        let mut products = DMatrix::zeros(self.columns, 0);
+        for (of, weighted) in weighted {
+            if products.ncols() == 0 {
+                products = DMatrix::zeros(self.columns, weighted.ncols());
+            }
+            let product = of.regressors.tr_mul(weighted) * 2.0;
+            for (&column, row) in of.block.columns.iter().zip(product.row_iter()) {
+                let mut to = products.row_mut(column);
+                to += row;
+            }
+        }
         let mut projected = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
             let column = products.column(block.row);
@@ -521,21 +477,4 @@ impl Coordinates {
             Some((block, start))
         })
     }
-}
-/// Replaces a matrix X with many rows by X R⁻¹ for an upper triangular R; returns `false` if a
-/// diagonal entry is zero. Whole columns are subtracted, which is faster than the dot products of
-/// `tr_solve_upper_triangular_mut` on the transposed matrix.
-fn divide(matrix: &mut DMatrix<f64>, triangle: &DMatrix<f64>) -> bool {
-    for at in 0..matrix.ncols() {
-        let (before, mut others) = matrix.columns_range_pair_mut(..at, at..);
-        let mut column = others.column_mut(0);
-        for (done, factor) in before.column_iter().zip(triangle.column(at).iter()) {
-            column.axpy(-factor, &done, 1.0);
-        }
-        if triangle[(at, at)] == 0.0 {
-            return false;
-        }
-        column.unscale_mut(triangle[(at, at)]);
-    }
-    true
 }

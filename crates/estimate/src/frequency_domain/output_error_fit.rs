@@ -195,7 +195,9 @@ impl EndLoads {
         let statistic =
             scaled.cholesky().map_or(f64::INFINITY, |f| in_errors.dot(&f.solve(&in_errors)));
         let loads = TransientLoad::new(data, tau);
-        let load: f64 = (0..data.len()).map(|row| loads.load(row).norm_squared()).sum();
+        let mut of_ends = DMatrix::zeros(data.dof(), data.len());
+        loads.subtract_from(&mut of_ends);
+        let load = of_ends.norm_squared();
         let share = load / data.force().norm_squared();
         Some(Self { tau: tau.to_vec(), statistic, share })
     }

@@ -14,7 +14,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::line::{Line, lower_factor, noisy_forces};
-use super::normal_equations::{Factors, Layout, NormalEquations};
+use super::line_block::{BlockFactors, LineBlock};
+use super::normal_equations::{Layout, NormalEquations};
 use super::search::Restartable;
 use crate::limits::LINES_AT_ONCE;
 use crate::relations::Relations;
@@ -65,8 +66,10 @@ pub(super) struct Misfit<'a> {
     rows: Vec<Line>,
     /// All rows at the parameters of the last trial.
     tried: Vec<Line>,
-    /// Orthonormal regressors X̂ s^p at the parameters last accepted.
-    regressors: DMatrix<f64>,
+    /// All lines, block by block.
+    blocks: Vec<LineBlock>,
+    /// Factors of the Jacobian at the last linearisation, with orthonormal regressors.
+    factors: Vec<BlockFactors>,
     /// Weight of each row; 1 except in the restarts of a search.
     shares: Vec<f64>,
 }
@@ -87,11 +90,20 @@ impl<'a> Misfit<'a> {
             Noise::Output(output_weights(noise)?)
         };
         let rows = vec![Line::new(data.dof()); data.len()];
+        let layout = Layout::new(unknowns, data.transient().ncols());
+        // The transients of all other records are zero on a line.
+        let is_used = |line: usize, at: usize| match layout.columns()[at].1.checked_sub(data.dof())
+        {
+            None => true,
+            Some(column) => data.transient()[(line, column)] != Complex::ZERO,
+        };
         Ok(Self {
+            blocks: LineBlock::all(data.len(), layout.columns().len(), is_used),
+            factors: Vec::new(),
             data,
             unknowns,
             relations: Relations::from_unknowns(unknowns),
-            layout: Layout::new(unknowns, data.transient().ncols()),
+            layout,
             noise,
             force: data.force().transpose(),
             displacement: data.displacement().transpose(),
@@ -99,7 +111,6 @@ impl<'a> Misfit<'a> {
             tried_at: DVector::zeros(0),
             tried: rows.clone(),
             rows,
-            regressors: DMatrix::zeros(0, 0),
             shares: vec![1.0; data.len()],
         })
     }
@@ -158,10 +169,8 @@ impl<'a> Misfit<'a> {
         };
         if !tau.is_empty() {
             let ends = TransientLoad::new(self.data, tau);
-            for (at, mut force) in self.force.column_iter_mut().enumerate() {
-                force.iter_mut().zip(self.data.force().row(at).iter()).for_each(|(to, f)| *to = *f);
-                ends.subtract(at, force.as_mut_slice());
-            }
+            self.data.force().transpose_to(&mut self.force);
+            ends.subtract_from(&mut self.force);
         }
         let Self { data, noise, force, displacement, shares, tried, .. } = self;
         let costs =
@@ -184,44 +193,62 @@ impl<'a> Misfit<'a> {
     }
 
     /// Returns the regressors φ of a displacement, given by row and channel, the weights WᴴW and
-    /// the weighted residuals Wᴴr.
-    fn factors(&self, displacement: impl Fn(usize, usize) -> Complex<f64>) -> Factors {
-        let (lines, n) = (self.rows.len(), self.data.dof());
+    /// the weighted residuals Wᴴr, block by block.
+    fn factors(
+        &self,
+        displacement: impl Fn(usize, usize) -> Complex<f64> + Sync,
+    ) -> Vec<BlockFactors> {
+        self.blocks.par_iter().map(|block| self.factors_of(block, &displacement)).collect()
+    }
+
+    fn factors_of(
+        &self,
+        block: &LineBlock,
+        displacement: &impl Fn(usize, usize) -> Complex<f64>,
+    ) -> BlockFactors {
+        let (lines, n) = (block.lines.len(), self.data.dof());
         let columns = self.layout.columns();
-        let mut regressors = DMatrix::zeros(columns.len(), 2 * lines);
-        let mut weights = DMatrix::zeros(2 * lines, n * n);
-        let mut residuals = DMatrix::zeros(2 * lines, n);
-        for (at, row) in self.rows.iter().enumerate() {
-            let powers = powers(self.data.omega()[at]);
-            for (to, (matrix, column)) in columns.iter().enumerate() {
+        let mut regressors = DMatrix::zeros(2 * lines, block.columns.len());
+        for (to, column) in block.columns.iter().enumerate() {
+            let (matrix, column) = columns[*column];
+            for (at, line) in block.lines.clone().enumerate() {
                 let x = match column.checked_sub(n) {
-                    None => displacement(at, *column),
-                    Some(column) => self.data.transient()[(at, column)],
+                    None => displacement(line, column),
+                    Some(column) => self.data.transient()[(line, column)],
                 };
-                let z = powers[*matrix as usize] * x;
-                (regressors[(to, at)], regressors[(to, lines + at)]) = (z.re, z.im);
+                let z = powers(self.data.omega()[line])[matrix as usize] * x;
+                (regressors[(at, to)], regressors[(lines + at, to)]) = (z.re, z.im);
             }
+        }
+        let mut weights = DMatrix::zeros(lines, n * n);
+        for (at, row) in self.rows[block.lines.clone()].iter().enumerate() {
             let white = row.white_receptance();
             for j in 0..n {
                 for i in 0..=j {
                     let z = white.column(i).dotc(&white.column(j));
-                    for (column, im) in [(i + n * j, z.im), (j + n * i, -z.im)] {
-                        (weights[(at, column)], weights[(lines + at, column)]) = (z.re, im);
+                    if i < j {
+                        weights[(at, j + n * i)] = z.im;
                     }
+                    weights[(at, i + n * j)] = z.re;
                 }
             }
-            self.write_weighted(at, row.white(), &mut residuals);
         }
-        Factors { regressors, weights, residuals }
+        let residuals = self.weighted(block, |line| self.rows[line].white().clone());
+        BlockFactors { block: block.clone(), regressors, weights, residuals }
     }
 
-    /// Writes Wᴴy of one row.
-    fn write_weighted(&self, at: usize, y: &ComplexVector, to: &mut DMatrix<f64>) {
-        let white = self.rows[at].white_receptance();
-        for (i, column) in white.column_iter().enumerate() {
-            let z = column.dotc(y);
-            (to[(at, i)], to[(self.rows.len() + at, i)]) = (z.re, z.im);
+    /// Returns Wᴴy of the lines of a block, 2 lines × n, real parts first.
+    fn weighted(&self, block: &LineBlock, y: impl Fn(usize) -> ComplexVector) -> DMatrix<f64> {
+        let lines = block.lines.len();
+        let mut weighted = DMatrix::zeros(2 * lines, self.data.dof());
+        for (at, line) in block.lines.clone().enumerate() {
+            let y = y(line);
+            for (i, column) in self.rows[line].white_receptance().column_iter().enumerate() {
+                let z = column.dotc(&y);
+                (weighted[(at, i)], weighted[(lines + at, i)]) = (z.re, z.im);
+            }
         }
+        weighted
     }
 }
 
@@ -241,7 +268,7 @@ impl SumOfSquares for Misfit<'_> {
     fn linearise(&mut self) -> Option<NormalEquations> {
         let mut factors = self.factors(|at, column| self.rows[at].likely_displacement()[column]);
         let equations = self.layout.normal_equations(&mut factors, self.tangent().as_ref());
-        self.regressors = factors.regressors;
+        self.factors = factors;
         equations
     }
 
@@ -261,18 +288,19 @@ impl SumOfSquares for Misfit<'_> {
         let zero = self.unknowns.assemble(&vec![0.0; entries.len()]);
         let moved = self.unknowns.assemble(entries);
         let [m, c, k] = [0, 1, 2].map(|at| &moved[at] - &zero[at]);
-        let ends = TransientLoad::new(self.data, tau);
-        let mut residuals = DMatrix::zeros(2 * self.rows.len(), self.data.dof());
-        for (at, row) in self.rows.iter().enumerate() {
-            let omega = self.data.omega()[at];
+        let mut without_ends = DMatrix::zeros(self.data.dof(), self.data.len());
+        TransientLoad::new(self.data, tau).subtract_from(&mut without_ends);
+        let second = |line: usize| {
+            let (row, omega) = (&self.rows[line], self.data.omega()[line]);
             let change =
                 k.zip_zip_map(&c, &m, |k, c, m| Complex::new(k - omega * omega * m, omega * c));
-            let load = &change * row.likely_displacement() + ends.load(at);
+            let load = &change * row.likely_displacement() - without_ends.column(line);
             let second = &change * (row.receptance() * load);
-            let white = row.white_receptance() * second * Complex::from(-2.0);
-            self.write_weighted(at, &white, &mut residuals);
-        }
-        Some(linearisation.coordinates.project(&self.regressors, &residuals))
+            row.white_receptance() * second * Complex::from(-2.0)
+        };
+        let weighted: Vec<DMatrix<f64>> =
+            self.factors.par_iter().map(|of| self.weighted(&of.block, second)).collect();
+        Some(linearisation.coordinates.project(self.factors.iter().zip(&weighted)))
     }
 }
 
