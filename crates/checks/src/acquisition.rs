@@ -314,9 +314,14 @@ pub fn fault_of_hits(
     let mut faults = Fault::all(first.dof(), &driven);
     faults.retain(|fault| !matches!(fault, Fault::Between(_)));
     let joint = joined(records)?;
-    let explained = of_fit.significant(faults).into_iter().filter_map(|(fault, score)| {
-        let mut likelihood = ChangedRecords::from_fit(&joint, unknowns, fit)?;
-        let undisturbed = likelihood.cost(&joint)?;
+    let significant = of_fit.significant(faults);
+    if significant.is_empty() {
+        return None;
+    }
+    let mut unchanged = ChangedRecords::from_fit(&joint, unknowns, fit)?;
+    let undisturbed = unchanged.cost(&joint)?;
+    let explained = significant.into_iter().filter_map(|(fault, score)| {
+        let mut likelihood = unchanged.clone();
         let cost = |corner: f64| likelihood.cost(&fault.removed(&joint, &system, dt, corner)?);
         let widths = CORNER_WIDTHS.map(|width| width * score.amount);
         let (corner, least) = minimum_near(score.amount, widths, cost, |cost| cost < undisturbed)?;
@@ -324,7 +329,7 @@ pub fn fault_of_hits(
         let without: Option<Vec<FrequencyData>> =
             records.iter().map(|data| fault.removed(data, &system, dt, corner)).collect();
         let remaining = least / undisturbed;
-        let becomes_noise = || Some(is_noise(&residuals_of_fit(&without?, unknowns)?));
+        let becomes_noise = || Some(is_noise(&residuals_of_fit(&without?, &likelihood)?));
         (remaining <= DELAY_REMAINING || becomes_noise()?)
             .then(|| (remaining, fault.cause(first, &driven, corner)))
     });

@@ -114,22 +114,13 @@ pub fn delay_of_open_records(
         return None;
     }
     let remaining = delayed / undelayed;
-    let with_delay = residuals_with(records, samples * dt, unknowns)?;
+    let late = |record: &FrequencyData| record.with_later_force(samples * dt);
+    let delayed_records: Vec<FrequencyData> = records.iter().map(late).collect();
+    let with_delay = residuals_of_fit(&delayed_records, &likelihood)?;
     let becomes_noise = !is_noise(without_delay) && is_noise(&with_delay);
     let is_most = follows_force || remaining <= DELAY_REMAINING || becomes_noise;
     let delay = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
     (is_most && is_uncorrelated(&with_delay)).then(delay)
-}
-
-/// Returns the residuals of a fit with the delay (s).
-fn residuals_with(
-    records: &[FrequencyData],
-    delay: f64,
-    unknowns: &Unknowns,
-) -> Option<Vec<SpectralResidual>> {
-    let late: Vec<FrequencyData> =
-        records.iter().map(|record| record.with_later_force(delay)).collect();
-    residuals_of_fit(&late, unknowns)
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the

@@ -1,7 +1,6 @@
 //! New fits of open records whose channels a check has changed.
 
-use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::output_error;
+use mechid_estimate::frequency_domain::ChangedRecords;
 use mechid_signal::Extent;
 use mechid_spectra::FrequencyData;
 
@@ -9,13 +8,14 @@ use super::limits::{LEAST_PART, PARABOLAS};
 use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::after_spectral_fit;
 
-/// Returns the residuals of a new maximum-likelihood fit to all records together, without the
-/// errors of their pulses and without their transients; `None` if the fit fails.
+/// Returns the residuals of a new maximum-likelihood fit to all changed records together, which
+/// begins at the last estimate of `likelihood`, without the errors of their pulses and without
+/// their transients; `None` if the fit fails.
 pub(super) fn residuals_of_fit(
     records: &[FrequencyData],
-    unknowns: &Unknowns,
+    likelihood: &ChangedRecords<'_>,
 ) -> Option<Vec<SpectralResidual>> {
-    let fit = output_error(&joined(records)?, unknowns).ok()?;
+    let fit = likelihood.fit(&joined(records)?).ok()?;
     let corrected = fit.without_pulse_errors(records).ok()?;
     let closed = fit.ends.as_ref()?.without_transients(&corrected).ok()?;
     Some(after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?.records)

@@ -2,22 +2,23 @@
 
 use std::borrow::Cow;
 
-use mechid_numerics::gauss_newton::minimise;
-use mechid_spectra::{FrequencyData, NoiseSpectrum};
+use mechid_numerics::gauss_newton::{Minimum, minimise};
+use mechid_spectra::{FrequencyData, NoiseSpectrum, Pooling};
 use nalgebra::DVector;
 
 use super::OutputErrorFit;
 use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
-use super::multi_start::{search, thinned};
+use super::multi_start::{GlobalMinimum, search, thinned};
 use super::output_error_fit::{plausible, spare};
 use super::pulse_fit::PulseFit;
-use super::unknown_noise::white_noise_at;
-use crate::Unknowns;
+use super::unknown_noise::{white_noise_at, with_unknown_noise};
 use crate::limits::DELAY_STEPS;
+use crate::{EstimateError, Unknowns};
 
 /// Maximum likelihood for the lines of open records with changed channels, such as a delayed force;
 /// each change has its own estimate of the transients and of the errors of pulses.
+#[derive(Debug, Clone)]
 pub struct ChangedRecords<'a> {
     unknowns: &'a Unknowns,
     /// Noise estimated from the residual without a change.
@@ -77,6 +78,27 @@ impl<'a> ChangedRecords<'a> {
             PulseFit::new(changed, self.unknowns, &self.theta, noise, before)?.amplitudes;
         let of_pulses: f64 = self.amplitudes.iter().map(|amplitude| amplitude.powi(2)).sum();
         Some(self.minimise(changed)? + of_pulses)
+    }
+
+    /// Estimates the parameters and the noise of `changed` data as [`output_error`], with the last
+    /// estimate as the only initial estimate.
+    ///
+    /// # Errors
+    /// As [`output_error`].
+    ///
+    /// # Source
+    /// As [`output_error`].
+    ///
+    /// [`output_error`]: super::output_error()
+    pub fn fit(&self, changed: &FrequencyData) -> Result<OutputErrorFit, EstimateError> {
+        let minimum = Minimum {
+            parameters: self.theta.clone(),
+            cost: f64::INFINITY,
+            steps: 0,
+            converged: true,
+        };
+        let from = GlobalMinimum { minimum, searches: 1, agreeing: 1 };
+        with_unknown_noise(changed, self.unknowns, None, Some(from), Pooling::Automatic)
     }
 
     fn minimise(&mut self, changed: &FrequencyData) -> Option<f64> {
