@@ -42,15 +42,17 @@ const MAX_ROWS: usize = 520;
 pub(crate) struct Root {
     pub(crate) pole: C,
     pub(crate) order: usize,
+    /// |pole|, which is needed for every pair of roots.
+    size: f64,
 }
 
 impl Root {
-    fn size(&self) -> f64 {
-        self.pole.norm()
+    pub(crate) fn new(pole: C, order: usize) -> Self {
+        Self { pole, order, size: pole.norm() }
     }
 
     fn damping(&self) -> f64 {
-        -self.pole.re / self.pole.norm()
+        -self.pole.re / self.size
     }
 }
 
@@ -113,7 +115,7 @@ pub(crate) fn subspace_roots(lines: &Lines) -> Result<(Vec<Root>, usize), ModalE
             let turns = if rate.im < 0.0 { TAU } else { 0.0 };
             let pole = C::new(rate.re / step, low + (rate.im + turns) / step);
             if pole.re < 0.0 && pole.im > low && pole.im < high {
-                retained.push(Root { pole, order: *order });
+                retained.push(Root::new(pole, *order));
             }
         }
     }
@@ -341,7 +343,7 @@ pub(crate) fn clusters(roots: Vec<Root>, orders: usize) -> Vec<C> {
         let size = centre.norm();
         let radius = (-0.3 * centre.re).max(5e-5 * size);
         let is_member = |root: &Root| members.iter().any(|member| member.pole == root.pole);
-        remaining.retain(|root| !is_member(root) && (root.size() - size).abs() >= radius);
+        remaining.retain(|root| !is_member(root) && (root.size - size).abs() >= radius);
         poles.push(centre);
     }
     poles.sort_by(|a: &C, b: &C| a.im.total_cmp(&b.im));
@@ -350,10 +352,10 @@ pub(crate) fn clusters(roots: Vec<Root>, orders: usize) -> Vec<C> {
 
 fn largest_cluster(roots: &[Root]) -> Option<Vec<Root>> {
     let near = |centre: &Root| -> Vec<Root> {
-        let (size, damping) = (centre.size(), centre.damping());
+        let (size, damping) = (centre.size, centre.damping());
         let radius = CLUSTER_FREQUENCY.min((2.0 * damping).max(4e-4)) * size;
         let is_near = |root: &&Root| {
-            (root.size() - size).abs() < radius
+            (root.size - size).abs() < radius
                 && (root.damping() - damping).abs() < CLUSTER_DAMPING * damping + 1e-4
         };
         roots.iter().filter(is_near).copied().collect()
