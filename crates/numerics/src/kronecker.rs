@@ -4,17 +4,17 @@ use nalgebra::{DMatrix, DMatrixView};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::lanes::dot;
-use crate::limits::PRODUCT_COLUMNS;
+use crate::limits::NARROW_PRODUCT;
 
-/// Returns 2 Re Σ φ̄_a φ_b H_ij, summed over lines, for rows φ ⊗ W of which H = WᴴW is known: pairs
-/// a ≤ b × dof² (column i + dof·j), in the squared unit of φ times the unit of H. The pairs have
-/// the order (0, 0), (0, 1), (1, 1), (0, 2), …
+/// Returns 2 Re Σ φ̄_a φ_b H_ij, summed over lines, for rows φ ⊗ W with H = WᴴW: pairs a ≤ b × dof²
+/// (column i + dof·j), in the squared unit of φ times the unit of H. Pairs have the order (0, 0),
+/// (0, 1), (1, 1), (0, 2), …
 ///
 /// `regressors` has φ: 2 lines × columns, the real parts of all lines first. `weights` has the
-/// Hermitian H: lines × dof². For i ≤ j the real part of H_ij is in column i + dof·j, and for i < j
-/// the imaginary part is in column j + dof·i.
+/// Hermitian H: lines × dof², the real parts of the pairs i ≤ j first, then the imaginary parts of
+/// the pairs i < j; [`real_part`] and [`imaginary_part`] return their columns.
 ///
-/// The result does not depend on the width of the vector registers.
+/// The result does not depend on the number of threads.
 ///
 /// # Panics
 /// Panics if `weights` does not have one row for every line and dof² columns.
@@ -39,80 +39,159 @@ pub fn gram(
     assert_eq!(regressors.nrows(), 2 * weights.nrows(), "real and imaginary parts of every line");
     assert_eq!(weights.ncols(), dof * dof, "one column for each part of H");
     let (q, lines) = (regressors.ncols(), weights.nrows());
-    let mut products = DMatrix::zeros(q * (q + 1) / 2, dof * dof);
-    if lines > 0 {
-        let pair = [vec![0.0; lines], vec![0.0; lines]];
-        Arch::new().dispatch(Products { regressors, weights, dof, pair, products: &mut products });
+    let mut sums = DMatrix::zeros(q * (q + 1) / 2, dof * dof);
+    if dof <= NARROW_PRODUCT {
+        let pair = vec![0.0; lines];
+        Arch::new().dispatch(Narrow { regressors, weights, dof, pair, sums: &mut sums });
+    } else {
+        add_wide(regressors, weights, dof, &mut sums);
     }
-    // From sums with the real and the imaginary parts to their sum and difference.
+    // The products of H_ij and H_ji are the sum and the difference of those of the two parts.
+    let mut products = sums.clone();
     for j in 0..dof {
-        for i in 0..j {
-            let (upper, lower) = (i + dof * j, j + dof * i);
-            for row in 0..products.nrows() {
-                let (re, im) = (products[(row, upper)], products[(row, lower)]);
-                (products[(row, upper)], products[(row, lower)]) = (re + im, re - im);
+        for i in 0..=j {
+            let real = sums.column(real_part(i, j));
+            let [upper, lower] = [i + dof * j, j + dof * i];
+            products.column_mut(upper).copy_from(&real);
+            if i < j {
+                let imaginary = sums.column(imaginary_part(i, j, dof));
+                products.column_mut(lower).copy_from(&(real - imaginary));
+                let mut upper = products.column_mut(upper);
+                upper += imaginary;
             }
         }
     }
     products
 }
 
-/// Arguments of the function that `pulp` compiles for each width of vector registers.
-struct Products<'a> {
+/// Returns the column of the weights of [`gram`] with the real part of H_ij, i ≤ j.
+///
+/// # Source
+/// Ours.
+pub fn real_part(i: usize, j: usize) -> usize {
+    j * (j + 1) / 2 + i
+}
+
+/// Returns the column of the weights of [`gram`] with the imaginary part of H_ij, i < j.
+///
+/// # Source
+/// Ours.
+pub fn imaginary_part(i: usize, j: usize, dof: usize) -> usize {
+    real_part(0, dof) + j * (j - 1) / 2 + i
+}
+
+/// Real or imaginary part of 2 φ̄_a φ_b; the imaginary part has the opposite sign.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Real,
+    Imaginary,
+}
+
+impl Part {
+    /// Returns the columns of the weights with this part of H: the first one and their number.
+    fn columns(self, dof: usize) -> (usize, usize) {
+        let real = real_part(0, dof);
+        match self {
+            Self::Real => (0, real),
+            Self::Imaginary => (real, dof * dof - real),
+        }
+    }
+
+    /// Returns the part for φ_a = (real, imaginary part) and φ_b.
+    #[inline(always)]
+    fn product(self, a: (f64, f64), b: (f64, f64)) -> f64 {
+        match self {
+            Self::Real => 2.0 * (a.0 * b.0 + a.1 * b.1),
+            Self::Imaginary => 2.0 * (a.1 * b.0 - a.0 * b.1),
+        }
+    }
+}
+
+/// Arguments of the sums for few degrees of freedom, which `pulp` compiles for each width of vector
+/// registers: dot products over the lines.
+struct Narrow<'a> {
     regressors: DMatrixView<'a, f64>,
     weights: DMatrixView<'a, f64>,
     dof: usize,
-    /// Real and negative imaginary part of 2 φ̄_a φ_b on every line.
-    pair: [Vec<f64>; 2],
-    products: &'a mut DMatrix<f64>,
+    /// One part of 2 φ̄_a φ_b on every line.
+    pair: Vec<f64>,
+    sums: &'a mut DMatrix<f64>,
 }
 
-impl WithSimd for Products<'_> {
+impl WithSimd for Narrow<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.compute();
-    }
-}
-
-impl Products<'_> {
-    /// Writes Σ 2 Re(φ̄_a φ_b) Re H_ij and Σ −2 Im(φ̄_a φ_b) Im H_ij at the places of these parts of H.
-    #[inline(always)]
-    fn compute(self) {
-        let Self { regressors, weights, dof, pair: [mut real, mut imaginary], products } = self;
-        let (lines, columns) = (weights.nrows(), dof * dof);
-        let part = |at: usize| regressors.column(at).data.into_slice().split_at(lines);
-        // The columns of H that are in use at a time fit in the fastest cache.
-        for first in (0..columns).step_by(PRODUCT_COLUMNS) {
-            let range = first..columns.min(first + PRODUCT_COLUMNS);
-            let mut row = 0;
-            for b in 0..regressors.ncols() {
-                for a in 0..=b {
-                    let ((re_a, im_a), (re_b, im_b)) = (part(a), part(b));
-                    write_sum(&mut real, 2.0, (re_a, re_b), 2.0, (im_a, im_b));
-                    if dof > 1 {
-                        write_sum(&mut imaginary, 2.0, (im_a, re_b), -2.0, (re_a, im_b));
+        let Self { regressors, weights, dof, mut pair, sums } = self;
+        let lines = weights.nrows();
+        let column = |at: usize| regressors.column(at).data.into_slice().split_at(lines);
+        let mut row = 0;
+        for b in 0..regressors.ncols() {
+            for a in 0..=b {
+                let ((re_a, im_a), (re_b, im_b)) = (column(a), column(b));
+                for part in [Part::Real, Part::Imaginary] {
+                    let (first, count) = part.columns(dof);
+                    if count == 0 {
+                        continue;
                     }
-                    for column in range.clone() {
-                        let (i, j) = (column % dof, column / dof);
-                        let factors = if i <= j { &real } else { &imaginary };
-                        let weights = weights.column(column).data.into_slice();
-                        products[(row, column)] = dot(factors, weights);
+                    let both = re_a.iter().zip(im_a).zip(re_b.iter().zip(im_b));
+                    for (to, ((re_a, im_a), (re_b, im_b))) in pair.iter_mut().zip(both) {
+                        *to = part.product((*re_a, *im_a), (*re_b, *im_b));
                     }
-                    row += 1;
+                    for at in first..first + count {
+                        sums[(row, at)] = dot(&pair, weights.column(at).data.into_slice());
+                    }
                 }
+                row += 1;
             }
         }
     }
 }
 
-/// Writes f·x1·x2 + g·y1·y2.
-#[inline(always)]
-fn write_sum(to: &mut [f64], f: f64, (x1, x2): (&[f64], &[f64]), g: f64, y: (&[f64], &[f64])) {
-    let factors = x1.iter().zip(x2).zip(y.0.iter().zip(y.1));
-    for (to, ((x1, x2), (y1, y2))) in to.iter_mut().zip(factors) {
-        *to = f * x1 * x2 + g * y1 * y2;
+/// Adds the sums for many degrees of freedom: products of a matrix of all pairs.
+fn add_wide(
+    regressors: DMatrixView<'_, f64>,
+    weights: DMatrixView<'_, f64>,
+    dof: usize,
+    sums: &mut DMatrix<f64>,
+) {
+    // The regressors of one line are contiguous.
+    let transposed = regressors.transpose();
+    let mut pairs = DMatrix::zeros(sums.nrows(), weights.nrows());
+    for part in [Part::Real, Part::Imaginary] {
+        Arch::new().dispatch(Pairs { transposed: &transposed, part, pairs: &mut pairs });
+        let (first, count) = part.columns(dof);
+        sums.columns_mut(first, count).gemm(1.0, &pairs, &weights.columns(first, count), 1.0);
+    }
+}
+
+/// Arguments of the function that writes one part of 2 φ̄_a φ_b, pairs × lines.
+struct Pairs<'a> {
+    transposed: &'a DMatrix<f64>,
+    part: Part,
+    pairs: &'a mut DMatrix<f64>,
+}
+
+impl WithSimd for Pairs<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { transposed, part, pairs } = self;
+        let (q, lines) = (transposed.nrows(), pairs.ncols());
+        let (real, imaginary) = transposed.as_slice().split_at(q * lines);
+        for line in 0..lines {
+            let [re, im] = [real, imaginary].map(|values| &values[q * line..][..q]);
+            let column = &mut pairs.as_mut_slice()[q * (q + 1) / 2 * line..];
+            for b in 0..q {
+                let of_b = (re[b], im[b]);
+                let to = column[b * (b + 1) / 2..].iter_mut();
+                for (to, (re, im)) in to.zip(re[..=b].iter().zip(im)) {
+                    *to = part.product((*re, *im), of_b);
+                }
+            }
+        }
     }
 }
 
@@ -130,12 +209,12 @@ mod tests {
         Complex::new(number(at), number(at + 57))
     }
 
-    /// The rows, written out, judge the products: 45 lines of 5 regressors, up to 5 degrees of
-    /// freedom, so that the parts of H are more than are in use at a time.
+    /// The rows, written out, judge the products: 45 lines of 5 regressors, with few and many
+    /// degrees of freedom.
     #[test]
     fn products_are_those_of_the_rows() {
         let (lines, q) = (45, 5);
-        for dof in [1, 2, 5] {
+        for dof in [1, 2, 3, 5] {
             let phi = |line: usize, at: usize| complex(17 * line + 3 * at);
             let w = |line: usize, i: usize, j: usize| complex(29 * line + 5 * i + 11 * j + 7);
             let h = |line: usize, i: usize, j: usize| -> Complex<f64> {
@@ -145,10 +224,15 @@ mod tests {
                 let z = phi(row % lines, at);
                 if row < lines { z.re } else { z.im }
             });
-            let weights = DMatrix::from_fn(lines, dof * dof, |line, column| {
-                let (i, j) = (column % dof, column / dof);
-                if i <= j { h(line, i, j).re } else { h(line, j, i).im }
-            });
+            let mut weights = DMatrix::zeros(lines, dof * dof);
+            for (line, j) in (0..lines).flat_map(|line| (0..dof).map(move |j| (line, j))) {
+                for i in 0..=j {
+                    weights[(line, real_part(i, j))] = h(line, i, j).re;
+                    if i < j {
+                        weights[(line, imaginary_part(i, j, dof))] = h(line, i, j).im;
+                    }
+                }
+            }
             let products = gram(regressors.as_view(), weights.as_view(), dof);
             for (column, i, j) in (0..dof * dof).map(|at| (at, at % dof, at / dof)) {
                 let pairs = (0..q).flat_map(|b| (0..=b).map(move |a| (a, b)));
@@ -162,5 +246,6 @@ mod tests {
         }
         let none = DMatrix::zeros(0, 3);
         assert_eq!(gram(none.as_view(), DMatrix::zeros(0, 4).as_view(), 2), DMatrix::zeros(6, 4));
+        assert_eq!(gram(none.as_view(), DMatrix::zeros(0, 9).as_view(), 3), DMatrix::zeros(6, 9));
     }
 }

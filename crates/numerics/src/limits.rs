@@ -56,9 +56,9 @@ pub(crate) const SWEEPS: usize = 100;
 /// columns then fits in the cache of a core.
 pub(crate) const PRODUCT_ROWS: usize = 1024;
 
-/// Number of columns of weights that a product with pairs of regressors uses at a time: with 256
-/// lines they fit in the fastest cache of a core.
-pub(crate) const PRODUCT_COLUMNS: usize = 16;
+/// Maximum number of degrees of freedom for which products of pairs of regressors are computed as
+/// dot products; with more, a product of matrices is faster.
+pub(crate) const NARROW_PRODUCT: usize = 2;
 
 /// Number of rows of a tall matrix that are multiplied by their weights at a time: they stay in the
 /// fastest cache of a core.

@@ -80,13 +80,13 @@ impl WithSimd for WeightedGram<'_> {
         for (block, weights) in weights.chunks(WEIGHTED_ROWS).enumerate() {
             let (first, len) = (block * WEIGHTED_ROWS, weights.len());
             for column in 0..a.ncols() {
-                let own = &a.column(column).data.into_slice()[first..first + len];
-                for ((to, a), weight) in weighted.iter_mut().zip(own).zip(weights) {
+                let column_of_a = &a.column(column).data.into_slice()[first..first + len];
+                for ((to, a), weight) in weighted.iter_mut().zip(column_of_a).zip(weights) {
                     *to = a * weight;
                 }
                 for row in column..a.ncols() {
-                    let other = &a.column(row).data.into_slice()[first..first + len];
-                    gram[(row, column)] += dot(&weighted[..len], other);
+                    let right = &a.column(row).data.into_slice()[first..first + len];
+                    gram[(row, column)] += dot(&weighted[..len], right);
                 }
             }
         }

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use mechid_numerics::kronecker;
 use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::DMatrix;
 
@@ -94,7 +95,7 @@ impl BlockFactors {
     /// Returns the triangular factor of the regressors, each line weighted by the size of its W:
     /// columns × columns of the block. `None` if a value is not finite.
     pub(super) fn triangle(&self, dof: usize) -> Option<DMatrix<f64>> {
-        let diagonal = (0..dof).map(|i| self.weights.column(i * (dof + 1)));
+        let diagonal = (0..dof).map(|i| self.weights.column(kronecker::real_part(i, i)));
         let power = diagonal.fold(self.weights.column(0) * 0.0, |sum, part| sum + part);
         let size = power.map(f64::sqrt);
         let mut rows = self.regressors.clone();

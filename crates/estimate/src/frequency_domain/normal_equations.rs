@@ -156,7 +156,8 @@ impl Layout {
     /// entries.
     ///
     /// # Source
-    /// Demmel, Grigori, Hoemmen & Langou (2012), SIAM J. Sci. Comput. 34, A206–A239 (tall matrices).
+    /// Demmel, Grigori, Hoemmen & Langou (2012), SIAM J. Sci. Comput. 34, A206–A239 (QR of tall
+    /// matrices).
     fn orthonormalise(&self, factors: &mut [BlockFactors], related: bool) -> Option<DMatrix<f64>> {
         let of_blocks: Vec<Option<DMatrix<f64>>> =
             factors.par_iter().map(|block| block.triangle(self.dof)).collect();

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 
 use mechid_numerics::cholesky::Cholesky;
 use mechid_numerics::gauss_newton::SumOfSquares;
+use mechid_numerics::kronecker;
 use mechid_signal::{Sampling, noise};
 use mechid_spectra::transient::{self, TransientLoad, powers};
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
@@ -226,10 +227,10 @@ impl<'a> Misfit<'a> {
             for j in 0..n {
                 for i in 0..=j {
                     let z = white.column(i).dotc(&white.column(j));
+                    weights[(at, kronecker::real_part(i, j))] = z.re;
                     if i < j {
-                        weights[(at, j + n * i)] = z.im;
+                        weights[(at, kronecker::imaginary_part(i, j, n))] = z.im;
                     }
-                    weights[(at, i + n * j)] = z.re;
                 }
             }
         }
