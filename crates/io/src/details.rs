@@ -112,13 +112,13 @@ fn known(name: &str, value: &str) -> Option<(String, String)> {
 
 /// Keeps the first detail of each name.
 fn once(details: impl Iterator<Item = (String, String)>) -> Vec<(String, String)> {
-    let mut kept: Vec<(String, String)> = Vec::new();
+    let mut first: Vec<(String, String)> = Vec::new();
     for (name, value) in details {
-        if kept.iter().all(|(other, _)| *other != name) {
-            kept.push((name, value));
+        if first.iter().all(|(other, _)| *other != name) {
+            first.push((name, value));
         }
     }
-    kept
+    first
 }
 
 #[cfg(test)]

@@ -49,10 +49,10 @@ fn with_listed_units(mut contents: Contents) -> Contents {
         }
     }
     for (list, units) in lists {
-        let place = list.rsplit_once('.').map(|(place, _)| place);
+        let group = list.rsplit_once('.').map(|(group, _)| group);
         let array_of = |column: &Column| {
             let (array, number) = column.name.strip_suffix(']')?.split_once('[')?;
-            let is_beside = array.rsplit_once('.').map(|(place, _)| place) == place;
+            let is_beside = array.rsplit_once('.').map(|(group, _)| group) == group;
             let channel = number.parse::<usize>().ok()?.checked_sub(1)?;
             is_beside.then(|| (array.to_owned(), channel))
         };
@@ -107,8 +107,8 @@ pub(crate) fn with_labels(contents: Contents) -> Contents {
         }
     }
     for array in &mut contents.complex {
-        let place = array.name.rsplit_once('.').map(|(place, _)| place);
-        if let Some([unit, _]) = place.and_then(|place| labels.get(place))
+        let group = array.name.rsplit_once('.').map(|(group, _)| group);
+        if let Some([unit, _]) = group.and_then(|group| labels.get(group))
             && array.unit.is_empty()
         {
             array.unit = unit.to_string();

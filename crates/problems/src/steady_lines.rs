@@ -68,13 +68,13 @@ pub fn eliminated(
     omega: &[f64],
     forces: &ComplexMatrix,
 ) -> ComplexMatrix {
-    let mut all = DMatrix::zeros(omega.len(), m.nrows());
+    let mut amplitudes = DMatrix::zeros(omega.len(), m.nrows());
     for (row, w) in omega.iter().enumerate() {
         let dynamic = k.zip_zip_map(c, m, |k, c, m| Complex::new(k - w * w * m, w * c));
         let load: DVector<Complex<f64>> = forces.row(row).transpose();
-        all.row_mut(row).copy_from(&dynamic.lu().solve(&load).unwrap().transpose());
+        amplitudes.row_mut(row).copy_from(&dynamic.lu().solve(&load).unwrap().transpose());
     }
-    all
+    amplitudes
 }
 
 /// Record with samples Σ Re(h A_n exp(i n ω0 t)), summed term by term; A_n are displacement

@@ -137,8 +137,9 @@ pub(crate) fn sensor_findings(measured: &Block) -> Vec<Finding> {
     }
     let responses = measured.responses();
     let motions = responses.iter().map(|(kind, motion)| (Quantity::Response(*kind), *motion));
-    let all: Vec<_> = std::iter::once((Quantity::Force, &measured.force)).chain(motions).collect();
-    findings.extend(repeated_channels(&all));
+    let channels: Vec<_> =
+        std::iter::once((Quantity::Force, &measured.force)).chain(motions).collect();
+    findings.extend(repeated_channels(&channels));
     findings
 }
 

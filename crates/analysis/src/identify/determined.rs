@@ -67,8 +67,8 @@ pub(super) fn check(
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
 pub(super) fn check_nonlinear(fit: &NonlinearEstimate) -> Result<(), AnalysisError> {
-    let left = fit.linear().residual_nrmse();
-    let unexplained = (left.iter().map(|e| e * e).sum::<f64>() / left.len() as f64).sqrt();
+    let residual = fit.linear().residual_nrmse();
+    let unexplained = (residual.iter().map(|e| e * e).sum::<f64>() / residual.len() as f64).sqrt();
     let dof = fit.linear().dof();
     let [equations, unknowns] = [fit.equations() / dof, fit.parameters().len().div_ceil(dof)];
     if let Some(Finding::Unrelated(unrelated)) =

@@ -141,8 +141,27 @@ pub(super) fn modes_of_tables(
     let decay = tables.added_decay.unwrap_or(0.0);
     let modes: Vec<IdentifiedMode> =
         estimate.modes().iter().map(|mode| without_decay(mode, decay)).collect();
+    let of_tables = checks::table_checks(tables, band_hz, &modes, settled);
+    let context = Context {
+        records: tables.with_segments().map(|(table, _)| RecordRow::from_table(table)).collect(),
+        hits: Vec::new(),
+        inputs: tables.forces.clone(),
+        driving_points,
+        outputs,
+        band_hz,
+        checks: of_tables.into_iter().chain(of_properties).collect(),
+        notes: notes_of_tables(tables),
+        predicted: None,
+        is_table: true,
+        added_decay: tables.added_decay,
+    };
+    context.with(Fit { data, estimate, modes }, settings)
+}
+
+/// Returns the notes on tables: what their windows cost, and the remarks of their files.
+fn notes_of_tables(tables: &Tables) -> Vec<String> {
     let mut notes = Vec::new();
-    if tables.added_decay.is_some() {
+    if let Some(decay) = tables.added_decay {
         notes.push(format!(
             "an exponential window adds {} 1/s to the decay rate of every mode of the tables: it was \
              subtracted",
@@ -157,21 +176,7 @@ pub(super) fn modes_of_tables(
     }
     let remarks = tables.with_segments().flat_map(|(table, _)| table.remarks.iter().cloned());
     notes.extend(remarks);
-    let of_tables = checks::table_checks(tables, band_hz, &modes, settled);
-    let context = Context {
-        records: tables.with_segments().map(|(table, _)| RecordRow::from_table(table)).collect(),
-        hits: Vec::new(),
-        inputs: tables.forces.clone(),
-        driving_points,
-        outputs,
-        band_hz,
-        checks: of_tables.into_iter().chain(of_properties).collect(),
-        notes,
-        predicted: None,
-        is_table: true,
-        added_decay: tables.added_decay,
-    };
-    context.with(Fit { data, estimate, modes }, settings)
+    notes
 }
 
 /// Number of candidates that a message lists.
@@ -242,11 +247,11 @@ fn predicted(
 }
 
 impl Context {
-    fn with(self, fit: Fit, settings: &ModesSettings) -> Result<Modes, AnalysisError> {
+    fn with(mut self, fit: Fit, settings: &ModesSettings) -> Result<Modes, AnalysisError> {
         let Fit { data, estimate, modes: reported } = fit;
         let names: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
         let explained = estimate.variance_explained();
-        let mut rows = self.checks;
+        let mut rows = std::mem::take(&mut self.checks);
         rows.extend(checks::mode_checks(
             &reported,
             &self.inputs,
@@ -264,18 +269,15 @@ impl Context {
         for term in &mut model.terms {
             term.pole[0] += self.added_decay.unwrap_or(0.0);
         }
-        let outputs = self.outputs.iter().enumerate().map(|(at, output)| OutputRow {
-            column: output.name.clone(),
-            unit: output.quantity.map(|quantity| quantity.unit()),
-            variance_explained: Some(explained[at]),
-            variance_predicted: self.predicted.as_ref().map(|shares| shares[at]),
-            noise_share: Some(estimate.noise_levels()[at] / rms(&data, at)),
-        });
+        let noise = |at: usize| estimate.noise_levels()[at] / rms(&data, at);
+        let outputs =
+            (0..self.outputs.len()).map(|at| self.output_row(at, explained[at], noise(at)));
+        let outputs = outputs.collect();
         let summary = ModesSummary {
             records: self.records,
             hits: self.hits,
             inputs: self.inputs,
-            outputs: outputs.collect(),
+            outputs,
             band_hz: self.band_hz,
             lines: data.len(),
             confidence: LEVEL,
@@ -302,6 +304,19 @@ impl Context {
             added_decay,
         }));
         Ok(Modes { summary, spectrum, source })
+    }
+
+    /// Returns the row of an output, given the share of its variance that the modes explain, and
+    /// its noise over its RMS.
+    fn output_row(&self, at: usize, explained: f64, noise: f64) -> OutputRow {
+        let output = &self.outputs[at];
+        OutputRow {
+            column: output.name.clone(),
+            unit: output.quantity.map(|quantity| quantity.unit()),
+            variance_explained: Some(explained),
+            variance_predicted: self.predicted.as_ref().map(|shares| shares[at]),
+            noise_share: Some(noise),
+        }
     }
 }
 

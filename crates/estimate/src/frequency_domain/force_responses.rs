@@ -110,8 +110,8 @@ pub(super) fn pulse_covariances(
         let mut first = 0;
         for pulse in pulses {
             let patterns: Vec<_> = rows.clone().map(|row| pulse.at(data.omega()[row])).collect();
-            let mut own = effects.columns_mut(first, pulse.count());
-            for (pattern, mut effect) in own.column_iter_mut().enumerate() {
+            let mut of_pulse = effects.columns_mut(first, pulse.count());
+            for (pattern, mut effect) in of_pulse.column_iter_mut().enumerate() {
                 let amplitude = |row: usize| patterns[row - rows.start][pattern];
                 effect.copy_from(&responses.to(&rows, pulse.input(), &amplitude));
             }

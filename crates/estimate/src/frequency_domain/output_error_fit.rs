@@ -101,8 +101,8 @@ impl OutputErrorFit {
         let count = |data: &FrequencyData| -> usize {
             data.pulse_errors().iter().map(PulseErrors::count).sum()
         };
-        let all = records.iter().map(count).sum();
-        check_size("amplitudes of the errors of pulses", all, self.pulse_amplitudes.len())?;
+        let total = records.iter().map(count).sum();
+        check_size("amplitudes of the errors of pulses", total, self.pulse_amplitudes.len())?;
         let mut following = &self.pulse_amplitudes[..];
         let corrected = records.iter().map(|data| {
             let (own, rest) = following.split_at(count(data));

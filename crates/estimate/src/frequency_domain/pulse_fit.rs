@@ -30,7 +30,7 @@ impl PulseFit {
     /// no force has noise of another kind, and the fit is not too large.
     pub(super) fn is_possible(data: &FrequencyData, unknowns: &Unknowns) -> bool {
         let effects = |pulse: &PulseErrors| 2 * data.dof() * pulse.rows().len() * pulse.count();
-        let all: usize = data.pulse_errors().iter().map(effects).sum();
+        let total: usize = data.pulse_errors().iter().map(effects).sum();
         let sensitivities = 2 * data.dof() * data.len() * unknowns.independent();
         let is_noisy = |row: usize, force: usize| data.force_variance()[(row, force)] > 0.0;
         let has_pulse = |row: usize, force: usize| {
@@ -43,8 +43,8 @@ impl PulseFit {
             .peekable();
         let is_any = noisy.peek().is_some();
         is_any
-            && all > 0
-            && all.max(sensitivities) <= MAX_PULSE_EFFECTS
+            && total > 0
+            && total.max(sensitivities) <= MAX_PULSE_EFFECTS
             && noisy.all(|(row, force)| has_pulse(row, force))
     }
 

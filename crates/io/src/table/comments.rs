@@ -123,8 +123,8 @@ impl Comments {
 
     /// Returns the units of the columns, one text for each line with units except the line `names`.
     pub fn units(&self, names: Option<usize>) -> impl Iterator<Item = Vec<String>> {
-        let others = self.lines.iter().enumerate().filter(move |(at, _)| Some(*at) != names);
-        others.map(|(_, line)| units_of(&line.fields, line.are_units))
+        let without_names = self.lines.iter().enumerate().filter(move |(at, _)| Some(*at) != names);
+        without_names.map(|(_, line)| units_of(&line.fields, line.are_units))
     }
 
     /// Returns remarks on the comments with names or units that were not read, because their number

@@ -89,8 +89,8 @@ fn merits(modes: &SavedModes) -> Vec<String> {
         return Vec::new();
     }
     subjects.dedup();
-    let all = modes.checks.len();
-    vec![format!("{count} of {all} checks of data and fit are good: {}", subjects.join(", "))]
+    let total = modes.checks.len();
+    vec![format!("{count} of {total} checks of data and fit are good: {}", subjects.join(", "))]
 }
 
 /// Returns all modes, with the columns that some mode has.
@@ -258,9 +258,9 @@ fn data(modes: &SavedModes) -> Option<Markup> {
 
 fn checks(modes: &SavedModes) -> Option<Markup> {
     // A check of a test that passed has no sentence; the heading names it.
-    let told: Vec<_> =
+    let shown: Vec<_> =
         modes.checks.iter().filter_map(|check| Some((check, check.text_to_show()?))).collect();
-    if told.is_empty() && modes.dropped.is_empty() {
+    if shown.is_empty() && modes.dropped.is_empty() {
         return None;
     }
     let rows: Vec<Vec<String>> = modes
@@ -272,9 +272,9 @@ fn checks(modes: &SavedModes) -> Option<Markup> {
         })
         .collect();
     Some(html! {
-        @if !told.is_empty() {
+        @if !shown.is_empty() {
             ul.checks {
-                @for (check, text) in &told {
+                @for (check, text) in &shown {
                     li {
                         strong class={ "verdict " (check.verdict()) } { (check.verdict()) }
                         " " (check.subject()) ": " (text)

@@ -168,11 +168,11 @@ impl Scores<'_> {
                     standard_error: variance.max(0.0).sqrt(),
                 }
             };
-            let all = (0..self.root.nrows()).map(one);
-            all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
+            let of_parameters = (0..self.root.nrows()).map(one);
+            of_parameters.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
         };
-        let all = (0..self.effects.len()).filter_map(of_part);
-        all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
+        let of_parts = (0..self.effects.len()).filter_map(of_part);
+        of_parts.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
     }
 }
 
@@ -235,20 +235,20 @@ impl PartsOfFit<'_> {
     fn scores(&self, cuts: &Cuts) -> Scores<'_> {
         let count = self.linear.basis.ncols();
         let parts = cuts.columns(self.data, &self.linear.basis);
-        let mut all = DMatrix::zeros(self.linear.residual.len(), count * parts.len());
+        let mut columns = DMatrix::zeros(self.linear.residual.len(), count * parts.len());
         for (at, part) in parts.iter().enumerate() {
             let unexplained = self.linear.unexplained(part.clone());
-            all.columns_mut(at * count, count).copy_from(&unexplained);
+            columns.columns_mut(at * count, count).copy_from(&unexplained);
         }
         let covariance = match self.responses {
-            Some(records) => covariance_of_errors(records, self.data.dof(), &all).0,
-            None => self.linear.covariance_of_products(&all),
+            Some(records) => covariance_of_errors(records, self.data.dof(), &columns).0,
+            None => self.linear.covariance_of_products(&columns),
         };
         Scores {
             root: &self.linear.root,
             values: &self.values,
             effects: parts.iter().map(|part| self.linear.effect_of(part)).collect(),
-            scores: all.tr_mul(&self.linear.residual),
+            scores: columns.tr_mul(&self.linear.residual),
             covariance,
         }
     }

@@ -72,12 +72,12 @@ impl PartsOfFit<'_> {
         let best = explained.iter().min_by(|a, b| a.evidence(self).total_cmp(&b.evidence(self)))?;
         let least = explained.iter().map(|one| one.p_value).fold(1.0, f64::min);
         let weight = |one: &Explained| (best.evidence(self) - one.evidence(self)).exp();
-        let all: f64 = explained.iter().map(weight).sum::<f64>() + best.evidence(self).exp();
+        let total: f64 = explained.iter().map(weight).sum::<f64>() + best.evidence(self).exp();
         let count = self.values.len();
         let mut mean_square = DMatrix::zeros(count, count);
         for one in &explained {
             let square = &one.changes * one.changes.transpose() + &one.covariance;
-            mean_square += square * (weight(one) / all);
+            mean_square += square * (weight(one) / total);
         }
         let errors = best.covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
         Some(OmittedTerms {
@@ -96,15 +96,15 @@ impl PartsOfFit<'_> {
         remove(&self.linear.transients, &mut columns);
         let by_parameters = self.linear.effect_of(&columns);
         let beyond = &columns - &self.linear.basis * &by_parameters;
-        let kept: Vec<usize> = (0..columns.ncols())
+        let informing: Vec<usize> = (0..columns.ncols())
             .filter(|at| {
                 beyond.column(*at).norm_squared()
                     > PART_INFORMS * columns.column(*at).norm_squared()
             })
             .collect();
         let (beyond, by_parameters) =
-            (beyond.select_columns(&kept), by_parameters.select_columns(&kept));
-        if kept.is_empty() {
+            (beyond.select_columns(&informing), by_parameters.select_columns(&informing));
+        if informing.is_empty() {
             return None;
         }
         let covariance = match self.responses {
