@@ -266,7 +266,7 @@ struct Levels {
     /// Sum over all lines.
     total: f64,
     mean: f64,
-    /// Whether the band is wide enough to be quieter than all other lines.
+    /// `true` if the band is wide enough to be quieter than all other lines.
     may_be_quiet: bool,
 }
 
