@@ -1,11 +1,12 @@
 //! Frequency responses for people and for programs.
 
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 
 use mechid_io::{
     ADDED_DECAY, AveragedSegments, CoherenceFunction, DERIVATIVE, FrequencyResponses,
-    ResponseFunction, derivative,
+    ResponseFunction, derivative, is_directed_point,
 };
 use mechid_model::ResponseQuantity;
 use mechid_signal::Window;
@@ -330,8 +331,9 @@ impl FrfTable {
     }
 
     /// Returns the responses for files of other programs; `points` has the point and direction of
-    /// each degree of freedom, such as `12+Z`. Without points, node and degree of freedom have the
-    /// same number, and the direction is +X.
+    /// each degree of freedom, such as `12+Z`. Without points, the names of the channels are used
+    /// if all of them are such points, as in a universal file; otherwise node and degree of freedom
+    /// have the same number, and the direction is +X.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and for forces
@@ -350,10 +352,14 @@ impl FrfTable {
             let why = format!("{given} for {}", message::count(dofs, "degree of freedom"));
             return Err(AnalysisError::Setting { setting: "points", why });
         }
-        let point = |dof: usize| points.get(dof - 1).cloned().unwrap_or_else(|| format!("{dof}+X"));
+        let numbered = || (1..=dofs).map(|dof| format!("{dof}+X")).collect();
+        let [motions_at, forces_at] = match points {
+            [] => self.points().unwrap_or_else(|| [numbered(), numbered()]),
+            given => [given.to_vec(), given.to_vec()],
+        };
         let functions = self.responses.iter().map(|r| ResponseFunction {
-            response: point(r.motion),
-            reference: point(r.force),
+            response: motions_at[r.motion - 1].clone(),
+            reference: forces_at[r.force - 1].clone(),
             quantity: self.quantity.parse().ok(),
             values: r
                 .real
@@ -364,10 +370,10 @@ impl FrfTable {
             standard_error: Some(r.standard_error.clone()),
         });
         let coherence = self.coherence.iter().map(|c| CoherenceFunction {
-            response: point(c.motion),
+            response: motions_at[c.motion - 1].clone(),
             // The multiple coherence with one force is the ordinary one.
             reference: (self.responses.len() == motions)
-                .then(|| self.responses.first().map(|r| point(r.force)))
+                .then(|| self.responses.first().map(|r| forces_at[r.force - 1].clone()))
                 .flatten(),
             values: c.values.clone(),
         });
@@ -381,6 +387,20 @@ impl FrfTable {
             remarks: Vec::new(),
             doubts: Vec::new(),
         })
+    }
+
+    /// Returns the names of the responses and of the forces if they are points with a direction, as
+    /// universal files name their channels, and no two responses or forces have the same.
+    fn points(&self) -> Option<[Vec<String>; 2]> {
+        let forces: BTreeSet<usize> = self.responses.iter().map(|r| r.force - 1).collect();
+        let of_forces: BTreeSet<&str> =
+            forces.iter().map(|at| self.force_names[*at].as_str()).collect();
+        let of_motions: BTreeSet<&str> = self.response_names.iter().map(String::as_str).collect();
+        let are_different =
+            of_forces.len() == forces.len() && of_motions.len() == self.response_names.len();
+        let are_points = of_motions.iter().chain(&of_forces).all(|name| is_directed_point(name));
+        (are_different && are_points)
+            .then(|| [self.response_names.clone(), self.force_names.clone()])
     }
 
     /// Returns whether every force has separate lines.
@@ -399,12 +419,16 @@ impl FrfTable {
     /// in every row.
     pub fn csv(&self) -> String {
         let mut text = String::from("frequency_hz");
+        let numbers = |count: usize| (1..=count).map(|dof| dof.to_string()).collect();
+        let [motions, forces] = self.points().unwrap_or_else(|| {
+            [&self.response_names, &self.force_names].map(|names| numbers(names.len()))
+        });
         for r in &self.responses {
-            let name = format!("h_{}_{}", r.motion, r.force);
+            let name = format!("h_{}_{}", motions[r.motion - 1], forces[r.force - 1]);
             let _ = write!(text, ",{name}_real,{name}_imaginary,{name}_standard_error");
         }
         for c in &self.coherence {
-            let _ = write!(text, ",coherence_{}", c.motion);
+            let _ = write!(text, ",coherence_{}", motions[c.motion - 1]);
         }
         let order = self.quantity.parse().ok().map(derivative);
         let constants = [(DERIVATIVE, order), (ADDED_DECAY, self.added_decay)];

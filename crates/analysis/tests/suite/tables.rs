@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 
 use mechid_analysis::identify::{Band, Method, PeriodEstimator, PeriodFit, Source};
 use mechid_analysis::{
-    AnalysisError, FrfSettings, Identify, IdentifyResponses, Measurement, ResponseQuantity, frf,
-    identify, identify_responses,
+    AnalysisError, Channels, FrfSettings, Identify, IdentifyResponses, Measurement,
+    ResponseQuantity, frf, identify, identify_responses,
 };
 use mechid_checks::Subject;
 use mechid_estimate::Estimate;
@@ -281,6 +281,43 @@ fn a_record_and_its_table_agree() {
     }
     let checks = &of_universal.summary().checks;
     assert!(!checks.is_empty() && checks.iter().all(|check| !check.is_conspicuous()));
+}
+
+/// Channels with the names that universal files give them: both kinds of files keep the points, and
+/// given points replace the names in a universal file.
+#[test]
+fn points_in_names_of_channels_are_kept() {
+    let sampling = Sampling::from_rate_hz(128.0, 1024).unwrap();
+    let force = noise::white(sampling, 1, 1.0, 3).unwrap();
+    let force = force.channel(0).to_vec();
+    let half: Vec<f64> = force.iter().map(|f| 0.5 * f).collect();
+    let columns = [("3+Z", &force[..]), ("12+Z", &force[..]), ("7-X", &half[..])];
+    let points = |force: &str, responses: &str, given: &[String]| {
+        let channels = Channels::new(force, ResponseQuantity::Acceleration, responses);
+        let named = [(force, columns[0].1), columns[1], columns[2]];
+        let test = Measurement::from_columns(sampling, &named, &channels).unwrap();
+        let table = frf(&test, &FrfSettings::default()).unwrap();
+        let text = FrequencyResponses::parse("a.csv", table.csv().as_bytes()).unwrap();
+        let universal = table.to_responses(given).unwrap().to_universal_file().unwrap();
+        let universal = FrequencyResponses::parse("a.unv", universal.as_bytes()).unwrap();
+        [text, universal].map(|table| {
+            let functions = table.functions.iter();
+            let pairs: Vec<String> =
+                functions.map(|f| format!("{}/{}", f.response, f.reference)).collect();
+            let coherence = table.coherence.iter().map(|c| c.response.clone());
+            (pairs, coherence.collect::<Vec<_>>())
+        })
+    };
+    let named = points("3+Z", "12+Z,7-X", &[]);
+    for (pairs, coherence) in &named {
+        assert_eq!(pairs, &["12+Z/3+Z", "7-X/3+Z"]);
+        assert_eq!(coherence, &["12+Z", "7-X"]);
+    }
+    let [text, universal] = points("3+Z", "12+Z,7-X", &["1+Y".into(), "2+Y".into()]);
+    assert_eq!((&text, &universal.0[1]), (&named[0], &"2+Y/1+Y".to_owned()));
+    // One name that is no point, such as that of a force, leaves all of them numbered.
+    let [text, universal] = points("hammer", "12+Z,7-X", &[]);
+    assert_eq!((&text.0[1], &universal.0[1]), (&"2/1".to_owned(), &"2+X/1+X".to_owned()));
 }
 
 /// Three periods give two deviations per line, so neighbouring lines share their noise levels. The

@@ -26,6 +26,7 @@ pub(crate) use self::geometry::read_geometry;
 pub(crate) use self::modes::read_modes;
 pub(crate) use self::responses::read as read_responses;
 pub(crate) use self::shapes::write_shapes;
+pub use self::write::is_directed_point;
 pub(crate) use self::write::write_responses;
 
 /// Reads the functions of a file as columns.

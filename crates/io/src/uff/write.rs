@@ -172,6 +172,16 @@ fn point(label: &str) -> Result<(u32, i32), String> {
     node_and_direction(label).ok_or_else(|| label.to_owned())
 }
 
+/// Returns whether a name is a node with a direction, as universal files name their channels:
+/// `12+Z`, `3-RX`.
+///
+/// # Source
+/// Structural Dynamics Research Laboratory, University of Cincinnati, *Universal File Formats*,
+/// dataset 58 (nodes and directions).
+pub fn is_directed_point(name: &str) -> bool {
+    name.contains(['+', '-']) && node_and_direction(name).is_some()
+}
+
 fn node_and_direction(label: &str) -> Option<(u32, i32)> {
     let Some(at) = label.find(['+', '-']) else { return Some((label.parse().ok()?, 0)) };
     let (node, direction) = label.split_at(at);
