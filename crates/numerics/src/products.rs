@@ -5,7 +5,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::lanes::dot;
-use crate::limits::{PRODUCT_ROWS, WEIGHTED_ROWS};
+use crate::limits::{NARROW_GRAM, PRODUCT_ROWS, WEIGHTED_ROWS};
 
 /// Returns AᵀB (columns of A × columns of B, in the product of their units), for two matrices with
 /// the same number of rows.
@@ -39,38 +39,63 @@ pub fn transposed_product(a: DMatrixView<'_, f64>, b: DMatrixView<'_, f64>) -> D
     products.into_iter().fold(zero, |sum, product| sum + product)
 }
 
-/// Returns AᵀWA (columns × columns, in the squared unit of A times that of W) for a diagonal W that
-/// is given by its diagonal. The result does not depend on the width of the vector registers.
-///
-/// # Panics
-/// Panics if there is not one weight for every row.
-///
-/// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 1.3 (block matrices).
+/// Products AᵀWA of one tall matrix A with diagonal matrices W.
 ///
 /// ```
-/// use mechid_numerics::products::weighted_gram;
+/// use mechid_numerics::products::WeightedGram;
 /// use nalgebra::dmatrix;
 ///
 /// let a = dmatrix![1.0, 2.0; 3.0, 4.0];
-/// assert_eq!(weighted_gram(a.as_view(), &[1.0, 10.0]), dmatrix![91.0, 122.0; 122.0, 164.0]);
+/// let gram = WeightedGram::new(a.as_view()).with(&[1.0, 10.0]);
+/// assert_eq!(gram, dmatrix![91.0, 122.0; 122.0, 164.0]);
 /// ```
-pub fn weighted_gram(a: DMatrixView<'_, f64>, weights: &[f64]) -> DMatrix<f64> {
-    assert_eq!(a.nrows(), weights.len(), "one weight for every row");
-    let mut gram = DMatrix::zeros(a.ncols(), a.ncols());
-    Arch::new().dispatch(WeightedGram { a, weights, gram: &mut gram });
-    gram.fill_upper_triangle_with_lower_triangle();
-    gram
+#[derive(Debug)]
+pub struct WeightedGram<'a> {
+    a: DMatrixView<'a, f64>,
+    /// Aᵀ, for matrices that are not narrow.
+    transposed: Option<DMatrix<f64>>,
 }
 
-/// Arguments of the function that `pulp` compiles for each width of vector registers.
-struct WeightedGram<'a> {
+impl<'a> WeightedGram<'a> {
+    /// Prepares the products of A, rows × columns.
+    pub fn new(a: DMatrixView<'a, f64>) -> Self {
+        let is_narrow = a.ncols() <= NARROW_GRAM;
+        Self { a, transposed: (!is_narrow).then(|| a.transpose()) }
+    }
+
+    /// Returns AᵀWA (columns × columns, in the squared unit of A times that of W) for the diagonal
+    /// of W.
+    ///
+    /// # Panics
+    /// Panics if there is not one weight for every row.
+    ///
+    /// # Source
+    /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 1.3 (block matrices).
+    pub fn with(&self, weights: &[f64]) -> DMatrix<f64> {
+        assert_eq!(self.a.nrows(), weights.len(), "one weight for every row");
+        if let Some(transposed) = &self.transposed {
+            let mut weighted = self.a.into_owned();
+            for mut column in weighted.column_iter_mut() {
+                column.iter_mut().zip(weights).for_each(|(value, weight)| *value *= weight);
+            }
+            return transposed * weighted;
+        }
+        let mut gram = DMatrix::zeros(self.a.ncols(), self.a.ncols());
+        Arch::new().dispatch(NarrowGram { a: self.a, weights, gram: &mut gram });
+        gram.fill_upper_triangle_with_lower_triangle();
+        gram
+    }
+}
+
+/// Arguments of the product of few columns, which `pulp` compiles for each width of vector
+/// registers: dot products.
+struct NarrowGram<'a> {
     a: DMatrixView<'a, f64>,
     weights: &'a [f64],
     gram: &'a mut DMatrix<f64>,
 }
 
-impl WithSimd for WeightedGram<'_> {
+impl WithSimd for NarrowGram<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -101,12 +126,16 @@ mod tests {
     fn weighted_products_of_several_blocks_are_the_dot_products() {
         let number = |at: usize| ((at * 7919 + 13) % 101) as f64 / 50.0 - 1.0;
         let rows = 3 * WEIGHTED_ROWS + 17;
-        let a = DMatrix::from_fn(rows, 4, |row, column| number(3 * row + column));
         let weights: Vec<f64> = (0..rows).map(|row| number(5 * row + 1)).collect();
-        let gram = weighted_gram(a.as_view(), &weights);
-        let expected = a.tr_mul(&(DMatrix::from_diagonal(&weights.clone().into()) * &a));
-        assert!((gram - expected).norm() < 1e-13 * a.norm_squared());
-        assert_eq!(weighted_gram(DMatrix::zeros(0, 2).as_view(), &[]), DMatrix::zeros(2, 2));
+        for columns in [4, 9] {
+            let a = DMatrix::from_fn(rows, columns, |row, column| number(3 * row + column));
+            let gram = WeightedGram::new(a.as_view()).with(&weights);
+            let expected = a.tr_mul(&(DMatrix::from_diagonal(&weights.clone().into()) * &a));
+            assert!((gram - expected).norm() < 1e-13 * a.norm_squared());
+            let none = DMatrix::zeros(0, columns);
+            let gram = WeightedGram::new(none.as_view()).with(&[]);
+            assert_eq!(gram, DMatrix::zeros(columns, columns));
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ mod bump;
 
 use std::ops::Range;
 
-use mechid_numerics::products::weighted_gram;
+use mechid_numerics::products::WeightedGram;
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use rayon::prelude::*;
 
@@ -326,6 +326,7 @@ fn most_likely(
     let mut misfit = deviance(&log_power, variances, &mut ratio);
     let tolerance = tolerance * (variances.len() as f64).sqrt();
     let mut next_ratio = ratio.clone();
+    let products = WeightedGram::new(basis.as_view());
     let mut factors: Option<Cholesky<f64, Dyn>> = None;
     let mut previous = f64::INFINITY;
     for _ in 0..SMOOTH_STEPS {
@@ -335,7 +336,7 @@ fn most_likely(
         let mut step = match reused.filter(|step| step.norm() <= HESSIAN_REUSED * previous) {
             Some(step) => step,
             None => {
-                factors = weighted_gram(basis.as_view(), ratio.as_slice()).cholesky();
+                factors = products.with(ratio.as_slice()).cholesky();
                 // If the Hessian is not positive definite, the expected information, which is the
                 // identity matrix, replaces it in Newton's step.
                 factors.as_ref().map_or_else(|| slope.clone(), |factors| factors.solve(&slope))
