@@ -136,7 +136,7 @@ pub use seam::{Seam, periodicity, periodicity_across};
 pub use search::SearchAgreement;
 pub use sensor_delay::{SensorDelay, delay_of_sensors};
 pub use spectral::{before_spectral_fit, steady_periods};
-pub use spectral_residual::SpectralResidual;
+pub use spectral_residual::{SpectralResidual, is_noise};
 pub use spike::{Spike, spiked_channels};
 pub use symmetry::{MassSymmetry, mass_symmetry};
 pub use unequal_periods::UnequalPeriods;

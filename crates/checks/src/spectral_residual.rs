@@ -48,7 +48,10 @@ pub struct SpectralResidual {
 }
 
 /// Returns whether no test of the residuals warns, with p-values adjusted for their number.
-pub(super) fn is_noise(residuals: &[SpectralResidual]) -> bool {
+///
+/// # Source
+/// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
+pub fn is_noise(residuals: &[SpectralResidual]) -> bool {
     passes(residuals.iter().flat_map(SpectralResidual::findings).collect())
 }
 

@@ -3,11 +3,13 @@
 use std::f64::consts::TAU;
 use std::str::FromStr;
 
+use mechid_checks::{Alternative, Cause, Finding, after_spectral_fit, is_noise};
 use mechid_estimate::frequency_domain::{
     OutputErrorFit, equivalent_force, output_error_from, output_error_pooling,
 };
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::{Discretisation, SecondOrderSystem};
+use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Pooling};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -112,6 +114,7 @@ impl Acquisition {
     ) -> Result<(OutputErrorFit, Vec<FrequencyData>), AnalysisError> {
         let mut last = (fit, records.to_vec());
         let Some(between) = self.between_samples else { return Ok(last) };
+        let mut settled = pooling == Pooling::AllLines;
         for round in 0..ACQUISITION_ROUNDS {
             let system = last.0.estimate.system()?;
             let equivalent =
@@ -121,26 +124,47 @@ impl Acquisition {
                 return Err(AnalysisError::Setting { setting: "between_samples", why });
             };
             let data = joined(&equivalent)?;
+            // White noise suffices until the equivalent force hardly changes.
+            let is_last = round + 1 == ACQUISITION_ROUNDS;
+            let of_round = if settled || is_last { pooling } else { Pooling::AllLines };
             // The band-limited force may have led to a wrong minimum.
             let fit = match round {
-                0 => output_error_pooling(&data, unknowns, pooling),
-                _ => output_error_from(&data, unknowns, &last.0, pooling)
-                    .or_else(|_| output_error_pooling(&data, unknowns, pooling)),
+                0 => output_error_pooling(&data, unknowns, of_round),
+                _ => output_error_from(&data, unknowns, &last.0, of_round)
+                    .or_else(|_| output_error_pooling(&data, unknowns, of_round)),
             }?;
-            let change = largest_change(&last.0.estimate, &fit.estimate);
+            let is_small = largest_change(&last.0.estimate, &fit.estimate) < ACQUISITION_SETTLED;
             last = (fit, equivalent);
-            if change < ACQUISITION_SETTLED {
+            if is_small && settled {
                 break;
             }
+            settled |= is_small;
         }
         Ok(last)
     }
 }
 
-/// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best, and the
-/// fraction of the residual power of a `fit` with a band-limited force that remains with it: the
-/// geometric mean over the channels, as in the likelihood of white noise. Long records are fitted
-/// on a part of their lines. `None` without kinds, or if no fit succeeds.
+/// Kind of a force between its samples that explains a residual.
+pub(super) struct BetweenSamples {
+    kind: Discretisation,
+    /// Fraction of the residual power of the fit with a band-limited force that remains: the
+    /// geometric mean over the channels, as in the likelihood of white noise.
+    pub(super) remaining: f64,
+    /// `true` if less power remains and no test of the residual warns any more.
+    pub(super) leaves_noise: bool,
+}
+
+impl BetweenSamples {
+    /// Returns the cause that the force is.
+    pub(super) fn finding(&self) -> Finding {
+        let cause = Cause::BetweenSamples { between_samples: self.kind };
+        Finding::Alternative(Alternative { cause, remaining: self.remaining })
+    }
+}
+
+/// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best instead of the
+/// band-limited force of a `fit`. Long records are fitted on a part of their lines. `None` without
+/// kinds, or if no fit succeeds.
 ///
 /// # Source
 /// Maximum likelihood with the levels of the channels eliminated.
@@ -150,17 +174,21 @@ pub(super) fn between_samples(
     dt: f64,
     fit: &OutputErrorFit,
     pooling: Pooling,
-) -> Option<(Discretisation, f64)> {
+) -> Option<BetweenSamples> {
     let unknowns = fit.estimate.unknowns();
     let lines: usize = records.iter().map(FrequencyData::len).sum();
     let step = (lines / (LINES_PER_UNKNOWN * unknowns.independent())).max(1);
     let thinned: Option<Vec<_>> = records.iter().map(|record| record.thinned(step)).collect();
     let thinned = thinned.filter(|_| !kinds.is_empty())?;
+    let closed = |fit: &OutputErrorFit, records: &[FrequencyData]| {
+        fit.ends.as_ref()?.without_transients(records).ok()
+    };
     let level = |fit: &OutputErrorFit, records: &[FrequencyData]| -> Option<f64> {
-        let closed = fit.ends.as_ref()?.without_transients(records).ok()?;
         let system = fit.estimate.system().ok()?;
-        let powers = closed.iter().map(|record| residual_powers(record, &system));
-        let sum = powers.reduce(|sum, powers| sum + powers)?;
+        let powers = closed(fit, records)?.into_iter();
+        let sum = powers
+            .map(|record| residual_powers(&record, &system))
+            .reduce(|sum, powers| sum + powers)?;
         Some(sum.map(f64::ln).mean())
     };
     let usual = output_error_from(&joined(&thinned).ok()?, unknowns, fit, pooling).ok()?;
@@ -169,9 +197,12 @@ pub(super) fn between_samples(
         let acquisition = Acquisition { between_samples: Some(*kind), ..Acquisition::default() };
         let (fit, equivalent) =
             acquisition.refitted(usual.clone(), &thinned, dt, unknowns, pooling).ok()?;
-        Some((*kind, (level(&fit, &equivalent)? - before).exp()))
+        Some((*kind, (level(&fit, &equivalent)? - before).exp(), fit, equivalent))
     });
-    refitted.min_by(|a, b| a.1.total_cmp(&b.1))
+    let (kind, remaining, fit, equivalent) = refitted.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let after = after_spectral_fit(&closed(&fit, &equivalent)?, &fit.estimate, Extent::Open);
+    let leaves_noise = remaining < 1.0 && after.is_ok_and(|after| is_noise(&after.records));
+    Some(BetweenSamples { kind, remaining, leaves_noise })
 }
 
 /// Returns the power of the residual of each channel, in the squared unit of the measured quantity.

@@ -4,10 +4,9 @@ use std::f64::consts::TAU;
 
 use mechid_checks::limits::DELAY_REMAINING;
 use mechid_checks::{
-    AfterSpectralFit, Alternative, Cause, Finding, Quantity, RowParts, SpectralResidual,
-    after_spectral_fit, before_spectral_fit, delay_of_lines, delay_of_open_records,
-    fault_of_acquisition, fault_of_hits, fitted_band, forces_between_samples,
-    linearity_of_open_record,
+    AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, after_spectral_fit,
+    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition,
+    fault_of_hits, fitted_band, forces_between_samples, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
@@ -17,7 +16,7 @@ use mechid_model::{Discretisation, ResponseQuantity};
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
 
-use super::acquisition::{Acquisition, between_samples};
+use super::acquisition::{Acquisition, BetweenSamples, between_samples};
 use super::compared::{Compared, rows_of};
 use super::disagreement::{Disagreement, squared_change};
 use super::fitted::{Fitted, Residual};
@@ -266,28 +265,18 @@ impl Tested<'_> {
         if let Excitation::Hits(_) = excitation {
             return Ok(likelier(late, fault_of_hits(records, closed, dt, fit, residuals)));
         }
-        let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
-        let is_known = |finding: &Finding| {
-            let Finding::Alternative(alternative) = finding else { return false };
-            let is_between = matches!(alternative.cause, Cause::BetweenSamples { .. });
-            is_between && alternative.remaining <= DELAY_REMAINING
+        let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
+        let between = between_samples(records, &kinds, dt, fit, pooling);
+        // AC coupling cannot explain more than a force that leaves only noise.
+        let leaves_noise = between.as_ref().is_some_and(|between| between.leaves_noise);
+        let fault = if leaves_noise {
+            None
+        } else {
+            fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?
         };
-        let mut named = likelier(late, fault);
-        if !named.as_ref().is_some_and(is_known) {
-            let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
-            let between = between_samples(records, &kinds, dt, fit, pooling);
-            let is_likelier = |(_, left): &(Discretisation, f64)| {
-                *left < named.as_ref().map_or(DELAY_REMAINING, remaining)
-            };
-            named = match between.filter(is_likelier) {
-                Some((between_samples, remaining)) => {
-                    let cause = Cause::BetweenSamples { between_samples };
-                    Some(Finding::Alternative(Alternative { cause, remaining }))
-                }
-                None => named,
-            };
-        }
-        Ok(named)
+        let between = between.filter(|between| leaves_noise || between.remaining < DELAY_REMAINING);
+        let between = between.as_ref().map(BetweenSamples::finding);
+        Ok(likelier(likelier(late, fault), between))
     }
 }
 
