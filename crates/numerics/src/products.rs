@@ -57,7 +57,7 @@ pub struct WeightedGram<'a> {
 }
 
 impl<'a> WeightedGram<'a> {
-    /// Prepares the products of A, rows × columns.
+    /// Prepares the products of A, rows × columns in any unit.
     pub fn new(a: DMatrixView<'a, f64>) -> Self {
         let is_narrow = a.ncols() <= NARROW_GRAM;
         Self { a, transposed: (!is_narrow).then(|| a.transpose()) }
