@@ -292,9 +292,9 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         for row in 0..self.data.len() {
             let line = self.model.at(&self.minimum.parameters, row)?;
             let input = self.data.inputs().row(row).transpose();
-            let weighted = self.weights.line(row, super::LineResponse::receptance(&line), |c| {
-                self.model.add_covariance(row, &line, &input, c);
-            })?;
+            let of_model = self.model.covariance(row, &line, &input);
+            let receptance = super::LineResponse::receptance(&line);
+            let weighted = self.weights.line(row, receptance, of_model)?;
             let roots: f64 = weighted.lower.diagonal().iter().map(|z| z.re.ln()).sum();
             log_determinant += 2.0 * roots + p * std::f64::consts::PI.ln();
         }

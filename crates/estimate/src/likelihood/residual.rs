@@ -227,9 +227,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         if let Some(own) = line.own_response() {
             white -= own;
         }
-        let weighted = self.weights.line(row, line.receptance(), |covariance| {
-            self.model.add_covariance(row, &line, &input, covariance);
-        })?;
+        let of_model = self.model.covariance(row, &line, &input);
+        let weighted = self.weights.line(row, line.receptance(), of_model)?;
         let exists = weighted.lower.solve_lower_triangular_mut(&mut white);
         exists.then_some((line, weighted, white))
     }

@@ -35,16 +35,16 @@ pub trait ResponseModel: Sync {
     /// Returns the response at a line with parameters in their units, `None` if it does not exist.
     fn at(&self, parameters: &[f64], row: usize) -> Option<Self::Line<'_>>;
 
-    /// Adds the uncertainty of the model itself to the covariance of the outputs (p × p, in the
-    /// products of their units), at a line with the response `line` under `input` (q, in the units
-    /// of the inputs); an exact model has none.
-    fn add_covariance<'l>(
+    /// Returns the covariance of the outputs due to the uncertainty of the model itself (p × p, in
+    /// the products of their units), at a line with the response `line` under `input` (q, in the
+    /// units of the inputs); `None` for an exact model.
+    fn covariance<'l>(
         &'l self,
         _row: usize,
         _line: &Self::Line<'l>,
         _input: &DVector<Complex<f64>>,
-        _covariance: &mut DMatrix<Complex<f64>>,
-    ) {
+    ) -> Option<DMatrix<Complex<f64>>> {
+        None
     }
 }
 

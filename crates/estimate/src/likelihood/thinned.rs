@@ -60,13 +60,12 @@ impl<M: ResponseModel> ResponseModel for Thinned<'_, M> {
         self.model.at(parameters, self.rows[row])
     }
 
-    fn add_covariance<'l>(
+    fn covariance<'l>(
         &'l self,
         row: usize,
         line: &Self::Line<'l>,
         input: &DVector<Complex<f64>>,
-        covariance: &mut DMatrix<Complex<f64>>,
-    ) {
-        self.model.add_covariance(self.rows[row], line, input, covariance);
+    ) -> Option<DMatrix<Complex<f64>>> {
+        self.model.covariance(self.rows[row], line, input)
     }
 }

@@ -11,6 +11,9 @@ pub(super) struct Weights {
     covariance: Vec<DMatrix<Complex<f64>>>,
     outputs: usize,
     inputs_are_exact: bool,
+    /// Lower triangular factors of the covariance of the outputs, for exact inputs; empty if one of
+    /// them does not exist.
+    lower: Vec<DMatrix<Complex<f64>>>,
 }
 
 /// Factors of the covariance L Lᴴ of the error e of a line.
@@ -28,7 +31,12 @@ impl Weights {
             inputs.iter().all(|z| *z == Complex::default())
         };
         let inputs_are_exact = covariance.iter().all(exact);
-        Self { covariance, outputs, inputs_are_exact }
+        let of_outputs = |matrix: &DMatrix<Complex<f64>>| {
+            cholesky(matrix.view((0, 0), (outputs, outputs)).into_owned())
+        };
+        let lower: Option<Vec<_>> =
+            covariance.iter().map(of_outputs).take_while(|_| inputs_are_exact).collect();
+        Self { covariance, outputs, inputs_are_exact, lower: lower.unwrap_or_default() }
     }
 
     /// Creates weights from variances of the outputs, lines × p, and the stated covariance of the
@@ -52,8 +60,8 @@ impl Weights {
 
     /// Returns the weights of some lines.
     pub(super) fn rows(&self, rows: &[usize]) -> Self {
-        let covariance = rows.iter().map(|row| self.covariance[*row].clone()).collect();
-        Self { covariance, ..*self }
+        let covariance = rows.iter().map(|row| self.covariance[*row].clone());
+        Self::new(covariance.collect(), self.outputs)
     }
 
     /// Adds noise relative to the response: an amplitude `share` of every output.
@@ -65,7 +73,7 @@ impl Weights {
                 matrix[(output, output)] += Complex::from(share * share * power);
             }
         }
-        Self { covariance, ..*self }
+        Self::new(covariance, self.outputs)
     }
 
     /// Variance of an output at a line.
@@ -86,14 +94,17 @@ impl Weights {
         (gain * of_inputs * gain.adjoint())[(0, 0)].re
     }
 
-    /// Factors S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ plus the covariance that `more` adds; `None` if
-    /// the sum is singular.
+    /// Factors S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ plus the covariance of an uncertain model;
+    /// `None` if the sum is singular.
     pub(super) fn line(
         &self,
         row: usize,
         receptance: &DMatrix<Complex<f64>>,
-        more: impl FnOnce(&mut DMatrix<Complex<f64>>),
+        of_model: Option<DMatrix<Complex<f64>>>,
     ) -> Option<WeightedLine> {
+        if let (None, Some(lower)) = (&of_model, self.lower.get(row)) {
+            return Some(WeightedLine { lower: lower.clone(), cross: DMatrix::zeros(0, 0) });
+        }
         let (p, q) = receptance.shape();
         let covariance = &self.covariance[row];
         let block = |at: (usize, usize), size: (usize, usize)| covariance.view(at, size);
@@ -104,7 +115,9 @@ impl Weights {
             cross = block((p, 0), (q, p)) - block((p, p), (q, q)) * &adjoint;
             total -= block((0, p), (p, q)) * &adjoint + receptance * &cross;
         }
-        more(&mut total);
+        if let Some(of_model) = of_model {
+            total += of_model;
+        }
         Some(WeightedLine { lower: cholesky(total)?, cross })
     }
 
@@ -114,6 +127,9 @@ impl Weights {
             return Ok(());
         }
         let p = self.outputs;
+        if self.lower.len() == self.covariance.len() {
+            return Ok(());
+        }
         for (covariance, omega) in self.covariance.iter().zip(data.omega()) {
             if cholesky(covariance.view((0, 0), (p, p)).into_owned()).is_none() {
                 let frequency_hz = omega / std::f64::consts::TAU;

@@ -338,24 +338,25 @@ impl ResponseModel for MachineModel {
         })
     }
 
-    /// Adds the covariance of the outputs due to the errors of a measured receptance: Σ var_ij
+    /// Returns the covariance of the outputs due to the errors of a measured receptance: Σ var_ij
     /// |g_j|² P_i P_iᴴ with the forces g on the part and the readings P of its motions.
-    fn add_covariance<'l>(
+    fn covariance<'l>(
         &'l self,
         row: usize,
         line: &MachineLine<'l>,
         input: &DVector<Complex<f64>>,
-        covariance: &mut DMatrix<Complex<f64>>,
-    ) {
-        let variance = self.measured.as_ref().and_then(|part| part.variance.as_ref());
-        let (Some(variance), Some([readings, forces])) = (variance, &line.part) else { return };
+    ) -> Option<DMatrix<Complex<f64>>> {
+        let variance = self.measured.as_ref()?.variance.as_ref()?;
+        let [readings, forces] = line.part.as_ref()?;
         let forces = forces * input;
+        let mut covariance = DMatrix::zeros(self.sensors.len(), self.sensors.len());
         let power = forces.map(|force| force.norm_sqr());
         let by_row = &variance[row] * power;
         for (at, weight) in by_row.iter().enumerate() {
             let reading = readings.column(at);
-            *covariance += reading * reading.adjoint() * Complex::from(*weight);
+            covariance += reading * reading.adjoint() * Complex::from(*weight);
         }
+        Some(covariance)
     }
 }
 
