@@ -45,15 +45,7 @@ pub(super) fn fit(
         excitation: Excitation::Lasting,
     };
     let linear = open_records::fit(records, unknowns, how)?.fitted;
-    let stepped: Vec<SteppedRecord> = records
-        .iter()
-        .map(|Windowed { held, .. }| SteppedRecord {
-            force: held.force.clone(),
-            response: held.response().0.clone(),
-            extent: Extent::Open,
-            periods: 1,
-        })
-        .collect();
+    let stepped: Vec<SteppedRecord> = records.iter().map(stepped_record).collect();
     let kind = records[0].held.response().1;
     let fit = output_error_of_open_records(&stepped, kind, &linear.estimate, terms)?;
     let further = FurtherTerms::from_open_records(&stepped, kind, &fit);
@@ -85,6 +77,15 @@ pub(super) fn fit(
         )
     }
     .with_terms(estimate))
+}
+
+fn stepped_record(Windowed { held, .. }: &Windowed) -> SteppedRecord {
+    SteppedRecord {
+        force: held.force.clone(),
+        response: held.response().0.clone(),
+        extent: Extent::Open,
+        periods: 1,
+    }
 }
 
 impl Fitted {
