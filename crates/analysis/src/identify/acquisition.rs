@@ -144,7 +144,7 @@ impl Acquisition {
     }
 }
 
-/// Kind of a force between its samples that explains a residual.
+/// Force that is held or linear between its samples, as an explanation of a residual.
 pub(super) struct BetweenSamples {
     kind: Discretisation,
     /// Fraction of the residual power of the fit with a band-limited force that remains: the
@@ -155,7 +155,7 @@ pub(super) struct BetweenSamples {
 }
 
 impl BetweenSamples {
-    /// Returns the cause that the force is.
+    /// Returns the finding that names this kind of force as the cause of the residual.
     pub(super) fn finding(&self) -> Finding {
         let cause = Cause::BetweenSamples { between_samples: self.kind };
         Finding::Alternative(Alternative { cause, remaining: self.remaining })
@@ -177,7 +177,7 @@ pub(super) fn between_samples(
 ) -> Option<BetweenSamples> {
     let unknowns = fit.estimate.unknowns();
     let lines: usize = records.iter().map(FrequencyData::len).sum();
-    let step = (lines / (LINES_PER_UNKNOWN * unknowns.independent())).max(1);
+    let step = (lines / (LINES_PER_UNKNOWN * unknowns.independent()).max(1)).max(1);
     let thinned: Option<Vec<_>> = records.iter().map(|record| record.thinned(step)).collect();
     let thinned = thinned.filter(|_| !kinds.is_empty())?;
     let closed = |fit: &OutputErrorFit, records: &[FrequencyData]| {

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use mechid_numerics::kronecker;
 use mechid_numerics::triangular::TriangularFactor;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::limits::GRAM_LINES;
 
@@ -96,7 +96,7 @@ impl BlockFactors {
     /// columns × columns of the block. `None` if a value is not finite.
     pub(super) fn triangle(&self, dof: usize) -> Option<DMatrix<f64>> {
         let diagonal = (0..dof).map(|i| self.weights.column(kronecker::real_part(i, i)));
-        let power = diagonal.fold(self.weights.column(0) * 0.0, |sum, part| sum + part);
+        let power = diagonal.fold(DVector::zeros(self.block.lines.len()), |sum, part| sum + part);
         let size = power.map(f64::sqrt);
         let mut rows = self.regressors.clone();
         for mut column in rows.column_iter_mut() {
