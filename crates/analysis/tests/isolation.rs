@@ -158,7 +158,7 @@ fn the_record_that_ends_the_process_has_the_error() {
         ..Reading::default()
     };
     let analysis = SavedAnalysis { reading, ..analysis() };
-    let little = Isolation { record_memory_gb: 0.1, ..isolation() };
+    let little = Isolation { record_memory_gb: 0.05, ..isolation() };
     let results = home.path().join("results");
     let summary =
         Fleet::new(analysis, &[path], &results, 3).unwrap().run_isolated(1, &little, &|_| ());

@@ -98,13 +98,14 @@ pub fn serve(
     })
 }
 
-/// Limits the memory of this process: an allocation above the limit ends it.
+/// Limits the writable memory of this process, without its code and without reserved addresses: an
+/// allocation above the limit ends it.
 fn limit_memory(bytes: Option<u64>) -> io::Result<()> {
     #[cfg(target_os = "linux")]
     if let Some(bytes) = bytes {
         use rustix::process::{Resource, Rlimit, setrlimit};
 
-        setrlimit(Resource::As, Rlimit { current: Some(bytes), maximum: Some(bytes) })?;
+        setrlimit(Resource::Data, Rlimit { current: Some(bytes), maximum: Some(bytes) })?;
     }
     #[cfg(not(target_os = "linux"))]
     let _ = bytes;

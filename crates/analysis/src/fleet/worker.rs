@@ -33,8 +33,9 @@ const START: Duration = Duration::from_secs(120);
 const FAREWELL: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(5);
 
-/// Beginning of the message with which a failed allocation ends a process.
-const OUT_OF_MEMORY: &str = "memory allocation of";
+/// Messages with which a process ends if an allocation fails, or the system has no memory for a
+/// thread.
+const OUT_OF_MEMORY: [&str; 2] = ["memory allocation of", "Cannot allocate memory"];
 
 /// Isolation of records in separate processes: the program that identifies them, and the limits for
 /// each record.
@@ -46,8 +47,8 @@ pub struct Isolation {
     pub program: PathBuf,
     /// Arguments of the program.
     pub arguments: Vec<OsString>,
-    /// Memory that a record and the program itself may take, in units of GB; only Linux enforces
-    /// it.
+    /// Writable memory that a record and the program itself may take, in units of GB; only Linux
+    /// enforces it.
     pub record_memory_gb: f64,
     /// Time that a record may take, in s.
     pub record_seconds: f64,
@@ -206,8 +207,6 @@ impl Worker {
         };
         let mut command = Command::new(program);
         command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // Every arena of the allocator would reserve addresses, which count as memory.
-        command.env("MALLOC_ARENA_MAX", "2");
         // A backtrace needs memory; a process that fails for lack of memory would wait for this
         // memory for ever.
         command.env("RUST_BACKTRACE", "0");
@@ -280,7 +279,7 @@ impl Running {
             thread::sleep(POLL);
         }
         let (status, said) = self.end();
-        if said.contains(OUT_OF_MEMORY) {
+        if OUT_OF_MEMORY.iter().any(|message| said.contains(message)) {
             return AnalysisError::RecordMemory { gb: memory_bytes as f64 / 1e9 };
         }
         let status = status.map_or_else(|error| error.to_string(), |status| status.to_string());

@@ -243,7 +243,7 @@ def run(
         interpreter: a record that takes too much memory or time, or ends its process, becomes a row
         with its error. If false, a worker computes in its own process.
     record_memory_gb : float
-        Memory that a record may take, in GB, including the 0.1 GB of its process; only Linux
+        Memory that a record may take, in GB, including the 0.03 GB of its process; only Linux
         enforces it.
     record_seconds : float
         Time that a record may take, in s.
