@@ -72,14 +72,13 @@ fn steady_start(
     );
     for _ in 0..PREDICTION_SHOTS {
         let Some(course) = tangent.run(fine, &initial(&state)?) else { return Err(none) };
-        let end = DVector::from_column_slice(&course.end[..2 * n]);
+        let end = course.end.column(0).into_owned();
         let gap = &end - &state;
         let size = course.state.amax();
         if gap.amax() <= PREDICTION_CLOSED * size || size == 0.0 {
             return initial(&end);
         }
-        let over = DMatrix::from_column_slice(2 * n, 2 * n, &course.end[2 * n..]);
-        let closing = DMatrix::identity(2 * n, 2 * n) - over;
+        let closing = DMatrix::identity(2 * n, 2 * n) - course.end.columns(1, 2 * n);
         // The state after one period is the next estimate if the matrix is singular or the step too
         // large.
         state = match closing.lu().solve(&gap) {

@@ -119,21 +119,60 @@ impl Stages {
 /// Integration of a nonlinear system by the classical Runge–Kutta method, together with the
 /// derivatives of the computed response by the tangent of the same method.
 ///
+/// Displacements and velocities are rows, each with its value followed by its derivatives with
+/// respect to all directions, so that a stage treats all directions of a row in one loop.
+///
 /// # Source
 /// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections
 /// II.1 (the rule) and I.14 (derivatives with respect to parameters and initial values).
 pub(super) struct Tangent<'a> {
     system: &'a NonlinearSystem,
     directions: &'a [Direction],
+    terms: Vec<TermTangent<'a>>,
     /// Inverse M⁻¹, n×n, computed once and applied at every stage.
     inverse_mass: DMatrix<f64>,
-    /// Term with one changed constant, and the change, for the derivatives with respect to the
-    /// constants of each law.
-    moved: Vec<Vec<(f64, Term)>>,
-    /// Work arrays of a stage.
+    /// Derivatives of the accelerations of the linear system with respect to displacements and
+    /// velocities, 2n × n: −[K C]ᵀM⁻ᵀ.
+    linear: DMatrix<f64>,
+    /// The same of the nonlinear system, at a stage.
+    slopes: DMatrix<f64>,
+    /// Displacement, velocity, acceleration and force of a stage.
+    displacement: Vec<f64>,
+    velocity: Vec<f64>,
     acceleration: Vec<f64>,
     force: Vec<f64>,
-    slopes: Vec<[f64; 2]>,
+}
+
+/// A term, and what its derivatives need.
+struct TermTangent<'a> {
+    term: &'a Term,
+    coefficient: f64,
+    /// Accelerations due to a unit force of the term.
+    acceleration: Vec<f64>,
+    /// The term with one changed constant, and the change, for each constant of its law.
+    moved: Vec<(f64, Term)>,
+}
+
+impl<'a> TermTangent<'a> {
+    fn new(term: &'a Term, coefficient: f64, inverse_mass: &DMatrix<f64>) -> Self {
+        let constants: Vec<f64> = term.law().constants().iter().map(|c| c.value).collect();
+        let moved = (0..constants.len()).filter_map(|at| {
+            let step = SIMULATION_STEP * constants[at].abs();
+            let mut changed = constants.clone();
+            changed[at] += step;
+            Some((step, term.with_constants(&changed)?))
+        });
+        let of_row = |row: usize| {
+            let forces = term.coordinate().signs();
+            -forces.map(|(dof, sign)| inverse_mass[(row, dof)] * sign).sum::<f64>()
+        };
+        Self {
+            term,
+            coefficient,
+            acceleration: (0..inverse_mass.nrows()).map(of_row).collect(),
+            moved: moved.collect(),
+        }
+    }
 }
 
 /// Displacement, velocity and acceleration at the samples, and their derivatives.
@@ -142,8 +181,9 @@ pub(super) struct Course {
     pub(super) state: DMatrix<f64>,
     /// Derivatives with respect to each direction, samples × 3n.
     pub(super) derivatives: Vec<DMatrix<f64>>,
-    /// State and derivatives one sampling interval after the last sample.
-    pub(super) end: Vec<f64>,
+    /// State one sampling interval after the last sample, and its derivatives with respect to each
+    /// direction, 2n × (1 + directions).
+    pub(super) end: DMatrix<f64>,
 }
 
 impl<'a> Tangent<'a> {
@@ -152,32 +192,38 @@ impl<'a> Tangent<'a> {
         let lu = system.linear().mass().clone().lu();
         let inverse_mass =
             lu.solve(&DMatrix::identity(n, n)).expect("the mass of a system is invertible");
-        let moved = system.terms().iter().map(|term| {
-            let constants: Vec<f64> = term.law().constants().iter().map(|c| c.value).collect();
-            (0..constants.len())
-                .filter_map(|at| {
-                    let step = SIMULATION_STEP * constants[at].abs();
-                    let mut changed = constants.clone();
-                    changed[at] += step;
-                    Some((step, term.with_constants(&changed)?))
-                })
-                .collect()
-        });
+        let terms = system.terms().iter().zip(system.coefficients());
+        let terms = terms
+            .map(|(term, coefficient)| TermTangent::new(term, *coefficient, &inverse_mass))
+            .collect();
+        let mut linear = DMatrix::zeros(2 * n, n);
+        let of_linear = [system.linear().stiffness(), system.linear().damping()];
+        for (at, matrix) in of_linear.into_iter().enumerate() {
+            linear.rows_mut(at * n, n).copy_from(&-(&inverse_mass * matrix).transpose());
+        }
         Self {
-            moved: moved.collect(),
             system,
             directions,
+            terms,
+            slopes: linear.clone(),
+            linear,
             inverse_mass,
+            displacement: vec![0.0; n],
+            velocity: vec![0.0; n],
             acceleration: vec![0.0; n],
             force: vec![0.0; n],
-            slopes: vec![[0.0; 2]; system.terms().len()],
         }
+    }
+
+    /// Number of entries of a row: the value and its derivatives.
+    fn width(&self) -> usize {
+        1 + self.directions.len()
     }
 
     /// Returns the response from an initial state; `None` if it overflows.
     pub(super) fn run(&mut self, force: &FineForce, start: &InitialState) -> Option<Course> {
-        let (n, width) = (self.system.dof(), 1 + self.directions.len());
-        let mut z = self.initial(start, width);
+        let (n, width) = (self.system.dof(), self.width());
+        let mut z = self.initial(start);
         let mut state = DMatrix::zeros(force.samples, 3 * n);
         let mut derivatives = vec![DMatrix::zeros(force.samples, 3 * n); self.directions.len()];
         let (mut stages, mut before) = (Stages::new(z.len()), z.clone());
@@ -186,29 +232,29 @@ impl<'a> Tangent<'a> {
             if !self.interval(force, sample, &mut z, &mut stages) {
                 return None;
             }
-            let outputs = std::iter::once(&mut state).chain(&mut derivatives).enumerate();
-            for (column, course) in outputs {
-                let start = 2 * n * column;
-                for entry in 0..2 * n {
-                    course[(sample, entry)] = before[start + entry];
-                }
-                for dof in 0..n {
-                    course[(sample, 2 * n + dof)] = stages.first[start + n + dof];
+            let accelerations = &stages.first[n * width..];
+            let rows = before.chunks_exact(width).chain(accelerations.chunks_exact(width));
+            for (entry, row) in rows.enumerate() {
+                let outputs = std::iter::once(&mut state).chain(&mut derivatives);
+                for (course, value) in outputs.zip(row) {
+                    course[(sample, entry)] = *value;
                 }
             }
         }
-        Some(Course { state, derivatives, end: z })
+        Some(Course { state, derivatives, end: DMatrix::from_row_slice(2 * n, width, &z) })
     }
 
     /// Returns state and derivatives at the first sample.
-    fn initial(&self, start: &InitialState, width: usize) -> Vec<f64> {
-        let n = self.system.dof();
+    fn initial(&self, start: &InitialState) -> Vec<f64> {
+        let (n, width) = (self.system.dof(), self.width());
         let mut z = vec![0.0; 2 * n * width];
-        z[..n].copy_from_slice(start.displacement().as_slice());
-        z[n..2 * n].copy_from_slice(start.velocity().as_slice());
+        let values = start.displacement().iter().chain(start.velocity().iter());
+        for (row, value) in z.chunks_exact_mut(width).zip(values) {
+            row[0] = *value;
+        }
         for (at, direction) in self.directions.iter().enumerate() {
             if let Direction::Initial(entry) = direction {
-                z[2 * n * (1 + at) + entry] = 1.0;
+                z[width * entry + 1 + at] = 1.0;
             }
         }
         z
@@ -221,20 +267,25 @@ impl<'a> Tangent<'a> {
         force: &FineForce,
         start: &InitialState,
     ) -> Option<Vec<Transition>> {
-        let n = self.system.dof();
-        let mut z = self.initial(start, 1 + self.directions.len());
-        let at_start = z[2 * n..].to_vec();
+        let (n, width) = (self.system.dof(), self.width());
+        let mut z = self.initial(start);
+        let at_start = z.clone();
         let mut stages = Stages::new(z.len());
         let mut transitions = Vec::with_capacity(force.samples);
         for sample in 0..force.samples {
-            z[2 * n..].copy_from_slice(&at_start);
+            for (row, start) in z.chunks_exact_mut(width).zip(at_start.chunks_exact(width)) {
+                row[1..].copy_from_slice(&start[1..]);
+            }
             if !self.interval(force, sample, &mut z, &mut stages) {
                 return None;
             }
-            let rates = DMatrix::from_column_slice(2 * n, 2 * n, &stages.first[2 * n..]);
+            let derivatives = |rows: &[f64]| {
+                let all = DMatrix::from_row_slice(rows.len() / width, width, rows);
+                all.columns(1, 2 * n).into_owned()
+            };
             transitions.push(Transition {
-                state: DMatrix::from_column_slice(2 * n, 2 * n, &z[2 * n..]),
-                acceleration: rates.rows(n, n).into_owned(),
+                state: derivatives(&z),
+                acceleration: derivatives(&stages.first[n * width..]),
             });
         }
         Some(transitions)
@@ -263,91 +314,102 @@ impl<'a> Tangent<'a> {
             self.rate(at, middle.as_slice(), k3);
             towards(z, h, k3, at);
             self.rate(at, force.values.column(instant + 2).as_slice(), k4);
-            for (i, z) in z.iter_mut().enumerate() {
-                *z += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+            let rates = k1.iter().zip(&*k2).zip(&*k3).zip(&*k4);
+            for (z, (((k1, k2), k3), k4)) in z.iter_mut().zip(rates) {
+                *z += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4);
             }
         }
         z.iter().all(|value| value.is_finite())
     }
 
-    /// Computes ż of state and derivatives (columns of 2n entries) under a force.
+    /// Computes ż of state and derivatives (2n rows) under a force.
     fn rate(&mut self, z: &[f64], force: &[f64], rate: &mut [f64]) {
-        let n = self.system.dof();
-        let (x, v) = z[..2 * n].split_at(n);
-        self.system.restoring_force(x, v, &mut self.force);
+        let (n, width) = (self.system.dof(), self.width());
+        let (displacements, velocities) = z.split_at(n * width);
+        let (rates, accelerations) = rate.split_at_mut(n * width);
+        rates.copy_from_slice(velocities);
+        for (values, rows) in
+            [(&mut self.displacement, displacements), (&mut self.velocity, velocities)]
+        {
+            for (value, row) in values.iter_mut().zip(rows.chunks_exact(width)) {
+                *value = row[0];
+            }
+        }
+        self.system.restoring_force(&self.displacement, &self.velocity, &mut self.force);
         self.force.iter_mut().zip(force).for_each(|(sum, force)| *sum = force - *sum);
-        rate[..n].copy_from_slice(v);
-        apply(&self.inverse_mass, &self.force, &mut rate[n..2 * n]);
-        if self.directions.is_empty() {
-            return;
+        for (row, acceleration) in self.acceleration.iter_mut().enumerate() {
+            let by_force = self.inverse_mass.row(row);
+            *acceleration = by_force.iter().zip(&self.force).map(|(a, f)| a * f).sum();
+            accelerations[row * width] = *acceleration;
         }
-        self.acceleration.copy_from_slice(&rate[n..2 * n]);
-        let (terms, coefficients) = (self.system.terms(), self.system.coefficients());
-        for ((term, coefficient), slopes) in terms.iter().zip(coefficients).zip(&mut self.slopes) {
-            let at = term.coordinate();
-            *slopes = term.law().slopes(at.value(x), at.value(v)).map(|slope| coefficient * slope);
-        }
-        let (damping, stiffness) =
-            (self.system.linear().damping(), self.system.linear().stiffness());
-        for (d, direction) in self.directions.iter().enumerate() {
-            let columns = 2 * n * (1 + d)..2 * n * (2 + d);
-            let (dx, dv) = z[columns.clone()].split_at(n);
-            let (rate_x, rate_v) = rate[columns].split_at_mut(n);
-            rate_x.copy_from_slice(dv);
-            for (row, force) in self.force.iter_mut().enumerate() {
-                let linear = |column: usize| {
-                    damping[(row, column)] * dv[column] + stiffness[(row, column)] * dx[column]
-                };
-                *force = -(0..n).map(linear).sum::<f64>();
-            }
-            for (term, slopes) in terms.iter().zip(&self.slopes) {
-                let at = term.coordinate();
-                let value = slopes[0] * at.value(dx) + slopes[1] * at.value(dv);
-                spread(term, value, &mut self.force);
-            }
-            match *direction {
-                Direction::Initial(_) => {}
-                Direction::Entry(entry) => {
-                    let quantity = match entry.matrix() {
-                        Matrix::Mass => &self.acceleration[..],
-                        Matrix::Damping => v,
-                        Matrix::Stiffness => x,
-                    };
-                    self.force[entry.row()] -= quantity[entry.column()];
-                }
-                Direction::Term(which) => {
-                    if let Some(term) = terms.iter().nth(which) {
-                        spread(term, term.value(x, v), &mut self.force);
-                    }
-                }
-                Direction::Constant(which, constant) => {
-                    let moved = self.moved[which].get(constant);
-                    if let (Some(term), Some((step, other))) = (terms.iter().nth(which), moved) {
-                        let slope = (other.value(x, v) - term.value(x, v)) / step;
-                        spread(term, coefficients[which] * slope, &mut self.force);
-                    }
-                }
-            }
-            apply(&self.inverse_mass, &self.force, rate_v);
+        if width > 1 {
+            self.differentiate(z, accelerations);
         }
     }
-}
 
-/// Subtracts the force of a term from the forces on its degrees of freedom.
-fn spread(term: &Term, value: f64, force: &mut [f64]) {
-    for (dof, force) in force.iter_mut().enumerate() {
-        *force -= term.coordinate().sign(dof) * value;
+    /// Computes the derivatives of the accelerations at a stage, n rows.
+    fn differentiate(&mut self, z: &[f64], accelerations: &mut [f64]) {
+        let (n, width) = (self.system.dof(), self.width());
+        self.slopes.copy_from(&self.linear);
+        for TermTangent { term, coefficient, acceleration, .. } in &self.terms {
+            let at = term.coordinate();
+            let [by_displacement, by_velocity] =
+                term.law().slopes(at.value(&self.displacement), at.value(&self.velocity));
+            for (dof, sign) in at.signs() {
+                let [of_x, of_v] = [by_displacement, by_velocity].map(|by| coefficient * sign * by);
+                for (row, acceleration) in acceleration.iter().enumerate() {
+                    self.slopes[(dof, row)] += of_x * acceleration;
+                    self.slopes[(n + dof, row)] += of_v * acceleration;
+                }
+            }
+        }
+        for (row, rates) in accelerations.chunks_exact_mut(width).enumerate() {
+            let rates = &mut rates[1..];
+            rates.fill(0.0);
+            for (slope, state) in self.slopes.column(row).iter().zip(z.chunks_exact(width)) {
+                for (rate, derivative) in rates.iter_mut().zip(&state[1..]) {
+                    *rate += slope * derivative;
+                }
+            }
+        }
+        for (at, direction) in self.directions.iter().enumerate() {
+            self.drive(*direction, accelerations[1 + at..].iter_mut().step_by(width));
+        }
+    }
+
+    /// Adds the accelerations that a unit of a parameter causes in a given motion.
+    fn drive<'b>(&self, direction: Direction, accelerations: impl Iterator<Item = &'b mut f64>) {
+        let (x, v) = (&self.displacement, &self.velocity);
+        let (of_unit, force) = match direction {
+            Direction::Initial(_) => return,
+            Direction::Entry(entry) => {
+                let quantity = match entry.matrix() {
+                    Matrix::Mass => &self.acceleration,
+                    Matrix::Damping => v,
+                    Matrix::Stiffness => x,
+                };
+                let of_unit = &self.inverse_mass.as_slice()[entry.row() * x.len()..][..x.len()];
+                (of_unit, -quantity[entry.column()])
+            }
+            Direction::Term(which) => {
+                let TermTangent { term, acceleration, .. } = &self.terms[which];
+                (&acceleration[..], term.value(x, v))
+            }
+            Direction::Constant(which, constant) => {
+                let TermTangent { term, coefficient, acceleration, moved } = &self.terms[which];
+                let Some((step, other)) = moved.get(constant) else { return };
+                let slope = (other.value(x, v) - term.value(x, v)) / step;
+                (&acceleration[..], coefficient * slope)
+            }
+        };
+        for (acceleration, of_unit) in accelerations.zip(of_unit) {
+            *acceleration += of_unit * force;
+        }
     }
 }
 
 fn towards(z: &[f64], h: f64, rate: &[f64], to: &mut [f64]) {
     for ((to, z), rate) in to.iter_mut().zip(z).zip(rate) {
         *to = z + h * rate;
-    }
-}
-
-fn apply(matrix: &DMatrix<f64>, vector: &[f64], to: &mut [f64]) {
-    for (row, to) in to.iter_mut().enumerate() {
-        *to = (0..vector.len()).map(|column| matrix[(row, column)] * vector[column]).sum();
     }
 }

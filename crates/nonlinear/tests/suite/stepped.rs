@@ -1,6 +1,8 @@
 //! Responses of nonlinear systems by extrapolation of very high order: the judge of nonlinear
 //! estimators, which share no line with it.
 
+use std::f64::consts::TAU;
+
 use mechid_signal::{Record, Sampling};
 
 /// Amplitude and phase on a line: A cos(n ω₀ t + φ).
@@ -32,24 +34,30 @@ pub fn steady_after<const N: usize>(
     forces: &[Vec<Cosine>; N],
     acceleration: impl Fn(&[f64; N], &[f64; N], &[f64; N]) -> [f64; N],
 ) -> (Record, Record) {
-    let omega0 = sampling.omega0();
-    let force = |t: f64| {
-        let mut all = [0.0; N];
-        for (own, lines) in all.iter_mut().zip(forces) {
-            *own = lines.iter().map(|(n, a, p)| a * (*n as f64 * omega0 * t + p).cos()).sum();
+    let (dt, len) = (sampling.dt(), sampling.len());
+    let turns: Vec<(f64, f64)> =
+        (0..len).map(|k| (TAU * k as f64 / len as f64).sin_cos()).collect();
+    // Forces at a fraction of each sampling interval: every line turns by whole multiples of 2π/len
+    // from sample to sample.
+    let forces_at = |fraction: f64| {
+        let mut all = vec![[0.0; N]; len];
+        for (dof, lines) in forces.iter().enumerate() {
+            for (n, amplitude, phase) in lines {
+                let angle = TAU * *n as f64 * fraction / len as f64 + phase;
+                let (sine, cosine) = angle.sin_cos();
+                for (sample, force) in all.iter_mut().enumerate() {
+                    let turn = turns[n * sample % len];
+                    force[dof] += amplitude * (cosine * turn.1 - sine * turn.0);
+                }
+            }
         }
         all
     };
-    // The instants of the substeps repeat from period to period.
+    // The instants of the substeps repeat from period to period: levels × instants × samples.
+    let table = SUBSTEPS.map(|count| -> Vec<_> {
+        (0..count).map(|k| forces_at(k as f64 / count as f64)).collect()
+    });
     let rate = |z: &[[f64; N]; 2], f: &[f64; N]| [z[1], acceleration(&z[0], &z[1], f)];
-    let (dt, len) = (sampling.dt(), sampling.len());
-    let at = |sample: usize| -> Vec<Vec<[f64; N]>> {
-        let instants = |count: &usize| {
-            (0..=*count).map(|k| force((sample as f64 + k as f64 / *count as f64) * dt)).collect()
-        };
-        SUBSTEPS.iter().map(instants).collect()
-    };
-    let table: Vec<_> = (0..len).map(at).collect();
     let mut z = [[0.0; N]; 2];
     let mut x = vec![vec![0.0; len]; N];
     for period in 0..settled {
@@ -57,19 +65,20 @@ pub fn steady_after<const N: usize>(
             if period + 1 == settled {
                 x.iter_mut().zip(z[0]).for_each(|(channel, value)| channel[sample] = value);
             }
-            z = step(&z, dt, &table[sample], &rate);
+            z = step(&z, dt, |level, instant| &table[level][instant][sample], &rate);
         }
     }
+    let at_samples = &table[0][0];
     let data: Vec<Vec<f64>> =
-        (0..N).map(|dof| (0..len).map(|k| force(k as f64 * dt)[dof]).collect()).collect();
+        (0..N).map(|dof| at_samples.iter().map(|force| force[dof]).collect()).collect();
     let record = |channels: &[Vec<f64>]| Record::from_channels(sampling, channels).unwrap();
     (record(&data), record(&x))
 }
 
-fn step<const N: usize>(
+fn step<'a, const N: usize>(
     z: &[[f64; N]; 2],
     dt: f64,
-    forces: &[Vec<[f64; N]>],
+    forces: impl Fn(usize, usize) -> &'a [f64; N],
     rate: &impl Fn(&[[f64; N]; 2], &[f64; N]) -> [[f64; N]; 2],
 ) -> [[f64; N]; 2] {
     let plus = |a: &[[f64; N]; 2], h: f64, b: &[[f64; N]; 2]| {
@@ -80,11 +89,11 @@ fn step<const N: usize>(
         sum
     };
     let mut table: Vec<[[f64; N]; 2]> = Vec::new();
-    for (level, (count, forces)) in SUBSTEPS.iter().zip(forces).enumerate() {
+    for (level, count) in SUBSTEPS.iter().enumerate() {
         let h = dt / *count as f64;
-        let (mut before, mut now) = (*z, plus(z, h, &rate(z, &forces[0])));
-        for force in &forces[1..*count] {
-            let next = plus(&before, 2.0 * h, &rate(&now, force));
+        let (mut before, mut now) = (*z, plus(z, h, &rate(z, forces(level, 0))));
+        for instant in 1..*count {
+            let next = plus(&before, 2.0 * h, &rate(&now, forces(level, instant)));
             (before, now) = (now, next);
         }
         // Aitken–Neville in h², from the newest value backwards.
@@ -104,5 +113,5 @@ fn step<const N: usize>(
 pub fn random_phases(lines: impl Iterator<Item = usize>, amplitude: f64, seed: u64) -> Vec<Cosine> {
     use rand::{RngExt, SeedableRng};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    lines.map(|n| (n, amplitude, random.random_range(0.0..std::f64::consts::TAU))).collect()
+    lines.map(|n| (n, amplitude, random.random_range(0.0..TAU))).collect()
 }
