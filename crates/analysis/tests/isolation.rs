@@ -1,14 +1,12 @@
 //! Tests of records that end the process which analyses them. This program is also the process that
 //! analyses the fleets of its own tests, so it has its own `main`.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::io::{stdin, stdout};
 use std::path::{Path, PathBuf};
 
-use mechid_analysis::fleet::{Fleet, FleetSummary, Isolation, read_results, serve};
-use mechid_analysis::{AnalysisError, Channels, Reading, ResponseQuantity, SavedAnalysis, Window};
-use mechid_io::{ParquetColumn, ParquetValues, write_parquet};
+use mechid_analysis::fleet::{Fleet, FleetSummary, Isolation, serve};
+use mechid_analysis::{AnalysisError, Channels, ResponseQuantity, SavedAnalysis, Window};
 
 /// Argument that makes this program analyse records for a fleet.
 const SERVE: &str = "serve";
@@ -23,9 +21,10 @@ fn main() {
     rows_are_those_of_one_process();
     a_program_that_ends_makes_rows();
     #[cfg(target_os = "linux")]
-    records_beyond_the_limits_make_rows();
-    #[cfg(target_os = "linux")]
-    the_record_that_ends_the_process_has_the_error();
+    {
+        limits::records_beyond_the_limits_make_rows();
+        limits::the_record_that_ends_the_process_has_the_error();
+    }
 }
 
 fn analysis() -> SavedAnalysis {
@@ -95,77 +94,88 @@ fn a_program_that_ends_makes_rows() {
     assert!(matches!(error, AnalysisError::Setting { setting: "record_seconds", .. }), "{error}");
 }
 
-/// Text of a table with this many columns and rows; each number takes eight bytes in memory.
-fn table(columns: usize, rows: usize) -> String {
-    let mut text = String::from("time,force,displacement");
-    (3..columns).for_each(|column| write!(text, ",c{column}").unwrap());
-    let rest = ",1".repeat(columns - 1);
-    (0..rows).for_each(|row| write!(text, "\n{row}{rest}").unwrap());
-    text + "\n"
-}
-
+/// Limits of memory, which only Linux enforces.
 #[cfg(target_os = "linux")]
-fn records_beyond_the_limits_make_rows() {
-    let home = tempfile::tempdir().unwrap();
-    let at = |name: &str| home.path().join(name);
-    // The 40 million numbers take 320 MB, which the settings of the reading allow.
-    fs::write(at("large.csv"), table(2000, 20_000)).unwrap();
-    let records = [RIG.into(), at("large.csv")];
-    let reading = Reading { memory_gb: Some(50.0), ..Reading::default() };
-    let analysis = SavedAnalysis { reading, ..analysis() };
-    let little = Isolation { record_memory_gb: 0.3, ..isolation() };
-    let summary = run(analysis.clone(), &records, &at("little"), &little).unwrap();
-    assert_eq!((summary.records, summary.failed), (2, 1));
-    assert_eq!(summary.failures[0].code, "analysis.record-memory", "{summary}");
-    assert!(summary.failures[0].message.contains("more than 0.3 GB of memory"), "{summary}");
-    let hasty = Isolation { record_seconds: 1e-6, ..isolation() };
-    let summary = run(analysis, &records, &at("hasty"), &hasty).unwrap();
-    assert_eq!((summary.failed, &*summary.failures[0].code), (2, "analysis.record-time"));
-}
+mod limits {
+    use std::fmt::Write as _;
+    use std::fs;
 
-/// If one of several records that are read together is too large for its process, only its row has
-/// the error.
-#[cfg(target_os = "linux")]
-fn the_record_that_ends_the_process_has_the_error() {
-    let home = tempfile::tempdir().unwrap();
-    let path = home.path().join("many.parquet");
-    let rig = fs::read_to_string(RIG).unwrap();
-    let rows: Vec<Vec<f64>> = rig
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').map(|number| number.parse().unwrap()).collect())
-        .collect();
-    // The second record needs more memory than the limit.
-    let counts = [("a", 1), ("b", 8_000), ("c", 1)];
-    let ids =
-        counts.iter().flat_map(|(id, count)| vec![Some((*id).to_owned()); count * rows.len()]);
-    let repeats: usize = counts.iter().map(|(_, count)| count).sum();
-    let column = |at: usize| {
-        let one = rows.iter().map(|row| Some(row[at]));
-        ParquetValues::Number(one.collect::<Vec<_>>().repeat(repeats))
-    };
-    let columns = [
-        ParquetColumn { name: "day", values: ParquetValues::Text(ids.collect()) },
-        ParquetColumn { name: "force", values: column(1) },
-        ParquetColumn { name: "displacement", values: column(2) },
-    ];
-    write_parquet(&path, &columns, &[]).unwrap();
-    drop(columns);
-    let reading = Reading {
-        record_column: Some("day".into()),
-        sample_rate_hz: Some(128.0),
-        memory_gb: Some(50.0),
-        ..Reading::default()
-    };
-    let analysis = SavedAnalysis { reading, ..analysis() };
-    let little = Isolation { record_memory_gb: 0.05, ..isolation() };
-    let results = home.path().join("results");
-    let summary =
-        Fleet::new(analysis, &[path], &results, 3).unwrap().run_isolated(1, &little, &|_| ());
-    let summary = summary.unwrap();
-    assert_eq!((summary.records, summary.failed), (3, 1), "{summary}");
-    let rows = read_results(&results).unwrap().rows;
-    let failed: Vec<_> = rows.iter().filter(|row| row.error.is_some()).collect();
-    assert_eq!((failed.len(), failed[0].record_id.as_deref()), (1, Some("b")));
-    assert_eq!(failed[0].error.as_ref().unwrap().code, "analysis.record-memory");
+    use mechid_analysis::fleet::{Fleet, Isolation, read_results};
+    use mechid_analysis::{Reading, SavedAnalysis};
+    use mechid_io::{ParquetColumn, ParquetValues, write_parquet};
+
+    use super::{RIG, analysis, isolation, run};
+
+    /// Text of a table with this many columns and rows; each number takes eight bytes in memory.
+    fn table(columns: usize, rows: usize) -> String {
+        let mut text = String::from("time,force,displacement");
+        (3..columns).for_each(|column| write!(text, ",c{column}").unwrap());
+        let rest = ",1".repeat(columns - 1);
+        (0..rows).for_each(|row| write!(text, "\n{row}{rest}").unwrap());
+        text + "\n"
+    }
+
+    pub fn records_beyond_the_limits_make_rows() {
+        let home = tempfile::tempdir().unwrap();
+        let at = |name: &str| home.path().join(name);
+        // The 40 million numbers take 320 MB, which the settings of the reading allow.
+        fs::write(at("large.csv"), table(2000, 20_000)).unwrap();
+        let records = [RIG.into(), at("large.csv")];
+        let reading = Reading { memory_gb: Some(50.0), ..Reading::default() };
+        let analysis = SavedAnalysis { reading, ..analysis() };
+        let little = Isolation { record_memory_gb: 0.3, ..isolation() };
+        let summary = run(analysis.clone(), &records, &at("little"), &little).unwrap();
+        assert_eq!((summary.records, summary.failed), (2, 1));
+        assert_eq!(summary.failures[0].code, "analysis.record-memory", "{summary}");
+        assert!(summary.failures[0].message.contains("more than 0.3 GB of memory"), "{summary}");
+        let hasty = Isolation { record_seconds: 1e-6, ..isolation() };
+        let summary = run(analysis, &records, &at("hasty"), &hasty).unwrap();
+        assert_eq!((summary.failed, &*summary.failures[0].code), (2, "analysis.record-time"));
+    }
+
+    /// If one of several records that are read together is too large for its process, only its row has
+    /// the error.
+    pub fn the_record_that_ends_the_process_has_the_error() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("many.parquet");
+        let rig = fs::read_to_string(RIG).unwrap();
+        let rows: Vec<Vec<f64>> = rig
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').map(|number| number.parse().unwrap()).collect())
+            .collect();
+        // The second record needs more memory than the limit.
+        let counts = [("a", 1), ("b", 8_000), ("c", 1)];
+        let ids =
+            counts.iter().flat_map(|(id, count)| vec![Some((*id).to_owned()); count * rows.len()]);
+        let repeats: usize = counts.iter().map(|(_, count)| count).sum();
+        let column = |at: usize| {
+            let one = rows.iter().map(|row| Some(row[at]));
+            ParquetValues::Number(one.collect::<Vec<_>>().repeat(repeats))
+        };
+        let columns = [
+            ParquetColumn { name: "day", values: ParquetValues::Text(ids.collect()) },
+            ParquetColumn { name: "force", values: column(1) },
+            ParquetColumn { name: "displacement", values: column(2) },
+        ];
+        write_parquet(&path, &columns, &[]).unwrap();
+        drop(columns);
+        let reading = Reading {
+            record_column: Some("day".into()),
+            sample_rate_hz: Some(128.0),
+            memory_gb: Some(50.0),
+            ..Reading::default()
+        };
+        let analysis = SavedAnalysis { reading, ..analysis() };
+        let little = Isolation { record_memory_gb: 0.05, ..isolation() };
+        let results = home.path().join("results");
+        let summary =
+            Fleet::new(analysis, &[path], &results, 3).unwrap().run_isolated(1, &little, &|_| ());
+        let summary = summary.unwrap();
+        assert_eq!((summary.records, summary.failed), (3, 1), "{summary}");
+        let rows = read_results(&results).unwrap().rows;
+        let failed: Vec<_> = rows.iter().filter(|row| row.error.is_some()).collect();
+        assert_eq!((failed.len(), failed[0].record_id.as_deref()), (1, Some("b")));
+        assert_eq!(failed[0].error.as_ref().unwrap().code, "analysis.record-memory");
+    }
 }

@@ -223,13 +223,14 @@ fn an_output_that_is_an_input_is_refused() {
     fs::write(path("other.csv"), "t,f\n").unwrap();
     fs::create_dir(path("sub")).unwrap();
     fs::hard_link(path("rec.csv"), path("hard.csv")).unwrap();
-    let mut same = vec![path("rec.csv"), path("sub/../rec.csv"), path("hard.csv")];
+    let same = ["rec.csv", "sub/../rec.csv", "hard.csv"];
     #[cfg(unix)]
-    {
+    let same = {
         std::os::unix::fs::symlink("rec.csv", path("soft.csv")).unwrap();
         std::os::unix::fs::symlink(folder.path(), path("sub/up")).unwrap();
-        same.extend([path("soft.csv"), path("sub/up/rec.csv")]);
-    }
+        [&same[..], &["soft.csv", "sub/up/rec.csv"]].concat()
+    };
+    let same: Vec<_> = same.iter().map(|name| path(name)).collect();
     for a in &same {
         for b in &same {
             let e =
