@@ -177,6 +177,8 @@ pub enum IoError {
         wanted: String,
         /// Numbers and names of the columns of that name.
         candidates: String,
+        /// Indices of these columns, counted from 0.
+        columns: Vec<usize>,
     },
     /// One column was requested twice.
     #[error("{}", Message(format_args!("column {column} of {file} is used twice, as \"{first}\" and as \"{second}\"; its columns are {available}")))]

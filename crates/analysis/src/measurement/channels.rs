@@ -53,12 +53,21 @@ impl Channels {
     /// Adds (or replaces) the columns of one kind of response.
     #[must_use]
     pub fn and(mut self, response: ResponseQuantity, columns: &str) -> Self {
-        *match response {
+        *self.response_mut(response) = split(columns);
+        self
+    }
+
+    pub(super) fn response_mut(&mut self, kind: ResponseQuantity) -> &mut Vec<String> {
+        match kind {
             ResponseQuantity::Displacement => &mut self.displacement,
             ResponseQuantity::Velocity => &mut self.velocity,
             ResponseQuantity::Acceleration => &mut self.acceleration,
-        } = split(columns);
-        self
+        }
+    }
+
+    /// Returns true if no column is named.
+    pub fn is_empty(&self) -> bool {
+        self.force.is_empty() && self.first_response().is_none()
     }
 
     /// Returns the columns of one kind of response.

@@ -5,6 +5,7 @@ pub mod channels;
 mod many;
 mod reading;
 mod repeated;
+mod stated;
 pub mod units;
 mod window;
 
@@ -151,6 +152,7 @@ impl Measurement {
         channels: &Channels,
         reading: &Reading,
     ) -> Result<Self, AnalysisError> {
+        let channels = &channels.distinguished(file.head());
         let units = ToSi::from_table(file.head(), &channels.roles())?;
         let time = reading.time_axis(file.head()).ok_or_else(|| AnalysisError::NoTimeAxis {
             file: file.head().file().into(),

@@ -42,7 +42,7 @@ pub(super) fn modes(
         "an ambient record",
         &["near_hz", "force_at", "response_at", "validate_percent", "real_shapes", "reciprocal"],
     )?;
-    let outputs = outputs_of(measurement.channels());
+    let outputs = outputs_of(&measurement.source().names);
     if outputs.is_empty() {
         return Err(AnalysisError::NoMotion);
     }

@@ -31,7 +31,7 @@ pub(super) fn modes(
     if let Some(block) = blocks.iter().find(|block| grows(block)) {
         return Err(AnalysisError::NoDecay { file: block.file.clone() });
     }
-    let recorded = Recorded::from_decays(&blocks, first.channels())?;
+    let recorded = Recorded::from_decays(&blocks, &first.source().names)?;
     let nyquist_hz = 0.5 / first.sampling().dt();
     let band_hz = settings.band_hz.unwrap_or([0.0, nyquist_hz]);
     let records = blocks.iter().map(RecordRow::from_block).collect();

@@ -37,7 +37,7 @@ pub fn predict_with_modes(
     system: &ModalSystem,
     how: &Predict,
 ) -> Result<Predicted, AnalysisError> {
-    let channels = measured.channels();
+    let channels = &measured.source().names;
     if channels.force.is_empty() {
         return Err(AnalysisError::NoForce);
     }

@@ -1,5 +1,8 @@
 //! Spectral lines of modal tests: whole records, hits of a hammer, or one hammer point per record.
 
+use std::borrow::Cow;
+
+use mechid_io::is_directed_point;
 use mechid_model::ResponseQuantity;
 use mechid_signal::{HitRule, Record, Spectrum, message};
 use mechid_spectra::LineData;
@@ -67,7 +70,7 @@ impl Recorded {
         if first.channels().force.is_empty() {
             return Err(AnalysisError::NoForce);
         }
-        let outputs = outputs_of(first.channels());
+        let outputs = outputs_of(&first.source().names);
         if outputs.is_empty() {
             return Err(AnalysisError::NoMotion);
         }
@@ -89,7 +92,7 @@ impl Recorded {
                 parts.push(Part { forces, responses: all_responses(block)? });
             }
         }
-        let responses = places.response_places(outputs.len())?;
+        let responses = places.response_places(&outputs)?;
         let driving_points = columns.driving_points(&responses);
         Ok(Self { parts, inputs: columns.names, outputs, driving_points, hits })
     }
@@ -246,7 +249,7 @@ impl Columns {
         let columns: Vec<&[String]> =
             measurements.iter().map(|m| m.channels().force.as_slice()).collect();
         let count = columns[0].len();
-        let stated = &places.forces;
+        let stated = &places.forces_of(measurements);
         let roves = count == 1 && measurements.len() > 1 && stated.len() == measurements.len();
         if roves {
             let mut names: Vec<String> = Vec::new();
@@ -302,12 +305,31 @@ impl Columns {
 }
 
 impl Places {
-    fn response_places(&self, outputs: usize) -> Result<Vec<Option<String>>, AnalysisError> {
-        if self.responses.is_empty() {
-            return Ok(vec![None; outputs]);
+    /// Returns the points of the forces; if none are stated, those after which the columns are
+    /// named: of the columns of a record, or of the only column of each record.
+    fn forces_of(&self, measurements: &[Measurement]) -> Cow<'_, [String]> {
+        let of_record = |measurement: &Measurement| measurement.source().names.force.clone();
+        let names: Vec<Vec<String>> = measurements.iter().map(of_record).collect();
+        let has_one = names.iter().all(|forces| forces.len() == 1);
+        let names = if has_one { names.concat() } else { names[0].clone() };
+        if self.forces.is_empty() && names.iter().all(|name| is_directed_point(name)) {
+            Cow::Owned(names)
+        } else {
+            Cow::Borrowed(&self.forces)
         }
-        if self.responses.len() != outputs {
-            let why = format!("{} places for {outputs} responses", self.responses.len());
+    }
+
+    /// Returns the points of the responses; if none are stated, those after which they are named.
+    fn response_places(&self, outputs: &[Output]) -> Result<Vec<Option<String>>, AnalysisError> {
+        if self.responses.is_empty() {
+            let names = outputs.iter().map(|output| output.name.clone());
+            return Ok(names
+                .map(|name| Some(name).filter(|name| is_directed_point(name)))
+                .collect());
+        }
+        if self.responses.len() != outputs.len() {
+            let (places, outputs) = (self.responses.len(), outputs.len());
+            let why = format!("{places} places for {outputs} responses");
             return Err(AnalysisError::Setting { setting: "response_at", why });
         }
         Ok(self.responses.iter().cloned().map(Some).collect())

@@ -32,7 +32,7 @@ pub fn reconstruct_with_modes(
     take: &mut Take<'_>,
 ) -> Result<Reconstructed, AnalysisError> {
     check_settings(run, how)?;
-    let recorded = Recorded::with_columns(run, &system.outputs_of(run.channels())?, true)?;
+    let recorded = Recorded::with_columns(run, &system.outputs_of(&run.source().names)?, true)?;
     let places = system.inputs.len();
     let request = Request::new(how, &recorded, places, true)?;
     let window = recorded.hold()?;

@@ -300,7 +300,8 @@ impl FitArgs {
     /// Reads the records, identifies the machine, and predicts the validation record.
     pub fn identify(&self) -> Result<Identified, CliError> {
         let how = self.settings()?;
-        let channels = self.hits.channels_of(&self.channels.channels(), 1 + self.more.len())?;
+        let channels = self.channels.pairs_in_record(&self.input)?;
+        let channels = self.hits.channels_of(&channels, 1 + self.more.len())?;
         channels.iter().try_for_each(Channels::check_pairs)?;
         let first = self.input.open(&channels[0])?;
         let mut records = vec![first.clone()];
@@ -361,8 +362,7 @@ impl FitArgs {
     /// Returns the file of a saved result or of a described machine: JSON, without columns to read.
     pub fn saved_result(&self) -> Option<&Path> {
         let record = self.input.record.as_path();
-        let channels = self.channels.channels();
-        let has_columns = !channels.force.is_empty() || channels.first_response().is_some();
+        let has_columns = !self.channels.channels().is_empty();
         let is_json = record.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         (is_json && !has_columns && self.more.is_empty()).then_some(record)
     }

@@ -89,7 +89,7 @@ impl FrfArgs {
 
     /// Reads, averages, and reports.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
-        let channels = self.channels.channels();
+        let channels = self.channels.in_file(&self.input.record, &self.input)?;
         let channels = self.hits.channels_of(&channels, 1 + self.more.len())?;
         channels.iter().try_for_each(Channels::check_some)?;
         let how = FrfSettings {

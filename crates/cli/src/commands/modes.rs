@@ -13,7 +13,7 @@ use mechid::integrate::ModeSearch;
 use mechid::io::{FrequencyResponses, IoError, input_name, read_sparse_system};
 use mechid::report::{PageSettings, ToFigure, comparison_page, comparison_svg, modes_page};
 use mechid::selected_modes::SelectedModes;
-use mechid::{DecaySettings, ModeSet, Modes};
+use mechid::{Channels, DecaySettings, ModeSet, Modes};
 use serde::Serialize;
 
 use crate::args::hits::HitRuleArgs;
@@ -178,7 +178,7 @@ impl ModesArgs {
             let why = "of modes belongs to a page, --plot FILE.html";
             return Err(CliError::MisplacedOption { option, why });
         }
-        let channels = self.channels.channels();
+        let mut channels = self.channels.channels();
         let path = &self.input.record;
         if channels.first_response().is_none() {
             if !channels.force.is_empty() {
@@ -192,7 +192,14 @@ impl ModesArgs {
                     None => self.machine_modes(path, words),
                 };
             }
-            return self.table_modes(words);
+            match self.read_tables() {
+                Ok(tables) => return self.table_modes(&tables, words),
+                Err(error) => {
+                    let stated = self.channels_of(path);
+                    channels = stated
+                        .ok_or_else(|| self.refuse_record_options().err().unwrap_or(error))?;
+                }
+            }
         }
         self.refuse("a record", &[("quantity", self.quantity.is_some())])?;
         let is_decay = channels.force.is_empty() && !self.unmeasured.ambient;
@@ -217,9 +224,11 @@ impl ModesArgs {
         }
         let mut records = vec![self.input.open(&channels)?];
         for record in &self.more {
+            // Columns that are not named may have other names in each record.
+            let channels = self.channels_of(record).unwrap_or_else(|| channels.clone());
             records.push(self.input.open_other(record, &channels, self.input.window())?);
         }
-        let mut modes = mechid::modes(&records, &self.settings())?;
+        let mut modes = mechid::modes(&records, &self.settings(&channels))?;
         if let Some(other) = &self.validate {
             modes.add_validation(&[self.input.open_other(
                 other,
@@ -230,13 +239,17 @@ impl ModesArgs {
         self.test_outcome(modes, words)
     }
 
-    fn table_modes(&self, words: &[OsString]) -> Result<Outcome, CliError> {
-        self.refuse(
-            "a table of frequency responses. A file without named columns is read as such a table; \
-             name the columns of a record, for example --acceleration a1,a2",
-            &self.record_options(),
-        )?;
-        self.input.refuse_units()?;
+    /// Returns the columns of a record: those that are named, or that state a force or a response;
+    /// `None` if there is no response.
+    fn channels_of(&self, record: &Path) -> Option<Channels> {
+        let mut channels = self.channels.in_file(record, &self.input).ok()?;
+        if self.unmeasured.ambient {
+            channels.force.clear();
+        }
+        channels.first_response().is_some().then_some(channels)
+    }
+
+    fn read_tables(&self) -> Result<Vec<FrequencyResponses>, CliError> {
         let files = std::iter::once(&self.input.record).chain(&self.more);
         let read = |file: &PathBuf| {
             FrequencyResponses::read(file).map_err(|error| match error {
@@ -246,8 +259,28 @@ impl ModesArgs {
                 other => other.into(),
             })
         };
-        let tables = files.map(read).collect::<Result<Vec<_>, _>>()?;
-        self.test_outcome(mechid::modes_of_responses(&tables, &self.settings())?, words)
+        Ok(files.map(read).collect::<Result<Vec<_>, _>>()?)
+    }
+
+    fn refuse_record_options(&self) -> Result<(), CliError> {
+        self.refuse(
+            "a table of frequency responses. A file without named columns is read as such a table \
+             where possible; name the columns of a record, for example --acceleration a1,a2",
+            &self.record_options(),
+        )
+    }
+
+    fn table_modes(
+        &self,
+        tables: &[FrequencyResponses],
+        words: &[OsString],
+    ) -> Result<Outcome, CliError> {
+        self.refuse_record_options()?;
+        self.input.refuse_units()?;
+        self.test_outcome(
+            mechid::modes_of_responses(tables, &self.settings(&Channels::default()))?,
+            words,
+        )
     }
 
     /// Reports the modes of a test, or compares them.
@@ -391,10 +424,9 @@ impl ModesArgs {
         self.drawn((outcome, words), (&machine, &modes), &modes.modes, &names)
     }
 
-    fn settings(&self) -> ModesSettings {
+    fn settings(&self, channels: &Channels) -> ModesSettings {
         let UnmeasuredArgs { ambient, without_hz, without_harmonics, from, to, .. } =
             &self.unmeasured;
-        let channels = self.channels.channels();
         let test = if *ambient {
             let (without_hz, without_harmonics) = (without_hz.clone(), *without_harmonics);
             ModalTest::Ambient { without_hz, without_harmonics }

@@ -106,6 +106,68 @@ fn labels_of_functions_of_time_are_units() {
     }
 }
 
+/// A universal file states which channel is a force, and at which point: nothing needs a name. A
+/// force and the response at its point have the same name.
+#[test]
+fn channels_of_a_universal_file_need_no_names() {
+    let home = tempfile::tempdir().unwrap();
+    let home = home.path();
+    let text = fs::read_to_string(format!("{EXAMPLES}/machine.csv")).unwrap();
+    let column = |at: usize| -> Vec<f64> {
+        text.lines().skip(1).map(|row| row.split(',').nth(at).unwrap().parse().unwrap()).collect()
+    };
+    // The force acts at one of two points, which move together.
+    let record = |file: &str, point: u32, responses: u32| {
+        let of = |node, ordinate, values| Function {
+            kind: 1,
+            first: 0.0,
+            step: 1.0 / 128.0,
+            ordinate,
+            response: (node, 3),
+            reference: (0, 0),
+            values,
+        };
+        let response = |node| of(node, (12, "m/s^2"), column(4));
+        let force = of(point, (13, "N"), column(1));
+        let channels: Vec<_> = (1..=responses).map(response).chain([force]).collect();
+        write(&home.join(file), &channels);
+    };
+    record("alone.unv", 1, 1);
+    record("one.unv", 1, 2);
+    record("two.unv", 2, 2);
+    let same = |unnamed: &str, named: &str| {
+        let [unnamed, named] = [unnamed, named].map(|line| json(home, line));
+        assert_eq!(unnamed, named);
+        unnamed
+    };
+    same("modes one.unv", "modes one.unv --force 1+Z --acceleration 1+Z,2+Z");
+    same("frf one.unv --period 256", "frf one.unv --force 3 --acceleration 1,2 --period 256");
+    same(
+        "identify alone.unv --period 256",
+        "identify alone.unv --force 1+Z --acceleration 1+Z --period 256",
+    );
+    // A roving hammer: the point of each record is in its file.
+    let roving = json(home, "modes one.unv two.unv");
+    assert_eq!(roving["inputs"], serde_json::json!(["1+Z", "2+Z"]));
+    // Two forces and two responses without points may belong together in two ways.
+    let table = text.replacen("time,force,displacement", "time,f1 [N],x1 [m]", 1);
+    fs::write(home.join("one.csv"), &table).unwrap();
+    same(
+        "identify one.csv --period 256",
+        "identify one.csv --force f1 --displacement x1 --period 256",
+    );
+    let rows = table.lines().map(|row| {
+        let fields: Vec<&str> = row.split(',').collect();
+        let name = |at: usize| fields[at].replace('1', "2");
+        let is_header = fields[0] == "time";
+        let more = if is_header { [name(1), name(2)] } else { [1, 2].map(|at| fields[at].into()) };
+        format!("{},{},{},{},{}\n", fields[0], fields[1], fields[2], more[0], more[1])
+    });
+    fs::write(home.join("two.csv"), rows.collect::<String>()).unwrap();
+    let message = refused(home, "identify two.csv --period 256");
+    assert!(message.contains("--force"), "{message}");
+}
+
 /// Masses of a machine with two points; its dampers and springs follow.
 const M: [f64; 2] = [4.0, 3.0];
 const C: Matrix2<f64> = Matrix2::new(25.0, -8.0, -8.0, 18.0);

@@ -472,11 +472,15 @@ impl Table {
             let Some(first) = named.next() else { return Ok(None) };
             match named.next() {
                 None => Ok(Some(first)),
-                Some(second) => Err(IoError::AmbiguousColumn {
-                    file: self.file.clone(),
-                    wanted: wanted.into(),
-                    candidates: self.list([first, second].into_iter().chain(named)),
-                }),
+                Some(second) => {
+                    let columns: Vec<usize> = [first, second].into_iter().chain(named).collect();
+                    Err(IoError::AmbiguousColumn {
+                        file: self.file.clone(),
+                        wanted: wanted.into(),
+                        candidates: self.list(columns.iter().copied()),
+                        columns,
+                    })
+                }
             }
         };
         let mut named = only(&|name| name.trim() == wanted)?;
