@@ -23,66 +23,62 @@ fn text_of(table: &Table, column: usize) -> String {
     texts.iter().find(finds).unwrap_or(&texts[0]).clone()
 }
 
-/// Columns of a record by the quantities that they state, in the order of the file.
-struct Stated {
-    channels: Channels,
-    /// Force at each response, if all columns are named after points.
-    beside: Option<Vec<String>>,
-}
-
-impl Stated {
-    fn new(path: &Path, reading: &Reading) -> Result<Self, AnalysisError> {
-        let file = reading.open(path, 1)?;
-        let table = file.head();
-        let of_quantity = |wanted: Quantity| -> Vec<usize> {
-            let columns = table.filled_columns();
-            columns.filter(|column| stated_quantity(table, *column) == Some(wanted)).collect()
-        };
-        let texts = |columns: &[usize]| columns.iter().map(|c| text_of(table, *c)).collect();
-        let points = |columns: &[usize]| -> Vec<String> {
-            columns.iter().map(|column| table.short_name(*column)).collect()
-        };
-        let forces = of_quantity(Quantity::Force);
-        let mut channels = Channels { force: texts(&forces), ..Channels::default() };
-        let mut responses = Vec::new();
-        for kind in ResponseQuantity::ALL {
-            let columns = of_quantity(kind.into());
-            *channels.response_mut(kind) = texts(&columns);
-            if !columns.is_empty() {
-                responses.push(points(&columns));
-            }
-        }
-        let beside =
-            responses.first().filter(|first| responses.iter().all(|other| other == *first));
-        let beside = beside.and_then(|at| beside_responses(&points(&forces), &channels.force, at));
-        Ok(Self { channels, beside })
-    }
-}
-
 impl Channels {
     /// Returns the columns of a record by the quantities that they state, in the order of the file;
-    /// empty if no column states the quantity of a force or of a response.
+    /// empty unless every column but that of time states a unit, and exactly one kind of response
+    /// was measured: otherwise only the user knows which columns belong to the test.
     ///
     /// # Errors
     /// Those of [`Reading::open`].
     pub fn stated(path: &Path, reading: &Reading) -> Result<Self, AnalysisError> {
-        Ok(Stated::new(path, reading)?.channels)
+        let file = reading.open(path, 1)?;
+        let table = file.head();
+        let time = reading.time.as_deref().or_else(|| table.time_column());
+        let time = time.and_then(|column| table.find(column).ok());
+        let columns: Vec<usize> = table.filled_columns().filter(|c| Some(*c) != time).collect();
+        let quantities: Option<Vec<Quantity>> =
+            columns.iter().map(|column| stated_quantity(table, *column)).collect();
+        let Some(quantities) = quantities else { return Ok(Self::default()) };
+        let of_quantity = |wanted: Quantity| -> Vec<String> {
+            let pairs = columns.iter().zip(&quantities);
+            let alike = pairs.filter(|(_, quantity)| **quantity == wanted).map(|(at, _)| *at);
+            let names: Vec<(usize, String)> = alike.map(|at| (at, table.short_name(at))).collect();
+            let is_unique = |name: &String| names.iter().filter(|(_, n)| n == name).count() == 1;
+            let text = |(at, name): &(usize, String)| match is_unique(name) {
+                true => name.clone(),
+                false => (at + 1).to_string(),
+            };
+            names.iter().map(text).collect()
+        };
+        let mut channels = Self { force: of_quantity(Quantity::Force), ..Self::default() };
+        for kind in ResponseQuantity::ALL {
+            *channels.response_mut(kind) = of_quantity(kind.into());
+        }
+        let kinds =
+            ResponseQuantity::ALL.iter().filter(|kind| !channels.response(**kind).is_empty());
+        Ok(if kinds.count() == 1 { channels } else { Self::default() })
     }
 
     /// Returns the same columns with the force at each degree of freedom that has a response: by
     /// points such as `12+Z`, after which a universal file names its columns, or if there is only
-    /// one force and one response of each kind; otherwise empty.
-    ///
-    /// # Errors
-    /// Those of [`Reading::open`].
-    pub fn stated_pairs(path: &Path, reading: &Reading) -> Result<Self, AnalysisError> {
-        let Stated { channels, beside } = Stated::new(path, reading)?;
-        let is_one = ResponseQuantity::ALL.iter().all(|kind| channels.response(*kind).len() <= 1);
-        Ok(match beside {
-            Some(force) => Self { force, ..channels },
-            None if is_one && channels.force.len() == 1 => channels,
-            None => Self::default(),
-        })
+    /// one force and one response without points; otherwise empty.
+    #[must_use]
+    pub fn paired_by_point(self) -> Self {
+        let Some(kind) = self.first_response() else { return Self::default() };
+        let responses = self.response(kind);
+        if self.force.iter().chain(responses).any(|name| !is_directed_point(name)) {
+            let is_pair = (self.force.len(), responses.len()) == (1, 1);
+            return if is_pair { self } else { Self::default() };
+        }
+        let is_once =
+            |point: &String| responses.iter().filter(|other| *other == point).count() == 1;
+        if self.force.is_empty() || !self.force.iter().all(is_once) {
+            return Self::default();
+        }
+        let force = responses.iter().map(|point| {
+            if self.force.contains(point) { point.clone() } else { ABSENT.to_owned() }
+        });
+        Self { force: force.collect(), ..self }
     }
 
     /// Returns these channels with the number of a column in place of a name that several columns
@@ -109,21 +105,4 @@ impl Channels {
         }
         distinguished
     }
-}
-
-/// Returns the force at the point of each response; `None` unless all names are points, and each
-/// force has one response at its point.
-fn beside_responses(
-    points: &[String],
-    forces: &[String],
-    responses: &[String],
-) -> Option<Vec<String>> {
-    let are_points = points.iter().chain(responses).all(|name| is_directed_point(name));
-    let is_once = |point: &String| responses.iter().filter(|other| *other == point).count() == 1;
-    (are_points && points.iter().all(is_once)).then_some(())?;
-    let at = |point: &String| {
-        let force = points.iter().position(|other| other == point);
-        force.map_or_else(|| ABSENT.to_owned(), |at| forces[at].clone())
-    };
-    Some(responses.iter().map(at).collect())
 }

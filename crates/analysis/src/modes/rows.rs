@@ -47,19 +47,25 @@ pub(super) fn row(
     }
 }
 
-/// Returns the modal mass of a mode by the driving point that determines it best.
+/// Returns the modal mass of a mode by the driving point that determines it best; `None` if the
+/// entries of its shape have several units.
 pub(super) fn modal_mass(
     estimate: &ModalEstimate,
     mode: usize,
     outputs: &[Output],
     points: &[(usize, usize)],
 ) -> Option<mechid_modal::Uncertain> {
+    (!has_several_quantities(outputs)).then_some(())?;
     let masses = points.iter().filter_map(|&(input, output)| {
         let derivative = derivative(outputs[output].quantity?) as i32;
         estimate.modal_mass(mode, DrivingPoint { output, input }, derivative)
     });
     let relative_error = |mass: &mechid_modal::Uncertain| mass.standard_error / mass.value.abs();
     masses.min_by(|a, b| relative_error(a).total_cmp(&relative_error(b)))
+}
+
+fn has_several_quantities(outputs: &[Output]) -> bool {
+    outputs.windows(2).any(|pair| pair[0].quantity != pair[1].quantity)
 }
 
 /// Returns f√(1 − ζ²), with its standard error to first order.
@@ -155,6 +161,13 @@ fn delay_note(delays: &[OutputDelay], outputs: &[Output]) -> Option<String> {
 
 pub(super) fn notes(estimate: &ModalEstimate, outputs: &[Output]) -> Vec<String> {
     let mut notes: Vec<String> = delay_note(estimate.delays(), outputs).into_iter().collect();
+    if has_several_quantities(outputs) {
+        notes.push(
+            "the responses are of several kinds: each entry of a shape is in the unit of its response, \
+             and modal masses are left out"
+                .into(),
+        );
+    }
     for (number, mode) in (1..).zip(estimate.modes()) {
         let hz = significant(mode.natural_frequency_hz.value, 4);
         if mode.near_edge {

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use clap::Args;
-use mechid::analysis::AnalysisError;
-use mechid::{Channels, Reading};
+use mechid::Channels;
 
 use super::RecordArgs;
 use crate::error::CliError;
@@ -12,9 +11,8 @@ use crate::error::CliError;
 /// Columns of force and response; one column per degree of freedom, in the same order everywhere.
 #[derive(Debug, Clone, Args)]
 pub struct ChannelArgs {
-    /// Force columns, in N, one per degree of freedom; 0 where no force acts [default: if no column
-    /// is named at all, forces and responses are the columns with the unit of a force or of a
-    /// response]
+    /// Force columns, in N, one per degree of freedom; 0 where no force acts. frf, identify and
+    /// modes need no names if every column states its unit
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     pub force: Vec<String>,
     /// Displacement columns, in m
@@ -32,25 +30,11 @@ impl ChannelArgs {
     /// Returns the columns; if none is named, those that state a force or a response in a file that
     /// is read like the `record`.
     pub fn in_file(&self, file: &Path, record: &RecordArgs) -> Result<Channels, CliError> {
-        self.named_or((file, record), Channels::stated)
-    }
-
-    /// Returns the columns of each degree of freedom; if none is named, those that state a force or
-    /// a response in the record, if each force has its response.
-    pub fn pairs_in_record(&self, record: &RecordArgs) -> Result<Channels, CliError> {
-        self.named_or((&record.record, record), Channels::stated_pairs)
-    }
-
-    fn named_or(
-        &self,
-        (file, record): (&Path, &RecordArgs),
-        stated: impl Fn(&Path, &Reading) -> Result<Channels, AnalysisError>,
-    ) -> Result<Channels, CliError> {
         let named = self.channels();
         if !named.is_empty() || file == Path::new("-") {
             return Ok(named);
         }
-        Ok(stated(file, &record.reading())?)
+        Ok(Channels::stated(file, &record.reading())?)
     }
 
     /// Returns the columns that are named.

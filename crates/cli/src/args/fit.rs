@@ -300,7 +300,10 @@ impl FitArgs {
     /// Reads the records, identifies the machine, and predicts the validation record.
     pub fn identify(&self) -> Result<Identified, CliError> {
         let how = self.settings()?;
-        let channels = self.channels.pairs_in_record(&self.input)?;
+        let mut channels = self.channels.channels();
+        if channels.is_empty() {
+            channels = self.channels.in_file(&self.input.record, &self.input)?.paired_by_point();
+        }
         let channels = self.hits.channels_of(&channels, 1 + self.more.len())?;
         channels.iter().try_for_each(Channels::check_pairs)?;
         let first = self.input.open(&channels[0])?;

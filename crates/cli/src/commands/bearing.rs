@@ -149,9 +149,8 @@ impl BearingArgs {
             return Ok(self.with_table(outcome, &speeds));
         }
         let how = self.settings();
-        let mut channels = self.channels.channels();
+        let channels = self.channels.channels();
         if !self.tables.frf_table {
-            channels = self.channels.pairs_in_record(&self.input)?;
             channels.check_pairs()?;
         }
         let data = |paths: &mut dyn Iterator<Item = &PathBuf>| -> Result<BearingData, CliError> {

@@ -224,8 +224,14 @@ impl ModesArgs {
         }
         let mut records = vec![self.input.open(&channels)?];
         for record in &self.more {
-            // Columns that are not named may have other names in each record.
-            let channels = self.channels_of(record).unwrap_or_else(|| channels.clone());
+            let mut channels = channels.clone();
+            // Only the point of a hammer that is not named may differ from record to record.
+            if let Some(Channels { force, .. }) = self.channels_of(record)
+                && force.len() == 1
+                && channels.force.len() == 1
+            {
+                channels.force = force;
+            }
             records.push(self.input.open_other(record, &channels, self.input.window())?);
         }
         let mut modes = mechid::modes(&records, &self.settings(&channels))?;

@@ -60,13 +60,12 @@ impl PredictArgs {
         let how = Predict { settle: self.settle };
         let predicted = match &modes {
             Some(modes) => {
-                let channels = self.channels.in_file(&self.input.record, &self.input)?;
-                let record = self.input.open(&channels)?;
+                let record = self.input.open(&self.channels.channels())?;
                 predict_with_modes(&record, modes, &how)?
             }
             None => {
                 let machine = Machine::read(&self.model)?;
-                let record = self.input.open(&self.channels.pairs_in_record(&self.input)?)?;
+                let record = self.input.open(&self.channels.channels())?;
                 predict(&record, &machine, &how)?
             }
         };

@@ -163,7 +163,7 @@ impl SweepArgs {
         how: &SweepSettings,
         bar: &ProgressBar,
     ) -> Result<SweepSummary, CliError> {
-        let channels = self.channels.pairs_in_record(&self.input)?;
+        let channels = self.channels.channels();
         channels.check_pairs()?;
         let record = self.input.open(&channels)?;
         let reference = self.reference.as_ref().map(read_system).transpose()?;

@@ -129,12 +129,16 @@ fn channels_of_a_universal_file_need_no_names() {
         };
         let response = |node| of(node, (12, "m/s^2"), column(4));
         let force = of(point, (13, "N"), column(1));
-        let channels: Vec<_> = (1..=responses).map(response).chain([force]).collect();
+        let mut channels: Vec<_> = (1..=responses).map(response).chain([force]).collect();
+        if file.starts_with("turned") {
+            channels.reverse();
+        }
         write(&home.join(file), &channels);
     };
     record("alone.unv", 1, 1);
     record("one.unv", 1, 2);
     record("two.unv", 2, 2);
+    record("turned.unv", 1, 2);
     let same = |unnamed: &str, named: &str| {
         let [unnamed, named] = [unnamed, named].map(|line| json(home, line));
         assert_eq!(unnamed, named);
@@ -146,26 +150,51 @@ fn channels_of_a_universal_file_need_no_names() {
         "identify alone.unv --period 256",
         "identify alone.unv --force 1+Z --acceleration 1+Z --period 256",
     );
+    // Other records are read by the names of the first one, in any order.
+    same("modes one.unv turned.unv", "modes one.unv turned.unv --force 1+Z --acceleration 1+Z,2+Z");
     // A roving hammer: the point of each record is in its file.
     let roving = json(home, "modes one.unv two.unv");
     assert_eq!(roving["inputs"], serde_json::json!(["1+Z", "2+Z"]));
     // Two forces and two responses without points may belong together in two ways.
-    let table = text.replacen("time,force,displacement", "time,f1 [N],x1 [m]", 1);
-    fs::write(home.join("one.csv"), &table).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|row| row.split(',').collect()).collect();
+    let write_table = |file: &str, header: &str, columns: &[usize]| {
+        let row = |row: &Vec<&str>| columns.iter().map(|at| row[*at]).collect::<Vec<_>>().join(",");
+        let rows: Vec<String> = rows[1..].iter().map(row).collect();
+        fs::write(home.join(file), format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+    };
+    write_table("one.csv", "time,f1 [N],x1 [m]", &[0, 1, 2]);
     same(
         "identify one.csv --period 256",
         "identify one.csv --force f1 --displacement x1 --period 256",
     );
-    let rows = table.lines().map(|row| {
-        let fields: Vec<&str> = row.split(',').collect();
-        let name = |at: usize| fields[at].replace('1', "2");
-        let is_header = fields[0] == "time";
-        let more = if is_header { [name(1), name(2)] } else { [1, 2].map(|at| fields[at].into()) };
-        format!("{},{},{},{},{}\n", fields[0], fields[1], fields[2], more[0], more[1])
-    });
-    fs::write(home.join("two.csv"), rows.collect::<String>()).unwrap();
+    write_table("two.csv", "time,f1 [N],f2 [N],x1 [m],x2 [m]", &[0, 1, 1, 2, 2]);
     let message = refused(home, "identify two.csv --period 256");
     assert!(message.contains("--force"), "{message}");
+    // A column without a unit may be a force, and a second kind of response another test.
+    write_table("plain.csv", "time,force,x1 [m]", &[0, 1, 2]);
+    write_table("kinds.csv", "time,f1 [N],x1 [m],a1 [m/s^2]", &[0, 1, 2, 4]);
+    for file in ["plain.csv", "kinds.csv"] {
+        let message = refused(home, &format!("frf {file} --period 256"));
+        assert!(message.contains("--force"), "{message}");
+    }
+}
+
+/// A displacement of micrometres beside an acceleration: a shape has entries of both units, so that
+/// it states no modal mass.
+#[test]
+fn responses_of_several_kinds_give_no_modal_mass() {
+    let home = tempfile::tempdir().unwrap();
+    let home = home.path();
+    let modes = |responses: &str, points: &str| {
+        let record = format!("{EXAMPLES}/machine.csv");
+        let line = format!("modes {record} --force force {responses} --force-at 1");
+        json(home, &format!("{line} --response-at {points}"))
+    };
+    let one = modes("--acceleration acceleration", "1");
+    assert!((one["modes"][0]["modal_mass"].as_f64().unwrap() / 25.0 - 1.0).abs() < 0.01, "{one}");
+    let two = modes("--displacement displacement --acceleration acceleration", "1,1");
+    assert!(two["modes"][0]["modal_mass"].is_null(), "{two}");
+    assert!(two["notes"].to_string().contains("of several kinds"), "{}", two["notes"]);
 }
 
 /// Masses of a machine with two points; its dampers and springs follow.
