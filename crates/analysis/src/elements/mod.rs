@@ -23,7 +23,11 @@ mod text;
 
 use std::fmt;
 
-use mechid_estimate::likelihood::machine::{MachineEstimate, identify_joined, identify_machine};
+use mechid_checks::Verdict;
+use mechid_checks::limits::SIGNIFICANCE;
+use mechid_estimate::likelihood::machine::{
+    FreedCoefficient, MachineEstimate, identify_joined, identify_machine,
+};
 use serde::{Serialize, Serializer};
 
 pub use self::data::{ElementData, TestKind, TestRow};
@@ -31,6 +35,7 @@ pub use self::notes::ElementNote;
 pub use self::settings::IdentifyElements;
 pub use self::summary::{CandidateRow, CombinationRow, ElementRow, ElementSummary, SensorRow};
 use crate::AnalysisError;
+use crate::identify::checks::{CheckRow, When};
 use crate::machine::Machine;
 
 /// Identifies the unknown coefficients of a machine of named elements by maximum likelihood.
@@ -63,9 +68,32 @@ pub fn identify_elements(
     }
     let checks = summary::checks(data, &estimate);
     let (estimate, is_late) = summary::allowing_for_delay(estimate, &checks);
+    let doubtful = if is_late { None } else { doubtful_known(data, how, &estimate, &checks) };
+    let note = doubtful.as_ref().map(|known| ElementNote::doubtful_known(known, &estimate));
+    let estimate = match doubtful {
+        Some(known) => estimate.with_parameter_errors(&known.changes),
+        None => estimate,
+    };
     let mut summary = ElementSummary::new(data, &estimate, how, checks)?;
-    summary.notes.extend(is_late.then_some(ElementNote::Delayed));
+    summary.notes.extend(is_late.then_some(ElementNote::Delayed).into_iter().chain(note));
     Ok(IdentifiedElements { estimate, summary, spectrum: ElementSpectrum::new(data) })
+}
+
+/// Returns the known coefficient of the machine that the data contradict, if a check of the fit has
+/// failed.
+fn doubtful_known(
+    data: &ElementData,
+    how: &IdentifyElements,
+    estimate: &MachineEstimate,
+    checks: &[CheckRow],
+) -> Option<FreedCoefficient> {
+    let has_failed =
+        |row: &CheckRow| row.when == When::After && row.finding.verdict() != Verdict::Good;
+    checks.iter().any(has_failed).then_some(())?;
+    let drawn = (&how.machine.machine, &how.machine.instruments);
+    let settings = how.likelihood(data);
+    let freed = estimate.freed_coefficient(&data.lines, drawn, data.part.as_ref(), &settings)?;
+    (freed.p_value < SIGNIFICANCE).then_some(freed)
 }
 
 /// Identified coefficients of a machine, with the data of the fit.

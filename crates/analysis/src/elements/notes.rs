@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use mechid_estimate::likelihood::machine::{FreedCoefficient, MachineEstimate};
 use serde::Serialize;
 
 use crate::text::{compact, scaled_errors, significant};
@@ -47,6 +48,25 @@ pub enum ElementNote {
     /// Standard errors and intervals include the change of the parameters by the delay that the
     /// residual shows.
     Delayed,
+    /// A coefficient that is stated as known may be wrong: as a further unknown it raises the
+    /// likelihood significantly. Standard errors and intervals include the changes of the
+    /// parameters that it causes.
+    DoubtfulKnown {
+        /// Name of the element and its coefficient.
+        parameter: String,
+        /// Stated value, in its unit.
+        known: f64,
+        /// Most likely value, in the same unit.
+        value: f64,
+        /// Standard error of this value, in the same unit.
+        standard_error: f64,
+        /// Probability of a larger rise of the likelihood if all known values are right.
+        p_value: f64,
+        /// Misfit in units of its expectation, with the stated value and with the further unknown;
+        /// absent if the noise comes from the residual.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        misfit: Option<[f64; 2]>,
+    },
     /// Standard errors of M, C and K do not include the uncertainty of a parameter at its bound.
     BoundInSystem,
     /// Remark on the data that were read.
@@ -54,6 +74,20 @@ pub enum ElementNote {
         /// The remark.
         text: String,
     },
+}
+
+impl ElementNote {
+    /// Creates the note about a known coefficient that the data contradict.
+    pub(super) fn doubtful_known(freed: &FreedCoefficient, estimate: &MachineEstimate) -> Self {
+        Self::DoubtfulKnown {
+            parameter: freed.name.clone(),
+            known: freed.known,
+            value: freed.value,
+            standard_error: freed.standard_error,
+            p_value: freed.p_value,
+            misfit: estimate.likelihood.misfit_ratio.zip(freed.misfit_ratio).map(<[f64; 2]>::from),
+        }
+    }
 }
 
 impl fmt::Display for ElementNote {
@@ -83,6 +117,22 @@ impl fmt::Display for ElementNote {
                 "the residual shows a delay of the sensors: the values are not corrected for it, but \
                  standard errors and intervals include the change that it causes",
             ),
+            Self::DoubtfulKnown { parameter, known, value, standard_error, misfit, .. } => {
+                write!(
+                    f,
+                    "{parameter} is stated as {}, but the data give {} ± {} if it is unknown, too",
+                    compact(*known, 6),
+                    compact(*value, 6),
+                    compact(*standard_error, 2)
+                )?;
+                if let Some([before, after]) = misfit.map(|both| both.map(|one| significant(one, 3))) {
+                    write!(f, ", and the misfit falls from {before} to {after}")?;
+                }
+                f.write_str(
+                    ": the stated value may be wrong; standard errors and intervals include the changes \
+                     that it causes",
+                )
+            }
             Self::BoundInSystem => f.write_str(
                 "the covariance of M, C and K treats parameters at their bounds as known",
             ),

@@ -98,6 +98,14 @@ pub(super) const LEAST_KEPT: f64 = 0.1;
 /// each of them: the cost of a line grows with their cube.
 pub(super) const OPEN_DOFS: usize = 60;
 
+/// Maximum number of known coefficients that are tried as unknowns where a machine does not explain
+/// the data: each costs a fit, and with very many of them one fits by chance.
+pub(super) const FREED_COEFFICIENTS: usize = 24;
+
+/// Maximum number of lines times the cube of the degrees of freedom with unknown terms, if a known
+/// coefficient is tried as an unknown: a step takes about a second.
+pub(super) const FREED_WORK: f64 = 1e9;
+
 /// Number of searches that must end at the lowest minimum if the known noise explains it; otherwise
 /// the search uses all initial estimates.
 pub(super) const CONFIRMED: usize = 2;

@@ -148,6 +148,19 @@ impl Assembly {
         self.parameters.iter().map(|parameter| parameter.start).collect()
     }
 
+    /// Returns the assembly with other initial values of the search, one for each parameter, in its
+    /// unit.
+    ///
+    /// # Panics
+    /// If there are more values than parameters.
+    #[must_use]
+    pub fn with_start(mut self, start: &[f64]) -> Self {
+        for (at, value) in start.iter().enumerate() {
+            self.parameters[at].start = *value;
+        }
+        self
+    }
+
     /// Returns whether any element is an unbalance.
     pub fn has_own_loads(&self) -> bool {
         !self.loads.is_empty()

@@ -56,6 +56,7 @@ mod element;
 mod error;
 mod instrumented;
 mod instruments;
+mod known;
 mod machine;
 #[cfg(feature = "serde")]
 mod serde_form;

@@ -191,7 +191,7 @@ fn identify(
     Ok(MachineEstimate { likelihood, assembly, variance, errors, residual, explained, delay, part })
 }
 
-fn parameter_space(assembly: &Assembly) -> ParameterSpace {
+pub(super) fn parameter_space(assembly: &Assembly) -> ParameterSpace {
     let parameters = assembly.parameters();
     let priors = parameters.iter().enumerate().filter_map(|(parameter, described)| {
         let prior = described.prior?;
@@ -207,7 +207,7 @@ fn parameter_space(assembly: &Assembly) -> ParameterSpace {
     }
 }
 
-fn checked_part(
+pub(super) fn checked_part(
     data: &LineData,
     assembly: &Assembly,
     part: &MeasuredReceptance,

@@ -3,6 +3,7 @@
 mod banded;
 mod candidates;
 mod identify;
+mod known;
 mod model;
 mod modes;
 mod nominal;
@@ -16,6 +17,7 @@ use super::LikelihoodError;
 
 pub use candidates::{Candidate, CandidateGain};
 pub use identify::{MachineEstimate, MeasuredReceptance, identify_joined, identify_machine};
+pub use known::FreedCoefficient;
 pub use model::{MachineLine, MachineModel};
 pub use modes::MachineMode;
 pub use system::UncertainEntries;

@@ -211,6 +211,24 @@ fn a_rotor_that_is_too_soft_by_a_percent_shows_in_the_misfit() {
     assert_eq!(estimate.error_scale, ratio.sqrt());
 }
 
+/// The data tell which part of the model is wrong, and intervals that allow for it hold.
+#[test]
+fn a_wrong_modulus_is_found_and_allowed_for() {
+    let soft = Rotor::new(13, 0.99);
+    let instruments = soft.instruments(vec![soft.shaker().0], Speed::Constant(300.0));
+    let judged = judge(&truth(), 3, |seed| {
+        let data = shaken(&Rotor::new(13, 1.0), 60, seed);
+        let estimate = fit(&data, &soft).ok()?;
+        let (machine, settings) = (soft.machine(), Settings::default());
+        let freed = estimate.freed_coefficient(&data, (&machine, &instruments), None, &settings)?;
+        assert_eq!(freed.name, "shaft.stiffness");
+        assert!((freed.value - 1.0 / 0.99).abs() < 4.0 * freed.standard_error);
+        assert!(freed.p_value < 1e-6 && freed.misfit_p_value.unwrap() > 1e-3, "{freed:?}");
+        Some(estimate.with_parameter_errors(&freed.changes).likelihood)
+    });
+    assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
+}
+
 /// Residual unbalance in kg·m, in addition to the trial weights.
 const RESIDUAL: Complex<f64> = Complex::new(-1e-4, 2e-4);
 
