@@ -1,5 +1,6 @@
 //! Columns that are not named, or that share their name: chosen by the quantities that they state.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use mechid_io::{IoError, Quantity, StatedUnit, Table, is_directed_point};
@@ -43,10 +44,10 @@ impl Channels {
             let pairs = columns.iter().zip(&quantities);
             let alike = pairs.filter(|(_, quantity)| **quantity == wanted).map(|(at, _)| *at);
             let names: Vec<(usize, String)> = alike.map(|at| (at, table.short_name(at))).collect();
-            let is_unique = |name: &String| names.iter().filter(|(_, n)| n == name).count() == 1;
-            let text = |(at, name): &(usize, String)| match is_unique(name) {
-                true => name.clone(),
-                false => (at + 1).to_string(),
+            let mut uses: HashMap<&str, usize> = HashMap::new();
+            names.iter().for_each(|(_, name)| *uses.entry(name).or_default() += 1);
+            let text = |(at, name): &(usize, String)| {
+                if uses[name.as_str()] == 1 { name.clone() } else { (at + 1).to_string() }
             };
             names.iter().map(text).collect()
         };

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use mechid_signal::message;
 
 use super::aligned::{by_wide_blanks, with_brackets_joined};
-use super::definitions::{Definitions, is_by_number};
+use super::definitions::{Definitions, is_by_number, is_numbered_with_unit};
 use super::delimiter::{Delimiter, is_comment};
 use super::dialect::is_data;
 use super::fields::{Fields, Layout};
@@ -187,6 +187,8 @@ impl CommentLine {
     ) -> Option<Self> {
         let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
         let (fields, by_blanks) = fields_of(names.or(units).unwrap_or(text), widths, layout)?;
+        // Words of the definition of one column are no names of all columns.
+        (!by_blanks || !is_numbered_with_unit(text)).then_some(())?;
         // Words of a sentence may be units, too: `sampled in s`.
         let are_all_units = || fields.iter().all(|field| are_units(std::slice::from_ref(field)));
         let seem_units = are_units(&fields) && (is_adjacent || !by_blanks || are_all_units());

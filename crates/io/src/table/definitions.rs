@@ -79,6 +79,12 @@ impl Definitions {
     }
 }
 
+/// Returns whether a comment without its sign defines one column, by its number and with a unit.
+pub(super) fn is_numbered_with_unit(comment: &str) -> bool {
+    let definition = Definition::parse(comment);
+    definition.is_some_and(|one| matches!(one.key, Key::Number(_)) && !one.unit().is_empty())
+}
+
 /// Returns whether a comment without its sign is the definition of a column by its number; `None`
 /// if it defines no column.
 pub(super) fn is_by_number(comment: &str) -> Option<bool> {
