@@ -228,4 +228,4 @@ def test_a_poison_record_becomes_a_row(tmp_path: Path) -> None:
     assert (short.failed, short.failures[0].code) == (2, "analysis.record-time")
     # If a process cannot start, no record is the cause.
     with pytest.raises(mechid.MechidError):
-        fleet.run(day, ANALYSIS, tmp_path / "small", record_memory_gb=0.02)
+        fleet.run(day, ANALYSIS, tmp_path / "small", record_memory_gb=0.001)
