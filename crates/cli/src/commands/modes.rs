@@ -206,18 +206,7 @@ impl ModesArgs {
         if is_decay && !self.more.is_empty() {
             self.refuse("free decays", &self.decay_refusals())?;
         } else if is_decay {
-            self.refuse("a free decay", &self.force_options())?;
-            let decayed = mechid::decay(&self.input.open(&channels)?, &self.decay())?;
-            let summary = decayed.summary();
-            let modes: Vec<ShapedMode> = summary.modes.iter().map(|m| m.mode.clone()).collect();
-            let names: Vec<String> = summary.channels.iter().map(|c| c.column.clone()).collect();
-            if self.compare.is_some() {
-                let set = ModeSet::from_shaped(&summary.file, names, &modes)?;
-                return self.compared(&set, words);
-            }
-            let outcome = Outcome::new(decayed.to_string(), &decayed)?;
-            let drawn = (&decayed, decayed.summary());
-            return self.drawn((outcome, words), drawn, &modes, &names);
+            return self.decay_modes(&channels, words);
         }
         if self.unmeasured.ambient {
             self.refuse("an ambient record", &[("hits", self.hits.rule().is_some())])?;
@@ -243,6 +232,22 @@ impl ModesArgs {
             )?])?;
         }
         self.test_outcome(modes, words)
+    }
+
+    /// Identifies the modes of one free decay.
+    fn decay_modes(&self, channels: &Channels, words: &[OsString]) -> Result<Outcome, CliError> {
+        self.refuse("a free decay", &self.force_options())?;
+        let decayed = mechid::decay(&self.input.open(channels)?, &self.decay())?;
+        let summary = decayed.summary();
+        let modes: Vec<ShapedMode> = summary.modes.iter().map(|m| m.mode.clone()).collect();
+        let names: Vec<String> = summary.channels.iter().map(|c| c.column.clone()).collect();
+        if self.compare.is_some() {
+            let set = ModeSet::from_shaped(&summary.file, names, &modes)?;
+            return self.compared(&set, words);
+        }
+        let outcome = Outcome::new(decayed.to_string(), &decayed)?;
+        let drawn = (&decayed, decayed.summary());
+        self.drawn((outcome, words), drawn, &modes, &names)
     }
 
     /// Returns the columns of a record: those that are named, or that state a force or a response;
