@@ -13,7 +13,7 @@ use mechid::integrate::ModeSearch;
 use mechid::io::{FrequencyResponses, IoError, input_name, read_sparse_system};
 use mechid::report::{PageSettings, ToFigure, comparison_page, comparison_svg, modes_page};
 use mechid::selected_modes::SelectedModes;
-use mechid::{Channels, DecaySettings, ModeSet, Modes};
+use mechid::{Channels, DecaySettings, Measurement, ModeSet, Modes};
 use serde::Serialize;
 
 use crate::args::hits::HitRuleArgs;
@@ -211,7 +211,21 @@ impl ModesArgs {
         if self.unmeasured.ambient {
             self.refuse("an ambient record", &[("hits", self.hits.rule().is_some())])?;
         }
-        let mut records = vec![self.input.open(&channels)?];
+        let records = self.open_records(&channels)?;
+        let mut modes = mechid::modes(&records, &self.settings(&channels))?;
+        if let Some(other) = &self.validate {
+            modes.add_validation(&[self.input.open_other(
+                other,
+                &channels,
+                self.input.window(),
+            )?])?;
+        }
+        self.test_outcome(modes, words)
+    }
+
+    /// Opens the records by the columns of the first one.
+    fn open_records(&self, channels: &Channels) -> Result<Vec<Measurement>, CliError> {
+        let mut records = vec![self.input.open(channels)?];
         for record in &self.more {
             let mut channels = channels.clone();
             // Only the point of a hammer that is not named may differ from record to record.
@@ -223,15 +237,7 @@ impl ModesArgs {
             }
             records.push(self.input.open_other(record, &channels, self.input.window())?);
         }
-        let mut modes = mechid::modes(&records, &self.settings(&channels))?;
-        if let Some(other) = &self.validate {
-            modes.add_validation(&[self.input.open_other(
-                other,
-                &channels,
-                self.input.window(),
-            )?])?;
-        }
-        self.test_outcome(modes, words)
+        Ok(records)
     }
 
     /// Identifies the modes of one free decay.
