@@ -210,6 +210,40 @@ fn unbalance_over_the_speed_gives_a_bearing() {
 }
 
 /// Every faulty description gives a message of one line with the name of the faulty part.
+/// The runs are those of the shaft in the example; a shaft that is too soft by 1 % is named, and the
+/// intervals include what it changes.
+#[test]
+fn a_wrong_part_of_a_rotor_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/rotor");
+    for file in ["mass.mtx", "stiffness.mtx", "gyroscopic.mtx", "runs.csv"] {
+        fs::copy(format!("{example}/{file}"), folder.path().join(file)).unwrap();
+    }
+    let text = fs::read_to_string(format!("{example}/rotor.json")).unwrap();
+    let mut machine: Value = serde_json::from_str(&text).unwrap();
+    let mut report = |factor: f64| {
+        machine["elements"][0]["stiffness_factor"] = json!(factor);
+        write(folder.path(), "rotor.json", &machine);
+        identified(folder.path(), "runs.csv --machine rotor.json --speed-table")
+    };
+    let named = |report: &Value| -> Option<Value> {
+        let notes = report["notes"].as_array().unwrap();
+        notes.iter().find(|note| note["kind"] == "doubtful_known").cloned()
+    };
+    let [right, soft] = [1.0, 0.99].map(&mut report);
+    assert!(named(&right).is_none(), "{}", right["notes"]);
+    let note = named(&soft).unwrap();
+    assert_eq!(note["parameter"], "shaft.stiffness");
+    let [value, error] = ["value", "standard_error"].map(|part| note[part].as_f64().unwrap());
+    assert!((value - 1.0).abs() < 3.0 * error && error < 0.002, "{note}");
+    let misfit = [0, 1].map(|at| note["misfit"][at].as_f64().unwrap());
+    assert!(misfit[0] > 1.3 && misfit[1] < 1.1, "{note}");
+    let name = "B.kxx";
+    let ([true_value, _], [wrong_value, wrong_error]) =
+        (unknown(&right, name), unknown(&soft, name));
+    assert!((wrong_value - true_value).abs() < 1.96 * wrong_error, "{wrong_value} ± {wrong_error}");
+}
+
 #[test]
 fn bad_descriptions_are_told_by_name() {
     let folder = simulated();

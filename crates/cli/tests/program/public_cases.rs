@@ -76,27 +76,36 @@ fn write(file: &Path, functions: &[Function<'_>]) {
     fs::write(file, functions.iter().map(Function::text).collect::<String>()).unwrap();
 }
 
+/// Returns the numbers of a column of the example, counted from 0.
+fn example_column(at: usize) -> Vec<f64> {
+    let text = fs::read_to_string(format!("{EXAMPLES}/machine.csv")).unwrap();
+    text.lines().skip(1).map(|row| row.split(',').nth(at).unwrap().parse().unwrap()).collect()
+}
+
+/// A channel of the example at a node, in the direction +Z.
+fn channel(node: u32, ordinate: (u32, &str), values: Vec<f64>) -> Function<'_> {
+    Function {
+        kind: 1,
+        first: 0.0,
+        step: 1.0 / 128.0,
+        ordinate,
+        response: (node, 3),
+        reference: (0, 0),
+        values,
+    }
+}
+
 /// Case F4: labels of functions in a universal file without dataset 164 are read as units.
 #[test]
 fn labels_of_functions_of_time_are_units() {
     let home = tempfile::tempdir().unwrap();
     let home = home.path();
-    let text = fs::read_to_string(format!("{EXAMPLES}/machine.csv")).unwrap();
-    let column = |at: usize| -> Vec<f64> {
-        text.lines().skip(1).map(|row| row.split(',').nth(at).unwrap().parse().unwrap()).collect()
-    };
     let mass = |label: &str, per_si: f64| {
-        let of = |node, ordinate, values| Function {
-            kind: 1,
-            first: 0.0,
-            step: 1.0 / 128.0,
-            ordinate,
-            response: (node, 3),
-            reference: (0, 0),
-            values,
-        };
-        let response = column(4).iter().map(|a| a * per_si).collect();
-        write(&home.join("a.unv"), &[of(1, (13, "N"), column(1)), of(2, (12, label), response)]);
+        let response = example_column(4).iter().map(|a| a * per_si).collect();
+        write(
+            &home.join("a.unv"),
+            &[channel(1, (13, "N"), example_column(1)), channel(2, (12, label), response)],
+        );
         let line = "identify a.unv --force 1+Z --acceleration 2+Z --period 256";
         parameter(&json(home, line), 0)[0]
     };
@@ -113,22 +122,10 @@ fn channels_of_a_universal_file_need_no_names() {
     let home = tempfile::tempdir().unwrap();
     let home = home.path();
     let text = fs::read_to_string(format!("{EXAMPLES}/machine.csv")).unwrap();
-    let column = |at: usize| -> Vec<f64> {
-        text.lines().skip(1).map(|row| row.split(',').nth(at).unwrap().parse().unwrap()).collect()
-    };
     // The force acts at one of two points, which move together.
     let record = |file: &str, point: u32, responses: u32| {
-        let of = |node, ordinate, values| Function {
-            kind: 1,
-            first: 0.0,
-            step: 1.0 / 128.0,
-            ordinate,
-            response: (node, 3),
-            reference: (0, 0),
-            values,
-        };
-        let response = |node| of(node, (12, "m/s^2"), column(4));
-        let force = of(point, (13, "N"), column(1));
+        let response = |node| channel(node, (12, "m/s^2"), example_column(4));
+        let force = channel(point, (13, "N"), example_column(1));
         let mut channels: Vec<_> = (1..=responses).map(response).chain([force]).collect();
         if file.starts_with("turned") {
             channels.reverse();

@@ -99,7 +99,7 @@ pub(super) const LEAST_KEPT: f64 = 0.1;
 pub(super) const OPEN_DOFS: usize = 60;
 
 /// Maximum number of known coefficients that are tried as unknowns where a machine does not explain
-/// the data: each costs a fit, and with very many of them one fits by chance.
+/// the data: each costs the derivatives of the response on all lines.
 pub(super) const FREED_COEFFICIENTS: usize = 24;
 
 /// Maximum number of lines times the cube of the degrees of freedom with unknown terms, if a known
