@@ -171,6 +171,78 @@ pub fn read_nonlinear(path: impl AsRef<Path>) -> Result<Option<NonlinearDescript
     Ok(json::read::<Described>(path.as_ref())?.1.nonlinear)
 }
 
+/// The system of an experiment: in its description, or in another JSON file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum SystemSource {
+    Described(Box<SystemDescription>),
+    /// Path of a file with a `system` that is not read yet.
+    File(PathBuf),
+}
+
+impl SystemSource {
+    /// Reads the files that the description names, relative to `folder`; returns the machine if it
+    /// is a large one, and the nonlinear terms of a file with the system.
+    pub(crate) fn load(
+        &mut self,
+        file: &str,
+        folder: &Path,
+    ) -> Result<(Option<SparseSystem>, Option<NonlinearDescription>), IoError> {
+        #[derive(Deserialize)]
+        struct Machine {
+            system: SystemDescription,
+            nonlinear: Option<NonlinearDescription>,
+        }
+        let path = match self {
+            Self::Described(system) => return Ok((system.load(file, folder)?, None)),
+            Self::File(path) => folder.join(path),
+        };
+        let (file, Machine { mut system, nonlinear }) = json::read::<Machine>(&path)?;
+        let sparse = system.load(&file, json::folder(&path))?;
+        *self = Self::Described(system.into());
+        Ok((sparse, nonlinear))
+    }
+
+    /// Returns whether all matrices are lists of rows.
+    pub(crate) fn lists_rows(&self) -> bool {
+        matches!(self, Self::Described(system) if system.lists_rows())
+    }
+
+    pub(crate) fn system(&self, file: &str) -> Result<SecondOrderSystem, IoError> {
+        match self {
+            Self::Described(system) => system.system(file),
+            Self::File(path) => {
+                let what = format!("the system in {} is not read", path.display());
+                Err(IoError::Description { file: file.into(), what })
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for SystemSource {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct SourceVisitor;
+
+        impl<'de> Visitor<'de> for SourceVisitor {
+            type Value = SystemSource;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "a system with its mass, or the name of a JSON file with a system")
+            }
+
+            fn visit_str<E: de::Error>(self, path: &str) -> Result<SystemSource, E> {
+                Ok(SystemSource::File(path.into()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<SystemSource, A::Error> {
+                SystemDescription::deserialize(MapAccessDeserializer::new(map))
+                    .map(|system| SystemSource::Described(Box::new(system)))
+            }
+        }
+
+        deserializer.deserialize_any(SourceVisitor)
+    }
+}
+
 /// M with C and K, or (one degree of freedom) the mass with natural frequency and damping ratio.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -22,7 +22,7 @@ pub use self::scheme::{
     SchemeChoice, SubStepLoad,
 };
 pub use self::study::{ExperimentStudy, StudyField, StudyRuns};
-use crate::system::{NonlinearDescription, SystemDescription, too_many};
+use crate::system::{NonlinearDescription, SystemSource, too_many};
 use crate::{IoError, escaped, json};
 
 /// Simulated experiment. An unknown field in the file is an error.
@@ -46,7 +46,7 @@ use crate::{IoError, escaped, json};
 pub struct Experiment {
     #[serde(skip)]
     file: String,
-    system: SystemDescription,
+    system: SystemSource,
     /// The machine in sparse matrices, if it is a large one.
     #[serde(skip)]
     sparse: Option<SparseSystem>,
@@ -94,28 +94,31 @@ impl Experiment {
     ///
     /// # Errors
     /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`]; the names of
-    /// Matrix Market files in it are relative to its folder.
+    /// other files in it are relative to its folder.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let (file, experiment) = json::read::<Self>(path.as_ref())?;
         experiment.loaded(file, json::folder(path.as_ref()))
     }
 
     /// Reads the description of an experiment in a text; `file` is its name in messages. The names
-    /// of Matrix Market files in it are relative to the current folder.
+    /// of other files in it are relative to the current folder.
     ///
     /// # Errors
     /// [`IoError::NotJson`] for a text of another kind, [`IoError::Json`] with field, line and
-    /// column for a wrong description; [`IoError::Read`], [`IoError::Malformed`],
-    /// [`IoError::TooLarge`] and [`IoError::Model`] for a Matrix Market file.
+    /// column for a wrong description, also of the system in another file; [`IoError::Read`],
+    /// [`IoError::Malformed`], [`IoError::TooLarge`] and [`IoError::Model`] for a Matrix Market
+    /// file.
     pub fn parse(file: impl Into<String>, text: &str) -> Result<Self, IoError> {
         let file = escaped(&file.into()).into_owned();
         json::parse::<Self>(&file, text)?.loaded(file, Path::new(""))
     }
 
-    /// Sets the name for messages, and reads the matrices in files relative to `folder`.
+    /// Sets the name for messages, and reads the system or its matrices in files relative to
+    /// `folder`. Nonlinear terms of the description replace those of the file with the system.
     fn loaded(mut self, file: String, folder: &Path) -> Result<Self, IoError> {
-        self.sparse = self.system.load(&file, folder)?;
-        Ok(Self { file, ..self })
+        let (sparse, of_file) = self.system.load(&file, folder)?;
+        let nonlinear = self.nonlinear.take().or(of_file);
+        Ok(Self { file, sparse, nonlinear, ..self })
     }
 
     /// Name of the file in messages.

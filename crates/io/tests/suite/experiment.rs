@@ -248,6 +248,43 @@ fn the_system_of_a_report_is_read_back() {
     assert!(read_system(&path).unwrap_err().to_string().contains("missing field `system`"));
 }
 
+/// Judge: the same machine in the description itself.
+#[test]
+fn the_system_may_be_that_of_another_file() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("results")).unwrap();
+    let inline = parse(&description(SDOF, FORCE, "")).unwrap();
+    let mut found = serde_json::json!({
+        "nrmse": 0.1,
+        "system": SystemMatrices::from(&inline.system().unwrap()),
+        "nonlinear": { "terms": "k3: x1^3", "coefficients": [1e6] },
+    });
+    found["system"]["mass"] = serde_json::json!("m.mtx");
+    let written = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    written("results/found.json", &found.to_string());
+    // The matrix is in the folder of the machine, the machine in one beside the description.
+    let m = inline.system().unwrap().mass()[(0, 0)];
+    written(
+        "results/m.mtx",
+        &format!("%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 {m}\n"),
+    );
+    written("run.json", &description("\"results/found.json\"", FORCE, ""));
+    let read = Experiment::read(folder.path().join("run.json")).unwrap();
+    assert_eq!(read.system().unwrap(), inline.system().unwrap());
+    assert_eq!(read.nonlinear().unwrap().unwrap().coefficients, [1e6]);
+
+    let own = r#", "nonlinear": { "terms": "k3: x1^3", "coefficients": [2e6] }"#;
+    written("run.json", &description("\"results/found.json\"", FORCE, own));
+    let read = Experiment::read(folder.path().join("run.json")).unwrap();
+    assert_eq!(read.nonlinear().unwrap().unwrap().coefficients, [2e6]);
+
+    written("run.json", &description("\"results/lost.json\"", FORCE, ""));
+    let error = Experiment::read(folder.path().join("run.json")).unwrap_err();
+    assert!(matches!(&error, IoError::Read { file, .. } if file.ends_with("lost.json")), "{error}");
+    let error = parse(&description("3", FORCE, "")).unwrap_err().to_string();
+    assert!(error.contains("a system with its mass, or the name of a JSON file"), "{error}");
+}
+
 /// Judge: closed forms in this test.
 #[test]
 fn every_kind_of_excitation_is_sampled() {
