@@ -22,6 +22,7 @@
 //! | `checks` | checks of the records and of the residual |
 //! | `stiffness` | the dynamic stiffness line by line |
 //! | `summary` | the result: numbers, remarks |
+//! | `element` | the bearing as an element of a machine of named elements |
 //! | `ross` | the coefficients in the axes of ROSS |
 //! | `speeds` | tests at several speeds and loads, and their results as one table |
 //!
@@ -31,6 +32,7 @@
 
 mod checks;
 mod data;
+mod element;
 mod film;
 mod ross;
 mod rotation;

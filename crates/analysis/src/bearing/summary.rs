@@ -8,9 +8,11 @@ use mechid_checks::limits::DISTURBED_ALONE;
 use mechid_estimate::frequency_domain::LikelihoodRatio;
 use mechid_io::ParameterCovariance;
 use mechid_model::OilFilm;
+use mechid_model::elements::Machine;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use super::element;
 use super::film::{Film, NAMED};
 use super::rotation::speed_of_misfit;
 use super::{BearingData, IdentifyBearing, StiffnessLine};
@@ -50,6 +52,10 @@ pub struct BearingSummary {
     pub coefficients: Vec<CoefficientRow>,
     /// Covariance of the coefficients.
     pub covariance: ParameterCovariance,
+    /// A machine of one element, `bearing`, at the degrees of freedom x and y: for descriptions of
+    /// machines of named elements. The prior of each coefficient is its estimate with the standard
+    /// error; `None` if these are withheld.
+    pub machine: Option<Machine>,
     /// Likelihood-ratio test whether the inertia of the fluid is negligible; `None` if the noise is
     /// not known.
     pub inertia_test: Option<LikelihoodRatio>,
@@ -176,13 +182,15 @@ impl BearingSummary {
             largest_displacement,
             over_clearance: how.size.clearance.map(|c| largest_displacement / c),
         });
+        let coefficients = coefficients(film, &uncertain)?;
         let mut summary = Self {
             tests: tests.names.clone(),
             baseline: baseline.map(|b| b.names.clone()).unwrap_or_default(),
             rotation_hz: how.rotation_hz,
             load: how.load,
             confidence: CONFIDENCE,
-            coefficients: coefficients(film, &uncertain)?,
+            machine: element::machine(&coefficients),
+            coefficients,
             covariance: covariance(film),
             inertia_test: film.inertia,
             dimensionless: None,

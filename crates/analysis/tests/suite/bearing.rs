@@ -9,6 +9,7 @@ use mechid_analysis::{
     frf, identify_bearing,
 };
 use mechid_io::{FrequencyResponses, ResponseFunction};
+use mechid_model::elements::{Element, Input, Instruments, Machine, Sensor};
 use mechid_problems::rig::{BearingRig, RigTest, Shakers};
 use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, Matrix2};
@@ -313,6 +314,27 @@ fn a_result_tells_what_a_bearing_engineer_asks() {
     assert!((0.2..0.6).contains(&ratio.value) && ratio.standard_error.unwrap() < 0.05, "{ratio:?}");
     assert!(summary.amplitude.unwrap().over_clearance.unwrap() < 0.05);
     assert!(summary.remarks.is_empty(), "{:?}", summary.remarks);
+
+    let massless = |machine: Machine, dof| machine.with(dof, Element::mass(dof, 0.0));
+    let machine = ["x", "y"].into_iter().fold(summary.machine.clone().unwrap(), massless);
+    let instruments = Instruments {
+        sensors: vec![Sensor::new("x", ResponseQuantity::Displacement)],
+        inputs: vec![Input::force("x")],
+        ..Instruments::default()
+    };
+    let assembly = machine.assembly(&instruments).unwrap();
+    let omega = TAU * 70.0;
+    let stiffness = assembly.dynamic_stiffness(&assembly.start(), omega, |_| true);
+    let expected = found.stiffness().map(Complex::from)
+        + found.damping().map(|c| Complex::new(0.0, omega * c))
+        - found.mass().map(|m| Complex::from(omega * omega * m));
+    let difference = expected - stiffness.fixed_view::<2, 2>(0, 0);
+    assert!(difference.norm() < 1e-12 * expected.norm(), "{stiffness} {expected}");
+    let priors: Vec<f64> =
+        assembly.parameters().iter().map(|p| p.prior.unwrap().standard_deviation).collect();
+    let errors = summary.coefficients.iter().map(|row| row.estimate.standard_error.unwrap());
+    assert_eq!(priors, errors.collect::<Vec<_>>());
+    assert_eq!(serde_json::to_value(&machine).unwrap()["elements"][0]["kind"], "bearing");
 
     let loud = identify_bearing(&tests(2000.0), None, &how).unwrap();
     assert!(loud.summary().remarks[0].contains("of the clearance: above 0.05"));
