@@ -17,6 +17,8 @@ mod generator;
 mod joint;
 #[path = "../tests/suite/machine/judge.rs"]
 mod judge;
+#[path = "../tests/suite/machine/long_chain.rs"]
+mod long_chain;
 #[path = "../tests/suite/machine/pulses.rs"]
 mod pulses;
 #[path = "../tests/suite/machine/rotor.rs"]
@@ -108,6 +110,7 @@ fn studies() -> Vec<Study> {
             Box::new(|seed| frame::fit([true; 2], seed)),
         ),
         ("joint of two measured beams", joint::truth(), Box::new(joint::fit)),
+        ("chain of forty, open record", long_chain::truth(), Box::new(long_chain::fit)),
         ("two masses, hammer, noise 0.1 % of the peak", pulses::truth(), Box::new(struck(true))),
         ("the same, noise of the force ignored", pulses::truth(), Box::new(struck(false))),
     ]

@@ -11,7 +11,6 @@ use mechid_spectra::{LineData, Transient};
 
 use super::estimate::LikelihoodEstimate;
 use super::fit::{ParameterSpace, fit};
-use super::limits::OPEN_DOFS;
 use super::machine::MachineModel;
 use super::search::Bounds;
 use super::{LikelihoodError, Settings};
@@ -53,9 +52,6 @@ pub fn identify_entries(
     }
     let assembly = assembly(unknowns, near, channels)?;
     let open = data.records().iter().any(|(_, kind)| *kind != Transient::None);
-    if open && assembly.dof() > OPEN_DOFS {
-        return Err(LikelihoodError::LargeOpen { dof: assembly.dof(), most: OPEN_DOFS });
-    }
     let model = MachineModel::new(&assembly, data.omega(), None, open)?;
     let count = assembly.parameters().len();
     let bounds = Bounds { min: vec![f64::NEG_INFINITY; count], max: vec![f64::INFINITY; count] };

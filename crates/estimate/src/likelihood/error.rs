@@ -71,12 +71,14 @@ pub enum LikelihoodError {
         /// Place in the search.
         at: &'static str,
     },
-    /// A machine with open records has too many degrees of freedom: its motion is needed on every
-    /// line.
-    #[error("open records are supported up to {most} degrees of freedom; the machine has {dof}")]
-    LargeOpen {
-        /// Degrees of freedom of the machine.
-        dof: usize,
+    /// The initial and final states of open records need too many unknowns.
+    #[error(
+        "the sensors respond to {got} independent differences between the initial and the final state of an \
+         open record in this band; at most {most} are supported: choose a narrower band, or whole periods"
+    )]
+    ManyStates {
+        /// Number of state loads.
+        got: usize,
         /// Largest number supported.
         most: usize,
     },

@@ -42,8 +42,8 @@ pub(super) const SEARCH_NUMBERS: usize = 100;
 /// residual is curved, hardly change.
 pub(super) const SHORT_STEP: f64 = 1.0;
 
-/// Maximum number of receptances between state loads, over all lines, that are kept from a residual
-/// to its derivative, 64 MiB; more are computed again for each record.
+/// Maximum number of responses to state loads, of the sensors and for each parameter over all lines,
+/// that are kept from a residual to its derivative, 64 MiB; more are computed again for each record.
 pub(super) const KEPT_RESPONSES: usize = 1 << 22;
 
 /// Maximum number of steps of a search.
@@ -94,9 +94,21 @@ pub(super) const LEAST_POWER: f64 = 1e-12;
 /// Minimum share of its noise that a residual is assumed to keep after the fit (1 − leverage).
 pub(super) const LEAST_KEPT: f64 = 0.1;
 
-/// Maximum number of degrees of freedom of a machine with open records, whose transient acts on
-/// each of them: the cost of a line grows with their cube.
-pub(super) const OPEN_DOFS: usize = 60;
+/// Maximum number of state loads of a machine with open records: the cost of a line grows with
+/// their square.
+pub(super) const MOST_STATES: usize = 150;
+
+/// Maximum number of degrees of freedom of a machine with a state load on each of them. In a larger
+/// machine the sensors respond to fewer independent loads, which are found first.
+pub(super) const EACH_STATE_DOFS: usize = 24;
+
+/// Maximum number of lines on which the state loads are found: between two of them every mode still
+/// contributes much more than [`STATE_RESPONSE`] to the response.
+pub(super) const STATE_LINES: usize = 1000;
+
+/// Minimum response of the sensors to a state load relative to that to the others: the noise of
+/// measurements is a hundred times larger.
+pub(super) const STATE_RESPONSE: f64 = 1e-6;
 
 /// Maximum number of known coefficients that are tried as unknowns where a machine does not explain
 /// the data: each costs the derivatives of the response on all lines.

@@ -376,8 +376,9 @@ impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
     fn evaluate(&self, parameters: &[f64]) -> Option<Self::Evaluation> {
         let first_prior = self.len() + self.amplitudes();
         let mut residual = DVector::zeros(first_prior + self.priors.len());
-        let states = self.model.dimensions().states;
-        let mut records = (self.data.len() * states.pow(2) <= KEPT_RESPONSES).then(Vec::new);
+        let size = self.model.dimensions();
+        let responses = self.data.len() * size.states * (size.outputs + size.parameters);
+        let mut records = (responses <= KEPT_RESPONSES).then(Vec::new);
         for (rows, kind) in self.data.records() {
             let record = self.record(parameters, rows, *kind)?;
             for block in &record.blocks {

@@ -8,7 +8,6 @@ use super::{MachineModel, MeasuredPart};
 use crate::likelihood::delay_score::{DelayScore, delay_score};
 use crate::likelihood::estimate::LikelihoodEstimate;
 use crate::likelihood::fit::{ParameterSpace, fit};
-use crate::likelihood::limits::OPEN_DOFS;
 use crate::likelihood::residual::PriorRow;
 use crate::likelihood::search::Bounds;
 use crate::likelihood::{LikelihoodError, Settings};
@@ -164,9 +163,6 @@ fn identify(
         }
     };
     let open = data.records().iter().any(|(_, kind)| *kind != Transient::None);
-    if open && assembly.dof() > OPEN_DOFS {
-        return Err(LikelihoodError::LargeOpen { dof: assembly.dof(), most: OPEN_DOFS });
-    }
     let model = MachineModel::new(&assembly, data.omega(), part.as_ref(), open)?;
     let space = parameter_space(&assembly);
     let fit = fit(&model, data, &space, settings)?;

@@ -11,7 +11,7 @@ use super::identify::{checked_part, parameter_space};
 use super::{MachineEstimate, MachineModel, MeasuredReceptance};
 use crate::likelihood::Settings;
 use crate::likelihood::fit::{ParameterSpace, fit};
-use crate::likelihood::limits::{FREED_COEFFICIENTS, FREED_WORK, OPEN_DOFS, RANK};
+use crate::likelihood::limits::{FREED_COEFFICIENTS, FREED_WORK, RANK};
 use crate::likelihood::residual::Residual;
 use crate::likelihood::search::Linearisation;
 use crate::likelihood::weights::Weights;
@@ -88,9 +88,8 @@ impl Freed {
         part: Option<&MeasuredReceptance>,
     ) -> Option<Self> {
         let open = data.records().iter().any(|(_, kind)| *kind != Transient::None);
-        let joints = if open { assembly.dof() } else { joints(&assembly) };
-        let is_possible = data.len() as f64 * (joints as f64).powi(3) <= FREED_WORK;
-        (is_possible && (!open || joints <= OPEN_DOFS)).then_some(())?;
+        let size = if open { assembly.dof() } else { joints(&assembly) };
+        (data.len() as f64 * (size as f64).powi(3) <= FREED_WORK).then_some(())?;
         let known = |name: &str| estimate.likelihood.parameter(name).map(|known| known.value);
         let further = assembly.parameters().iter().position(|p| known(&p.name).is_none())?;
         let start = assembly.parameters().iter().map(|p| known(&p.name).unwrap_or(p.start));

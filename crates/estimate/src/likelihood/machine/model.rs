@@ -6,7 +6,8 @@ use std::ops::AddAssign;
 use mechid_model::elements::{Assembly, Pattern, Power};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::nominal::{NominalLine, Places, is_coupled, nominal_coefficient, prepare};
+use super::nominal::{Nominal, NominalLine, Places, is_coupled, nominal_coefficient};
+use super::state_loads::state_loads;
 use super::{LikelihoodError, MeasuredPart};
 use crate::elimination::solve_in_place;
 use crate::likelihood::{Dimensions, LineResponse, ResponseModel};
@@ -89,10 +90,11 @@ pub struct MachineLine<'a> {
     own_values: Vec<f64>,
     /// Response S H of the sensors to forces at the joints, p × j.
     from_joints: DMatrix<Complex<f64>>,
-    /// Motion of joints and support (j + 1) per unit of each input and load of the machine.
+    /// Response of the sensors to a unit of each state load, p × s; `None` without state loads.
+    states: Option<DMatrix<Complex<f64>>>,
+    /// Motion of joints and support (j + 1) per unit of each input, load of the machine and state
+    /// load.
     joints: DMatrix<Complex<f64>>,
-    /// Transposed receptance Hᵀ between the joints, if there are state loads.
-    internal: Option<DMatrix<Complex<f64>>>,
     /// Frequency factor of each term between the joints.
     factors: Vec<Complex<f64>>,
     /// Response S (I − H Δ) of the sensors to motions of a measured part, and the forces on it per
@@ -101,20 +103,26 @@ pub struct MachineLine<'a> {
 }
 
 impl MachineModel {
-    /// Prepares a machine for lines at `omega` (rad/s). With `open` records all degrees of freedom
-    /// are joints, because the difference between the initial and the final state acts on each of
-    /// them.
+    /// Prepares a machine for lines at `omega` (rad/s). With `open` records the difference between
+    /// the initial and the final state acts on it: the state loads.
     ///
     /// # Errors
-    /// [`LikelihoodError::NoResponse`] if the machine has no response at its initial values.
+    /// [`LikelihoodError::NoResponse`] if the machine has no response at its initial values,
+    /// [`LikelihoodError::ManyStates`] for too many state loads.
     pub fn new(
         assembly: &Assembly,
         omega: &[f64],
         measured: Option<&MeasuredPart>,
         open: bool,
     ) -> Result<Self, LikelihoodError> {
-        let places = Places::new(assembly, measured, open);
-        let (lines, line_of) = prepare(assembly, measured, &places, omega)?;
+        let places = Places::new(assembly, measured);
+        let nominal = Nominal::new(assembly, measured, &places);
+        let states = if open {
+            state_loads(&nominal, assembly, &places, omega)?
+        } else {
+            DMatrix::zeros(assembly.dof(), 0)
+        };
+        let (lines, line_of) = nominal.lines(omega, &states)?;
         let n = assembly.dof();
         // The support, degree of freedom n, has no index in `places`.
         let joint = |dof: usize| places.index(dof).unwrap_or(places.joints);
@@ -151,7 +159,7 @@ impl MachineModel {
             terms,
             lines,
             line_of,
-            states: if open { places.joints } else { 0 },
+            states: states.ncols(),
             places,
             omega: omega.to_vec(),
             assembly: assembly.clone(),
@@ -312,13 +320,15 @@ impl ResponseModel for MachineModel {
         let own_loads = self.assembly.own_loads(omega);
         let value = |parameter: &Option<usize>| parameter.map_or(1.0, |at| parameters[at]);
         let own_values: Vec<f64> = own_loads.iter().map(|(of, _)| value(of)).collect();
+        let (own_count, first_state) = (own_values.len(), load_count - self.states);
         let own_response =
-            self.read(&of_sensors, load_count - inputs, |place, load| motion(place, inputs + load));
+            self.read(&of_sensors, own_count, |place, load| motion(place, inputs + load));
         let own_sum = (!own_values.is_empty()).then(|| {
             let values = own_values.iter().map(|value| Complex::from(*value));
             &own_response * DVector::from_iterator(own_values.len(), values)
         });
-        let internal = (self.states > 0).then(|| from_joints.columns(0, j).into_owned());
+        let state = |place: usize, load: usize| motion(place, first_state + load);
+        let states = (self.states > 0).then(|| self.read(&of_sensors, self.states, state));
         let from_joints = self.read(&of_sensors, j, |place, joint| {
             if place < places { from_joints[(joint, place)] } else { Complex::default() }
         });
@@ -331,8 +341,8 @@ impl ResponseModel for MachineModel {
             own: own_sum,
             own_values,
             from_joints,
+            states,
             joints,
-            internal,
             factors,
             part,
         })
@@ -370,7 +380,7 @@ impl LineResponse for MachineLine<'_> {
     }
 
     fn state_response(&self) -> Option<&DMatrix<Complex<f64>>> {
-        (self.model.states > 0).then_some(&self.from_joints)
+        self.states.as_ref()
     }
 
     /// Writes ∂y = −S H ∂D x for every term, and the response to a unit of each load of the
@@ -388,9 +398,9 @@ impl LineResponse for MachineLine<'_> {
         for (value, column) in self.own_values.iter().zip(inputs..) {
             motion.axpy(Complex::from(*value), &self.joints.column(column), Complex::new(1.0, 0.0));
         }
-        if let Some(internal) = self.internal.as_ref().filter(|_| !states.is_empty()) {
-            let count = internal.ncols();
-            motion.rows_mut(0, count).gemv_tr(ONE, internal, states, ONE);
+        if !states.is_empty() {
+            let first = self.joints.ncols() - states.len();
+            motion.gemv(ONE, &self.joints.columns(first, states.len()), states, ONE);
         }
         let assembly = &self.model.assembly;
         let mut response = vec![Complex::default(); self.from_joints.nrows()];
@@ -411,8 +421,8 @@ impl LineResponse for MachineLine<'_> {
             let Some(parameter) = sensor.delay_parameter else { continue };
             let mut reading = (self.receptance.row(row) * input)[0];
             reading += self.own.as_ref().map_or(Complex::default(), |own| own[row]);
-            if !states.is_empty() {
-                reading += (self.from_joints.row(row) * states)[0];
+            if let Some(of_states) = self.states.as_ref().filter(|_| !states.is_empty()) {
+                reading += (of_states.row(row) * states)[0];
             }
             to[(row, parameter)] += reading * Complex::new(0.0, -self.omega);
         }

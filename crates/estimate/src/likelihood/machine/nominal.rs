@@ -19,7 +19,8 @@ const NOMINAL_LOSS: f64 = 0.05;
 pub(super) struct NominalLine {
     /// Transposed receptance H₀ᵀ from the joints to all degrees of freedom of [`Places`], j × r.
     pub(super) from_joints: DMatrix<Complex<f64>>,
-    /// Response of the degrees of freedom of [`Places`] to a unit of each load, r × loads.
+    /// Response of the degrees of freedom of [`Places`] to a unit of each load, r × loads: inputs,
+    /// loads of the machine, state loads.
     pub(super) loads: DMatrix<Complex<f64>>,
     /// Motion of the support per unit of each load.
     pub(super) support: Vec<Complex<f64>>,
@@ -34,9 +35,8 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Collects the degrees of freedom. Joints are all of them if `all`, otherwise those of unknown
-    /// terms and of a measured part.
-    pub(super) fn new(assembly: &Assembly, measured: Option<&MeasuredPart>, all: bool) -> Self {
+    /// Collects the degrees of freedom. Joints are those of unknown terms and of a measured part.
+    pub(super) fn new(assembly: &Assembly, measured: Option<&MeasuredPart>) -> Self {
         let n = assembly.dof();
         let mut dofs: Vec<usize> = Vec::new();
         let mut add = |at: usize| {
@@ -44,9 +44,6 @@ impl Places {
                 dofs.push(at);
             }
         };
-        if all {
-            (0..n).for_each(&mut add);
-        }
         for term in assembly.terms().iter().filter(|term| is_coupled(term, measured)) {
             touched(term).for_each(&mut add);
         }
@@ -104,8 +101,8 @@ pub(super) fn nominal_coefficient(
     Complex::new(1.0, loss) * term.value(start)
 }
 
-/// Data that all lines share.
-struct Plan<'a> {
+/// The nominal machine, for the responses at any line.
+pub(super) struct Nominal<'a> {
     assembly: &'a Assembly,
     measured: Option<&'a MeasuredPart>,
     places: &'a Places,
@@ -115,89 +112,141 @@ struct Plan<'a> {
     coefficients: Vec<Complex<f64>>,
 }
 
-/// Returns the nominal responses at the distinct frequencies of `omega`, and the index of the
-/// response of each row.
-pub(super) fn prepare(
-    assembly: &Assembly,
-    measured: Option<&MeasuredPart>,
-    places: &Places,
-    omega: &[f64],
-) -> Result<(Vec<NominalLine>, Vec<usize>), LikelihoodError> {
-    let n = assembly.dof();
-    let mut neighbours = vec![Vec::new(); n];
-    for term in assembly.terms() {
-        term.for_each_entry(n, |row, column, _| {
-            if column < n && row != column {
-                neighbours[row].push(column);
-                neighbours[column].push(row);
-            }
-        });
-    }
-    neighbours.iter_mut().for_each(|columns| {
-        columns.sort_unstable();
-        columns.dedup();
-    });
-    let order = order(&neighbours);
-    let mut row = vec![0; n];
-    order.iter().enumerate().for_each(|(at, dof)| row[*dof] = at);
-    let half = half_band(&neighbours, &order);
-    let start = assembly.start();
-    let nominal = |term: &Term| nominal_coefficient(term, &start, measured);
-    let coefficients = assembly.terms().iter().map(nominal).collect();
-    let plan = Plan { assembly, measured, places, row, half, coefficients };
-    // Rows of equal frequency share a line.
-    let (mut distinct, mut lines): (HashMap<u64, usize>, Vec<usize>) = (HashMap::new(), Vec::new());
-    let mut first_rows: Vec<usize> = Vec::new();
-    for (at, omega) in omega.iter().enumerate() {
-        let fresh = first_rows.len();
-        let line = *distinct.entry(omega.to_bits()).or_insert(fresh);
-        if line == fresh {
-            first_rows.push(at);
+impl<'a> Nominal<'a> {
+    /// Takes the machine at the initial values of its unknowns.
+    pub(super) fn new(
+        assembly: &'a Assembly,
+        measured: Option<&'a MeasuredPart>,
+        places: &'a Places,
+    ) -> Self {
+        let n = assembly.dof();
+        let mut neighbours = vec![Vec::new(); n];
+        for term in assembly.terms() {
+            term.for_each_entry(n, |row, column, _| {
+                if column < n && row != column {
+                    neighbours[row].push(column);
+                    neighbours[column].push(row);
+                }
+            });
         }
-        lines.push(line);
+        neighbours.iter_mut().for_each(|columns| {
+            columns.sort_unstable();
+            columns.dedup();
+        });
+        let order = order(&neighbours);
+        let mut row = vec![0; n];
+        order.iter().enumerate().for_each(|(at, dof)| row[*dof] = at);
+        let half = half_band(&neighbours, &order);
+        let start = assembly.start();
+        let nominal = |term: &Term| nominal_coefficient(term, &start, measured);
+        let coefficients = assembly.terms().iter().map(nominal).collect();
+        Self { assembly, measured, places, row, half, coefficients }
     }
-    let solved: Option<Vec<NominalLine>> =
-        first_rows.par_iter().map(|row| plan.line(omega[*row], *row)).collect();
-    let failed = || LikelihoodError::NoResponse { at: "the initial values" };
-    Ok((solved.ok_or_else(failed)?, lines))
-}
 
-impl Plan<'_> {
-    fn line(&self, omega: f64, data_row: usize) -> Option<NominalLine> {
-        let (assembly, n) = (self.assembly, self.assembly.dof());
-        let speed = assembly.speed();
-        let is_measured = |dof: usize| self.measured.is_some_and(|part| part.dofs.contains(&dof));
+    /// Returns the nominal responses at the distinct frequencies of `omega`, and the index of the
+    /// response of each row; the columns of `states` are state loads, n × s.
+    pub(super) fn lines(
+        &self,
+        omega: &[f64],
+        states: &DMatrix<f64>,
+    ) -> Result<(Vec<NominalLine>, Vec<usize>), LikelihoodError> {
+        // Rows of equal frequency share a line.
+        let mut distinct: HashMap<u64, usize> = HashMap::new();
+        let mut lines: Vec<usize> = Vec::new();
+        let mut first_rows: Vec<usize> = Vec::new();
+        for (at, omega) in omega.iter().enumerate() {
+            let fresh = first_rows.len();
+            let line = *distinct.entry(omega.to_bits()).or_insert(fresh);
+            if line == fresh {
+                first_rows.push(at);
+            }
+            lines.push(line);
+        }
+        let line = |row: &usize| self.line(omega[*row], *row, states);
+        let solved: Option<Vec<NominalLine>> = first_rows.par_iter().map(line).collect();
+        let failed = || LikelihoodError::NoResponse { at: "the initial values" };
+        Ok((solved.ok_or_else(failed)?, lines))
+    }
+
+    fn is_measured(&self, dof: usize) -> bool {
+        self.measured.is_some_and(|part| part.dofs.contains(&dof))
+    }
+
+    /// Returns the dynamic stiffness at a line without the rows of a measured part, or its
+    /// transpose, and the forces per motion of the support.
+    fn dynamic_stiffness(&self, omega: f64, transposed: bool) -> (Banded, Vec<Complex<f64>>) {
+        let (n, speed) = (self.assembly.dof(), self.assembly.speed());
         let mut band = Banded::zeros(n, self.half);
         let mut support = vec![Complex::<f64>::default(); n];
-        for (term, coefficient) in assembly.terms().iter().zip(&self.coefficients) {
+        for (term, coefficient) in self.assembly.terms().iter().zip(&self.coefficients) {
             if *coefficient == Complex::default() {
                 continue;
             }
             let factor = term.power.factor(omega, speed.at(omega)) * coefficient;
             term.for_each_entry(n, |row, column, value| {
-                if column < n {
-                    band.add(self.row[row], self.row[column], factor * value);
-                } else {
+                if column == n {
                     support[row] -= factor * value;
+                    return;
                 }
+                let (row, column) = if transposed { (column, row) } else { (row, column) };
+                band.add(self.row[row], self.row[column], factor * value);
             });
         }
         // The rows of a measured part are replaced by its receptance in `fill_measured`.
-        (0..n).filter(|dof| is_measured(*dof)).for_each(|dof| {
+        (0..n).filter(|dof| self.is_measured(*dof)).for_each(|dof| {
             band.add(self.row[dof], self.row[dof], Complex::new(1.0, 0.0));
         });
-        let loads = self.load_columns(omega);
+        (band, support)
+    }
+
+    /// Returns the motions of the `readings`, lists of degrees of freedom with weights, per unit
+    /// force at each degree of freedom: n × readings. `None` for a singular machine.
+    pub(super) fn motions_per_force(
+        &self,
+        omega: f64,
+        readings: &[Vec<(usize, f64)>],
+    ) -> Option<DMatrix<Complex<f64>>> {
+        let n = self.assembly.dof();
+        let mut sides = DMatrix::zeros(n, readings.len());
+        for (column, reading) in readings.iter().enumerate() {
+            for (dof, weight) in reading.iter().filter(|(dof, _)| *dof < n) {
+                sides[(self.row[*dof], column)] += Complex::from(*weight);
+            }
+        }
+        self.dynamic_stiffness(omega, true).0.solve(&mut sides).then_some(())?;
+        Some(DMatrix::from_fn(n, readings.len(), |dof, column| sides[(self.row[dof], column)]))
+    }
+
+    /// Returns the diagonal of the dynamic stiffness at a line.
+    pub(super) fn diagonal(&self, omega: f64) -> Vec<Complex<f64>> {
+        let n = self.assembly.dof();
+        let mut diagonal = vec![Complex::<f64>::default(); n];
+        for (term, coefficient) in self.assembly.terms().iter().zip(&self.coefficients) {
+            let factor = term.power.factor(omega, self.assembly.speed().at(omega)) * coefficient;
+            term.for_each_entry(n, |row, column, value| {
+                if row == column {
+                    diagonal[row] += factor * value;
+                }
+            });
+        }
+        diagonal
+    }
+
+    fn line(&self, omega: f64, data_row: usize, states: &DMatrix<f64>) -> Option<NominalLine> {
+        let n = self.assembly.dof();
+        let (mut band, support) = self.dynamic_stiffness(omega, false);
+        let loads = self.load_columns(omega, states);
         let joints = self.places.joints;
         let mut sides = DMatrix::zeros(n, joints + loads.len());
         for (column, dof) in self.places.dofs[..joints].iter().enumerate() {
-            if !is_measured(*dof) {
+            if !self.is_measured(*dof) {
                 sides[(self.row[*dof], column)] = Complex::new(1.0, 0.0);
             }
         }
         let mut moved = Vec::with_capacity(loads.len());
         for (column, load) in loads.iter().enumerate() {
             let mut motion = Complex::<f64>::default();
-            for (at, value) in load.iter().filter(|(at, _)| !is_measured(*at)) {
+            for (at, value) in load.iter().filter(|(at, _)| !self.is_measured(*at)) {
                 if *at < n {
                     sides[(self.row[*at], joints + column)] += value;
                 } else {
@@ -221,11 +270,16 @@ impl Plan<'_> {
         })
     }
 
-    /// Returns the loads of the inputs, then the loads of the machine.
-    fn load_columns(&self, omega: f64) -> Vec<Vec<(usize, Complex<f64>)>> {
+    /// Returns the loads of the inputs, the loads of the machine, and the state loads.
+    fn load_columns(&self, omega: f64, states: &DMatrix<f64>) -> Vec<Vec<(usize, Complex<f64>)>> {
         let (n, speed) = (self.assembly.dof(), self.assembly.speed());
         let inputs = self.assembly.inputs().iter().map(|input| input.load(n, omega, speed));
-        inputs.chain(self.assembly.own_loads(omega).into_iter().map(|(_, load)| load)).collect()
+        let own = self.assembly.own_loads(omega).into_iter().map(|(_, load)| load);
+        let states = states.column_iter().map(|column| {
+            let loads = column.iter().enumerate().filter(|(_, load)| **load != 0.0);
+            loads.map(|(dof, load)| (dof, Complex::from(*load))).collect()
+        });
+        inputs.chain(own).chain(states).collect()
     }
 
     /// Writes the rows of a measured part from its receptance.

@@ -3,7 +3,7 @@
 use mechid_model::ResponseQuantity;
 use mechid_model::elements::{
     Assembly, Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine,
-    MatrixElement, Sensor, Speed,
+    MatrixElement, SUPPORT, Sensor, Speed,
 };
 use mechid_signal::Sampling;
 use mechid_spectra::noise::pulse::PulseNoise;
@@ -11,6 +11,8 @@ use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 
 use super::MachineModel;
+use super::nominal::{Nominal, Places};
+use super::state_loads::state_loads;
 use crate::likelihood::limits::SEARCH_NUMBERS;
 use crate::likelihood::residual::{Evaluation, Residual};
 use crate::likelihood::search::LeastSquaresProblem;
@@ -297,5 +299,52 @@ fn first_steps_have_lines_of_every_force_and_record() {
             assert!(share * 10 > rows.len() * 4, "{share} of {}, every {thinning}", rows.len());
         }
         assert!(rows.iter().filter(|row| **row >= lines - 20).count() >= 20 / thinning);
+    }
+}
+
+/// In a machine with more degrees of freedom than state loads, the sensors respond to every load as
+/// to its component in the space of the state loads, also with unknowns far from the initial values.
+#[test]
+fn state_loads_contain_every_load_to_which_a_sensor_responds() {
+    let n = 40;
+    let mut machine = Machine::new((0..n).map(|at| format!("x{at}")));
+    let dofs = machine.dofs.clone();
+    for (at, dof) in dofs.iter().enumerate() {
+        let before = if at == 0 { SUPPORT } else { &dofs[at - 1] };
+        let stiffness = match at {
+            0 | 20 => FreeCoefficient::from_start(2e6).into(),
+            _ => Coefficient::Known(2e6 + 1e5 * (at as f64).sin()),
+        };
+        let link = Element::spring_damper([before, dof], stiffness, 200.0);
+        machine = machine.with(&format!("s{at}"), link).with(dof, Element::mass(dof, 1.0));
+    }
+    let instruments = Instruments {
+        sensors: vec![Sensor::new(&dofs[30], ResponseQuantity::Displacement)],
+        inputs: vec![Input::force(&dofs[10])],
+        ..Instruments::default()
+    };
+    let assembly = machine.assembly(&instruments).unwrap();
+    let omega: Vec<f64> = (1..200).map(|line| 4.0 * f64::from(line)).collect();
+    let places = Places::new(&assembly, None);
+    let nominal = Nominal::new(&assembly, None, &places);
+    let loads = state_loads(&nominal, &assembly, &places, &omega).unwrap();
+    // A free chain has about 11 modes below 800 rad/s.
+    assert!((10..36).contains(&loads.ncols()), "{}", loads.ncols());
+    for parameters in [[2e6, 2e6], [5e5, 4e6], [1e7, 1e5]] {
+        let mut all = DMatrix::zeros(400, n);
+        for line in 0..200 {
+            let omega = 3.7 + 3.99 * line as f64;
+            let stiffness = assembly.dynamic_stiffness(&parameters, omega, |_| true);
+            let inverse = stiffness.columns(0, n).into_owned().try_inverse().unwrap();
+            let response = inverse.row(30) / Complex::from(inverse.row(30).norm());
+            all.row_mut(2 * line).copy_from(&response.map(|z| z.re));
+            all.row_mut(2 * line + 1).copy_from(&response.map(|z| z.im));
+        }
+        let space = (&all * &loads).qr().q();
+        for of_each in all.column_iter() {
+            let rest = of_each - &space * space.tr_mul(&of_each);
+            let gap = rest.norm() / of_each.norm();
+            assert!(gap < 1e-4, "{parameters:?}: {gap:e}");
+        }
     }
 }

@@ -8,6 +8,7 @@ mod frame;
 mod generator;
 mod joint;
 mod judge;
+mod long_chain;
 mod open;
 mod pulses;
 mod rotor;
