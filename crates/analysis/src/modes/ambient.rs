@@ -51,10 +51,14 @@ pub(super) fn modes(
     let engine = engine_settings(settings, without_hz, without_harmonics);
     let estimate = identify_ambient(&record, &engine)?;
     let halves = Halves::of_ambient(&record, &estimate);
-    let estimate = estimate.with_error_scales(&halves.error_scales);
+    let (of_spectrum, scale) = estimate.misfit.as_ref().map(checks::spectrum_check).unzip();
+    let scale = scale.unwrap_or(1.0);
+    let scales: Vec<f64> = halves.error_scales.iter().map(|halves| halves.max(scale)).collect();
+    let estimate = estimate.with_error_scales(&scales);
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
     let modes: Vec<ModalModeRow> = estimate.modes.iter().map(row).collect();
-    let of_modes = halves.check.into_iter().chain(ambient_checks(&modes, &outputs));
+    let of_fit = of_spectrum.into_iter().chain(halves.check);
+    let of_modes = of_fit.chain(ambient_checks(&modes, &outputs));
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
     let summary = ModesSummary {
         records: vec![RecordRow::from_block(&block)],

@@ -99,3 +99,7 @@ pub(super) const STRONG_EVIDENCE: f64 = 4.0;
 
 /// Maximum number of additional poles for harmonics, a background or modes outside the band.
 pub(super) const NUISANCE_POLES: usize = 4;
+
+/// Minimum number of squared amplitudes in a group of lines whose power is compared with the fitted
+/// spectrum: the cube root of a power has a normal distribution from far fewer on.
+pub(super) const MISFIT_GROUP: f64 = 100.0;

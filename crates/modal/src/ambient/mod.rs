@@ -13,6 +13,7 @@ mod initial;
 mod likelihood;
 mod limits;
 mod lines;
+mod misfit;
 mod noise_order;
 mod order;
 mod parameters;
@@ -29,6 +30,7 @@ mod tests;
 pub use error::AmbientError;
 pub use harmonics::Harmonic;
 pub use limits::MIN_DECAY_TIMES;
+pub use misfit::SpectrumMisfit;
 pub use result::{
     AmbientEstimate, AmbientMode, DropReason, DroppedCandidate, ModalValue, Uncertainty,
 };
@@ -117,6 +119,7 @@ pub fn identify_ambient(
         return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
     }
     let modes = fitted_modes(&fitted, &band, &accepted, &sinusoids)?;
+    let misfit = fitted.misfit();
     let parameters = fitted.fit.parameters;
     let factor = parameters.factor().select_rows(&accepted);
     Ok(AmbientEstimate {
@@ -127,6 +130,7 @@ pub fn identify_ambient(
         band_hz,
         lines: band.omega.len(),
         log_likelihood: -fitted.cost,
+        misfit,
         force_correlation: &factor * factor.transpose(),
         spectrum: FittedSpectrum { parameters, scale: band.scale, sound: accepted, excluded_hz },
     })

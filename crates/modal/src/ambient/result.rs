@@ -2,6 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::SpectrumMisfit;
 use super::harmonics::Harmonic;
 use super::limits::{MAX_BIAS, MIN_DECAY_TIMES};
 use super::parameters::{Parameters, Span};
@@ -172,6 +173,8 @@ pub struct AmbientEstimate {
     /// Logarithm ln L of the likelihood of the lines, with each output divided by its RMS value in
     /// the band.
     pub log_likelihood: f64,
+    /// Power of the record relative to the fitted spectrum; `None` if it cannot be computed.
+    pub misfit: Option<SpectrumMisfit>,
     /// Correlation coefficients of the forces on the modes, modes × modes.
     pub force_correlation: DMatrix<f64>,
     /// Whole spectrum, to fit it again to a part of the record.

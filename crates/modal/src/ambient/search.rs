@@ -7,6 +7,7 @@ use super::likelihood::{cost, gradient};
 use super::limits::{COARSE_POOLING, ENOUGH, LARGEST_STEP, POOLING};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Parameters, Span};
+use crate::decomposition::hermitian_eigen;
 
 /// Damping of the first step, and the factors that multiply it after a refused and after a
 /// successful step.
@@ -279,6 +280,16 @@ fn scaled_symmetrically(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<
     DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * matrix[(i, j)] * scale[j])
 }
 
+/// Returns the inverse of a scaled information whose eigenvalues are at least
+/// [`LEAST_INFORMATION`] but for rounding; `None` if it is not finite.
+fn inverse_of_determined(scaled: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let mut root = hermitian_eigen(scaled)?;
+    for (mut column, information) in root.eigenvectors.column_iter_mut().zip(&root.eigenvalues) {
+        column.unscale_mut(information.max(LEAST_INFORMATION).sqrt());
+    }
+    Some(&root.eigenvectors * root.eigenvectors.transpose())
+}
+
 /// Returns the parameters after a step; the steps of parameters in which the likelihood is far from
 /// quadratic are limited.
 fn moved(parameters: &Parameters, step: &DVector<f64>) -> Parameters {
@@ -307,13 +318,41 @@ fn moved(parameters: &Parameters, step: &DVector<f64>) -> Parameters {
 }
 
 impl Fit {
-    /// Returns the covariance of the parameters, the inverse of the information.
+    /// Returns the covariance of the parameters, the inverse of the information. A combination that
+    /// the lines do not determine, such as correlations of the forces on all modes by one force, has
+    /// a large variance; `None` if the information is not finite.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let (scaled, scale) = scaled(&self.information, LEAST_INFORMATION);
-        Some(scaled_symmetrically(&scaled.cholesky()?.inverse(), &scale))
+        let inverse = match scaled.clone().cholesky() {
+            Some(factor) => factor.inverse(),
+            None => inverse_of_determined(scaled)?,
+        };
+        Some(scaled_symmetrically(&inverse, &scale))
     }
 
     pub fn poles(&self) -> Vec<Complex<f64>> {
         self.parameters.poles()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_undetermined_combination_does_not_change_other_variances() {
+        // The second and the third parameter act only by their sum; rounding makes an eigenvalue
+        // negative.
+        let information = nalgebra::dmatrix![
+            1.0, 0.3, 0.3;
+            0.3, 1.0, 1.0 + 1e-9;
+            0.3, 1.0 + 1e-9, 1.0
+        ];
+        assert!(information.clone().cholesky().is_none());
+        let inverse = inverse_of_determined(information).unwrap();
+        let exact = 1.0 / (1.0 - 0.09);
+        assert!((inverse[(0, 0)] - exact).abs() < 1e-6, "{inverse}");
+        assert!(inverse[(1, 1)] > 1e8 && inverse[(2, 2)] > 1e8, "{inverse}");
+        assert!(inverse_of_determined(DMatrix::from_element(2, 2, f64::NAN)).is_none());
     }
 }

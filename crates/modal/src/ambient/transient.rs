@@ -14,8 +14,9 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::likelihood::{TASK, log_determinant, noise, positive_factor};
-use super::limits::TRANSIENT_ROUNDS;
+use super::limits::{POOLING, TRANSIENT_ROUNDS};
 use super::lines::BandLines;
+use super::misfit::{SpectrumMisfit, misfit};
 use super::parameters::{Parameters, Span};
 use super::search::{Effort, Fit, search_pooled};
 use super::spectrum::Coefficients;
@@ -53,6 +54,15 @@ pub(super) struct FitWithTransient {
     pub lines: BandLines,
     /// −log L of all lines, with the transient integrated out.
     pub cost: f64,
+}
+
+impl FitWithTransient {
+    /// Compares the power of the lines with the fitted spectrum.
+    pub fn misfit(&self) -> Option<SpectrumMisfit> {
+        let parameters = &self.fit.parameters;
+        let pooled = self.lines.pooled(&self.fit.poles(), POOLING, parameters.layout.noise_terms);
+        misfit(parameters, &pooled, self.lines.span)
+    }
 }
 
 /// Searches from the parameters of `fit`, in alternation with the transient, until the likelihood

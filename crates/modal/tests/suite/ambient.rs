@@ -103,6 +103,22 @@ fn intervals_hold_the_truth() {
     assert!(covered >= 61, "{covered} of {all}");
 }
 
+/// A mean over twelve samples filters the record as it would filter the forces: their spectrum has
+/// five zeros in the band.
+#[test]
+fn forces_whose_spectrum_is_not_flat_are_seen() {
+    let record = tower().accelerations(20.0, 3000, 0.1, 60);
+    let misfit = |record: &Record| identified(record, AmbientSettings::default()).misfit.unwrap();
+    let right = misfit(&record);
+    assert!(right.p_value > 0.01 && right.error_scale() < 1.2, "{right:?}");
+    let len = record.len() - 11;
+    let mean = |k: usize, channel: usize| record.channel(channel)[k..k + 12].iter().sum::<f64>();
+    let data = DMatrix::from_fn(len, record.channels(), mean);
+    let filtered = Record::new(Sampling::from_rate_hz(20.0, len).unwrap(), data).unwrap();
+    let wrong = misfit(&filtered);
+    assert!(wrong.p_value < 1e-9 && wrong.error_scale() > 1.5, "{wrong:?}");
+}
+
 /// The noise of the sensors falls over the band in a way that a few polynomials cannot describe.
 #[test]
 fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {

@@ -6,6 +6,7 @@ mod force_peak;
 mod idle;
 mod one_point;
 mod reciprocity;
+mod spectrum;
 mod table;
 mod tested;
 
@@ -15,6 +16,7 @@ use mechid_modal::{IdentifiedMode, OutputDelay};
 pub(super) use self::force_peak::force_peak_check;
 pub(super) use self::idle::response_checks;
 pub(super) use self::one_point::one_point_check;
+pub(super) use self::spectrum::spectrum_check;
 pub(super) use self::table::table_checks;
 pub(super) use self::tested::{Tested, adjusted};
 use super::sources::Output;
