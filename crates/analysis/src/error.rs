@@ -409,6 +409,12 @@ pub enum AnalysisError {
         /// Number of samples in the period.
         period: usize,
     },
+    /// No input varies.
+    #[error(
+        "no measured force or other input varies in any record: it excites nothing. Without it the \
+         record is a free decay, or with `ambient` the response to forces that were not measured"
+    )]
+    IdleInputs,
     /// The force has no spectral line in the band.
     #[error(
         "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \

@@ -87,5 +87,5 @@ pub use system::{
     read_system,
 };
 pub use table::{Inventory, RecordFile, Survey, Table, Tally, TimeAxis};
-pub use uff::is_directed_point;
+pub use uff::{is_directed_point, opposite_point};
 pub use units::{Evidence, Quantity, StatedUnit, Unit, name_without_unit, stated_unit};

@@ -181,7 +181,8 @@ impl DecaySummary {
             if channel.explained < EXPLAINED {
                 remarks.push(format!(
                     "the modes explain {} % of the variance of {column}; the rest is noise, or a motion \
-                     that is not a decaying oscillation",
+                     that is not a decaying oscillation, such as the response to forces that were not \
+                     measured (`ambient`)",
                     significant(100.0 * channel.explained, 3)
                 ));
             }

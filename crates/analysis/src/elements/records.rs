@@ -235,7 +235,7 @@ impl Signals {
         }
         let band_hz = match how.band {
             Some(band) => [band.low_hz, band.high_hz],
-            None => driven_band([&self.inputs]),
+            None => driven_band([&self.inputs])?,
         };
         let data = LineData::from_open_record(Some(&self.inputs), &self.outputs, band_hz)?;
         let spacing_hz = self.inputs.sampling().line_spacing_hz();

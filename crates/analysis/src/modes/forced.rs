@@ -40,6 +40,7 @@ struct Context {
     inputs: Vec<String>,
     outputs: Vec<Output>,
     driving_points: Vec<(usize, usize)>,
+    opposite_points: Vec<(usize, usize)>,
     band_hz: [f64; 2],
     checks: Vec<ModalCheck>,
     notes: Vec<String>,
@@ -87,7 +88,7 @@ impl Test {
             0.0 => None,
             share => Some(predicted(&recorded, band_hz, share, &engine)?),
         };
-        let Recorded { inputs, outputs, driving_points, hits, .. } = recorded;
+        let Recorded { inputs, outputs, driving_points, opposite_points, hits, .. } = recorded;
         let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
         checks.extend(prediction_checks(predicted.as_deref().unwrap_or(&[]), &names));
         let context = Context {
@@ -96,6 +97,7 @@ impl Test {
             inputs,
             outputs,
             driving_points,
+            opposite_points,
             band_hz,
             checks,
             notes: halves.note.into_iter().collect(),
@@ -147,6 +149,7 @@ pub(super) fn modes_of_tables(
         hits: Vec::new(),
         inputs: tables.forces.clone(),
         driving_points,
+        opposite_points: Vec::new(),
         outputs,
         band_hz,
         checks: of_tables.into_iter().chain(of_properties).collect(),
@@ -261,7 +264,8 @@ impl Context {
             settings.properties.reciprocal,
         ));
         // The masses are those of the fitted modes, with the decay of an exponential window.
-        let mass = |at| modal_mass(&estimate, at, &self.outputs, &self.driving_points);
+        let points = [&self.driving_points[..], &self.opposite_points[..]];
+        let mass = |at| modal_mass(&estimate, at, &self.outputs, points);
         let modes: Vec<ModalModeRow> =
             reported.iter().enumerate().map(|(at, mode)| row(mode, mass(at))).collect();
         rows.extend(checks::output_checks(&explained, &modes, &names));

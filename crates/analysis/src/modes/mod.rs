@@ -107,7 +107,8 @@ pub fn modes(
         }
     };
     let recorded = Recorded::from_forced(measurements, hits.as_ref(), &settings.places)?;
-    let band_hz = settings.band_hz.unwrap_or_else(|| recorded.driven_band());
+    let driven_hz = recorded.driven_band()?;
+    let band_hz = settings.band_hz.unwrap_or(driven_hz);
     let records = measurements.iter().map(|measurement| {
         let block = measurement.whole_block()?;
         Ok(RecordRow::from_block(&block))

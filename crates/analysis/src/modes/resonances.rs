@@ -20,7 +20,7 @@ const LISTED: usize = 8;
 pub(crate) fn surplus(measurements: &[Measurement]) -> Option<String> {
     let recorded = Recorded::from_forced(measurements, None, &Places::default()).ok()?;
     let responses = recorded.outputs.len();
-    surplus_of(&recorded.lines(recorded.driven_band()).ok()?, responses)
+    surplus_of(&recorded.lines(recorded.driven_band().ok()?).ok()?, responses)
 }
 
 /// Returns the remark of [`surplus`] for tables of frequency responses.

@@ -48,18 +48,22 @@ pub(super) fn row(
 }
 
 /// Returns the modal mass of a mode by the driving point that determines it best; `None` if the
-/// entries of its shape have several units.
+/// entries of its shape have several units. `points` have force and response in the same direction,
+/// then in opposite ones.
 pub(super) fn modal_mass(
     estimate: &ModalEstimate,
     mode: usize,
     outputs: &[Output],
-    points: &[(usize, usize)],
+    [same, opposite]: [&[(usize, usize)]; 2],
 ) -> Option<mechid_modal::Uncertain> {
     (!has_several_quantities(outputs)).then_some(())?;
-    let masses = points.iter().filter_map(|&(input, output)| {
+    let mass = |(sign, &(input, output)): (f64, &(usize, usize))| {
         let derivative = derivative(outputs[output].quantity?) as i32;
-        estimate.modal_mass(mode, DrivingPoint { output, input }, derivative)
-    });
+        let mass = estimate.modal_mass(mode, DrivingPoint { output, input }, derivative)?;
+        Some(mechid_modal::Uncertain { value: sign * mass.value, ..mass })
+    };
+    let points = same.iter().map(|point| (1.0, point));
+    let masses = points.chain(opposite.iter().map(|point| (-1.0, point))).filter_map(mass);
     let relative_error = |mass: &mechid_modal::Uncertain| mass.standard_error / mass.value.abs();
     masses.min_by(|a, b| relative_error(a).total_cmp(&relative_error(b)))
 }

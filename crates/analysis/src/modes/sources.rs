@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use mechid_io::is_directed_point;
+use mechid_io::{is_directed_point, opposite_point};
 use mechid_model::ResponseQuantity;
 use mechid_signal::{HitRule, Record, Spectrum, message};
 use mechid_spectra::LineData;
@@ -26,6 +26,8 @@ pub(super) struct Recorded {
     pub outputs: Vec<Output>,
     /// Input and output at the same point, counted from 0.
     pub driving_points: Vec<(usize, usize)>,
+    /// Input and output at the same point in opposite directions, counted from 0.
+    pub opposite_points: Vec<(usize, usize)>,
     /// Hits, if the records were cut.
     pub hits: Vec<HitRow>,
 }
@@ -93,8 +95,9 @@ impl Recorded {
             }
         }
         let responses = places.response_places(&outputs)?;
-        let driving_points = columns.driving_points(&responses);
-        Ok(Self { parts, inputs: columns.names, outputs, driving_points, hits })
+        let [driving_points, opposite_points] = columns.driving_points(&responses);
+        let inputs = columns.names;
+        Ok(Self { parts, inputs, outputs, driving_points, opposite_points, hits })
     }
 
     /// Reads records like [`Recorded::from_forced`], with one force in the first of them and
@@ -116,12 +119,13 @@ impl Recorded {
             inputs: Vec::new(),
             outputs: outputs_of(channels),
             driving_points: Vec::new(),
+            opposite_points: Vec::new(),
             hits: Vec::new(),
         })
     }
 
     /// Returns the band, in Hz, that the forces excite.
-    pub fn driven_band(&self) -> [f64; 2] {
+    pub fn driven_band(&self) -> Result<[f64; 2], AnalysisError> {
         driven_band(self.parts.iter().filter_map(|part| part.forces.as_ref()))
     }
 
@@ -190,6 +194,7 @@ impl Recorded {
             inputs: self.inputs.clone(),
             outputs: self.outputs.clone(),
             driving_points: Vec::new(),
+            opposite_points: Vec::new(),
             hits: Vec::new(),
         }
     }
@@ -210,7 +215,9 @@ impl Recorded {
 
 /// Returns the band, in Hz, that forces or other inputs excite: from the first to the last group of
 /// lines with at least [`DRIVEN_POWER`] of the largest power of an input.
-pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [f64; 2] {
+pub(crate) fn driven_band<'a>(
+    inputs: impl IntoIterator<Item = &'a Record>,
+) -> Result<[f64; 2], AnalysisError> {
     let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
     for forces in inputs {
         let spacing_hz = forces.sampling().line_spacing_hz();
@@ -231,7 +238,7 @@ pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [
             }
         }
     }
-    [low, high]
+    if low < high { Ok([low, high]) } else { Err(AnalysisError::IdleInputs) }
 }
 
 /// Inputs of the force columns of each record.
@@ -293,12 +300,19 @@ impl Columns {
         HitRow { force, ..hit }
     }
 
-    /// Returns the pairs of an input and an output at the same point.
-    fn driving_points(&self, responses: &[Option<String>]) -> Vec<(usize, usize)> {
-        let mut pairs = Vec::new();
+    /// Returns the pairs of an input and an output at the same point, then the other ones with
+    /// opposite directions.
+    fn driving_points(&self, responses: &[Option<String>]) -> [Vec<(usize, usize)>; 2] {
+        let mut pairs = [Vec::new(), Vec::new()];
         for (input, place) in self.places.iter().enumerate() {
-            let output = responses.iter().position(|other| other.is_some() && other == place);
-            pairs.extend(output.map(|output| (input, output)));
+            let Some(place) = place else { continue };
+            let at = |place: &String| responses.iter().position(|r| r.as_ref() == Some(place));
+            let opposite = || opposite_point(place).as_ref().and_then(at);
+            if let Some(output) = at(place) {
+                pairs[0].push((input, output));
+            } else if let Some(output) = opposite() {
+                pairs[1].push((input, output));
+            }
         }
         pairs
     }

@@ -191,6 +191,12 @@ fn frequency_responses_are_those_of_the_machine() {
         let product = stiffness * nalgebra::Complex::new(response.real[at], response.imaginary[at]);
         assert!((product - 1.0).norm() < 1e-9, "{hz} Hz: {product}");
     }
+    assert!(table.remarks.is_empty(), "{:?}", table.remarks);
+    let (force, [x, _, a]) = steady_state();
+    let responses = [(ResponseQuantity::Displacement, &x), (ResponseQuantity::Acceleration, &a)];
+    let both = Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap();
+    let table = frf(&both, &FrfSettings::default()).unwrap();
+    assert!(table.remarks[0].contains("the acceleration is not used"), "{:?}", table.remarks);
 }
 
 #[test]

@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 
 use mechid_analysis::identify::Band;
 use mechid_analysis::{
-    Channels, Measurement, ModalSystem, Predict, Reconstruct, predict_with_modes,
-    reconstruct_with_modes,
+    AnalysisError, Channels, Measurement, ModalSystem, ModesSettings, Predict, Reconstruct,
+    predict_with_modes, reconstruct_with_modes,
 };
 use mechid_model::ResponseQuantity::Displacement;
-use mechid_signal::{Record, Sampling, Spectrum, measures};
+use mechid_signal::{NoiseLevel, Record, Sampling, Spectrum, measures, noise};
 use nalgebra::{Complex, DMatrix};
 
 use crate::modes::{FORCES, modes, plain, receptance};
@@ -158,4 +158,39 @@ fn what_modes_cannot_do_is_refused() {
     };
     assert!(refused(2).contains("do not determine the motion of all modes"), "{}", refused(2));
     assert!(refused(SAMPLES).contains("fitted to 2 to 8191"), "{}", refused(SAMPLES));
+}
+
+/// A hammer strikes downwards, the sensors count upwards: the modal masses are those of the same
+/// test with both in one direction.
+#[test]
+fn forces_against_the_direction_of_their_sensors_give_modal_masses() {
+    let forces = pulses();
+    let motion = noise::add_white(&response(&forces), NoiseLevel::FractionOfRms(0.01), 3).unwrap();
+    let downwards = Record::new(forces.sampling(), -forces.data()).unwrap();
+    let masses = |forces: &Record, places: [&str; 2]| -> Vec<f64> {
+        let mut settings = ModesSettings { modes: Some(2), ..ModesSettings::default() };
+        settings.band_hz = Some([10.0, 60.0]);
+        settings.places.forces = places.map(str::to_owned).to_vec();
+        settings.places.responses = ["1+Z", "2+Z", "3+Z", "4+Z"].map(str::to_owned).to_vec();
+        let found = mechid_analysis::modes(&[measurement(forces, &motion)], &settings).unwrap();
+        found.summary().modes.iter().map(|row| row.modal_mass.unwrap()).collect()
+    };
+    let upwards = masses(&forces, ["1+Z", "4+Z"]);
+    let against = masses(&downwards, ["1-Z", "4-Z"]);
+    assert_eq!(upwards.len(), 2);
+    for (one, other) in upwards.iter().zip(&against) {
+        // The largest entry of both shapes is 0.5 1/√kg.
+        assert!((one / 4.0 - 1.0).abs() < 0.01, "{upwards:?}");
+        assert!((one / other - 1.0).abs() < 1e-6, "{upwards:?} {against:?}");
+    }
+}
+
+#[test]
+fn forces_that_do_not_vary_are_refused() {
+    let forces = pulses();
+    let motion = response(&forces);
+    let still = Record::new(forces.sampling(), forces.data().map(|_| 2.0)).unwrap();
+    let settings = ModesSettings::default();
+    let error = mechid_analysis::modes(&[measurement(&still, &motion)], &settings).unwrap_err();
+    assert!(matches!(error, AnalysisError::IdleInputs), "{error}");
 }

@@ -182,6 +182,16 @@ pub fn is_directed_point(name: &str) -> bool {
     name.contains(['+', '-']) && node_and_direction(name).is_some()
 }
 
+/// Returns the point of such a name in the opposite direction: `12-Z` for `12+Z`; `None` for a name
+/// without a direction.
+///
+/// # Source
+/// As [`is_directed_point`].
+pub fn opposite_point(name: &str) -> Option<String> {
+    let turned = if name.contains('+') { name.replace('+', "-") } else { name.replace('-', "+") };
+    is_directed_point(name).then_some(turned)
+}
+
 fn node_and_direction(label: &str) -> Option<(u32, i32)> {
     let Some(at) = label.find(['+', '-']) else { return Some((label.parse().ok()?, 0)) };
     let (node, direction) = label.split_at(at);
