@@ -204,6 +204,32 @@ impl MachineModel {
         (change, factors)
     }
 
+    /// Returns Hᵀ from the joints, j × r, and the response H to each load, r × loads, of the machine
+    /// with the change Δ; `None` if it is singular.
+    fn coupled(
+        &self,
+        nominal: &NominalLine,
+        change: &Change,
+    ) -> Option<[DMatrix<Complex<f64>>; 2]> {
+        let j = self.places.joints;
+        // `from_joints` is H₀ᵀ before the solution of (I + Δ H₀)ᵀ Hᵀ = H₀ᵀ, and Hᵀ after it.
+        let (mut from_joints, mut loads) = (nominal.from_joints.clone(), nominal.loads.clone());
+        if j > 0 {
+            let mut coupled = DMatrix::identity(j, j);
+            for (row, column, value) in change.0.iter().filter(|entry| entry.1 < j) {
+                let from = nominal.from_joints.column(*column);
+                add_scaled(coupled.column_mut(*row).as_mut_slice(), *value, from.as_slice());
+            }
+            solve_in_place(&mut coupled, &mut from_joints).then_some(())?;
+            let mut reaction = DMatrix::zeros(j, loads.ncols());
+            change.add_product(&mut reaction, |row, load| {
+                if row < j { nominal.loads[(row, load)] } else { nominal.support[load] }
+            });
+            loads.gemm_tr(-ONE, &from_joints, &reaction, ONE);
+        }
+        Some([from_joints, loads])
+    }
+
     /// Returns the readings of the sensors, with their `factors`, for the motions of `columns`
     /// loads; a motion has the index of the place, r for the support, and that of the load.
     fn read(
@@ -290,21 +316,7 @@ impl ResponseModel for MachineModel {
         let (j, inputs) = (self.places.joints, self.assembly.inputs().len());
         let (change, factors) = self.change(parameters, omega);
         let load_count = nominal.loads.ncols();
-        // `from_joints` is H₀ᵀ before the solution of (I + Δ H₀)ᵀ Hᵀ = H₀ᵀ, and Hᵀ after it.
-        let (mut from_joints, mut loads) = (nominal.from_joints.clone(), nominal.loads.clone());
-        if j > 0 {
-            let mut coupled = DMatrix::identity(j, j);
-            for (row, column, value) in change.0.iter().filter(|entry| entry.1 < j) {
-                let from = nominal.from_joints.column(*column);
-                add_scaled(coupled.column_mut(*row).as_mut_slice(), *value, from.as_slice());
-            }
-            solve_in_place(&mut coupled, &mut from_joints).then_some(())?;
-            let mut reaction = DMatrix::zeros(j, load_count);
-            change.add_product(&mut reaction, |row, load| {
-                if row < j { nominal.loads[(row, load)] } else { nominal.support[load] }
-            });
-            loads.gemm_tr(-ONE, &from_joints, &reaction, ONE);
-        }
+        let [from_joints, loads] = self.coupled(nominal, &change)?;
         let joints = DMatrix::from_fn(j + 1, load_count, |row, load| {
             if row < j { loads[(row, load)] } else { nominal.support[load] }
         });
