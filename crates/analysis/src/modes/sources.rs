@@ -76,6 +76,7 @@ impl Recorded {
         if outputs.is_empty() {
             return Err(AnalysisError::NoMotion);
         }
+        measurements.iter().try_for_each(|other| check_alike(first, other))?;
         let columns = Columns::new(measurements, places)?;
         let mut hits = Vec::new();
         let mut parts = Vec::new();
@@ -360,6 +361,23 @@ pub(super) fn outputs_of(channels: &Channels) -> Vec<Output> {
         (0..channels.response(quantity).len()).map(named)
     };
     ResponseQuantity::ALL.into_iter().flat_map(outputs).collect()
+}
+
+/// Checks that a record has as many forces and responses of each kind as the first one.
+fn check_alike(first: &Measurement, other: &Measurement) -> Result<(), AnalysisError> {
+    let [expected, got] = [first, other].map(|measurement| &*measurement.source().names);
+    let compared = |setting, expected: &[String], got: &[String]| {
+        if expected.len() == got.len() {
+            return Ok(());
+        }
+        let [got, expected] = [got, expected].map(|names| message::count(names.len(), "column"));
+        let why = format!("{} has {got}, the first record {expected}", other.name());
+        Err(AnalysisError::Setting { setting, why })
+    };
+    compared("force", &expected.force, &got.force)?;
+    compared("displacement", &expected.displacement, &got.displacement)?;
+    compared("velocity", &expected.velocity, &got.velocity)?;
+    compared("acceleration", &expected.acceleration, &got.acceleration)
 }
 
 /// Returns all responses of a record, samples × outputs.

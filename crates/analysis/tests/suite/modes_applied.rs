@@ -194,3 +194,16 @@ fn forces_that_do_not_vary_are_refused() {
     let error = mechid_analysis::modes(&[measurement(&still, &motion)], &settings).unwrap_err();
     assert!(matches!(error, AnalysisError::IdleInputs), "{error}");
 }
+
+#[test]
+fn records_with_other_columns_are_refused() {
+    let forces = pulses();
+    let both = measurement(&forces, &response(&forces));
+    let channels = Channels::new("f1", Displacement, "x1,x2");
+    let columns: Vec<(&str, &[f64])> =
+        vec![("f1", forces.channel(0)), ("x1", forces.channel(1)), ("x2", forces.channel(0))];
+    let fewer = Measurement::from_columns(forces.sampling(), &columns, &channels).unwrap();
+    let settings = ModesSettings::default();
+    let error = mechid_analysis::modes(&[both, fewer], &settings).unwrap_err().to_string();
+    assert!(error.contains("has 1 column, the first record 2 columns"), "{error}");
+}
