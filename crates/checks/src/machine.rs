@@ -11,12 +11,14 @@ use super::limits::FREE_RESIDUALS;
 use super::line_correlation::correlation_of_lines;
 use super::misfit::{Misfit, NoiseSource};
 use super::p_value::{CorrelationTest, PValue};
+use super::parts::{RowParts, agreement};
 use super::prior::PriorAgreement;
 use super::search::SearchAgreement;
 use super::whiteness::{Residual, Whiteness};
 
 /// Tests the power of the residual against the noise if `source` states the origin of the noise
-/// power ([`Finding::Misfit`]), priors against the data ([`Finding::PriorAgreement`]), and whether
+/// power ([`Finding::Misfit`]), parts of the data against each other
+/// ([`Finding::PartsAgreement`]), priors against the data ([`Finding::PriorAgreement`]), and whether
 /// several searches agree ([`Finding::SearchAgreement`]).
 ///
 /// # Source
@@ -34,6 +36,8 @@ pub fn after_machine_fit(estimate: &MachineEstimate, source: Option<NoiseSource>
             concentration: None,
         })
     }));
+    let compared = estimate.parts.iter().map(|parts| (parts.clone(), RowParts::Records));
+    findings.extend(agreement(compared.collect()));
     for parameter in &likelihood.parameters {
         let tested = parameter.prior.and_then(|prior| Some((prior, prior.p_value?)));
         findings.extend(tested.map(|(prior, p_value)| {

@@ -3,7 +3,6 @@
 use std::fmt::{self, Display, Formatter};
 
 use mechid_estimate::frequency_domain::{self, PartsComparison, PartsOfFit, Split};
-use mechid_model::Parameter;
 
 use super::digits::{line_hz, six_digits, three_digits};
 use super::finding::{Check, Names};
@@ -23,8 +22,7 @@ pub struct PartsAgreement {
     /// The part that differs most from the others.
     pub part: DataPart,
     /// Parameter in which this part differs most.
-    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
-    pub parameter: Parameter,
+    pub parameter: String,
     /// Value by the part (unit of the parameter).
     pub by_part: f64,
     /// Value by the other parts (unit of the parameter).
@@ -93,7 +91,11 @@ pub enum RowParts {
 /// The source of [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.
 pub fn agreement_of_parts(fit: &PartsOfFit<'_>, splits: &[(Split, RowParts)]) -> Option<Finding> {
     let compared = splits.iter().filter_map(|(split, rows)| Some((fit.compare(split)?, *rows)));
-    let compared: Vec<(PartsComparison, RowParts)> = compared.collect();
+    agreement(compared.collect())
+}
+
+/// Returns the finding on the comparisons of several splits.
+pub(crate) fn agreement(compared: Vec<(PartsComparison, RowParts)>) -> Option<Finding> {
     let count = compared.len() as f64;
     let scatter = |of: &PartsComparison| (of.error_scale, of.degrees_of_freedom);
     let significant = compared.iter().filter(|(of, _)| count * of.p_value < SIGNIFICANCE);

@@ -27,7 +27,7 @@ mod rotor;
 use std::time::Instant;
 
 use judge::{Judged, judge};
-use mechid_estimate::likelihood::machine::identify_machine;
+use mechid_estimate::likelihood::machine::{MachineEstimate, identify_machine};
 use mechid_estimate::likelihood::{LikelihoodEstimate, NoiseSource, Settings};
 use mechid_model::elements::{Coefficient, Element, FreeCoefficient, Input};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
@@ -122,6 +122,39 @@ fn told(name: &str, seeds: u64, p_value: impl Fn(u64) -> Option<f64>) {
     println!("{name}: told in {count} of {seeds}");
 }
 
+/// Returns the probability that the parts of the data differ as much by noise alone, over all
+/// comparisons.
+fn parts(estimate: &MachineEstimate) -> Option<f64> {
+    let p_values = estimate.parts.iter().map(|parts| parts.p_value);
+    Some(p_values.min_by(f64::total_cmp)? * estimate.parts.len() as f64)
+}
+
+/// How often parts of right and of wrong data disagree.
+fn parts_rows(seeds: u64, is_wanted: impl Fn(&str) -> bool) {
+    let chain = |noise: NoiseSource| {
+        move |seed| {
+            let data = chain::data(&chain::STIFFNESSES, seed);
+            let settings = Settings { noise, ..Settings::default() };
+            let instruments = chain::instruments();
+            parts(&identify_machine(&data, &chain::machine(), &instruments, &settings).ok()?)
+        }
+    };
+    let rotor = |modulus: f64| {
+        let [right, model] = [1.0, modulus].map(|factor| rotor::Rotor::new(13, factor));
+        move |seed| parts(&rotor::fit(&rotor::shaken(&right, 120, seed), &model).ok()?)
+    };
+    let rows: [(&str, Box<dyn Fn(u64) -> Option<f64>>); 5] = [
+        ("parts, chain of five, known noise", Box::new(chain(NoiseSource::Automatic))),
+        ("parts, chain of five, noise from residual", Box::new(chain(NoiseSource::SmoothResidual))),
+        ("parts, open record", Box::new(|seed| parts(&long_chain::estimate(seed)?))),
+        ("parts, rotor", Box::new(rotor(1.0))),
+        ("parts, rotor, E wrong by 1 %", Box::new(rotor(0.99))),
+    ];
+    for (name, p_value) in rows.iter().filter(|row| is_wanted(row.0)) {
+        told(name, seeds, p_value);
+    }
+}
+
 fn time_of_large_rotor() {
     let rotor = rotor::Rotor::new(50, 1.0);
     let data = rotor::shaken(&rotor, 500, 0);
@@ -211,6 +244,7 @@ fn main() {
             });
         }
     }
+    parts_rows(seeds, is_wanted);
     let name = "rotor, E wrong by 1 %, misfit";
     if is_wanted(name) {
         told(name, seeds, |seed| shaken(0.99)(seed)?.misfit_p_value);

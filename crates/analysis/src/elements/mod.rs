@@ -67,6 +67,7 @@ pub fn identify_elements(
         return Err(AnalysisError::Undetermined { combinations: sentences.join("; ") });
     }
     let checks = summary::checks(data, &estimate);
+    let estimate = summary::allowing_for_parts(estimate, &checks, how.confidence);
     let (estimate, is_late) = summary::allowing_for_delay(estimate, &checks);
     let doubtful = if is_late { None } else { doubtful_known(data, how, &estimate, &checks) };
     let note = doubtful.as_ref().map(|known| ElementNote::doubtful_known(known, &estimate));

@@ -23,6 +23,8 @@ pub enum ElementNote {
     ScaledErrors {
         /// Factor.
         factor: f64,
+        /// Subjects of the checks that the factor follows from.
+        checks: String,
     },
     /// Most of the information on a parameter comes from its prior.
     FromPrior {
@@ -98,7 +100,7 @@ impl fmt::Display for ElementNote {
                 "{parameter} lies at its bound {}: without the bound the estimate would lie beyond it; its interval is one-sided",
                 compact(*bound, 6)
             ),
-            Self::ScaledErrors { factor } => f.write_str(&scaled_errors(*factor, "misfit")),
+            Self::ScaledErrors { factor, checks } => f.write_str(&scaled_errors(*factor, checks)),
             Self::FromPrior { parameter, share } => write!(
                 f,
                 "{} % of the information on {parameter} comes from its prior",

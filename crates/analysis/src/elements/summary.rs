@@ -162,6 +162,7 @@ impl ElementSummary {
             (!data.force_noise.is_empty()).then(|| ForceNoise::remark(&data.force_noise));
         let remarks = of_forces.into_iter().chain(data.remarks.iter().cloned());
         let remarks = remarks.map(|text| ElementNote::Read { text });
+        let notes = notes_of(estimate, &checks).chain(notes).chain(remarks).collect();
         Ok(Self {
             tests: data.tests.clone(),
             hits: data.hits.clone(),
@@ -187,7 +188,7 @@ impl ElementSummary {
             candidates: candidates(data, estimate, how)?,
             modes: modes(estimate, equations)?,
             checks,
-            notes: notes_of(estimate).chain(notes).chain(remarks).collect(),
+            notes,
             system: system.as_ref().map(SystemMatrices::from),
             covariance,
             analysis: how.clone(),
@@ -295,6 +296,28 @@ pub(super) fn allowing_for_delay(
     }
 }
 
+/// Returns the estimate with larger standard errors and intervals, at the level `confidence`, if
+/// parts of the data disagree by more than its standard errors allow.
+pub(super) fn allowing_for_parts(
+    estimate: MachineEstimate,
+    checks: &[CheckRow],
+    confidence: f64,
+) -> MachineEstimate {
+    let scatter = |check: &CheckRow| match &check.finding {
+        Finding::PartsAgreement(parts) if check.finding.verdict() != Verdict::Good => {
+            Some((parts.scatter, parts.degrees_of_freedom))
+        }
+        _ => None,
+    };
+    match checks.iter().find_map(scatter) {
+        Some((scatter, degrees_of_freedom)) if scatter > estimate.likelihood.error_scale => {
+            let factor = scatter / estimate.likelihood.error_scale;
+            estimate.with_error_scale(factor, degrees_of_freedom, confidence)
+        }
+        _ => estimate,
+    }
+}
+
 /// Returns the checks of data and fit.
 pub(super) fn checks(data: &ElementData, estimate: &MachineEstimate) -> Vec<CheckRow> {
     let before =
@@ -316,11 +339,19 @@ pub(super) fn checks(data: &ElementData, estimate: &MachineEstimate) -> Vec<Chec
     findings.iter().map(row).collect()
 }
 
-fn notes_of(estimate: &MachineEstimate) -> impl Iterator<Item = ElementNote> {
+fn notes_of(estimate: &MachineEstimate, checks: &[CheckRow]) -> impl Iterator<Item = ElementNote> {
     let likelihood = &estimate.likelihood;
     let mut notes = Vec::new();
     if likelihood.error_scale > 1.0 {
-        notes.push(ElementNote::ScaledErrors { factor: likelihood.error_scale });
+        let is_cause = |check: &&CheckRow| {
+            matches!(check.finding, Finding::Misfit(_) | Finding::PartsAgreement(_))
+                && check.finding.verdict() != Verdict::Good
+        };
+        let mut causes: Vec<String> =
+            checks.iter().filter(is_cause).map(|check| check.subject.to_string()).collect();
+        causes.dedup();
+        let (factor, checks) = (likelihood.error_scale, causes.join(", "));
+        notes.push(ElementNote::ScaledErrors { factor, checks });
     }
     for parameter in &likelihood.parameters {
         let name = || parameter.name.clone();

@@ -72,7 +72,7 @@ fn a_weight_added_for_one_record_is_named_and_in_the_interval() {
     let parts = agreement(&found);
     assert!(parts.p_value.adjusted < 1e-6, "{found}");
     assert!(matches!(parts.part, DataPart::Records { .. }), "{found}");
-    assert_eq!(parts.parameter.matrix(), Matrix::Mass);
+    assert_eq!(parts.parameter, "m");
     let difference = (parts.by_part - parts.by_others).abs();
     assert!((difference / (0.02 * linear.mass) - 1.0).abs() < 0.2, "{found}");
     let scale = found.summary().fit.error_scale;

@@ -82,6 +82,7 @@ pub use parts::{
     Difference, OmittedTerm, OmittedTerms, Part, PartsComparison, PartsOfFit, Power, SampledRows,
     Split,
 };
+pub(crate) use parts::{Level, Scores, equal_bands};
 pub use sampled_force::equivalent_force;
 pub use structural_damping::{StructuralDamping, structural_damping};
 pub use whitened::Whitened;

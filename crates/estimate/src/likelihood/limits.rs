@@ -126,6 +126,14 @@ pub(super) const CONFIRMED: usize = 2;
 /// misfit shows whether the minimum is the correct one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 
+/// Number of degrees of freedom that stands for a noise level that is known exactly: with more,
+/// Fisher's distribution does not change.
+pub(super) const KNOWN_FREEDOM: f64 = 1e6;
+
+/// Maximum number of records of a fit that are compared with each other: the cost grows with the
+/// square of their number.
+pub(super) const COMPARED_RECORDS: usize = 16;
+
 /// Level of significance of the misfit of known noise below which standard errors and intervals are
 /// scaled by it: a correct model has wider intervals than necessary in one of a thousand fits.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;

@@ -361,6 +361,20 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
     }
 }
 
+impl<L> RecordResidual<'_, L> {
+    /// Removes from columns over all rows of the residual what the transient of this record
+    /// explains.
+    pub(super) fn remove_transient(&self, columns: &mut DMatrix<f64>) {
+        let Some((basis, _)) = &self.transient else { return };
+        let rows = |block: &Block<L>| columns.rows(block.first_row, block.residual.len()).into();
+        let mut parts: Vec<DMatrix<f64>> = self.blocks.iter().map(rows).collect();
+        basis.remove_from(&mut parts.iter_mut().collect::<Vec<_>>());
+        for (block, part) in self.blocks.iter().zip(&parts) {
+            columns.rows_mut(block.first_row, part.nrows()).copy_from(part);
+        }
+    }
+}
+
 impl<L> Block<L> {
     /// Returns L⁻¹e of a line of the block, with p entries.
     pub(super) fn white(&self, at: usize, p: usize) -> DVector<Complex<f64>> {

@@ -1,6 +1,5 @@
 //! Test that the parts of the data agree about the parameters.
 
-use mechid_model::Parameter;
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -30,12 +29,12 @@ pub struct PartsComparison {
 }
 
 /// Difference between a part of the data and the other parts in one parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
     /// The part.
     pub part: Part,
-    /// The parameter.
-    pub parameter: Parameter,
+    /// Name of the parameter.
+    pub parameter: String,
     /// Value from the part, in the unit of the parameter.
     pub by_part: f64,
     /// Value from the other parts, in the unit of the parameter.
@@ -45,21 +44,21 @@ pub struct Difference {
 }
 
 /// Scores of the parts of a linearised fit, and their covariance in units of the noise.
-struct Scores<'a> {
+pub(crate) struct Scores<'a> {
     /// Change of every parameter per unit of each column, parameters × columns.
-    root: &'a DMatrix<f64>,
+    pub(crate) root: &'a DMatrix<f64>,
     /// Values of the parameters, each in its unit.
-    values: &'a DVector<f64>,
+    pub(crate) values: &'a DVector<f64>,
     /// Change of the coefficients of Q by a change of the residual by D_p Q, for the selection D_p
     /// of the rows of every part p.
-    effects: Vec<DMatrix<f64>>,
+    pub(crate) effects: Vec<DMatrix<f64>>,
     /// Scores Qᵀ D_p e of the parts, one below the other, with the residual e.
-    scores: DVector<f64>,
-    covariance: DMatrix<f64>,
+    pub(crate) scores: DVector<f64>,
+    pub(crate) covariance: DMatrix<f64>,
 }
 
 /// Variance of the residual in units of the noise.
-enum Level {
+pub(crate) enum Level {
     /// Variance of the stated noise, times an `inflation` for sampled weights, with its degrees of
     /// freedom.
     Known { inflation: f64, degrees_of_freedom: f64 },
@@ -81,15 +80,6 @@ impl Level {
         };
         (rank > 0 && of_level >= 1.0 && level > 0.0).then_some((level, of_level))
     }
-}
-
-/// Result of [`Scores::compare`], with parts and parameters by their index.
-struct ScoreComparison {
-    ratio: f64,
-    degrees_of_freedom: usize,
-    p_value: f64,
-    error_scale: f64,
-    largest: Option<PartDifference>,
 }
 
 /// Difference between one part and the other parts in one parameter, in the unit of the parameter.
@@ -114,21 +104,34 @@ impl Scores<'_> {
         self.covariance.view((part * count, part * count), (count, count)).into_owned()
     }
 
-    /// Compares the scores with their covariance; `None` with too few residuals for an estimate of
-    /// the noise.
-    fn compare(&self, level: &Level) -> Option<ScoreComparison> {
+    /// Compares the scores of some `parts` with their covariance; `parameters` are the names. `None`
+    /// with too few residuals for an estimate of the noise.
+    pub(crate) fn compare(
+        &self,
+        level: &Level,
+        parts: &[Part],
+        parameters: &[String],
+    ) -> Option<PartsComparison> {
         let (squares, rank) = whitened_square(&self.covariance, &self.scores)?;
         let degrees = rank as f64;
         let (level, of_level) = level.without(squares, rank)?;
         let ratio = squares / (degrees * level);
         let law = FisherSnedecor::new(degrees, of_level).ok()?;
         let of_one = self.largest_scatter(level).unwrap_or(0.0);
-        Some(ScoreComparison {
+        let largest = self.largest_difference(level).map(|largest| Difference {
+            part: parts[largest.part],
+            parameter: parameters[largest.parameter].clone(),
+            by_part: largest.by_part,
+            by_others: largest.by_others,
+            standard_error: largest.standard_error,
+        });
+        Some(PartsComparison {
+            parts: parts.len(),
             ratio,
             degrees_of_freedom: rank,
             p_value: law.sf(ratio),
             error_scale: ratio.sqrt().max(of_one),
-            largest: self.largest_difference(level),
+            largest,
         })
     }
 
@@ -198,22 +201,8 @@ impl PartsOfFit<'_> {
     pub fn compare(&self, split: &Split) -> Option<PartsComparison> {
         let cuts = Cuts::new(self, split)?;
         let parts: Vec<Part> = cuts.parts().collect();
-        let comparison = self.scores(&cuts).compare(&self.noise_level())?;
-        let largest = comparison.largest.map(|largest| Difference {
-            part: parts[largest.part],
-            parameter: self.parameters[largest.parameter],
-            by_part: largest.by_part,
-            by_others: largest.by_others,
-            standard_error: largest.standard_error,
-        });
-        Some(PartsComparison {
-            parts: parts.len(),
-            ratio: comparison.ratio,
-            degrees_of_freedom: comparison.degrees_of_freedom,
-            p_value: comparison.p_value,
-            error_scale: comparison.error_scale,
-            largest,
-        })
+        let parameters: Vec<String> = self.parameters.iter().map(ToString::to_string).collect();
+        self.scores(&cuts).compare(&self.noise_level(), &parts, &parameters)
     }
 
     /// Returns how the variance of the residual is known.

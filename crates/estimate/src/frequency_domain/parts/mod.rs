@@ -21,7 +21,9 @@ use crate::{Estimate, Unknowns};
 use linearised::Linearised;
 
 pub use comparison::{Difference, PartsComparison};
+pub(crate) use comparison::{Level, Scores};
 pub use omitted::OmittedTerms;
+pub(crate) use split::equal_bands;
 pub use split::{Part, Split};
 pub use terms::{OmittedTerm, Power, SampledRows};
 

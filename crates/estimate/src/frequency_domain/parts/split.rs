@@ -111,11 +111,23 @@ impl Cuts {
 
 /// Returns bands of lines with the same information, the sum of the leverages of their residuals.
 fn bands(fit: &PartsOfFit<'_>) -> Vec<(Part, Cut)> {
-    let (omega, n) = (fit.data.omega(), fit.data.dof());
+    let n = fit.data.dof();
+    let leverage = |row: usize| fit.linear.basis.rows(2 * n * row, 2 * n).norm_squared();
+    let band = |(part, rows): (Part, Vec<usize>)| {
+        (part, Cut::Rows(rows.into_iter().map(|row| row..row + 1).collect()))
+    };
+    equal_bands(fit.data.omega(), leverage).into_iter().map(band).collect()
+}
+
+/// Divides lines at `omega` (rad/s) into bands with the same sum of the leverages; returns each
+/// band with its rows.
+pub(crate) fn equal_bands(
+    omega: &[f64],
+    leverage: impl Fn(usize) -> f64,
+) -> Vec<(Part, Vec<usize>)> {
     let mut rows: Vec<usize> = (0..omega.len()).collect();
     rows.sort_by(|a, b| omega[*a].total_cmp(&omega[*b]));
-    let leverage = |row: usize| fit.linear.basis.rows(2 * n * row, 2 * n).norm_squared();
-    let total = fit.linear.basis.norm_squared();
+    let total: f64 = rows.iter().map(|row| leverage(*row)).sum();
     let mut bands: Vec<Vec<usize>> = vec![Vec::new()];
     let (mut sum, mut last) = (0.0, f64::NAN);
     for row in rows {
@@ -130,7 +142,7 @@ fn bands(fit: &PartsOfFit<'_>) -> Vec<(Part, Cut)> {
     }
     let band = |rows: Vec<usize>| {
         let (first_hz, last_hz) = (omega[rows[0]] / TAU, omega[rows[rows.len() - 1]] / TAU);
-        (Part::Band { first_hz, last_hz }, Cut::Rows(rows.into_iter().map(|r| r..r + 1).collect()))
+        (Part::Band { first_hz, last_hz }, rows)
     };
     bands.into_iter().filter(|rows| !rows.is_empty()).map(band).collect()
 }

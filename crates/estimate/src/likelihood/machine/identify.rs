@@ -3,8 +3,11 @@
 use mechid_model::elements::{Assembly, Instruments, Machine};
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
+use super::parts::compared_parts;
 use super::{MachineModel, MeasuredPart};
+use crate::frequency_domain::PartsComparison;
 use crate::likelihood::delay_score::{DelayScore, delay_score};
 use crate::likelihood::estimate::LikelihoodEstimate;
 use crate::likelihood::fit::{ParameterSpace, fit};
@@ -41,6 +44,8 @@ pub struct MachineEstimate {
     /// is the identity minus Q Qᵀ: an orthonormal basis of the sensitivities, then what the errors
     /// of pulses explain.
     pub explained: DMatrix<f64>,
+    /// Comparisons of parts of the data: bands of lines, and records if there are several.
+    pub parts: Vec<PartsComparison>,
     /// Delay that explains most of the residual; `None` if the data do not determine any.
     pub delay: Option<DelayScore>,
     /// Part with a measured receptance.
@@ -48,6 +53,35 @@ pub struct MachineEstimate {
 }
 
 impl MachineEstimate {
+    /// Returns the same estimate with all standard errors multiplied by a factor (pure number) that
+    /// is known with some `degrees_of_freedom`. The intervals become wider accordingly, up to the
+    /// bounds of the parameters; `confidence` is their level, a probability.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227; Student's t for a factor from few differences.
+    #[must_use]
+    pub fn with_error_scale(
+        mut self,
+        factor: f64,
+        degrees_of_freedom: usize,
+        confidence: f64,
+    ) -> Self {
+        let end = 0.5 * (1.0 + confidence);
+        let students = StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64);
+        let quantile = students.map_or(f64::INFINITY, |law| law.inverse_cdf(end));
+        let wider = factor * quantile / Normal::standard().inverse_cdf(end);
+        self.likelihood.covariance *= factor * factor;
+        self.likelihood.error_scale *= factor;
+        let parameters = self.likelihood.parameters.iter_mut().zip(self.assembly.parameters());
+        for (parameter, described) in parameters {
+            let value = parameter.value;
+            let end = |end: f64| (value + (end - value) * wider).max(described.min);
+            parameter.interval = parameter.interval.map(|at| end(at).min(described.max));
+            parameter.standard_error = parameter.standard_error.map(|error| factor * error);
+        }
+        self
+    }
+
     /// Returns the same estimate with the squares of possible errors of the parameters, one for
     /// each in its unit, added to their covariance. The intervals become wider by the ratio of the
     /// standard errors, up to the bounds of the parameters.
@@ -181,10 +215,21 @@ fn identify(
     let delay = delay_score(&fit, &linearised, &known);
     let of_parameters = linearised.jacobian.rows(0, rows).into_owned().qr().q();
     let of_pulses = fit.residual().explained_by_pulses(parameters).ok_or_else(failed)?;
+    let parts = compared_parts(&fit, &linearised, &of_pulses, &names);
     let columns = of_parameters.column_iter().chain(of_pulses.column_iter());
     let explained = DMatrix::from_columns(&columns.collect::<Vec<_>>());
     let residual = linearised.residual.rows(0, rows).into_owned();
-    Ok(MachineEstimate { likelihood, assembly, variance, errors, residual, explained, delay, part })
+    Ok(MachineEstimate {
+        likelihood,
+        assembly,
+        variance,
+        errors,
+        residual,
+        explained,
+        parts,
+        delay,
+        part,
+    })
 }
 
 pub(super) fn parameter_space(assembly: &Assembly) -> ParameterSpace {

@@ -7,6 +7,7 @@ mod known;
 mod model;
 mod modes;
 mod nominal;
+mod parts;
 mod state_loads;
 mod system;
 #[cfg(test)]

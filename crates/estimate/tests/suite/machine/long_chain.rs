@@ -1,6 +1,6 @@
 //! A chain of forty masses in an open record, of which two springs and dampers are unknown.
 
-use mechid_estimate::likelihood::machine::identify_machine;
+use mechid_estimate::likelihood::machine::{MachineEstimate, identify_machine};
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
 use mechid_model::elements::{
     Coefficient, Element, FreeCoefficient, Input, Instruments, Machine, Sensor,
@@ -86,10 +86,13 @@ pub fn truth() -> Vec<(String, f64)> {
     UNKNOWN.iter().flat_map(of).collect()
 }
 
-pub fn fit(seed: u64) -> Option<LikelihoodEstimate> {
+pub fn estimate(seed: u64) -> Option<MachineEstimate> {
     let (machine, instruments) = machine();
-    let settings = Settings::default();
-    Some(identify_machine(&data(seed), &machine, &instruments, &settings).ok()?.likelihood)
+    identify_machine(&data(seed), &machine, &instruments, &Settings::default()).ok()
+}
+
+pub fn fit(seed: u64) -> Option<LikelihoodEstimate> {
+    Some(estimate(seed)?.likelihood)
 }
 
 #[test]
