@@ -28,7 +28,7 @@ pub enum AnalysisError {
          \"candidates\" of the description show what a measurement would add"
     )]
     Undetermined {
-        /// Unknowns and the determined combinations, a sentence each.
+        /// Unknowns, and the combinations that the data determine, a sentence each.
         combinations: String,
     },
     /// No modes can be identified from the responses alone.
@@ -668,7 +668,7 @@ impl AnalysisError {
     /// assert_eq!(Machine::read("no-such-file").unwrap_err().code(), "io.read");
     /// ```
     pub fn code(&self) -> String {
-        // A derived `Debug` writes a variant that wraps another with the inner one in parentheses.
+        // A derived `Debug` writes a wrapped variant in parentheses after its outer variant.
         let written = format!("{self:?}");
         let (mut rest, mut names) = (written.as_str(), vec!["Analysis"]);
         loop {
@@ -694,7 +694,7 @@ impl AnalysisError {
     }
 }
 
-/// Returns the part of the library named in the code of a failure: codes are unchanged when a
+/// Returns the part of the library that the code of a failure names. The code stays the same when a
 /// failure moves to another crate.
 fn part_of_library<'a>(part: &'a str, name: &str) -> &'a str {
     match (part, name) {
@@ -741,7 +741,7 @@ fn unclear_time(unclear: Option<&(String, String)>) -> String {
     })
 }
 
-/// Returns advice for a response among the forces.
+/// Returns advice if a response is named as a force, otherwise an empty text.
 fn support_advice(measures: Quantity, wanted: Quantity) -> &'static str {
     if wanted == Quantity::Force && matches!(measures, Quantity::Response(_)) {
         return "; the motion of a support is an input of a machine of named elements (`machine`)";

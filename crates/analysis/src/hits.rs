@@ -203,12 +203,12 @@ pub(crate) struct HitNoise {
     pub pulses: Vec<Range<usize>>,
 }
 
-/// Windows of consecutive good hits without a gap.
+/// Treatment of consecutive good hits whose windows have no gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Windows {
-    /// Each is a record.
+    /// Each window is a record.
     Separate,
-    /// They are one record: the motion at the end of a window is that at the beginning of the next.
+    /// The windows are one record: the motion continues from one window to the next.
     Joined,
 }
 
@@ -275,8 +275,8 @@ pub(crate) fn cut(
     Ok(cut)
 }
 
-/// Returns the samples of a window with the force of hits, one range for each; hits whose contacts
-/// overlap have one range.
+/// Returns the samples of a window on which the force of hits acts, one range for each hit. Hits
+/// whose contacts overlap have a common range.
 fn pulses_of(hits: &[Hit], window: &Range<usize>) -> Vec<Range<usize>> {
     let mut pulses: Vec<Range<usize>> = Vec::new();
     for hit in hits {
@@ -291,7 +291,7 @@ fn pulses_of(hits: &[Hit], window: &Range<usize>) -> Vec<Range<usize>> {
     pulses
 }
 
-/// Returns the ranges of good hits that make one record each.
+/// Returns the ranges of good hits; the hits of a range become one record.
 fn pieces(all: &[Hit], windows: Windows) -> Vec<Range<usize>> {
     let follows = |a: &Hit, b: &Hit| {
         let both_good = a.faults.is_empty() && b.faults.is_empty();

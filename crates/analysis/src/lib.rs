@@ -44,7 +44,7 @@
 //!
 //! Settings are plain structs with defaults, which `serde` saves and reads; every result contains
 //! its settings and implements [`Display`](std::fmt::Display).
-// Feature badges on docs.rs, which sets this.
+// docs.rs sets `docsrs`, which turns on the badges of features.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod batch;

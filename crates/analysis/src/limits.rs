@@ -50,9 +50,9 @@ pub const LEAST_EXPLAINED: f64 = 0.5;
 /// longest record is divided instead.
 pub const SMALLER_HALF: f64 = 0.25;
 
-/// Number of modes of an ambient record within one half-width at which a peak of the unmeasured
-/// forces is suspected. Two are a close pair, as of a symmetric tower; a force with a peak gives
-/// one mode for each independent force.
+/// Minimum number of modes of an ambient record within one half-width for a suspected peak of the
+/// unmeasured forces. Two modes may be a close pair, as of a symmetric tower; a force with a peak
+/// gives one mode for each independent force.
 pub const CROWDED_MODES: usize = 3;
 
 /// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest
@@ -152,7 +152,8 @@ pub const ACQUISITION_ROUNDS: usize = 8;
 /// linear between its samples.
 pub const ACQUISITION_SETTLED: f64 = 0.02;
 
-/// Maximum number of effects of the noise of pulses that the fit of a machine holds for hits
-/// without a gap as one record, 256 MiB; with more, every hit is a record with its own transient,
-/// which costs up to half of the information about light damping.
+/// Maximum number of effects of the noise of pulses (lines × patterns × outputs, real and imaginary
+/// parts) that the fit of a machine stores if hits without a gap are one record: 256 MiB. With
+/// more, every hit is a record with its own transient, which costs up to half of the information
+/// about light damping.
 pub(crate) const PULSE_EFFECTS: usize = 1 << 25;

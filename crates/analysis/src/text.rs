@@ -88,7 +88,7 @@ pub fn compact(value: f64, digits: usize) -> String {
     }
 }
 
-/// Returns lines after an empty one; an empty text without lines.
+/// Returns an empty line followed by the lines; an empty text if there are no lines.
 pub fn paragraph(lines: impl Iterator<Item = String>) -> String {
     let lines: String = lines.map(|line| line + "\n").collect();
     if lines.is_empty() { lines } else { format!("\n{lines}") }

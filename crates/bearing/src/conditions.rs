@@ -41,10 +41,10 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// L / D, a ratio.
+    /// Ratio L / D of length to diameter.
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] naming the one that is not positive and finite.
+    /// [`BearingError::Parameter`] naming the value that is not positive and finite.
     pub fn length_over_diameter(&self) -> Result<f64, BearingError> {
         self.check()?;
         Ok(self.length / self.diameter)

@@ -286,9 +286,9 @@ pub fn forces_between_samples(
 
 /// Finds AC coupling that explains the residual of a maximum-likelihood `fit` to hits
 /// ([`Finding::Alternative`]). `records` are the data of the fit, sampled every `dt` (s), `closed`
-/// those without the transients, and `after` the residuals. `None` unless the tests of the residual
-/// warn, and without the AC coupling they pass or at most a quarter of the power remains: a short
-/// force hardly shows whether the residual is correlated with it.
+/// are the data without the transients, and `after` are the residuals. `None` unless the tests of
+/// the residual warn, and without the AC coupling they pass or at most a quarter of the power
+/// remains. A short force hardly shows whether the residual is correlated with it.
 ///
 /// # Source
 /// Rao's score test; maximum likelihood with new transients for the corner frequency.

@@ -124,9 +124,9 @@ pub fn delay_of_open_records(
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the
-/// dynamic stiffness of the estimate without a delay: under Hann's window, which reduces the
-/// leakage of a lasting force, or without a window, which would weight a hit otherwise than its
-/// response.
+/// dynamic stiffness of the estimate without a delay. The lines are either under Hann's window,
+/// which reduces the leakage of a lasting force, or without a window, because a window would weight
+/// a hit differently from its response.
 fn delay_of_either_window(
     data: &FrequencyData,
     dt: f64,
@@ -168,7 +168,7 @@ pub fn delay_of_responses(
     unknowns: &Unknowns,
     estimate: &Estimate,
 ) -> Option<f64> {
-    // The sampling interval with the highest line as Nyquist frequency.
+    // The sampling interval is the one whose Nyquist frequency is the highest line.
     let dt = PI / data.omega().iter().copied().fold(0.0, f64::max);
     Some(dt * delay_weighted(data, dt, unknowns, estimate)?.0)
 }

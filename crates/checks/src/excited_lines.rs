@@ -21,14 +21,14 @@ pub struct ExcitedLines {
     pub unknowns: usize,
 }
 
-/// Largest number of unknowns in an equation of motion.
+/// Returns the largest number of unknowns in an equation of motion.
 pub(super) fn unknowns_of_an_equation(unknowns: &Unknowns) -> usize {
     let free = unknowns.free();
     let count_of = |equation| free.iter().filter(|p| p.row() == equation).count();
     (0..unknowns.dof()).map(count_of).max().unwrap_or(0)
 }
 
-/// Number of lines with force, compared with the number of unknowns.
+/// Compares the number of lines with force with the number of unknowns.
 pub(super) fn excitation(data: &FrequencyData, unknowns: &Unknowns) -> Finding {
     let force = data.force();
     let floor: Vec<f64> =

@@ -31,8 +31,8 @@ pub(crate) trait Check {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result;
 }
 
-/// Declares the findings: a variant for each check, of the struct of the same name in the file of
-/// the check.
+/// Declares the findings: one variant for each check. The variant contains the struct of the same
+/// name from the file of the check.
 macro_rules! findings {
     ($($(#[$doc:meta])* $name:ident in $file:ident,)*) => {
         /// Result of one check, with its numbers; [`Display`](std::fmt::Display) gives one
@@ -92,9 +92,9 @@ findings! {
     Leakage in leakage,
     /// Text in the header of a column that may be a unit.
     Unit in unit,
-    /// Time column without a unit, whose numbers are hardly seconds.
+    /// Time column without a unit, whose numbers are probably not in seconds.
     TimeUnit in unit,
-    /// A channel was cut off by an amplifier or a converter.
+    /// An amplifier or a converter has clipped a channel.
     Clipping in clipping,
     /// A channel has the same value in all samples.
     ConstantChannel in constant_channel,
@@ -102,7 +102,7 @@ findings! {
     RepeatedChannel in repeated_channel,
     /// Every value of a frequency response is real and positive.
     ConstantPhase in constant_phase,
-    /// A channel has a few equally spaced values only.
+    /// A channel has only a few equally spaced values.
     Quantisation in quantisation,
     /// One sample of a channel is far outside its neighbours.
     Spike in spike,
@@ -133,7 +133,7 @@ findings! {
     Misfit in misfit,
     /// Term that the model omits and that the residual indicates.
     TermLeftOut in omitted,
-    /// Nonlinear terms that a fit with others lacks.
+    /// Nonlinear terms that are missing from a fit with other nonlinear terms.
     NonlinearTermsLeftOut in omitted,
     /// Agreement between parts of the data.
     PartsAgreement in parts,

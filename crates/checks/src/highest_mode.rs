@@ -58,8 +58,9 @@ pub enum ModeLimit {
     },
 }
 
-/// Returns the natural frequency (Hz) of the highest oscillating mode and its samples per period;
-/// the geometric mean of all if no mode oscillates: fast decays need not be resolved.
+/// Returns the natural frequency (Hz) of the highest oscillating mode and its samples per period.
+/// If no mode oscillates, it is the geometric mean of all natural frequencies, because fast decays
+/// need not be resolved.
 pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 2], EstimateError> {
     let modes = system.modes()?;
     let oscillating = modes.iter().filter(|mode| mode.oscillates());

@@ -16,8 +16,8 @@ use super::{Subject, Verdict};
 ///
 /// The p-value is the probability that the estimate of a neutrally stable system grows by as many
 /// standard errors in any mode: the one-sided probability of Student's t distribution, times the
-/// number of modes. For a pair of real eigenvalues, one of them positive, their product is tested,
-/// the ratio of stiffness to mass.
+/// number of modes. If one eigenvalue of a real pair is positive, the test uses the product of the
+/// pair, which is the ratio of stiffness to mass.
 pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
     let grows = |mode: &&IdentifiedMode| {

@@ -14,9 +14,9 @@ use super::limits::STANDARD_ERRORS;
 use super::{Subject, Verdict};
 
 /// Finds the channels with one response quantity that does not change as another predicts
-/// ([`Finding::Kinematics`]): units (mm/s for m/s), interchanged columns or a sign. Checks each
-/// pair of displacement (m), velocity (m/s) and acceleration (m/s²) that is measured, in that
-/// order.
+/// ([`Finding::Kinematics`]): a wrong unit (mm/s for m/s), interchanged columns or a wrong sign.
+/// Checks each pair of displacement (m), velocity (m/s) and acceleration (m/s²) that is measured,
+/// in that order.
 ///
 /// # Errors
 /// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if

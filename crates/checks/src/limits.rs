@@ -7,8 +7,8 @@ pub const SIGNIFICANCE: f64 = 0.01;
 /// Minimum share of the residual power beyond the noise that a few lines must have to be reported.
 pub const CONCENTRATED: f64 = 0.8;
 
-/// Maximum ratio of residual power to noise power on all other lines, for the model to count as
-/// right there.
+/// Maximum ratio of residual power to noise power on all lines except the few with most of the
+/// misfit, for the model to count as correct on these other lines.
 pub const DISTURBED_ALONE: f64 = 10.0;
 
 /// Minimum share of the residual power of a linear model that a reported nonlinear term explains.
@@ -151,8 +151,8 @@ pub(crate) const HARDLY_FOLLOWS: f64 = 0.25;
 /// Number of reductions of the interval around the best delay, each to two thirds.
 pub(crate) const DELAY_REDUCTIONS: usize = 24;
 
-/// Maximum delay of the equations of motion, in samples, at which the search by maximum likelihood
-/// starts from the fit without a delay.
+/// Maximum delay from the equations of motion, in samples, at which the search by maximum
+/// likelihood starts from the fit without a delay.
 pub(crate) const DELAY_NEAR: f64 = 0.5;
 
 /// Half width of the first parabola through the sums of squares around a delay, in samples.
@@ -161,7 +161,7 @@ pub(crate) const DELAY_REACH: f64 = 0.25;
 /// Maximum number of parabolic steps in the search for a delay or a corner frequency.
 pub(crate) const PARABOLAS: usize = 8;
 
-/// Minimum ratio of successive parabola widths in these searches.
+/// Minimum ratio of successive parabola widths in the search for a delay or a corner frequency.
 pub(crate) const LEAST_PART: f64 = 0.1;
 
 /// Parabola width, in samples, that ends the search for a delay.
@@ -182,7 +182,7 @@ pub(crate) const LINEARITY_SENSITIVITIES: usize = 1 << 22;
 /// Number of lines on either side in the averages of a residual spectrum.
 pub(crate) const LINEARITY_NEIGHBOURS: usize = 10;
 
-/// Mismatch relative to the RMS of the force, above which it does not repeat.
+/// Mismatch above which a force does not repeat, relative to its RMS.
 pub(crate) const PERIOD_WORST: f64 = 0.1;
 
 /// Maximum ratio between squared mismatches of lags at which the force repeats equally well.
@@ -194,8 +194,7 @@ pub(crate) const PERIOD_ROUNDING: f64 = 1e-12;
 /// Maximum difference in length between a claimed and a neighbouring period, in samples.
 pub(crate) const PERIOD_NEIGHBOURS: usize = 2;
 
-/// Mismatch relative to the RMS of the force, above which it does not repeat, even with noise on
-/// it.
+/// Mismatch above which a force does not repeat, even with noise on the force, relative to its RMS.
 pub(crate) const PERIOD_REPEATS: f64 = 0.5;
 
 /// Minimum reduction of the squared mismatch, relative to its scatter, for a neighbouring period to

@@ -74,7 +74,7 @@ pub fn omitted_term(
     Some((finding, omitted))
 }
 
-/// Nonlinear terms that a fit with others lacks.
+/// Nonlinear terms that are missing from a fit with other nonlinear terms.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct NonlinearTermsLeftOut {

@@ -8,9 +8,9 @@ use super::limits::{LEAST_PART, PARABOLAS};
 use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::after_spectral_fit;
 
-/// Returns the residuals of a new maximum-likelihood fit to all changed records together, which
-/// begins at the last estimate of `likelihood`, without the errors of their pulses and without
-/// their transients; `None` if the fit fails.
+/// Returns the residuals of a new maximum-likelihood fit to all changed records together. The fit
+/// begins at the last estimate of `likelihood`; the errors of the pulses and the transients are
+/// subtracted from the records. `None` if the fit fails.
 pub(super) fn residuals_of_fit(
     records: &[FrequencyData],
     likelihood: &ChangedRecords<'_>,
@@ -27,9 +27,9 @@ pub(super) fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
     following.iter().try_fold(first.clone(), |joined, record| joined.and(record)).ok()
 }
 
-/// Returns the place of the minimum of a `cost` near `start` and the cost there, by parabolas whose
-/// half width falls from the first of `widths` to the last; `None` if a cost does not exist or no
-/// longer `promises` an explanation.
+/// Returns the position of the minimum of a `cost` near `start`, and the cost there. The search
+/// uses parabolas with a half width that decreases from the first of `widths` to the last. `None`
+/// if a cost does not exist or if `promises` rejects a cost.
 pub(super) fn minimum_near(
     start: f64,
     widths: [f64; 2],

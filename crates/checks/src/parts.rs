@@ -63,7 +63,7 @@ pub enum DataPart {
         /// Highest line, in Hz.
         last_hz: f64,
     },
-    /// Stretch of an open record.
+    /// Section of an open record.
     Time {
         /// First sample.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]

@@ -81,7 +81,7 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
 /// relative to √2 times the RMS of the force.
 fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let pairs = channels[0].len().checked_sub(period)?;
-    // One period at least outside the stretch must be comparable with the next one.
+    // At least one period outside the stretch must be comparable with the next period.
     if pairs < 2 * period {
         return None;
     }
@@ -98,7 +98,7 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let within = |first: usize| (sums[first + period] - sums[first]) / period as f64;
     let stretches = 0..=pairs - period;
     let worst = stretches.max_by(|a, b| within(*a).total_cmp(&within(*b)))?;
-    // A new sum: the difference of large sums would be rounding.
+    // The sum is computed again, because the difference of large sums would be rounding.
     let outside: f64 = squares[..worst].iter().chain(&squares[worst + period..]).sum();
     let outside = outside / (pairs - period) as f64;
     if within(worst) <= PERIOD_WORST * PERIOD_WORST
@@ -116,7 +116,7 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
 /// not a multiple of it and repeats less well.
 fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let squares = squared_mismatches(channels);
-    // Excludes the first lags, at which a slow force resembles itself.
+    // The search excludes the first lags, at which a slow force resembles itself.
     let apart = (1..squares.len()).find(|lag| squares[*lag] > PERIOD_WORST * PERIOD_WORST)?;
     let best = squares[apart..].iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
     let repeats_equally = |lag: &usize| squares[*lag] <= PERIOD_ALIKE * best + PERIOD_ROUNDING;

@@ -163,7 +163,7 @@ impl<'a> Series<'a> {
     }
 
     /// Returns the correlation Σ r̄(n) r(n + d) at distances d that the window does not correlate,
-    /// and the smallest of them; `None` if there are too few lines.
+    /// and the smallest of these distances; `None` if there are too few lines.
     fn line_to_line(&self, residual: &[Complex<f64>]) -> Option<(Correlation, usize)> {
         let (count, first) = (residual.len() as f64, self.correlation.len());
         let distances: Vec<usize> = (first..self.lines.len() / LINES_PER_DISTANCE)

@@ -37,7 +37,7 @@ pub struct SpectralResidual {
     /// QᵀΣQ with the squares Σ of those deviations.
     explained_spread: DMatrix<f64>,
     /// Forces, rows × n, without the part of their noise that the residual shows: the residual of a
-    /// right model is correlated with this part, too.
+    /// correct model is also correlated with this part.
     force: DMatrix<Complex<f64>>,
     rounding: bool,
     /// Ratio of residual power to noise power on the lines where force noise dominates, and the
@@ -386,7 +386,8 @@ impl SpectralResidual {
     }
 }
 
-/// Standard deviation of every residual before the fit of the parameters, from its own size.
+/// Returns the standard deviation of every residual before the fit of the parameters, from its own
+/// size.
 fn deviations(values: &DVector<f64>, explained: &DMatrix<f64>) -> DVector<f64> {
     let leverage = |row: usize| explained.row(row).norm_squared();
     let mut deviations = DVector::zeros(values.len());

@@ -24,8 +24,8 @@ pub struct Unrelated {
 /// `unexplained` (ratio of RMS values), of a fit of `unknowns` parameters to `equations` real
 /// equations (each of one degree of freedom); `None` if the response follows.
 ///
-/// F test of the regression, times the number of lines: a fit can place the resonance at any of
-/// them.
+/// The p-value is that of the F test of the regression, times the number of lines, because a fit
+/// can place the resonance at any of them.
 ///
 /// # Source
 /// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1; Bonferroni's bound.

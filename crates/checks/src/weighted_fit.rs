@@ -414,9 +414,10 @@ fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(
     Some(residuals)
 }
 
-/// Returns the ratio of residual power to noise power on the lines where force noise dominates, and
-/// the probability of a ratio as small times the number of channels, for the channel with the
-/// smallest probability. `None` if no force noise is stated, or if it dominates on too few lines.
+/// Returns two values for the channel with the smallest probability: the ratio of residual power to
+/// noise power on the lines where force noise dominates, and the probability of a ratio as small,
+/// times the number of channels. `None` if no force noise is stated, or if it dominates on too few
+/// lines.
 fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
     if data.force_variance().iter().all(|variance| *variance == 0.0) {
         return None;
@@ -487,8 +488,8 @@ fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
             column /= length;
         }
     }
-    // The inverse of the triangular factor suffices without dependent parameters, in a fraction of
-    // the time.
+    // If no parameters are dependent, the inverse of the triangular factor suffices, and takes a
+    // fraction of the time.
     if let Some(inverse) = r.solve_upper_triangular(&DMatrix::identity(parameters, parameters))
         && r.norm() * inverse.norm() * FIT_RANK < 1.0
     {

@@ -45,10 +45,10 @@ pub enum CliError {
     MisplacedOption {
         /// The option.
         option: &'static str,
-        /// Reason for which it does not belong there.
+        /// Reason why the option is not allowed there.
         why: &'static str,
     },
-    /// A time-stepping scheme refuses.
+    /// A time-stepping scheme fails.
     #[error(transparent)]
     Integrate(#[from] mechid::integrate::IntegrateError),
     /// The simulation failed.
@@ -60,7 +60,7 @@ pub enum CliError {
          --periods or --inputs"
     )]
     RecordSize {
-        /// Samples times columns.
+        /// Numbers in the record: samples times columns.
         numbers: usize,
         /// The limit.
         largest: usize,

@@ -24,8 +24,8 @@ mod signals {
 
     /// Removes unfinished outputs when a signal ends the program.
     pub fn watch() {
-        // If no handler can be installed, such a file remains until the same output is written
-        // again.
+        // If no handler can be installed, an unfinished file remains until the same output is
+        // written again.
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         std::thread::spawn(move || {
             for signal in signals.forever() {

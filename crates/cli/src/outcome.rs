@@ -130,7 +130,8 @@ impl Outcome {
         self.with_drawing(path, &figure.to_svg()?, || page(figure, words))
     }
 
-    /// Adds a drawing in the format that the ending of the file names, or its page.
+    /// Adds a drawing in the format that the ending of the file names: PNG, an HTML page, or
+    /// otherwise SVG.
     pub fn with_drawing(
         self,
         path: &Path,
@@ -180,8 +181,9 @@ impl Outcome {
         }
     }
 
-    /// Writes the files, all or none, and prints the report; on the error stream if a file goes to
-    /// standard output, so that the reader there receives only the file.
+    /// Writes all files or none, and prints the report. If a file goes to standard output, the
+    /// report goes to the error stream, so that the reader of standard output receives only the
+    /// file.
     ///
     /// `spelled` replaces the names of settings in the report by options.
     pub fn deliver(

@@ -21,8 +21,8 @@ const TICK: Duration = Duration::from_millis(100);
 
 static PROGRESS: Progress = Progress { parts: Mutex::new([String::new(), String::new()]) };
 
-/// Progress from the log messages of the crates of this workspace: a part of the work at
-/// [`Level::Debug`], and the progress of this part at [`Level::Trace`].
+/// Current part of the work and its progress, from the log messages of the crates of this
+/// workspace: [`Level::Debug`] names the part, [`Level::Trace`] reports its progress.
 struct Progress {
     parts: Mutex<[String; 2]>,
 }
@@ -61,8 +61,8 @@ fn spinner() -> ProgressBar {
     ProgressBar::new_spinner().with_style(style.expect("the template is written correctly"))
 }
 
-/// Does some work and shows its progress if it takes long: on one line that changes at a terminal,
-/// as a line every [`LINE`] elsewhere.
+/// Does some work and shows its progress if it takes long. At a terminal, the progress is one line
+/// that changes; elsewhere it is a new line every [`LINE`].
 pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     // An existing logger is kept: a caller of the library may have set one.
     if log::set_logger(&PROGRESS).is_ok() {

@@ -14,9 +14,10 @@ const WORD: &str = "fleet-worker";
 /// Program and arguments of a worker process.
 static PROGRAM: OnceLock<(PathBuf, Vec<OsString>)> = OnceLock::new();
 
-/// Sets the program, and its arguments before the word `fleet-worker`, of the worker processes of
-/// `mechid fleet`: one that calls [`run`](crate::run) with its arguments. If it is not set, the
-/// records are identified in the calling process, which a faulty record can end.
+/// Sets the program that `mechid fleet` starts as worker processes, and the arguments that it gets
+/// before the word `fleet-worker`. This program must call [`run`](crate::run) with its arguments.
+/// If no program is set, the records are identified in the calling process, and a faulty record can
+/// end that process.
 pub fn set_worker_program(program: impl Into<PathBuf>, arguments: &[&str]) {
     let words = arguments.iter().copied().chain([WORD]).map(OsString::from);
     let _ = PROGRAM.set((program.into(), words.collect()));

@@ -16,7 +16,8 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
 
-/// Returns x, ẋ and ẍ of a displacement (m) recorded over whole periods: its lines times iω.
+/// Returns x, ẋ and ẍ of a displacement (m) recorded over whole periods; each derivative multiplies
+/// the lines by iω.
 ///
 /// At the Nyquist frequency (records of even length) the velocity is zero at every sample.
 ///

@@ -12,7 +12,7 @@ use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
 use crate::relations::Relations;
 use crate::{EstimateError, Unknowns};
 
-/// M̂, Ĉ, K̂ with the covariance of what was estimated.
+/// M̂, Ĉ, K̂ with the covariance of the estimated entries.
 ///
 /// The standard errors assume a correct model and exact regressors: they describe the scatter
 /// between repeated experiments, not the bias of an estimator.
@@ -64,8 +64,8 @@ pub struct Estimated {
 pub struct Undetermined {
     /// Ratio of its singular value to that of the best determined combination.
     pub relative_singular_value: f64,
-    /// Parameters and the weight of each, in its unit: the data fit as well with any multiple of
-    /// all weights added to the parameters.
+    /// Parameters and the weight of each, in its unit. If all weights times any common factor are
+    /// added to the parameters, the data fit equally well.
     pub terms: Vec<(Parameter, f64)>,
 }
 
@@ -345,8 +345,8 @@ impl Estimate {
     /// reconstruction.
     ///
     /// # Errors
-    /// As [`Estimate::system`]; [`EstimateError::Model`] if the covariance is not finite, as with
-    /// as many unknowns as equations.
+    /// As [`Estimate::system`]; [`EstimateError::Model`] if the covariance is not finite, for
+    /// example with as many unknowns as equations.
     pub fn uncertain_system(&self) -> Result<UncertainSystem, EstimateError> {
         let covariance = self.covariance();
         Ok(UncertainSystem::new(self.system()?, self.parameters.clone(), covariance)?)

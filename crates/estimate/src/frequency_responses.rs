@@ -18,8 +18,8 @@ pub struct ResponseEstimate {
     pub fit: OutputErrorFit,
     /// Fitted responses of each record: the measured ones, corrected for the bias of their window.
     pub responses: Vec<Frf>,
-    /// Largest change of a parameter by the correction of the window bias, in its standard errors
-    /// (pure number); zero if the window has no bias.
+    /// Largest change of a parameter due to the correction of the window bias, in standard errors
+    /// of this parameter (pure number); zero if the window has no bias.
     pub blunted: f64,
     /// True if the alternation between the correction and the parameters converged.
     pub settled: bool,
@@ -150,7 +150,7 @@ impl Sharpening<'_> {
     }
 }
 
-/// Concatenates the responses of all records to the data of one fit.
+/// Concatenates the responses of all records into the data of one fit.
 fn joined(
     records: &[(Frf, Vec<usize>)],
     responses: &[Frf],
@@ -199,16 +199,16 @@ impl Errors {
         DVector::from_iterator(self.root.nrows(), self.root.row_iter().map(|row| row.norm()))
     }
 
-    /// Returns the covariance of the parameters, and the fewest degrees of freedom of their
-    /// variances.
+    /// Returns the covariance of the parameters, and the smallest number of degrees of freedom of
+    /// their variances.
     fn covariance(&self, records: &[(Frf, Vec<usize>)]) -> (DMatrix<f64>, usize) {
         covariance_of_errors(records, self.dof, &(&self.q * self.root.transpose()))
     }
 }
 
-/// Returns the covariance of the sums Σ b e over the weighted errors e of averaged responses of
-/// `dof` outputs, one for each column b of `influence`, and the fewest degrees of freedom of their
-/// variances.
+/// Returns the covariance of sums Σ b e over the weighted errors e of averaged responses of `dof`
+/// outputs, and the smallest number of degrees of freedom of their variances. There is one sum for
+/// each column b of `influence`.
 pub(crate) fn covariance_of_errors(
     records: &[(Frf, Vec<usize>)],
     dof: usize,

@@ -11,8 +11,8 @@ pub(crate) const DELAY_STEPS: usize = 30;
 /// Maximum number of Gauss–Newton steps of the first search by maximum likelihood.
 pub(crate) const SEARCH_STEPS: usize = 200;
 
-/// Maximum number of Gauss–Newton steps of each search after the first one, which confirms its
-/// minimum.
+/// Maximum number of Gauss–Newton steps of each search after the first one; these searches confirm
+/// the minimum of the first.
 pub(crate) const STEPS_MORE: usize = 60;
 
 /// Maximum number of Gauss–Newton steps in resampled data, where the search need not converge.
@@ -24,8 +24,9 @@ pub(crate) const THIN_LINES: usize = 20;
 /// Largest ratio of the number of all lines to that on which searches after the first one begin.
 pub(crate) const THIN_STEP: usize = 10;
 
-/// Largest ratio of the sum of squares at the end of a search on fewer lines to that of the best
-/// minimum for the search to continue on all lines: on fewer lines the minima differ a little.
+/// Largest ratio of the sum of squares at the end of a search on fewer lines to the sum of squares
+/// of the best minimum on these lines; above it the search does not continue on all lines. The
+/// ratio is above 1 because the minima differ a little on fewer lines.
 pub(crate) const THIN_NEAR: f64 = 2.0;
 
 /// Largest relative difference of the sums of squares of two searches that count as one minimum.
@@ -91,8 +92,8 @@ pub(crate) const MAX_PARTS: usize = 1 << 24;
 /// lines; in larger fits the errors of the lines are assumed to be independent.
 pub(crate) const MAX_SENSITIVITIES: usize = 1 << 22;
 
-/// Number of partial sums of the products of the effects of pulses. It limits their memory, and is
-/// the same for any number of threads, so that the result is, too.
+/// Number of partial sums of the products of the effects of pulses. It limits the memory of the
+/// sums. It is the same for any number of threads, so that the result is the same, too.
 pub(crate) const PULSE_SUMS: usize = 8;
 
 /// Maximum number of effects of the errors of pulses on the residuals, and of sensitivities of such
@@ -105,7 +106,7 @@ pub(crate) const MAX_PULSE_EFFECTS: usize = 1 << 24;
 pub(crate) const PULSE_ROUNDS: usize = 8;
 
 /// Change of the amplitudes of pulse errors, in standard deviations of the stated noise, that ends
-/// these rounds.
+/// the rounds of the errors of pulses and the fit.
 pub(crate) const PULSE_SETTLED: f64 = 0.02;
 
 /// Relative change of the noise levels that ends the rounds of weighting.
@@ -184,12 +185,13 @@ pub(crate) const PARTS: usize = 4;
 /// data, below which the part does not determine the combination.
 pub(crate) const PART_INFORMS: f64 = 1e-9;
 
-/// Largest distance of lines whose errors a window correlates, Hann's, the usual one of analysers.
+/// Largest distance, in lines, between lines whose errors are correlated by Hann's window, the
+/// usual window of analysers.
 pub(crate) const CORRELATED_DISTANCES: usize = 2;
 
 /// p-value below which the errors of neighbouring lines of a table are correlated.
 pub(crate) const CORRELATED_LINES: f64 = 0.01;
 
-/// Largest deviation of a distance of lines from a multiple of the smallest one, in steps: the
-/// rounding of a file.
+/// Largest deviation of the distance between two lines from a multiple of the smallest distance, in
+/// units of the smallest distance. It allows for the rounding of numbers in a file.
 pub(crate) const LINE_STEP: f64 = 0.01;

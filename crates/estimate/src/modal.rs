@@ -268,7 +268,8 @@ struct Value {
 }
 
 /// Returns the modulus (rad/s) and the damping ratio of a mode from the `sum` and the product
-/// (`square`) of its eigenvalue and the partner; `gradient` belongs to the eigenvalue.
+/// (`square`) of two eigenvalues, of the mode and of its partner; `gradient` belongs to the
+/// eigenvalue of the mode.
 fn modulus_and_damping(
     mode: &Mode,
     gradient: &DVector<Complex<f64>>,
@@ -297,7 +298,8 @@ fn modulus_and_damping(
 struct Sensitivity {
     /// Derivative of λ with respect to each parameter.
     eigenvalue: DVector<Complex<f64>>,
-    /// Derivative of the equation of motion of each parameter with respect to it, at fixed λ.
+    /// Derivative of each parameter's equation of motion with respect to this parameter, at fixed
+    /// λ.
     push: Vec<Complex<f64>>,
     /// Matrix U of dφ = −U f for changes f of the equations of motion, n×n.
     answers: DMatrix<Complex<f64>>,

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::limits::PULSE_SUMS;
 
-/// Covariance I + P Pᵀ of the weighted errors of a record, with the weighted effects P of the
-/// amplitudes of its pulse errors in blocks of rows.
+/// Covariance I + P Pᵀ of the weighted errors of a record. The columns of P are the weighted
+/// effects of the amplitudes of its pulse errors; P is stored in blocks of rows.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 2.1.4 (formula of Sherman,
@@ -37,8 +37,8 @@ impl PulseCovariance {
     }
 
     /// Replaces the columns v of a matrix, in blocks of rows, by v − P b with (I + PᵀP) b = Pᵀv,
-    /// and returns b. With b as further rows, the products of two such columns are those of the
-    /// columns before with the inverse of the covariance.
+    /// and returns b. If b is appended to each column as further rows, the product of two new
+    /// columns is v₁ᵀ(I + P Pᵀ)⁻¹v₂ for the original columns v₁ and v₂.
     pub(crate) fn whiten(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
         let columns = parts.first().map_or(0, |part| part.ncols());
         let pairs = self.effects.par_iter().zip(parts.par_iter());
@@ -69,8 +69,8 @@ impl PulseCovariance {
         self.effects.par_iter().map(columns).collect()
     }
 
-    /// Returns the number of amplitudes that the lines determine, each counted by the share of the
-    /// information about it that they have.
+    /// Returns the number of amplitudes that the lines determine. Each amplitude counts with the
+    /// share of its information that comes from the lines.
     pub(crate) fn determined(&self) -> f64 {
         self.factor.l_dirty().nrows() as f64 - self.factor.inverse().trace()
     }

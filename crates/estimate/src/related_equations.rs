@@ -13,7 +13,7 @@ use crate::relations::Relations;
 use crate::unknowns::only_ratios;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
-/// All equations of motion, compressed to rows of the same Gram matrix.
+/// All equations of motion, compressed to rows with the same Gram matrix.
 pub(crate) struct RelatedEquations<'a> {
     /// Columns \[ẍ | ẋ | x\] of all degrees of freedom.
     pub(crate) motions: DMatrix<f64>,
@@ -59,7 +59,8 @@ impl RelatedEquations<'_> {
         self.estimate(&free, &relations, fit.unknowns, fit.solution)
     }
 
-    /// Searches for the least squares by Gauss–Newton steps; linear relations need one step.
+    /// Searches for the minimum of the sum of squares by Gauss–Newton steps; linear relations need
+    /// one step.
     fn search(
         &self,
         free: &[Parameter],
@@ -78,7 +79,7 @@ impl RelatedEquations<'_> {
             if !step.iter().all(|value| value.is_finite()) {
                 return Ok(Fit { unknowns, solution });
             }
-            // Standard errors up to a common factor: they give each unknown its scale.
+            // The standard errors, known up to a common factor, give each unknown its scale.
             let scale = solution.unscaled_covariance.diagonal().map(f64::sqrt);
             let size = unknowns.component_div(&scale).norm();
             let settled = step.component_div(&scale).norm() <= RELATED_SETTLED * size;
@@ -182,7 +183,7 @@ impl RelatedEquations<'_> {
         let tangent = relations.tangent(unknowns.as_slice());
         let covariance = solution.unscaled_covariance * solution.residual_covariance[(0, 0)];
         let residuals = self.residuals(free, &theta);
-        // Mean over the equations, because an equation may have no force.
+        // The mean over the equations is used, because an equation may have no force.
         let force = self.targets.norm() / (self.targets.ncols() as f64).sqrt();
         let undetermined = solution.undetermined.iter().map(|direction| {
             let of_entries = &tangent * &direction.combination;

@@ -183,7 +183,8 @@ impl Relations {
         let lengths = [0, 1].map(|part| columns.column(part).norm());
         let factors = [unknowns[self.shared], unknowns[self.shared + 1]];
         let gradient = |of: usize| {
-            // Part of this matrix that is orthogonal to the matrix of the other factor.
+            // The gradient follows from the part of this matrix that is orthogonal to the matrix of
+            // the other factor.
             let (column, other) = (columns.column(of), columns.column(1 - of));
             let unit = if lengths[1 - of] > 0.0 { other / lengths[1 - of] } else { other.into() };
             let orthogonal = column - &unit * unit.dot(&column);

@@ -33,7 +33,8 @@ pub(crate) struct Augmented {
     information: ForceInformation,
 }
 
-/// A model of the forces, and the noise that remains, in channel scales.
+/// Force model with its likelihood and the remaining noise, which is relative to the channel
+/// scales.
 #[derive(Debug, Clone)]
 pub(crate) struct Tuned {
     pub model: ForceModel,
@@ -87,8 +88,9 @@ impl Augmented {
         &self.units
     }
 
-    /// Returns the state space under a model; `noise` and `spread` are relative to the channel
-    /// scales and to the largest response in the measurement.
+    /// Returns the state space under a model. `noise` is relative to the channel scales; `spread`,
+    /// the standard deviation of the initial state, is relative to the largest response that the
+    /// measurement allows.
     pub fn space(
         &self,
         model: &ForceModel,
@@ -158,7 +160,8 @@ impl Augmented {
             return None;
         }
         let largest = ratios.iter().copied().fold(0.0, f64::max).exp();
-        // Ten times the measured motion is no constraint, and it keeps the digits of the filter.
+        // An initial standard deviation of ten times the measured motion is no constraint, and it
+        // does not cost the filter any precision.
         let spread = 10.0 * if noise.is_none() { largest } else { 1.0 };
         let space = self.space(&model, process, unit, spread).ok()?;
         let innovations = space.innovations(&self.data);
@@ -200,7 +203,8 @@ impl Augmented {
     pub fn noise_without_force(&self) -> Option<f64> {
         let forces = self.units.len();
         let process = LowPass::new(limits::FORCE_ORDERS[0]).ok()?;
-        // The least force that a trial may have is the same at any corner frequency.
+        // The smallest signal-to-noise ratio of a trial is the same at any corner frequency, so
+        // that the corner frequency is arbitrary here.
         let mut least = vec![(limits::RATIO_RANGE.start * (1.0 + 1e-9)).ln(); forces];
         least.push((0.1 * limits::HIGHEST_CORNER).ln());
         let without = self.trial(&process, None, &least)?;
@@ -228,7 +232,8 @@ impl Augmented {
         energies.iter().all(|energy| energy.is_finite()).then_some(energies)
     }
 
-    /// Returns a given model, with the noise of the scales.
+    /// Returns a given model with its likelihood; the channel scales are the standard deviations of
+    /// the noise.
     pub fn given(&self, model: &ForceModel) -> Result<Tuned, ForceError> {
         let process = LowPass::new(model.order)?;
         let space = self.space(model, &process, 1.0, 10.0)?;
@@ -236,8 +241,8 @@ impl Augmented {
         Ok(Tuned { model: model.clone(), noise: 1.0, log_likelihood, free: Vec::new() })
     }
 
-    /// Returns the lowest corner frequency, in radians per sample: that of half a period in twenty
-    /// records.
+    /// Returns the lowest corner frequency, in radians per sample: half a period in twenty times
+    /// the length of the record.
     fn lowest(&self) -> f64 {
         0.05 * PI / self.sampling.len() as f64
     }
@@ -316,11 +321,11 @@ impl Augmented {
         best.1
     }
 
-    /// Returns the state space with the initial state from a first pass; its standard deviations
-    /// are at most a hundred times those of the converged filter.
+    /// Returns the state space with the initial state from a first pass. The standard deviations of
+    /// this state are at most a hundred times those of the converged filter.
     ///
     /// With the wide initial covariance of the first pass, the variances of the first samples lose
-    /// their digits. The narrower one keeps them, and changes the estimates by a ten-thousandth of
+    /// digits. The narrower covariance avoids this; it changes the estimates by a ten-thousandth of
     /// their standard error.
     pub fn started(&self, mut space: StateSpace) -> StateSpace {
         let (m, machine) = (space.states, self.rate.nrows());
@@ -340,8 +345,8 @@ impl Augmented {
 }
 
 /// Returns an initial estimate for a higher order: the corner frequency of the previous order, and
-/// the ratio that suits a sharper end of the band. A band with a gentle end would model noise as
-/// force.
+/// the signal-to-noise ratio that suits the steeper roll-off. A band with a gradual roll-off would
+/// model noise as force.
 fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
     let mut best = (cost(point), point.to_vec());
     let last = point.len() - 1;

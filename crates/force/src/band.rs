@@ -9,11 +9,11 @@ use crate::limits;
 /// Returns the part of a record between two frequencies in Hz, including the ends: samples ×
 /// channels, in the unit of the record.
 ///
-/// A whole period keeps its lines in the band. An open record is continued by its mirror image, so
-/// that its ends match: its lines are half as far apart.
+/// A whole period keeps its lines in the band. An open record is extended by its mirror image, so
+/// that its ends match; the lines of the extended record are half as far apart.
 ///
-/// Methods that estimate a force in a band ([`Measurement::in_band`]) return this part, and their
-/// result is to be compared with it.
+/// Methods that estimate a force in a band ([`Measurement::in_band`]) return this part; compare
+/// their result with this part of the reference force.
 ///
 /// # Errors
 /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
@@ -45,7 +45,7 @@ pub fn within_band(
     Ok(Record::new(record.sampling(), data)?)
 }
 
-/// Returns an error unless these are the ends of a band.
+/// Returns an error unless these frequencies are the ends of a band.
 pub(crate) fn check_band([low_hz, high_hz]: [f64; 2]) -> Result<(), ForceError> {
     if low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite() {
         return Ok(());
@@ -59,7 +59,7 @@ pub(crate) fn is_within([low_hz, high_hz]: [f64; 2], frequency_hz: f64, spacing_
     (low_hz - slack..=high_hz + slack).contains(&frequency_hz)
 }
 
-/// Returns the error for a band without a line of a period.
+/// Returns the error for a band that contains no spectral line of a period.
 pub(crate) fn empty_band([low_hz, high_hz]: [f64; 2], sampling: Sampling) -> ForceError {
     let spacing_hz = sampling.line_spacing_hz();
     let last_hz = (sampling.lines() - 1) as f64 * spacing_hz;

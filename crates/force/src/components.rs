@@ -22,7 +22,7 @@ pub(crate) struct Components {
     pub lowest_hz: Vec<f64>,
     /// Energy of the measurement outside the space of the forces.
     pub outside_energy: f64,
-    /// Number of real data in the measurement.
+    /// Number of real data outside the space of the forces.
     pub outside_weight: f64,
 }
 
@@ -50,8 +50,8 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Returns the residual variance per remaining real datum, which is the noise level if the fit
-    /// is right.
+    /// Returns the residual variance per remaining real datum: the noise variance if the fit is
+    /// correct.
     pub fn noise(&self, components: &Components) -> f64 {
         self.residual / (components.data() - self.unknowns).max(f64::MIN_POSITIVE)
     }

@@ -87,7 +87,8 @@ fn force_of_steps(
 pub(crate) struct Solution {
     /// Transition matrix Φ, 2n×2n.
     pub state: DMatrix<f64>,
-    /// Factor of order n if the input is held over a step, of order 2n if it is linear.
+    /// LU factors of the input matrix: of order n if the input is held over a step, of order 2n if
+    /// it is linear.
     input: LU<f64, Dyn, Dyn>,
 }
 
@@ -110,10 +111,10 @@ impl Solution {
         let StateTransition { state, held, ramp } = transition;
         let n = held.ncols();
         let input = if is_held {
-            // Γ₀ᵥ q = (z(k+1) − Φ z(k))ᵥ.
+            // The equation of the velocity rows is Γ₀ᵥ q = (z(k+1) − Φ z(k))ᵥ.
             held.rows(n, n).into_owned()
         } else {
-            // (Γ₀ − Γ₁) q(k) + Γ₁ q(k+1) = z(k+1) − Φ z(k).
+            // The equation of all rows is (Γ₀ − Γ₁) q(k) + Γ₁ q(k+1) = z(k+1) − Φ z(k).
             let mut both = DMatrix::zeros(2 * n, 2 * n);
             both.columns_mut(0, n).copy_from(&(held - &ramp));
             both.columns_mut(n, n).copy_from(&ramp);
@@ -122,8 +123,8 @@ impl Solution {
         Ok(Self { state, input: invertible(input, dt)? })
     }
 
-    /// Solves for changes, 2n × any number: returns the input at the start of each step, n × the
-    /// same number, and for a linear input also the input at its end.
+    /// Returns the inputs for `change`, 2n × any number of steps: the input at the start of each
+    /// step, n × the same number, and for a linear input also the input at the end of the step.
     pub fn inputs(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let n = self.state.nrows() / 2;
         if self.input.lu_internal().nrows() == n {
@@ -135,7 +136,8 @@ impl Solution {
         (change.rows(0, n).into_owned(), Some(change.rows(n, n).into_owned()))
     }
 
-    /// Returns the input q, n × samples; for a held input n × steps.
+    /// Returns the input q: n × steps if the input is held over a step, n × samples if it is
+    /// linear.
     fn input(&self, response: &Response, extent: Extent) -> DMatrix<f64> {
         let len = response.sampling().len();
         let (start, end) = self.inputs(changes(&self.state, response, extent));
@@ -164,7 +166,8 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
     change
 }
 
-/// Factors the input matrix; an error if its rows do not show some force.
+/// Returns the factors of the input matrix, or an error if it is nearly singular: the step then
+/// does not show some force.
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;

@@ -142,7 +142,7 @@ pub enum ForceError {
         /// Angular frequency, in rad/s.
         omega: f64,
     },
-    /// Too few lines remain to measure the noise on.
+    /// Too few lines remain outside the chosen ones to estimate the noise.
     #[error(
         "the noise level is estimated from the lines outside the chosen ones, but only {outside} of the \
          {needed} needed remain: choose fewer lines, give a longer period, or state the level"
@@ -153,7 +153,7 @@ pub enum ForceError {
         /// Minimum number of lines.
         needed: usize,
     },
-    /// A channel without noise on the lines that measure it.
+    /// A channel is zero or not finite on the lines that determine its noise.
     #[error(
         "channel {channel} (counted from 1) is zero or not finite outside the chosen lines, from which \
          its noise is estimated: the sensor may be dead; leave it out, or state the noise level"
@@ -191,7 +191,7 @@ pub enum ForceError {
         /// The forced degree of freedom, counted from 0.
         dof: usize,
     },
-    /// A model of another number of forces.
+    /// A force model has RMS values for another number of forces.
     #[error("the model of the forces has {models} RMS values for {}: give one for each", message::count(*forces, "force"))]
     ModelCount {
         /// RMS values given.
@@ -199,7 +199,7 @@ pub enum ForceError {
         /// Number of forces.
         forces: usize,
     },
-    /// A model of forces of an impossible order.
+    /// A force model has an impossible order.
     #[error(
         "a force model of order {order} is not possible: choose 1 (first-order low-pass) to {most} (a sharp band)"
     )]
@@ -237,14 +237,14 @@ pub enum ForceError {
         /// Frequency of the last line, in Hz.
         last_hz: f64,
     },
-    /// The Kalman filter overflows at every tuning tried, or at the one given.
+    /// The Kalman filter overflows with every tuning that is tried, or with the given tuning.
     #[error(
         "the Kalman filter of this measurement overflows: use units that keep the values \
          of data and system between 1e-50 and 1e50; for an unstable machine, shorten the time step \
          or take the initial state as unknown"
     )]
     NoLikelihood,
-    /// The measurement has no channel.
+    /// No force reaches the measured channels, or all channels are zero.
     #[error("no force reaches the measured channels, or all of them are zero: measure elsewhere")]
     Silent,
     /// Two force records have different numbers of channels.

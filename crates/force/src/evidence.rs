@@ -1,12 +1,12 @@
 //! Marginal likelihood of force and noise, before any parameter is chosen.
 //!
 //! Each component is y_i = s_i f_i + e_i, with noise e of variance σ². Of the strongest components,
-//! whose number is the `reach`, a share π carries a force of variance τ² g_i; the others and all
-//! weaker ones carry none. A band of frequencies has a certain reach, single lines have a small
-//! share, and a white force has the reach of all components and π = 1. The colour g_i =
-//! (ω_i/ω₁)^(−2a) makes a force of falling spectrum: a = 1 is a random walk. The result is averaged
-//! over all parameter values that are about as likely as the best: a force with a standard error
-//! must not depend on parameters that the measurement does not determine.
+//! whose number is the `reach`, a share π carries a force of variance τ² g_i; all other components
+//! carry none. A force in a band has a certain reach. A force of single lines has a small share. A
+//! white force has the reach of all components and π = 1. The colour g_i = (ω_i/ω₁)^(−2a) describes
+//! a force of falling spectrum: a = 1 is a random walk. The result is averaged over all parameter
+//! values that are about as likely as the best ones: a force with a standard error must not depend
+//! on parameters that the measurement does not determine.
 
 use crate::components::Components;
 use crate::error::ForceError;
@@ -33,8 +33,8 @@ pub(crate) struct Posterior {
 }
 
 impl Posterior {
-    /// Averages over reach and colour and, at the most likely of them, over share and variances. If
-    /// the noise is known, its variance is 1.
+    /// Averages over the likely values of reach and colour and, for each of these, over share and
+    /// variances. If the noise is known, its variance is 1.
     pub fn from_components(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
         let white = Evidence::most_likely(components, limits::COLOURS[0], noise);
@@ -107,12 +107,13 @@ impl Posterior {
 }
 
 impl Evidence {
-    /// Finds the most likely reach: a coarse descent, then smaller steps around the best.
+    /// Returns the parameters with the most likely reach: a coarse descent, then smaller steps
+    /// around the best reach.
     fn most_likely(components: &Components, colour: i32, noise: Option<f64>) -> Self {
         let most = components.transmitted();
         let mut reach = most;
         let mut best = Self::at_reach(components, most, colour, noise);
-        // A force of falling spectrum has no upper end, so that it needs no reach.
+        // A falling spectrum has no upper end, so that a coloured force reaches all components.
         while colour == 0 && reach > 2 {
             reach = ((reach as f64 * limits::REACH_RATIO) as usize).max(2);
             best = best.better(Self::at_reach(components, reach, colour, noise));
@@ -133,8 +134,8 @@ impl Evidence {
         if other.likelihood > self.likelihood { other } else { self }
     }
 
-    /// Adds this reach and those of its neighbours that are likely enough, each with the number of
-    /// reaches that it represents.
+    /// Adds this reach and the neighbouring reaches that are likely enough. Each has as a weight
+    /// the number of reaches that it represents.
     fn beside(
         self,
         components: &Components,
@@ -266,8 +267,8 @@ impl Evidence {
             .expect("there are starts")
     }
 
-    /// Returns initial noise variances: from the weakest components, or low quantiles if these are
-    /// few.
+    /// Returns initial noise variances: the mean beyond the reach or, if few data remain there, low
+    /// quantiles of all components.
     fn first_noises(components: &Components, reach: usize) -> Vec<f64> {
         let tail_weight: f64 =
             components.weight[reach..].iter().sum::<f64>() + components.outside_weight;
@@ -280,8 +281,8 @@ impl Evidence {
         [50, 5].map(|part| per_datum[per_datum.len() / part].max(f64::MIN_POSITIVE)).to_vec()
     }
 
-    /// Fits a force that drives every component within reach: the ratio σ/τ on a grid, and both
-    /// variances from it.
+    /// Fits a force that drives every component within reach. The ratio σ/τ is searched on a grid,
+    /// and gives both variances.
     fn white(self, components: &Components, noise: Option<f64>) -> Self {
         let (data, tail) = (components.data(), tail_energy(components, self.reach));
         let shown =
@@ -340,8 +341,8 @@ impl Evidence {
         likelihood
     }
 
-    /// Performs one round of expectation and maximisation; the likelihood belongs to the values
-    /// before it.
+    /// Performs one round of expectation and maximisation. The returned likelihood is that of the
+    /// values before the round.
     fn round(self, components: &Components, known: Option<f64>) -> Self {
         let likelihood = self.log_likelihood(components);
         let (mut driven, mut driven_weight, mut force) = (0.0, 0.0, 0.0);

@@ -120,8 +120,8 @@ impl ForceInformation {
 }
 
 impl ErrorSpectrum {
-    /// Returns the frequency below which the noise of the channels exceeds the force, in Hz; 0 if
-    /// they show it down to a constant force, `None` if they show it at no frequency.
+    /// Returns the frequency, in Hz, below which the noise of the channels exceeds the force; 0 if
+    /// the channels show even a constant force, `None` if they show the force at no frequency.
     pub fn lowest_hz(&self) -> Option<f64> {
         let first = self.is_determined.iter().position(|is| *is)?;
         Some(self.edges[first][0].max(self.least_hz))

@@ -71,8 +71,8 @@ pub(crate) struct LowPass {
 }
 
 impl LowPass {
-    /// Creates the low-pass from sections of second order, and one of first order for an odd order,
-    /// in a chain.
+    /// Creates the low-pass as a chain of sections of second order and, for an odd order, one
+    /// section of first order.
     ///
     /// # Source
     /// Butterworth (1930): poles at equal angles on a circle.
@@ -105,8 +105,9 @@ impl LowPass {
     }
 }
 
-/// Returns the covariance of the state of u̇ = A u + noise due to the white noise within a unit of
-/// time: a series over a short step, doubled up to the unit. Only sums of squares are added.
+/// Returns the covariance that white noise gives the state of u̇ = A u + noise within a unit of
+/// time: a series over a short step, which is doubled until it covers the unit. Only sums of
+/// squares are added.
 ///
 /// # Source
 /// Van Loan (1978) for the integral; doubling as in Higham (2008), *Functions of Matrices*, 10.3.

@@ -62,9 +62,9 @@ impl IdentifiedForce {
     /// Returns the part of the force between two frequencies in Hz, including the ends, with a
     /// white error.
     ///
-    /// The standard error, in N, then covers the lines in the band. It is for the equation of
-    /// motion ([`continuous`](crate::continuous()) and its variants), which turns white noise into
-    /// white noise; the other methods use the band of their measurement
+    /// The standard error, in N, then covers the lines in the band. Use this function for the
+    /// equation of motion ([`continuous`](crate::continuous()) and its variants), which turns white
+    /// noise into white noise; the other methods use the band of their measurement
     /// ([`Measurement::in_band`](crate::Measurement::in_band)).
     ///
     /// # Errors
@@ -124,7 +124,7 @@ impl IdentifiedForce {
 
     /// Part of each measured channel that the force does not explain.
     ///
-    /// `None` if there are as many forces as channels, and by [`continuous`](crate::continuous())
+    /// `None` if there are as many forces as channels, and for [`continuous`](crate::continuous())
     /// and [`discretised`](crate::discretised()), which have no residual.
     pub fn unexplained(&self) -> Option<&[Unexplained]> {
         self.rest.as_ref().map(Residual::channels)

@@ -11,11 +11,11 @@ use crate::limits::{INTERMITTENT_BLOCKS, INTERMITTENT_LEVEL, QUIET_BLOCKS, REST_
 use crate::measurement::{Measurement, Start};
 use crate::noise::channel_sizes;
 
-/// Returns the range of samples in which the innovations of a stationary force are smallest, if
-/// they are smaller than by chance; `None` for a stationary force.
+/// Returns the range of samples in which the innovations under a stationary force model are
+/// smallest; `None` if they may be this small by chance.
 ///
-/// The spectrum of a pulse falls with frequency. A stationary force has the same spectrum in the
-/// whole record, so that the fit takes noise in the quiet part for force.
+/// A stationary model has the same spectrum in the whole record. If the force is a pulse, whose
+/// spectrum falls with frequency, the fit therefore mistakes noise in the quiet part for force.
 ///
 /// # Source
 /// Goldfeld & Quandt (1965), Journal of the American Statistical Association 60, 539–547 (the ratio
@@ -56,11 +56,12 @@ pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Ra
     (p_value * count < INTERMITTENT_LEVEL).then(|| range.start * block..range.end * block)
 }
 
-/// Returns whether the system is at rest at the first sample, by the Bayesian information criterion
-/// of a displacement and a velocity of every degree of freedom there; `noise_std` has the standard
+/// Returns whether the system is at rest at the first sample; `noise_std` has the standard
 /// deviation of each channel in its unit (m, m/s or m/s²), if they are known.
 ///
-/// The first samples of the record decide, under the force of maximum likelihood from rest.
+/// The Bayesian information criterion decides whether the first samples of the record need an
+/// initial displacement and velocity of every degree of freedom. The force model is the most likely
+/// one for a start from rest.
 ///
 /// # Errors
 /// Those of [`kalman`](crate::kalman()).

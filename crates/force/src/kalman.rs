@@ -51,8 +51,8 @@ pub struct KalmanForce {
     pub noise_std: Vec<f64>,
     /// Prior spectrum of the forces.
     pub model: ForceModel,
-    /// Frequency, in Hz, below which the noise of the channels exceeds the force; 0 if they show it
-    /// down to a constant force, `None` if they show it at no frequency.
+    /// Frequency, in Hz, below which the noise of the channels exceeds the force; 0 if the channels
+    /// show even a constant force, `None` if they show the force at no frequency.
     pub seen_from_hz: Option<f64>,
     /// Log-likelihood of the measurement, dimensionless, without constants.
     pub log_likelihood: f64,
@@ -67,10 +67,10 @@ pub struct KalmanForce {
 /// for every instant. The standard error comes from the model.
 ///
 /// For a structure on springs, accelerations and velocities do not show a constant force, and their
-/// noise exceeds a slow one. Without a displacement the force is therefore restricted to
-/// frequencies above [`KalmanForce::seen_from_hz`], as is its standard error
+/// noise exceeds the response to a slow force. Without a displacement, the force and its standard
+/// error are therefore restricted to frequencies above [`KalmanForce::seen_from_hz`]
 /// ([`IdentifiedForce::band_hz`]), unless the measurement has its own band
-/// ([`Measurement::in_band`]). The standard error in a band is the one far from the ends of the
+/// ([`Measurement::in_band`]). The standard error in a band is its value far from the ends of the
 /// record, plus the increase of the whole force's error at each instant.
 ///
 /// Cost: linear in the record. With c channels and m = 2n + (order × forces) states, a pass takes
@@ -155,7 +155,7 @@ pub fn kalman(
 }
 
 /// Returns the noise of the part of the record in which no force acts, in the scales of the
-/// channels; `None` for a stationary force, and for one that acts everywhere.
+/// channels; `None` for a stationary force, and for a force that acts in the whole record.
 fn quiet_part_noise(
     augmented: &Augmented,
     tuned: &Tuned,
@@ -178,7 +178,8 @@ fn in_band(
 ) -> Result<IdentifiedForce, ForceError> {
     let record = within_band(force.record(), band_hz, Extent::Open)?;
     let (sampling, len) = (record.sampling(), record.len());
-    // A slope of 1 at the first sample that decays to 0 at the last: its mirror image has a corner.
+    // This function has the slope 1 at the first sample and the slope 0 at the last one, so that
+    // its mirror image has a corner.
     let corner: Vec<f64> =
         (0..len).map(|k| sampling.time(k) * (1.0 - 0.5 * k as f64 / len as f64)).collect();
     let corner = BandFilter { sampling, band_hz, extent: Extent::Open }.apply(&corner)?;
@@ -198,14 +199,15 @@ fn in_band(
     Ok(force.replaced(record).with_standard_error(Some(error)).with_band(band_hz))
 }
 
-/// Returns the stated noise levels, if they are possible.
+/// Returns the stated noise levels, or an error if they are not possible.
 fn known(measured: &Measurement, noise: &[f64]) -> Result<Vec<f64>, ForceError> {
     let spectrum = Spectrum::from_record(measured.record());
     let level = Noise::PerChannel(noise.to_vec()).resolve(measured, &spectrum, &[])?;
     Ok(level.unwrap_or_default())
 }
 
-/// Checks at an arbitrary frequency that the forces can be separated; otherwise they cannot at any.
+/// Checks at an arbitrary frequency that the forces can be separated. If they cannot be separated
+/// there, they cannot be separated at any frequency.
 pub(crate) fn check_seen(
     system: &SecondOrderSystem,
     measured: &Measurement,
@@ -232,8 +234,8 @@ fn states(augmented: &Augmented, tuned: &Tuned) -> Result<(Vec<f64>, Vec<f64>, u
     Ok((mean, variance, space.states))
 }
 
-/// Returns the forces of the whole record under posterior models: mean and standard deviation of
-/// their mixture, from the best of them.
+/// Returns the forces of the whole record, averaged over posterior models: mean and standard
+/// deviation of the mixture. `best` is the force of the best model.
 fn mixed(
     augmented: &Augmented,
     best: &IdentifiedForce,

@@ -38,7 +38,7 @@ pub(crate) const HIGHEST_CORNER: f64 = std::f64::consts::PI;
 /// Signal-to-noise ratios of the grid for the force model.
 pub(crate) const GRID_RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
 
-/// Range of the signal-to-noise ratio: above it the noise has no digits, below it the measurement
+/// Range of the signal-to-noise ratio: above it rounding hides the noise, below it the measurement
 /// is only noise.
 pub(crate) const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
 
@@ -50,8 +50,8 @@ pub(crate) const CONVERGED_COVARIANCE: f64 = 1e-12;
 /// likelihood is needed.
 pub(crate) const CONVERGED_LIKELIHOOD: f64 = 1e-7;
 
-/// Number of time constants 1/ω_c after which the start of a force has decayed: e^(−0.1·512) for
-/// order 16.
+/// Number of time constants 1/ω_c after which the initial state of a force model has decayed:
+/// e^(−0.1·512) for order 16.
 pub(crate) const DECAY_TIME: f64 = 512.0;
 
 /// Largest norm of a rate matrix times a sub-step; the terms of the series then fall by half or
@@ -61,12 +61,12 @@ pub(crate) const SUBSTEP: f64 = 0.25;
 /// Number of terms of the series for the noise of a step; the next would be below rounding.
 pub(crate) const SERIES_TERMS: usize = 18;
 
-/// Maximum number of frequencies at which the system is evaluated; only resonances are narrower,
-/// and there the force is known best.
+/// Maximum number of frequencies at which the system is evaluated. Only resonances are narrower
+/// than the spacing of these frequencies, and there the force is known best.
 pub(crate) const INFORMATION_FREQUENCIES: usize = 1024;
 
-/// Number of periods in the record that the slowest force has, if the channels do not show a
-/// constant force: the unknown mean affects slower ones.
+/// Number of periods of the slowest force in the record, if the channels do not show a constant
+/// force; the unknown mean affects slower forces.
 pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
 
 // Likelihood of the components

@@ -99,7 +99,7 @@ impl Measurement {
         Ok(Self { band_hz: Some(band_hz), ..self })
     }
 
-    /// Returns some consecutive samples.
+    /// Returns the measurement of some consecutive samples.
     pub(crate) fn part(&self, samples: std::ops::Range<usize>) -> Result<Self, ForceError> {
         let record = self.record.window(samples.start, samples.len())?;
         Ok(Self { record, ..self.clone() })
@@ -110,8 +110,8 @@ impl Measurement {
         self.band_hz
     }
 
-    /// Returns the band in which channels without a displacement show a force; `None` if it is the
-    /// whole band.
+    /// Returns the band in which a measurement without displacements shows a force; `None` if the
+    /// force needs no restriction to a band.
     pub(crate) fn shown(&self, seen_from_hz: Option<f64>) -> Option<[f64; 2]> {
         let displaced = self.channels.iter().any(|c| c.quantity == ResponseQuantity::Displacement);
         let nyquist = 0.5 * self.sampling().rate_hz();

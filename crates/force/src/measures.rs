@@ -4,7 +4,7 @@ use mechid_signal::{Record, Spectrum};
 
 use crate::error::ForceError;
 
-/// ‖F̂ − F‖ / ‖F‖ over all samples and channels, a pure number.
+/// Relative error ‖F̂ − F‖ / ‖F‖ over all samples and channels, a pure number.
 ///
 /// # Errors
 /// [`ForceError::Compared`], [`ForceError::Signal`] if the records do not match,
@@ -18,7 +18,8 @@ pub fn relative_error(estimate: &Record, truth: &Record) -> Result<f64, ForceErr
     Ok((estimate.data() - truth.data()).norm() / norm)
 }
 
-/// ‖F̂ − F‖ / ‖F‖, a pure number, for each channel; `None` for channels without a force.
+/// Relative error ‖F̂ − F‖ / ‖F‖ of each channel, a pure number; `None` for channels without a
+/// force.
 ///
 /// # Errors
 /// The errors of [`relative_error`], except [`ForceError::NoForce`].
@@ -30,7 +31,7 @@ pub fn channel_errors(estimate: &Record, truth: &Record) -> Result<Vec<Option<f6
         .collect())
 }
 
-/// |F̂_n − F_n| / |F_n|, a pure number, at each of the lines, for one channel.
+/// Relative error |F̂_n − F_n| / |F_n| at each of the lines, for one channel, a pure number.
 ///
 /// # Errors
 /// [`ForceError::NoForceAtLine`] if F_n is zero; [`ForceError::NoSuchLine`],

@@ -22,7 +22,7 @@ pub struct MotionNoise {
 
 impl MotionNoise {
     /// Creates standard deviations of the displacement (m), velocity (m/s) and acceleration (m/s²)
-    /// of every degree of freedom; none for an acceleration that was not measured.
+    /// of every degree of freedom; the list of an acceleration that was not measured is empty.
     ///
     /// # Errors
     /// [`ForceError::NotPositive`] for a level that is not positive and finite.
@@ -137,7 +137,7 @@ pub fn discretised_with_noise(
 
 /// Estimate of the force in a step, from the motion at its ends.
 struct Side {
-    /// Number of the step, relative to the one that begins with the sample: 0, or −1 for the
+    /// Index of the step, relative to the step that begins with the sample: 0, or −1 for the
     /// previous step.
     step: isize,
     /// Weights of the states at the two ends of the step, n × 2n each.
@@ -170,8 +170,8 @@ fn error(
         extent == Extent::WholePeriod || (0..len - 1).contains(&step)
     };
     let sides: Vec<&Side> = sides.iter().filter(within).collect();
-    // In a short period, a sample may be both before and after another one: its contributions are
-    // added before they are squared.
+    // In a short period, one sample may be both before and after another sample: its two
+    // contributions are added before they are squared.
     let mut parts: BTreeMap<isize, DMatrix<f64>> = BTreeMap::new();
     for side in &sides {
         for (sample, part) in (k as isize + side.step..).zip(&side.of_ends) {

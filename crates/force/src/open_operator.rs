@@ -55,7 +55,7 @@ impl OpenOperator {
         let rows = data.len();
         let mut freed = 0;
         if start == Start::InMotion {
-            // The response to any state at the first sample is removed from both sides.
+            // The response to any initial state is projected out of the matrix and of the data.
             let free = machine.free_responses(samples).qr().q();
             freed = free.ncols();
             matrix -= &free * free.tr_mul(&matrix);

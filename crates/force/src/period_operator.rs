@@ -17,7 +17,7 @@ use crate::transfer::Transfer;
 /// over the lines.
 pub(crate) struct PeriodOperator {
     components: Components,
-    /// Index of each component and the shape of its force.
+    /// Line, coefficient and force shape of each component.
     places: Vec<Place>,
     sampling: Sampling,
     forces: usize,
@@ -80,8 +80,8 @@ impl PeriodOperator {
 }
 
 /// Returns the frequency of a line as a line number: N/2π times the RMS change from sample to
-/// sample, relative to the RMS value, with N samples per period. The mean is assumed to be as
-/// strong as the first line.
+/// sample, relative to the RMS value, with N samples per period. Line 0 has the frequency of line
+/// 1: the mean is assumed to be as strong as the first line.
 fn frequency(line: usize, len: usize) -> f64 {
     let half = std::f64::consts::PI / len as f64;
     (half * line.max(1) as f64).sin() / half

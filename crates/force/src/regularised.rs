@@ -54,11 +54,11 @@ pub struct RegularisedForce {
 /// it is unknown, by their size). A period separates into its lines; an open record is one dense
 /// problem with a force linear between samples.
 ///
-/// The standard error is such that the force is within 1.96 of it with a probability of 95 % given
-/// the measurement. It includes transmitted noise, the damped part of the force, and the
-/// uncertainty of the sizes of force and noise. A noise level that is stated or measured separately
-/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. For a given λ
-/// ([`Rule::Given`](crate::Rule::Given)) the standard error belongs to a force of variance
+/// Given the measurement, the force is within 1.96 standard errors of the estimate with a
+/// probability of 95 %. The standard error includes transmitted noise, the damped part of the
+/// force, and the uncertainty of the sizes of force and noise. A noise level that is stated or
+/// measured separately ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. For a
+/// given λ ([`Rule::Given`](crate::Rule::Given)) the standard error belongs to a force of variance
 /// (noise/λ)² in every component; for truncation it covers only the noise.
 ///
 /// Channels without a displacement do not show a constant force. The force is then restricted to
@@ -231,9 +231,10 @@ impl Choice {
     }
 }
 
-/// Standard errors of the two-sided interval of a normal variable with probability [`CONFIDENCE`].
+/// Half width of the two-sided interval of a normal variable with probability [`CONFIDENCE`], in
+/// standard deviations.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
-/// Standard errors of the one-sided interval.
+/// Limit of the one-sided interval, in standard deviations.
 const ONE_SIDED: f64 = 1.644_853_626_951_472;
 const CONFIDENCE: f64 = 0.95;
 /// Returns half the width of the interval about 0 that contains a normal variable of this mean and

@@ -83,7 +83,7 @@ impl Filter {
     }
 }
 
-/// Returns the λ of a rule; it is infinite if zero is the nearest force.
+/// Returns the λ of a rule; `None` for [`Filter::Shrinkage`], which has no λ.
 pub(crate) fn choose(
     filter: Filter,
     components: &Components,
@@ -141,7 +141,7 @@ fn thresholds(components: &Components) -> Vec<f64> {
     values.iter().zip(next).map(|(s, next)| (s * next.max(1e-3 * s)).sqrt()).collect()
 }
 
-/// Returns the candidate with the least residual²/remaining², if enough data remain.
+/// Returns the candidate with the least residual²/(data − unknowns)², if enough data remain.
 fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     let share = if matches!(filter, Filter::TruncatedSvd(_)) {
         limits::TRUNCATION_RESIDUAL

@@ -1,8 +1,8 @@
 //! The Kalman filter and fixed-interval smoother, one scalar measurement at a time.
 //!
-//! The channels of a sample are processed one after the other, which avoids matrix inverses, as
-//! does the smoother in the form of backward sums r and N; the loops do not allocate. The estimates
-//! are those of the Rauch-Tung-Striebel smoother.
+//! The channels of a sample are processed one after the other, and the smoother uses backward sums
+//! r and N; both avoid matrix inverses. The loops do not allocate. The estimates are those of the
+//! Rauch-Tung-Striebel smoother.
 //!
 //! # Source
 //! Durbin & Koopman (2012), Time Series Analysis by State Space Methods, sections 4.4 and 6.4.

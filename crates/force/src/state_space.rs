@@ -24,7 +24,7 @@ pub(crate) fn growth_rate(system: &SecondOrderSystem) -> Result<f64, ForceError>
     Ok(system.eigenvalues()?.iter().map(|l| l.re).fold(f64::NEG_INFINITY, f64::max))
 }
 
-/// Outputs of the system in step units: y = out·z + through·q, with a force linear over a step.
+/// System in step units with the outputs y = out·z + through·q, for a force linear over a step.
 pub(crate) struct Machine {
     pub transition: StateTransition,
     /// Output matrix, channels × 2n; each row is divided by the scale of its channel.

@@ -8,10 +8,10 @@ use crate::error::ForceError;
 use crate::identified::IdentifiedForce;
 use crate::limits;
 
-/// Returns the force that `find` gives for `system`, with the uncertainty of the system added to
-/// its standard error: variance + gᵀ Σ g at every sample, with g the derivatives of the force with
-/// respect to the uncertain entries (delta method). The residual of the measured channels is
-/// treated likewise ([`Unexplained::machine`](crate::Unexplained)).
+/// Returns the force that `find` gives for the identified system, with the uncertainty of the
+/// system added to its standard error: variance + gᵀ Σ g at every sample, with g the derivatives of
+/// the force with respect to the uncertain entries (delta method). The residual of the measured
+/// channels is treated likewise ([`Unexplained::machine`](crate::Unexplained)).
 ///
 /// The derivatives are central differences over a tenth of a standard error: exact for
 /// [`continuous`](crate::continuous()), for which the force is linear in the entries. If `find`
@@ -96,8 +96,8 @@ pub fn with_uncertain_nonlinear_system(
     })
 }
 
-/// Returns a force with the uncertainty of parameters of this covariance; `changed` returns the
-/// force with one of the parameters increased.
+/// Returns a force whose standard error includes the uncertainty of parameters with this
+/// covariance; `changed` returns the force for a change of one of the parameters.
 fn propagate(
     force: IdentifiedForce,
     covariance: &DMatrix<f64>,

@@ -57,7 +57,7 @@ pub enum IntegrateError {
         /// The degree of freedom, counted from 0.
         index: usize,
     },
-    /// The forces within the steps have another time axis than the force.
+    /// The forces within the steps differ from the force in number of samples or time step.
     #[error(
         "the forces within the steps have {} at {got_dt} s, the force {expected} at {dt} s", message::count(*got, "sample"),
         got_dt = message::number(*got_dt), dt = message::number(*dt)
@@ -72,7 +72,7 @@ pub enum IntegrateError {
         /// Step of the force, in seconds.
         dt: f64,
     },
-    /// The scheme needs the force at an instant within the steps and was given samples alone.
+    /// The scheme needs the force at an instant within the steps, but only samples were given.
     #[error("{scheme} needs the force within each step: supply it, or choose held or linear")]
     MidStepMissing {
         /// The scheme's name.
@@ -93,7 +93,8 @@ pub enum IntegrateError {
         /// The value found.
         value: f64,
     },
-    /// M is singular, and the scheme solves the equation of motion for the acceleration.
+    /// The mass matrix M is singular, but the scheme solves the equation of motion for the
+    /// acceleration.
     #[error(
         "{scheme}: the mass matrix is singular (pivot {smallest:.1e} of its terms), so the acceleration \
          is not determined: every degree of freedom needs a mass; model rigid connections with fewer \
@@ -102,10 +103,10 @@ pub enum IntegrateError {
     SingularMass {
         /// Name of the scheme.
         scheme: &'static str,
-        /// Smallest pivot of its factorisation, relative to the terms of its row (pure number).
+        /// Smallest pivot of the factors of M, relative to the terms of its row (pure number).
         smallest: f64,
     },
-    /// The matrix the scheme has to solve with is singular.
+    /// The effective mass matrix of the scheme is singular.
     #[error(
         "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivot {smallest:.1e} of its terms)",
         dt = message::number(*dt)
@@ -115,7 +116,8 @@ pub enum IntegrateError {
         scheme: &'static str,
         /// Time step, in seconds.
         dt: f64,
-        /// Smallest pivot of its factorisation, relative to the terms of its row (pure number).
+        /// Smallest pivot of the factors of the effective mass matrix, relative to the terms of its
+        /// row (pure number).
         smallest: f64,
     },
     /// The factors of a matrix need more memory than the limit.
@@ -143,12 +145,13 @@ pub enum IntegrateError {
     SingularShift {
         /// Im σ, in rad/s.
         omega: f64,
-        /// Smallest pivot of its factorisation, relative to the terms of its row (pure number).
+        /// Smallest pivot of the factors of the dynamic stiffness, relative to the terms of its row
+        /// (pure number).
         smallest: f64,
         /// Degrees of freedom of the system.
         dof: usize,
     },
-    /// Modes are searched for near a frequency that none has.
+    /// The frequency near which modes are searched for is not positive and finite.
     #[error(
         "modes are searched for near a positive frequency, got {omega} rad/s",
         omega = message::number(*omega)
@@ -157,7 +160,7 @@ pub enum IntegrateError {
         /// The frequency given, in rad/s.
         omega: f64,
     },
-    /// Fewer modes than wanted were found to rounding.
+    /// Fewer modes than wanted converged to rounding accuracy.
     #[error(
         "{found} of {} converged in a space of {vectors} vectors: ask for fewer, or for those near another \
          frequency",
@@ -207,7 +210,7 @@ pub enum IntegrateError {
         /// Velocity, in m/s.
         velocity: f64,
     },
-    /// No response repeats with the period of the force, or rounding hides it.
+    /// No unique response repeats with the period of the force: I − Φ is singular up to rounding.
     #[error(
         "no response that repeats every {period} s is unique, because a free motion has this period, too \
          (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})",
@@ -216,7 +219,8 @@ pub enum IntegrateError {
     NoPeriodicState {
         /// Period of the force, in seconds.
         period: f64,
-        /// Reciprocal condition of I − Φ, where Φ is the free motion over one period.
+        /// Reciprocal condition number of I − Φ, where Φ maps a state over one period of free
+        /// motion.
         reciprocal_condition: f64,
         /// Reciprocal condition that rounding alone can cause.
         rounding: f64,
@@ -231,7 +235,8 @@ pub enum IntegrateError {
     PeriodNotClosed {
         /// Period of the force, in seconds.
         period: f64,
-        /// Change over a period, relative to the largest displacement, velocity or acceleration.
+        /// Change of the state over a period, relative to the largest displacement, velocity or
+        /// acceleration.
         missed: f64,
         /// Number of passes over the period.
         products: usize,
@@ -246,7 +251,8 @@ pub enum IntegrateError {
     NoOrbit {
         /// Period of the force, in seconds.
         period: f64,
-        /// Change over a period, relative to the largest displacement, velocity or acceleration.
+        /// Change of the state over a period, relative to the largest displacement, velocity or
+        /// acceleration.
         missed: f64,
     },
     /// The nonlinear equation of a step has no solution that Newton's method finds.
@@ -267,17 +273,17 @@ pub enum IntegrateError {
         /// Scheme or analysis.
         what: &'static str,
     },
-    /// A scheme is for fewer degrees of freedom.
+    /// The system has more degrees of freedom than the scheme allows.
     #[error("{scheme} is for at most {}, the system has {dof}", message::count(*most, "degree of freedom"))]
     TooManyDof {
         /// Name of the scheme.
         scheme: &'static str,
         /// Degrees of freedom of the system.
         dof: usize,
-        /// Most it takes.
+        /// Maximum number of degrees of freedom that the scheme allows.
         most: usize,
     },
-    /// The response grew beyond what a number can hold.
+    /// The response overflows.
     #[error("the response overflows at sample {sample}, degree of freedom {component}")]
     Overflow {
         /// Sample, counted from 0.
@@ -285,7 +291,7 @@ pub enum IntegrateError {
         /// Degree of freedom, counted from 1.
         component: usize,
     },
-    /// An accuracy analysis needs a motion that oscillates.
+    /// The damping ratio of an accuracy analysis is not at least 0 and less than 1.
     #[error(
         "the damping ratio must be at least 0 and less than 1, got {damping_ratio}",
         damping_ratio = message::number(*damping_ratio)

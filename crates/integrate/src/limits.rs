@@ -41,8 +41,8 @@ pub(crate) const FIXED_SIZE_DOF: usize = 2;
 /// suffice, Newton's method, which has safeguards, takes the step.
 pub(crate) const SECANT_STEPS: usize = 12;
 
-/// Residual, in tolerances, above which a secant step updates the slope; below it the residual is
-/// mostly rounding.
+/// Residual, in multiples of the tolerance, above which a secant step updates the slope; below it
+/// the residual is mostly rounding.
 pub(crate) const SECANT_UPDATE: f64 = 1e3;
 
 /// Number of steps that the general stepper takes after an unsolved step of fixed size.
@@ -85,8 +85,8 @@ pub(crate) const PERIODIC_GMRES_RESIDUAL: f64 = 1e-9;
 /// Maximum number of Krylov searches; each one reduces the residual of the previous one.
 pub(crate) const PERIODIC_SEARCHES: usize = 8;
 
-/// Maximum number of passes over the period that correct a linear periodic state found by its
-/// matrix.
+/// Maximum number of passes over the period after a linear periodic state is computed from the
+/// matrix of the period map. Each pass corrects the state.
 pub(crate) const PERIODIC_PASSES: usize = 4;
 
 /// Ratio of successive corrections above which the remaining gap is rounding.
@@ -216,8 +216,8 @@ pub(crate) const RIGID_BODY_MODES: usize = 6;
 /// Shift for a free structure, relative to the highest natural frequency.
 pub(crate) const FREE_SHIFT: f64 = 1e-3;
 
-/// Ratio of the frequencies searched for to the unit of the velocities above which the unit is
-/// changed.
+/// Ratio of the frequencies searched for to the unit of the velocities (rad/s). Above it, the unit
+/// is changed.
 pub(crate) const VELOCITY_SCALE_RATIO: f64 = 10.0;
 
 /// Number of inverse iterations that estimate the lowest natural frequency.
@@ -226,8 +226,8 @@ pub(crate) const LOWEST_FREQUENCY_STEPS: usize = 3;
 /// Largest ratio of the imaginary part of a shift to its modulus for which real factors are used.
 pub(crate) const REAL_SHIFT: f64 = 1e-6;
 
-/// Relative distance of a shift from the eigenvalue it is placed at, so that the matrix is not
-/// singular.
+/// Distance between a shift and the eigenvalue near it, relative to the eigenvalue; without it the
+/// matrix would be singular.
 pub(crate) const SHIFT_OFFSET: f64 = 1e-6;
 
 /// Largest relative difference of converged eigenvalues from two shifts that count as the same
@@ -257,8 +257,8 @@ pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-9;
 /// eigenvalue are subtracted, for which it is independent of them.
 pub(crate) const INDEPENDENT_EIGENVECTOR: f64 = 1e-6;
 
-/// Number of eigenvalues examined beyond the modes wanted, since the operator orders them a little
-/// differently.
+/// Number of eigenvalues examined in addition to the modes wanted, because the order of the
+/// eigenvalues of the operator differs slightly from the order of the search.
 pub(crate) const SPARE_MODES: usize = 8;
 
 /// Largest residual of a mode that is returned.

@@ -82,8 +82,7 @@ impl Contents {
 #[derive(Debug)]
 pub(crate) struct ComplexArray {
     pub name: String,
-    /// Lengths of its dimensions, in the order in which programs that write such files list the
-    /// indices.
+    /// Lengths of the dimensions, in the order of the indices in programs that write such files.
     pub lengths: Vec<usize>,
     /// Distance between neighbouring elements in `values`, along each dimension.
     pub strides: Vec<usize>,

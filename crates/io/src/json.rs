@@ -19,8 +19,8 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoErr
     Ok(read(path.as_ref())?.1)
 }
 
-/// Reads a value from a JSON file, or from standard input as `-`; returns its name in messages,
-/// too.
+/// Reads a value from a JSON file, or from standard input as `-`; also returns the name of the file
+/// for messages.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<(String, T), IoError> {
     let file = standard::input_name(path);
     match standard::read_text(path) {

@@ -5,11 +5,11 @@ use std::collections::HashMap;
 use crate::contents::{Column, Contents};
 use crate::table::is_time;
 
-/// Names, in lower case and without other signs than letters, of a field or an attribute that
-/// states a unit without the word.
+/// Names of a field or an attribute that state a unit without the word `unit`, in lower case and
+/// with letters only.
 const UNITS: [&str; 2] = ["eu", "uom"];
 
-/// Parts of names of units of an axis, and of names in which a unit is a device.
+/// Parts of names in which `unit` means the unit of an axis, or a device.
 const OTHER_UNITS: [&str; 10] =
     ["xunit", "unitx", "xaxis", "time", "number", "serial", "name", "count", "test", "under"];
 
@@ -22,7 +22,7 @@ pub(crate) fn states_unit(name: &str) -> bool {
     let letters: String = name.chars().filter(|c| c.is_alphabetic()).collect();
     let letters = letters.to_lowercase();
     let is_device = letters.starts_with("id") || letters.ends_with("id");
-    // The end of a word such as community, but not of `unit_y` and `unitY`.
+    // `community` is a word with `unity`, whereas `unit_y` and `unitY` state a unit.
     let mut words = name.split(|c: char| !c.is_alphabetic());
     let is_word = words.any(|word| word.contains("unity") || word.contains("UNITY"));
     UNITS.contains(&letters.as_str())
@@ -32,8 +32,8 @@ pub(crate) fn states_unit(name: &str) -> bool {
             && !OTHER_UNITS.iter().any(|other| letters.contains(other)))
 }
 
-/// Assigns to the channels of an array the units of a list beside it, if there are as many; a list
-/// without such an array is a remark.
+/// Assigns the units of a list to the channels of an array beside it, if it has as many channels as
+/// the list has units. A list without such an array becomes a remark.
 fn with_listed_units(mut contents: Contents) -> Contents {
     let mut lists: Vec<(String, Vec<String>)> = Vec::new();
     for (path, text) in &contents.texts {
@@ -66,7 +66,7 @@ fn with_listed_units(mut contents: Contents) -> Contents {
         for (column, channel) in contents.columns.iter_mut().zip(&channels) {
             let Some((array, channel)) = channel else { continue };
             let is_whole = counts.get(array.as_str()) == Some(&units.len());
-            // A name in a file may have any number.
+            // The number in a name may be larger than the number of units.
             let unit = units.get(*channel).filter(|_| is_whole && column.unit.is_empty());
             if let Some(unit) = unit {
                 (column.unit, is_used) = (unit.clone(), true);
@@ -88,7 +88,7 @@ pub(crate) fn with_labels(contents: Contents) -> Contents {
     let mut contents = with_listed_units(contents);
     let mut labels: HashMap<&str, [&str; 2]> = HashMap::new();
     for (path, text) in &contents.texts {
-        // The element of a list belongs to one channel.
+        // An element of a list belongs to one channel, not to the whole struct.
         let Some((place, leaf)) = path.rsplit_once('.').filter(|_| !path.ends_with('}')) else {
             continue;
         };

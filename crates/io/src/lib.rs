@@ -15,7 +15,7 @@
 //! assert_eq!(record.channel(1), [0.002, 0.004, 0.002]);
 //! # Ok::<(), mechid_io::IoError>(())
 //! ```
-// Feature badges on docs.rs, which sets this.
+// On docs.rs, which sets `docsrs`, badges show the features that an item needs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod contents;

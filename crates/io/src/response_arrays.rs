@@ -189,7 +189,7 @@ impl Header {
 
 /// Returns the last part of the name of an array, in a struct or a group.
 fn leaf(name: &str) -> &str {
-    // The stroke of a unit in brackets at the end separates no groups.
+    // A slash in the unit in brackets at the end does not separate groups.
     let open = [(']', '['), (')', '(')].into_iter().find(|(close, _)| name.ends_with(*close));
     let end = open.and_then(|(_, open)| name.rfind(open)).unwrap_or(name.len());
     let start = name[..end].rfind(['.', '/']).map_or(0, |at| at + 1);
@@ -197,7 +197,8 @@ fn leaf(name: &str) -> &str {
 }
 
 /// Removes a unit at the end of the words of a name and returns it: `g`, `N` as `g/N`, `mm`, `s2`,
-/// `N` as `mm/s2/N`. In the name of a `quantity`, the unit may also be one that is not understood.
+/// `N` as `mm/s2/N`. If the name states a quantity, this may also be a unit of something other than
+/// a frequency response.
 fn take_unit_words(words: &mut Vec<String>, has_quantity: bool) -> Option<String> {
     let joined = |count: usize| {
         let first = words.len().checked_sub(count).filter(|first| *first > 0)?;

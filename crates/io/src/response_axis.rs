@@ -162,7 +162,8 @@ fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
     if lines.len() < MIN_LINES {
         return 0;
     }
-    // Lines from the first multiple of the step on have the sampling rate as sum of each pair.
+    // If the lines begin at 0 Hz or at the first multiple of the step, the frequencies of each
+    // mirrored pair add up to the sampling rate.
     let step = hz(lines[1]) - hz(lines[0]);
     let is_complete = lines.len() < order.len() || (hz(lines[0]) / step - 1.0).abs() <= SAME;
     let pairs = || lines.iter().zip(lines.iter().rev());

@@ -14,7 +14,7 @@ const ALONE: &str = "1";
 /// phases are degrees.
 const MAX_RADIANS: f64 = 6.5;
 
-/// Part of a frequency response that the numbers of a column are.
+/// Part of a frequency response in a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Part {
     Real,
@@ -83,8 +83,8 @@ impl Heading {
         Some(heading)
     }
 
-    /// Reads a word of the name, in lower case, which may be alone there; returns `false` for a
-    /// word that is not known, such as a point.
+    /// Reads a word of the name, in lower case; `is_alone` is `true` if it is the whole name.
+    /// Returns `false` for a word that is not known, such as a point.
     fn take_word(&mut self, word: &str, part: &mut Option<Part>, is_alone: bool) -> bool {
         match word {
             "real" | "re" => *part = Some(Part::Real),

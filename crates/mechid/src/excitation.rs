@@ -13,7 +13,7 @@ use serde::Serialize;
 /// Maximum amplitude, relative to the strongest line, of a line that counts as rounding.
 const FLOOR: f64 = 1e-9;
 
-/// Level of the lines at the ends of the effective band below the strongest line, in dB.
+/// Difference of level between the strongest line and the ends of the effective band, in dB.
 const DROP_DB: f64 = 20.0;
 
 /// Design of the excitation of a test.
@@ -191,7 +191,7 @@ pub struct ExcitationSummary {
 /// Identification: A Frequency Domain Approach*, the chapter on excitations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputMeasures {
-    /// Name of its column.
+    /// Name of the column of the input.
     pub name: String,
     /// RMS value, in N.
     pub rms: f64,

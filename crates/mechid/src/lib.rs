@@ -41,7 +41,7 @@
 //! | [`stability`] | comparison of time-stepping schemes |
 //! | `plot` | figures as SVG and PNG (feature `report`, on by default) |
 //! | `report` | figures and HTML pages of results (the same feature) |
-// Feature badges on docs.rs, which sets this.
+// docs.rs sets `docsrs`; its pages then show the feature that each item needs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod excitation;

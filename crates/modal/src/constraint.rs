@@ -106,7 +106,7 @@ impl ModalConstraint {
                 let pole = mode.pole();
                 let phase = pole.powi(*derivative) / Complex::i();
                 let phase = phase / phase.norm();
-                // If the gauge is a transient, it does not fix the phase of the forces.
+                // If the gauge is the load of a transient, it does not fix the phase of the forces.
                 let reference = mode.phase_input();
                 let phase_factor = mode.participation(reference);
                 let phase_factor = phase_factor / phase_factor.norm();

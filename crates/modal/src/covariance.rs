@@ -167,7 +167,7 @@ impl Covariance {
         let (outputs, inputs) = (shape.len(), fit.lines.inputs());
         let (values, mut covariance) = self.joint(fit, &[(mode, shape)]);
         for (output, delay) in fit.lines.delays.iter().enumerate() {
-            // A delay that is too large by δ turns the entry φ by jωδφ.
+            // A delay that is too large by δ changes the entry φ by jωδφ.
             let change = shape[output] * C::new(0.0, fit.model.poles[mode].im);
             let by_delay = Vector2::new(change.re, change.im) * delay.standard_error;
             let at = ModeParameters::shape_index(output);
@@ -266,12 +266,13 @@ impl Covariance {
     }
 }
 
-/// Parameters of one mode and what changes them.
+/// Parameters of one mode, with the derivatives and covariances that describe their errors.
 struct ModeResponse {
     values: DVector<f64>,
     /// Derivatives by the parameters of the search.
     response: DMatrix<f64>,
-    /// Derivatives by the complex factor that an unmeasured force puts on the shape.
+    /// Derivatives with respect to the complex factor that an unmeasured force applies to the
+    /// shape.
     common: DMatrix<f64>,
     /// Covariance of this complex factor with the score.
     cross: DMatrix<f64>,

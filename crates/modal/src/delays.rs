@@ -1,7 +1,7 @@
 //! Delays of the outputs behind the forces, as filters or scanning converters cause them.
 //!
-//! A delay turns the phase of an output in proportion to the frequency. Modes and a few residual
-//! terms cannot describe that, so that a fit without the delay has false modes.
+//! A delay changes the phase of an output in proportion to the frequency. Modes and a few residual
+//! terms cannot describe this change, so that a fit without the delay has false modes.
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
@@ -68,12 +68,12 @@ pub(crate) fn apparent_delays(lines: &Lines, poles: &[C]) -> Option<Vec<f64>> {
 }
 
 /// Returns the delays of the outputs with the modes, residual terms and weights of a fit, from
-/// `initial` ones (s); zero for outputs whose delay the data do not determine. `None` if the delays
-/// improve the fit by less than the penalty of one unknown for each.
+/// `initial` delays (s); zero for outputs whose delay the data do not determine. `None` if the
+/// delays improve the fit by less than the penalty of one unknown for each delay.
 ///
-/// Complex shapes can take the place of a small delay of displacements, to second order: their
-/// derivative by the delay then contains noise alone. A delay of accelerations leaves residual
-/// terms of odd powers of jω.
+/// For displacements, complex shapes can represent a small delay up to second order: the derivative
+/// of the residual with respect to the delay then contains only noise. For accelerations, residual
+/// terms of odd powers of jω remain.
 pub(crate) fn determined_delays(
     lines: &Lines,
     fit: &Fit<'_>,
@@ -185,8 +185,9 @@ impl<D: Design> Trial<'_, D> {
         (residuals, slopes)
     }
 
-    /// Returns the delays after Gauss–Newton steps, until each moves a delay by less than a small
-    /// part of its standard error; `None` if one is not finite or beyond the largest.
+    /// Returns the delays after Gauss–Newton steps, which end when each step is less than a small
+    /// part of the standard error of its delay; `None` if a delay is not finite or exceeds the
+    /// largest.
     fn refined(&self, mut delays: Vec<f64>, most: usize) -> Option<Vec<f64>> {
         let largest = MAX_DELAY_TURNS * TAU / self.lines.band().1;
         for _ in 0..most {
@@ -210,8 +211,8 @@ impl<D: Design> Trial<'_, D> {
     }
 }
 
-/// Returns an effective number of residuals r, 3(Σr²)²/Σr⁴: all of them if they are normal, fewer
-/// if the errors of initial poles make those near resonances large.
+/// Returns an effective number of residuals r, 3(Σr²)²/Σr⁴. It is their number if they are normal,
+/// and smaller if errors of the initial poles make the residuals near resonances large.
 fn effective_count(values: &[f64]) -> f64 {
     let fourth: f64 = values.iter().map(|value| value.powi(4)).sum();
     3.0 * square(values).powi(2) / fourth

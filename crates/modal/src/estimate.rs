@@ -127,9 +127,9 @@ impl ModalEstimate {
     /// acts as a force; `None` without such a mode, output or input, and if the mode does not move
     /// at the point.
     ///
-    /// It holds for light, proportional damping, and is in kg if the input is in N and the output
-    /// in m, m/s or m/s². It is negative if the response has the wrong sign. A delay between the
-    /// channels of less than a quarter of a period does not change it.
+    /// The mass is valid for light, proportional damping, and is in kg if the input is in N and the
+    /// output in m, m/s or m/s². It is negative if the response has the wrong sign. A delay between
+    /// the channels of less than a quarter of a period does not change the mass.
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), sections 2.4 and 3.5; the standard error is to first
@@ -172,8 +172,9 @@ impl ModalEstimate {
         compare(&self.compared_modes(), &other.compared_modes(), PairingRule::default())
     }
 
-    /// Returns the same estimate with the standard errors of each of its modes multiplied by its
-    /// entry of `scales` (pure numbers): for data that disagree by more than their noise.
+    /// Returns the same estimate; the standard errors of each mode are multiplied by the entry of
+    /// `scales` for this mode (a pure number). Use it for data that disagree by more than their
+    /// noise.
     ///
     /// # Errors
     /// [`ModalError::Setting`] for another number of modes, or a scale that is not positive and
@@ -270,7 +271,7 @@ impl ModalEstimate {
         self.model.response(omega)
     }
 
-    /// Predicts the outputs of line data from its inputs, lines × outputs; the transients of its
+    /// Predicts the outputs of line data (lines × outputs) from its inputs. The transients of its
     /// open records are estimated from its outputs: modal loads per record, and residual terms per
     /// output.
     ///
@@ -299,7 +300,7 @@ impl ModalEstimate {
     }
 }
 
-/// Returns the parameters of a mode with the constraints, and the tests of these.
+/// Returns the parameters of a mode with the constraints imposed, and the tests of the constraints.
 fn imposed(
     constraints: &[ModalConstraint],
     free: ModeParameters,
@@ -310,7 +311,8 @@ fn imposed(
     (imposed.unwrap_or(free), tests)
 }
 
-/// Returns each mode alone with its covariance, which is all that a constrained estimate has.
+/// Returns one group for each mode: a constrained estimate has only the covariance of each single
+/// mode.
 fn groups_of_one(modes: &[ModeParameters]) -> Vec<ModalGroup> {
     let alone =
         |(index, mode): (usize, &ModeParameters)| ModalGroup::new(vec![index], &mode.covariance);

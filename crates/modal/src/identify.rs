@@ -99,11 +99,11 @@ pub fn identify_modes(
 /// Fits the modes of an estimate to other data of the same structure: a part of the record, or a
 /// record of another day.
 ///
-/// The search starts from the poles of the estimate and has its residual powers and delays; the
+/// The search starts from the poles of the estimate and uses its residual powers and delays. The
 /// result has no modes that the data do not determine.
 ///
 /// # Errors
-/// [`ModalError`] as of [`identify_modes`].
+/// [`ModalError`] as for [`identify_modes`].
 pub fn refit_modes(
     data: &LineData,
     estimate: &ModalEstimate,
@@ -266,7 +266,7 @@ impl<'a> Identification<'a> {
                 Ok(()) => {
                     self.update_noise();
                     self.remove_impossible();
-                    // A candidate that only replaces another mode would be added without end.
+                    // A candidate that only replaces another mode would be added again and again.
                     if self.fit.model.modes() <= before {
                         break;
                     }
@@ -373,11 +373,11 @@ impl<'a> Identification<'a> {
         removed
     }
 
-    /// Removes the weakest modes without which the likelihood, maximised again, falls by less than
-    /// the penalty of their parameters; returns whether there were any.
+    /// Removes the weakest modes if the likelihood, maximised again without them, falls by less
+    /// than the penalty of their parameters; returns whether there were any.
     ///
-    /// The loss at fixed poles and participations is larger if the other modes can take over the
-    /// response of a mode.
+    /// If other modes can represent the response of a mode, its loss at fixed poles and
+    /// participations is larger than this fall.
     fn remove_replaceable(&mut self) -> bool {
         let required = required_gain(self.lines);
         let mut removed = false;
@@ -397,7 +397,8 @@ impl<'a> Identification<'a> {
             trial.model.select(&retained);
             trial.refresh();
             trial.search_roughly_to(self.fit.cost() + required);
-            // A mode that leaves the band or its damping to replace another one would be lost, too.
+            // A mode that replaces another one may leave the band or the range of damping: it would
+            // be lost, too.
             let is_lost = |(before, after): (&usize, &Complex<f64>)| -> bool {
                 self.is_possible(self.fit.model.poles[*before]) && !self.is_possible(*after)
             };
@@ -485,7 +486,7 @@ impl<'a> Identification<'a> {
     }
 
     /// Chooses the residual powers by Akaike's criterion: too few terms bias the poles, too many
-    /// only add variance. Terms beyond the number of the current ones have another `penalty`.
+    /// only add variance. Each unknown beyond the current number has the given `penalty` instead.
     fn choose_powers(&mut self, penalty: f64) {
         if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
             return;
@@ -592,8 +593,8 @@ impl<'a> Identification<'a> {
     }
 }
 
-/// Returns the reasons without those of modes beside a weaker one that is removed: neighbours may
-/// explain the same response, and a mode that is removed may be all that makes another doubtful.
+/// Returns the reasons, except for modes near a weaker mode that is removed. Neighbours may explain
+/// the same response, so that the reason against a mode may disappear with the weaker mode.
 fn weakest_of_neighbours(
     poles: &[Complex<f64>],
     losses: &[f64],

@@ -124,9 +124,9 @@ pub(crate) const DELAY_OUTPUTS: usize = 4;
 pub(crate) const ROUGH_DELAY_STEPS: usize = 4;
 /// Maximum number of Gauss–Newton steps of the delays with the final modes.
 pub(crate) const DELAY_STEPS: usize = 10;
-/// Minimum share of the power of the derivative of an output by its delay, without the part that
-/// modes and residual terms explain, that is not noise; below it the data do not determine the
-/// delay.
+/// Minimum share that is not noise in the power of the derivative of an output with respect to its
+/// delay. The part of the derivative that modes and residual terms explain is removed first. Below
+/// this share the data do not determine the delay.
 pub(crate) const LEAST_DELAY_INFORMATION: f64 = 0.5;
 /// Maximum step of a delay, relative to the maximum delay.
 pub(crate) const MAX_DELAY_STEP: f64 = 0.1;

@@ -99,8 +99,8 @@ impl Lines {
         values.map(|(value, omega)| value * Complex::cis(omega * delay)).collect()
     }
 
-    /// Returns the same lines with outputs without their delays; no delays: the outputs as they
-    /// are.
+    /// Returns the same lines with these delays removed from the outputs; an empty list does not
+    /// change the outputs.
     pub(crate) fn advanced(&self, delays: Vec<OutputDelay>) -> Self {
         let mut lines = self.clone();
         for (output, delay) in delays.iter().enumerate() {

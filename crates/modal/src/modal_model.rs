@@ -31,7 +31,7 @@ pub struct ModalModel {
     /// Delay of each output behind the forces, in s; empty: none.
     #[cfg_attr(feature = "serde", serde(default))]
     pub delays: Vec<f64>,
-    /// Modes whose errors belong together, with their covariance.
+    /// Groups of modes with dependent errors, with their covariance.
     pub groups: Vec<ModalGroup>,
 }
 
@@ -49,15 +49,15 @@ pub struct ModalTerm {
     pub participation: Vec<[f64; 2]>,
 }
 
-/// Modes whose errors belong together.
+/// Modes whose errors depend on one another.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ModalGroup {
     /// Indices of the modes.
     pub modes: Vec<usize>,
-    /// Covariance, a row of the lower triangle each, of ln(−Re λ), ln Im λ, real and imaginary part
-    /// of each entry of the shape, then of each participation, mode after mode.
+    /// Lower triangle of the covariance, row by row. The parameters are ln(−Re λ), ln Im λ, real
+    /// and imaginary part of each entry of the shape, then of each participation, mode after mode.
     pub covariance: Vec<Vec<f64>>,
 }
 
@@ -140,8 +140,8 @@ impl ModalModel {
         self.residuals.first().map_or(0, Vec::len)
     }
 
-    /// Returns whether all lists have the sizes that belong together, so that no index is out of
-    /// range, for example of a model that was read from a file.
+    /// Returns whether the sizes of all lists agree, so that no index is out of range, for example
+    /// in a model that was read from a file.
     pub fn is_consistent(&self) -> bool {
         let (outputs, inputs) = (self.outputs(), self.inputs());
         let fits = |term: &ModalTerm| {

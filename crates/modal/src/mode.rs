@@ -81,7 +81,7 @@ pub enum DropReason {
         /// Required decrease.
         required: f64,
     },
-    /// The damping ratio is not above zero beyond its error.
+    /// The damping ratio does not exceed zero significantly.
     UndeterminedDamping {
         /// Standard error of the damping ratio.
         standard_error: f64,

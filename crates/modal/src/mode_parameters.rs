@@ -147,7 +147,7 @@ impl ModeParameters {
     }
 
     /// Returns the mode with these parameters: its shape divided by the largest entry, and its
-    /// participations multiplied by it.
+    /// participations multiplied by this entry.
     pub(crate) fn mode(&self) -> IdentifiedMode {
         let pole = self.pole();
         let (frequency, damping, frequency_damping_covariance) =

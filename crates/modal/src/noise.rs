@@ -225,8 +225,8 @@ impl Residuals {
         Self { error, power }
     }
 
-    /// Returns the spectrum of each output's noise: smooth or, if it is stated and this is more
-    /// likely, the stated one times a smooth factor.
+    /// Returns the noise spectrum of each output: a smooth spectrum or, if a spectrum is stated and
+    /// more likely, the stated spectrum times a smooth factor.
     fn smooth_power(&self, lines: &Lines, power: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let records = record_rows(lines);
         let smoothed = |(at, power): (usize, Vec<f64>)| {

@@ -112,7 +112,7 @@ impl NormalEquations {
     }
 }
 
-/// Derivatives of Re λ and Im λ (or of L) with respect to the parameters.
+/// Returns the derivatives of Re λ and Im λ (or of L) with respect to the parameters.
 pub(crate) fn parameter_scale(pairs: &[(usize, Option<usize>)], model: &Model) -> Vec<f64> {
     let scale = |&(mode, load): &(usize, Option<usize>)| match load {
         None => [model.poles[mode].re, model.poles[mode].im],

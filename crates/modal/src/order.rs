@@ -77,9 +77,9 @@ pub(crate) fn is_within_resonance(pole: C, modes: &[C]) -> bool {
 /// Returns the best candidate within the resonance of a mode of the fit whose response to the
 /// measured forces explains most of the residual around it.
 ///
-/// If two close modes are fitted as one, the unmeasured force of this mode takes up what remains,
-/// and the weights hide the other mode. Noise and unmeasured forces are independent of the measured
-/// ones: they explain little of such a residual.
+/// If two close modes are fitted as one, the unmeasured force of this mode represents the remaining
+/// response, and the weights hide the other mode. Noise and unmeasured forces are independent of
+/// the measured forces: they explain little of such a residual.
 pub(crate) fn hidden(fit: &Fit<'_>, required: f64) -> Option<Candidate> {
     let mut candidates = candidates(fit, &|pole| is_within_resonance(pole, &fit.model.poles));
     candidates.retain(|one| one.gain > required && one.explained > LEAST_HIDDEN_SHARE);
@@ -224,7 +224,7 @@ fn rank_one(
         let pivot = square[k * loads + k];
         cross[k * outputs..(k + 1) * outputs].iter_mut().for_each(|value| *value /= pivot);
     }
-    // Columns of F⁻¹ cross as rows over the loads.
+    // Each row is one column of F⁻¹ cross, with one entry for each load.
     let rows: Vec<Vec<C>> = (0..outputs)
         .map(|output| (0..loads).map(|load| cross[load * outputs + output]).collect())
         .collect();

@@ -8,12 +8,13 @@ use crate::{IdentifiedMode, ModalError, ModalEstimate};
 
 impl ModalEstimate {
     /// Returns for each mode the ratio of the residual power along its shape, near its resonance,
-    /// to that of independent noise of the outputs and of the unmeasured force on the mode,
-    /// corrected for the unknowns that the fit absorbs; `None` with too few lines at the resonance.
+    /// to the power expected from independent noise of the outputs and from the unmeasured force on
+    /// the mode. The ratio is corrected for the unknowns that the fit absorbs; it is `None` with
+    /// too few lines at the resonance.
     ///
-    /// Leakage of averaged responses moves all outputs together, along the shape of the mode: the
-    /// variance of frequency and damping ratio is larger than that of independent outputs by this
-    /// ratio.
+    /// Leakage of averaged responses moves all outputs together, along the shape of the mode. The
+    /// variance of frequency and damping ratio is then larger by this ratio than with independent
+    /// outputs.
     ///
     /// # Errors
     /// As [`ModalEstimate::synthesis`].

@@ -34,8 +34,8 @@ impl ForceSums {
 
     /// Returns the degrees of freedom of the noise estimate at the resonance.
     ///
-    /// The variance of ln S_r is 1/information, that of the logarithm of an estimate with ν degrees
-    /// of freedom 2/ν; only the share of the force in the noise has this uncertainty.
+    /// The variance of ln S_r is 1/information. The logarithm of an estimate with ν degrees of
+    /// freedom has the variance 2/ν. Only the share of the force in the noise has this uncertainty.
     ///
     /// # Source
     /// Satterthwaite (1946), Biometrics Bulletin 2, 110–114.

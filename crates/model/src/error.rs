@@ -75,7 +75,7 @@ pub enum ModelError {
         /// Value given, in the unit of the quantity.
         value: f64,
     },
-    /// Displacement and velocity of a state, or a state and a system, do not fit.
+    /// The displacement and velocity of a state differ in length, or a state does not fit a system.
     #[error("the state has {} for {}", message::count(*got, "entry"), message::count(*dof, "degree of freedom"))]
     StateLength {
         /// Number of entries found.
@@ -155,7 +155,7 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
-    /// A name is not that of an entry of M, C or K.
+    /// No entry of M, C or K has this name.
     #[error(
         "a system of {} has no parameter `{name}`: {}",
         message::count(*dof, "degree of freedom"),
@@ -200,7 +200,7 @@ pub enum ModelError {
     Term {
         /// The text of the term.
         text: String,
-        /// Reason of the refusal.
+        /// Reason why the text is refused.
         reason: String,
     },
     /// Two nonlinear terms have the same name.
@@ -234,7 +234,7 @@ pub enum ModelError {
     Numerics(#[from] mechid_numerics::NumericsError),
 }
 
-/// First and last name of the entries for `dof` degrees of freedom.
+/// Returns the first and the last name of the entries for `dof` degrees of freedom.
 fn names(dof: usize) -> String {
     let last = dof.saturating_sub(1);
     let entry = |matrix, at| Parameter::new(matrix, at, at, dof).map(|entry| entry.to_string());
@@ -245,7 +245,7 @@ fn names(dof: usize) -> String {
     }
 }
 
-/// Returns an error that names `value` unless it is finite and `holds`.
+/// Returns an error that names `value` unless it is finite and `holds` is true.
 pub(crate) fn require(
     name: &'static str,
     value: f64,

@@ -265,8 +265,8 @@ impl Decomposition {
         eigenvalues
     }
 
-    /// Returns a shape φ for the eigenvalue λ, of any length, by inverse iteration; for a repeated
-    /// eigenvalue each `copy` gives another shape.
+    /// Returns a shape φ for the eigenvalue λ, with arbitrary scale, by inverse iteration; for a
+    /// repeated eigenvalue each `copy` gives another shape.
     fn shape(&self, eigenvalue: Complex<f64>, copy: usize) -> DVector<Complex<f64>> {
         let len = self.balance.len();
         let shift = eigenvalue

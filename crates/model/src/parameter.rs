@@ -37,8 +37,8 @@ impl Parameter {
         Ok(Self { matrix, row, column, dof })
     }
 
-    /// Returns every entry for `dof` degrees of freedom, in the order of every covariance: M, C, K,
-    /// each row by row.
+    /// Returns all entries for `dof` degrees of freedom, in the order that covariances use: M, C,
+    /// K, each row by row.
     pub fn all(dof: usize) -> impl Iterator<Item = Self> {
         Matrix::ALL.into_iter().flat_map(move |matrix| {
             let entry = move |at| Self { matrix, row: at / dof, column: at % dof, dof };

@@ -22,7 +22,7 @@ pub enum Matrix {
 }
 
 impl Matrix {
-    /// Matrices M, C, K, in the order of every covariance.
+    /// Matrices M, C, K, in the order that covariances use.
     pub const ALL: [Self; 3] = [Self::Mass, Self::Damping, Self::Stiffness];
 
     /// Returns the letter of its entries: `m`, `c` or `k`.

@@ -145,7 +145,8 @@ pub fn band(dof: usize, diagonals: &[(isize, f64)]) -> CsrMatrix<f64> {
     CsrMatrix::from(&coo)
 }
 
-/// Returns an error for the first entry that is not finite; its row and column count from 0.
+/// Returns an error for the first entry that is not finite. Rows and columns of `entries` are
+/// counted from 0; the error counts from 1.
 fn check_finite(
     matrix: Matrix,
     entries: impl IntoIterator<Item = (usize, usize, f64)>,

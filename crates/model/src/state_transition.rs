@@ -77,8 +77,8 @@ impl StateTransition {
         })
     }
 
-    /// Computes the transition for a constant input with the exponential series truncated after
-    /// `order` terms, for B = I (n inputs, in m); order 1 is Euler's rule.
+    /// Computes the transition for a constant input. The exponential series ends with the term of
+    /// power p = `order`; order 1 is Euler's rule. The input matrix is B = I (n inputs, in m).
     ///
     /// ```text
     /// Φ = Σ_{j=0}^{p} Aʲ/j!      Γ₀ = Σ_{j=0}^{p−1} Aʲ B/(j+1)!

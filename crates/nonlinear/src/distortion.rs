@@ -54,7 +54,7 @@ pub struct Distortion {
     /// Level on odd lines that are not driven: odd nonlinearities, such as x³.
     pub odd: Option<Level>,
     /// Share of the force (RMS) on the lines of the band that a linear model does not explain; the
-    /// lines are weighted by the response of the linear model to it.
+    /// lines are weighted by the response of the linear model to this force.
     pub linear_leaves: f64,
     /// Kinds of terms, by decreasing explained share.
     pub kinds: Vec<Kind>,
@@ -64,8 +64,8 @@ pub struct Distortion {
 /// a linear model, in whole periods of force (N) and response of one or several experiments at the
 /// lines of a band.
 ///
-/// All experiments share one linear model; a single one need not determine it. The levels are those
-/// of the experiment with the largest level.
+/// All experiments share one linear model; a single experiment need not determine this model. The
+/// levels are those of the experiment with the largest level.
 ///
 /// A nonlinear system responds at sums and differences of the driven lines: if odd lines are
 /// driven, an even power responds at even lines and an odd power at odd lines. If all odd lines are

@@ -1,5 +1,5 @@
-//! Usual kinds of nonlinear terms: those that the test of distortion tries, and those that a fit
-//! lacks.
+//! Usual kinds of nonlinear terms, for the test of distortion and for the search for terms that a
+//! fit lacks.
 
 use mechid_estimate::EstimateError;
 use mechid_model::{Coordinate, Friction, Law, ModelError, Power, QuadraticDamping, Term, Terms};
@@ -77,8 +77,8 @@ pub fn further_terms(
     })
 }
 
-/// Returns the terms of [`further_terms`], with friction up to the largest velocity (m/s) of the
-/// coordinate of a term.
+/// Returns the terms of [`further_terms`]; `fastest` returns the largest velocity (m/s) of the
+/// coordinate of a term, which scales the friction.
 pub(super) fn further_terms_up_to(
     fit: &NonlinearEstimate,
     fastest: impl Fn(&Term) -> f64,
@@ -96,7 +96,7 @@ pub(super) fn further_terms_up_to(
         let is_friction =
             |one: &Term| is_same_coordinate(one.coordinate(), coordinate) && is_bounded(one.law());
         if fastest > 0.0 && !fit.terms().iter().any(is_friction) {
-            // Rounded, so that a message can show it.
+            // The velocity is rounded, so that a message can show it.
             let width = FRICTION_WIDTH * fastest;
             let step = 10f64.powf(width.log10().floor());
             let law = KnownFriction(Friction::new(step * (width / step).round())?);

@@ -24,8 +24,8 @@ pub(crate) const DISTORTION_SIGNIFICANT: f64 = 1e-3;
 /// Maximum number of degrees of freedom for which terms between any two of them are tested.
 pub(crate) const DISTORTION_PAIRS: usize = 4;
 
-/// Velocity below which the friction creeps that is tried as a missing term, relative to the
-/// largest velocity: a narrower step needs more harmonics than a record has.
+/// Velocity b of the friction that is tried as a missing term, relative to the largest velocity;
+/// below it the friction creeps. A narrower step needs more harmonics than a record has.
 pub(crate) const FRICTION_WIDTH: f64 = 0.05;
 
 /// Maximum number of weighting rounds.

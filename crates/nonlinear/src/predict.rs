@@ -17,9 +17,9 @@ use crate::limits::{PREDICTION_CLOSED, PREDICTION_SHOTS};
 ///
 /// Between the samples the force is band-limited, not held or linear: for a hardening spring with a
 /// third harmonic near resonance, the difference is several times the noise of a good sensor. The
-/// classical Runge–Kutta method is used with a step that is halved until the response changes by
-/// less than 10⁻⁵ of its peak; the steady state without nonlinear terms is exact, line by line. A
-/// hardening spring may have several steady states; the returned one is near `start`.
+/// classical Runge–Kutta method is used with a step that is halved until the remaining error of the
+/// displacement is about 10⁻⁵ of its peak; the steady state without nonlinear terms is exact, line
+/// by line. A hardening spring may have several steady states; the returned one is near `start`.
 ///
 /// # Errors
 /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels,

@@ -62,8 +62,8 @@ impl<'a> Propagation<'a> {
         push
     }
 
-    /// Returns the change of the measured response by a force at the same instant, n × n: zero but
-    /// for accelerations.
+    /// Returns the change of the measured response by a force at the same instant, n × n; it is
+    /// zero except for accelerations.
     pub(super) fn direct(&self) -> DMatrix<f64> {
         self.inverse_mass * f64::from(u8::from(self.is_acceleration()))
     }

@@ -89,7 +89,7 @@ impl NonlinearEstimate {
             let channels: Vec<Vec<f64>> = (0..data.dof()).map(channel).collect();
             Ok(Record::from_channels(data.period(), &channels)?)
         };
-        // Values on the lines of the fit; zero on other lines.
+        // The function returns the value on a line of the fit, and zero on other lines.
         let row_value = |rows: &DMatrix<Complex<f64>>, line: usize, dof: usize| {
             equations.rows.binary_search(&line).map_or(Complex::ZERO, |row| rows[(row, dof)])
         };

@@ -26,8 +26,7 @@ impl Misfit {
 pub(super) struct Line<'a> {
     /// Deviations, channels × periods.
     pub(super) deviations: &'a DMatrix<Complex<f64>>,
-    /// Factor of the product of a value and a conjugate value of this line in the equivalent sum
-    /// over samples.
+    /// Weight of this line in a sum of products over lines that equals the sum over samples.
     pub(super) weight: f64,
     /// `true` if the values are real: on line 0 and at half the sampling rate.
     pub(super) is_real: bool,

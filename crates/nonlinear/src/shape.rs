@@ -186,7 +186,7 @@ fn undetermined(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
     let deviation = residual.norm() / (rows as f64).sqrt();
     let scales = start.steps(projected.equations.data.period().dt());
     let of = |((name, column), step): ((String, f64), f64)| {
-        // A lower bound of the standard error: all other constants count as known.
+        // This is a lower bound of the standard error, because all other constants count as known.
         (deviation > column * step / SHAPE_STEP).then_some(name)
     };
     let lengths = jacobian.column_iter().map(|column| column.norm());

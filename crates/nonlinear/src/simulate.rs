@@ -134,7 +134,7 @@ pub(super) struct Tangent<'a> {
     /// Derivatives of the accelerations of the linear system with respect to displacements and
     /// velocities, 2n × n: −[K C]ᵀM⁻ᵀ.
     linear: DMatrix<f64>,
-    /// The same of the nonlinear system, at a stage.
+    /// The same derivatives for the nonlinear system, at a stage.
     slopes: DMatrix<f64>,
     /// Displacement, velocity, acceleration and force of a stage.
     displacement: Vec<f64>,
@@ -143,7 +143,7 @@ pub(super) struct Tangent<'a> {
     force: Vec<f64>,
 }
 
-/// A term, and what its derivatives need.
+/// Term with the data for its derivatives.
 struct TermTangent<'a> {
     term: &'a Term,
     coefficient: f64,

@@ -13,14 +13,14 @@ use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
     serde(rename_all = "kebab-case")
 )]
 pub enum Weighting {
-    /// The one of the other choices with the highest likelihood of the residual (Akaike's
+    /// Whichever of the other choices gives the residual the highest likelihood (Akaike's
     /// criterion).
     #[default]
     Automatic,
     /// Equal size on all lines of an equation of motion: white noise of the force.
     WhiteForce,
-    /// Equal size on all lines of the response of the linear part to it: the model error is largest
-    /// at the resonances.
+    /// Equal size of the response of the linear part to the error, on all lines: the model error is
+    /// largest at the resonances.
     Response,
     /// Smooth spectrum: the spectrum of the residual, averaged over neighbouring lines and all
     /// experiments.
@@ -104,8 +104,8 @@ fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMat
     scaled
 }
 
-/// Returns the weights of rows that turn a residual force into the size of the linear part's
-/// response to it; `None` if the coefficients define no system.
+/// Returns the row weights that scale a residual force to the size of the response of the linear
+/// part to this force; `None` if the coefficients define no system.
 pub(super) fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
     let variance = variance_of_response(equations, coefficients)?;
     Some(equations.unit.zip_map(&variance, |unit, v| unit / v.sqrt()))

@@ -85,7 +85,7 @@ impl NoisePath {
         let (mut covariance, mut gain) = (zeros(n, n), zeros(2 * n, n));
         let (mut spread, mut next) = (zeros(2 * n, 2 * n), zeros(2 * n, 2 * n));
         for (sample, NoiseStep { state, input, output, direct }) in self.0.iter().enumerate() {
-            // G and H times the standard deviations of the force noise.
+            // The two matrices are G and H times the standard deviations of the force noise.
             pushed.copy_from(input);
             at_once.copy_from(direct);
             for (force, variance) in variances.force.iter().enumerate() {
@@ -176,7 +176,7 @@ fn add_product(
 /// record (samples × n); `None` if no covariance is regular.
 ///
 /// The search is over the logarithms of the ratios of the variances; the common factor follows from
-/// the residual. Forces in `driven` alone have noise.
+/// the residual. Only the forces in `driven` have noise.
 pub(super) fn most_likely(
     path: &NoisePath,
     residual: &DMatrix<f64>,
@@ -189,7 +189,8 @@ pub(super) fn most_likely(
     if levels.iter().any(|level| *level <= 0.0 || !level.is_finite()) {
         return None;
     }
-    // The force noise that alone makes the residual, by the channel where it has most effect.
+    // This is the variance of force noise that alone explains the residual, from the channel on
+    // which it has most effect.
     let of_force = DVector::from_fn(n, |force, _| {
         let effect = path.mean_square(force).component_div(&levels).max();
         if driven[force] && effect > 0.0 && effect.is_finite() { 1.0 / effect } else { 0.0 }
@@ -206,7 +207,7 @@ pub(super) fn most_likely(
         }
         variances
     };
-    // The common factor, and twice the negative logarithm of the likelihood.
+    // The function returns the common factor and minus twice the logarithm of the likelihood.
     let judged = |variances: &NoiseVariances| -> Option<(f64, f64)> {
         let filter = path.filter(variances)?;
         let mut white = residual.clone();

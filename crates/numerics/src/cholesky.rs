@@ -60,7 +60,8 @@ impl Cholesky {
         solution
     }
 
-    /// Returns L⁻¹, with as many rows and columns as A; its unit is one over the root of that of A.
+    /// Returns L⁻¹, with as many rows and columns as A, in the inverse square root of the unit of
+    /// A.
     pub fn inverse_of_lower(&self) -> DMatrix<f64> {
         let size = self.lower.nrows();
         let mut inverse = DMatrix::zeros(size, size);

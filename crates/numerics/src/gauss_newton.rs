@@ -184,7 +184,7 @@ pub fn minimise<P: SumOfSquares>(
             growth *= 2.0;
             if damping > LARGEST_DAMPING {
                 // No direction descends: this is a minimum up to rounding, unless the data
-                // determine none.
+                // determine no minimum.
                 return Some(Minimum { parameters, cost, steps, converged: undamped.is_some() });
             }
         }

@@ -6,9 +6,9 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::lanes::dot;
 use crate::limits::NARROW_PRODUCT;
 
-/// Returns 2 Re Σ φ̄_a φ_b H_ij, summed over lines, for rows φ ⊗ W with H = WᴴW: pairs a ≤ b × dof²
-/// (column i + dof·j), in the squared unit of φ times the unit of H. Pairs have the order (0, 0),
-/// (0, 1), (1, 1), (0, 2), …
+/// Returns 2 Re Σ φ̄_a φ_b H_ij, summed over lines, for rows φ ⊗ W with H = WᴴW, in the squared
+/// unit of φ times the unit of H. The result has one row for each pair a ≤ b and dof² columns; H_ij
+/// belongs to column i + dof·j. Pairs have the order (0, 0), (0, 1), (1, 1), (0, 2), …
 ///
 /// `regressors` has φ: 2 lines × columns, the real parts of all lines first. `weights` has the
 /// Hermitian H: lines × dof², the real parts of the pairs i ≤ j first, then the imaginary parts of
@@ -46,7 +46,8 @@ pub fn gram(
     } else {
         add_wide(regressors, weights, dof, &mut sums);
     }
-    // The products of H_ij and H_ji are the sum and the difference of those of the two parts.
+    // The products of H_ij and H_ji are the sum and the difference of the sums for the real and the
+    // imaginary part of H_ij.
     let mut products = sums.clone();
     for j in 0..dof {
         for i in 0..=j {

@@ -117,7 +117,7 @@ impl LeastSquares {
         if self.factor.merge(&other.factor) { Ok(()) } else { Err(NumericsError::Overflow) }
     }
 
-    /// Returns the triangle of \[A | B\], whose Gram matrix is that of all rows so far, in the
+    /// Returns the triangle of \[A | B\], which has the same Gram matrix as all rows so far, in the
     /// units of regressors and targets.
     pub fn triangle(&self) -> &DMatrix<f64> {
         self.factor.r()

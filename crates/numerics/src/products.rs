@@ -10,9 +10,9 @@ use crate::limits::{NARROW_GRAM, PRODUCT_ROWS, WEIGHTED_ROWS};
 /// Returns AᵀB (columns of A × columns of B, in the product of their units), for two matrices with
 /// the same number of rows.
 ///
-/// The `tr_mul` of nalgebra computes one dot product per entry; here blocks of rows are transposed
-/// and multiplied on all threads. They are added in the order of the rows, so the result does not
-/// depend on the number of threads.
+/// The `tr_mul` of nalgebra computes one dot product per entry. This function transposes and
+/// multiplies blocks of rows on all threads. The products of the blocks are added in the order of
+/// the rows, so the result does not depend on the number of threads.
 ///
 /// # Panics
 /// Panics if the numbers of rows differ.
@@ -63,8 +63,8 @@ impl<'a> WeightedGram<'a> {
         Self { a, transposed: (!is_narrow).then(|| a.transpose()) }
     }
 
-    /// Returns AᵀWA (columns × columns, in the squared unit of A times that of W) for the diagonal
-    /// of W.
+    /// Returns AᵀWA (columns × columns, in the squared unit of A times the unit of W) for the
+    /// diagonal of W.
     ///
     /// # Panics
     /// Panics if there is not one weight for every row.

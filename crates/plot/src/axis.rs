@@ -1,14 +1,14 @@
 //! Axes: quantity, unit, scale and range.
 
-/// Number of decibels for a relative change of e, the base of natural logarithms: a relative error
-/// times this number is one in decibels.
+/// Number of decibels in a change by the factor e, the base of natural logarithms: a relative error
+/// times this number is the error in decibels.
 pub const NEPER: f64 = 20.0 * std::f64::consts::LOG10_E;
 
-/// Maximum ratio of a value to the largest value of a figure that is a rounding error: logarithmic
-/// axes end there, and responses that are never larger are not drawn.
+/// Maximum rounding error, relative to the largest value of a figure: logarithmic axes end there,
+/// and responses that are never larger are not drawn.
 pub const ROUNDING: f64 = 1e-12;
 
-/// Division of an axis.
+/// Linear or logarithmic scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
     /// Equal distances mean equal differences.

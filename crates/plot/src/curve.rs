@@ -2,7 +2,7 @@
 
 use crate::style::{Color, Dash, Marker, Style};
 
-/// Kind of drawing of the points of a curve.
+/// Way in which the points of a curve are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Line,
@@ -125,7 +125,8 @@ impl Curve {
     }
 
     /// Shades ± 2 standard errors around the curve; `error` has one standard error for each point,
-    /// in the unit of the ordinate. Of levels in decibels the band is that of the magnitude.
+    /// in the unit of the ordinate. For levels in decibels, the band is ± 2 standard errors of the
+    /// magnitude.
     #[must_use]
     pub fn standard_error(mut self, error: &[f64]) -> Self {
         self.error = error.to_vec();

@@ -137,15 +137,15 @@ fn draw_curve(
     }
 }
 
-/// Number of markers above which they are drawn as one path, which needs a third of the text of
-/// circles.
+/// Maximum number of circles that are drawn one by one; more of them are drawn as one path, which
+/// needs a third of the text.
 const MANY: usize = 400;
 
 /// Half-width of an error band, in standard errors.
 const ERRORS: f64 = 2.0;
 
-/// Shades ± 2 standard errors, of levels in decibels those of the magnitude; an edge without a
-/// logarithm is at the bottom.
+/// Shades ± 2 standard errors; for levels in decibels, these are standard errors of the magnitude.
+/// An edge without a logarithm is at the bottom.
 fn error_band(
     panel: &Panel,
     layout: &PanelLayout,

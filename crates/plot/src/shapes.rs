@@ -44,8 +44,9 @@ const COLORS: [Color; 3] = [Color::GREY, Color::BLUE, Color::VERMILION];
 /// same value.
 const DEFLECTION: f64 = 0.16;
 
-/// Maximum fractions of the width and height of the canvas that the structure fills, and fraction
-/// of its length that its depth adds to its height; the script uses the same values.
+/// Maximum fractions of the width and of the height of the canvas that the structure fills, and
+/// fraction of its horizontal extent that its depth adds to its drawn height; the script uses the
+/// same values.
 const FILLED: (f64, f64, f64) = (0.7, 0.8, 0.45);
 
 /// Maximum number of points whose names are written.

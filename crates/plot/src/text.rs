@@ -16,7 +16,7 @@ pub enum Weight {
 }
 
 /// Font families for a viewer: the embedded font first, then similar fonts, then any sans serif.
-/// [`Canvas::text`](crate::Canvas::text) states the length of each text, so another font does not
+/// [`Canvas::text`](crate::Canvas::text) states the length of most texts, so another font does not
 /// change the layout.
 pub(crate) const FAMILY: &str =
     "Noto Sans, Open Sans, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif";

@@ -45,7 +45,7 @@ fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
     Ticks { major, minor: Vec::new(), factor }
 }
 
-/// Returns the first multiple of `step` on `low..=high`, and their number.
+/// Returns the factor of the first multiple of `step` on `low..=high`, and the number of multiples.
 fn multiples(low: f64, high: f64, step: f64) -> (f64, usize) {
     let first = (low / step - 1e-9).ceil();
     let last = (high / step + 1e-9).floor();

@@ -105,8 +105,8 @@ pub fn exact_harmonic_periodic(
     Ok(Response::new(x?, v?, a?)?)
 }
 
-/// Response from `start` to the band-limited force: the periodic response and the free decay of
-/// the difference between `start` and it.
+/// Response from `start` to the band-limited force: the sum of the periodic response and the free
+/// decay from `start` minus the initial state of the periodic response.
 ///
 /// # Errors
 /// The errors of [`exact_harmonic_periodic`] and [`exact_zoh`].

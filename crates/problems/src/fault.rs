@@ -82,7 +82,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Returns the record with the fault; draws from `seed`.
+    /// Returns the record with the fault; random values are drawn from `seed`.
     ///
     /// # Errors
     /// [`ProblemError::Signal`] if a level or a colour is out of range.

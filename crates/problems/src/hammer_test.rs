@@ -218,8 +218,8 @@ struct Oscillator {
 }
 
 impl Oscillator {
-    /// Returns the response from rest to a half-sine: the sum of a sine that begins with it and a
-    /// second one half a period later.
+    /// Returns the response from rest to a half-sine: the sum of the responses to a sine that
+    /// begins with the pulse and to a second sine that begins half a period later.
     fn response(&self, pulse: &Pulse, t: f64, quantity: ResponseQuantity) -> f64 {
         let begun = self.to_sine(pulse, t - pulse.start);
         let ended = self.to_sine(pulse, t - pulse.start - pulse.duration);

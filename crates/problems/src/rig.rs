@@ -58,7 +58,8 @@ pub struct RigTest {
 }
 
 impl BearingRig {
-    /// Returns a rig without a film: 20 kg, 50 Hz, typical sensors, no other imperfection.
+    /// Returns a rig with the given film: a housing of 20 kg, rotation at 50 Hz, typical noise of
+    /// the sensors, and no other imperfection.
     pub fn new(film: [Matrix2<f64>; 3]) -> Self {
         Self {
             film,

@@ -12,7 +12,7 @@ pub fn oscillator() -> SecondOrderSystem {
     Sdof::new(10.0, 180.0, 5000.0).unwrap().system()
 }
 
-/// The dissertation's bearing with −Kyx: one light and one heavily damped mode.
+/// The dissertation's bearing with −Kyx: one lightly damped and one heavily damped mode.
 pub fn bearing() -> SecondOrderSystem {
     let film = OilFilm {
         kxx: 40.0,

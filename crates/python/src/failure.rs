@@ -56,13 +56,13 @@ impl Failure for SimulateError {
     const CRATE: &'static str = "Simulate";
 }
 
-/// Returns the exception for an error: its message, and crate and variant with all numbers; the
-/// Python class derives `code` and `fields` from them.
+/// Returns the exception for an error. It has the message, and a text with the crate, the variant
+/// and all numbers; the Python class derives `code` and `fields` from this text.
 pub fn exception<E: Failure>(py: Python<'_>, failure: &E) -> PyErr {
     raised(py, failure.to_string(), format!("{}({failure:?})", E::CRATE))
 }
 
-/// Returns the exception for threads that the system does not provide.
+/// Returns the exception for a thread pool that cannot be created.
 pub fn no_threads(py: Python<'_>, failure: &ThreadPoolBuildError) -> PyErr {
     raised(py, failure.to_string(), "Threads".into())
 }
@@ -79,7 +79,7 @@ pub fn panicked(py: Python<'_>, message: &str) -> PyErr {
 pub fn settings<T: DeserializeOwned>(py: Python<'_>, json: &str) -> PyResult<T> {
     serde_json::from_str(json).map_err(|wrong| {
         let message = wrong.to_string();
-        // A position in JSON that the caller did not write is not useful.
+        // The caller did not write this JSON, so the position in it is removed from the message.
         let message = message.split(" at line ").next().unwrap_or_default().to_owned();
         raised(py, message, "Settings".into())
     })

@@ -52,9 +52,10 @@ pub fn fleet_record_column(py: Python<'_>, analysis: &str) -> PyResult<Option<St
     Ok(analysis.reading.record_column)
 }
 
-/// Computes the rows of some records unless they exist; returns a report as JSON. The analysis is
-/// JSON, too. `isolation` is the interpreter of the worker processes, with the memory, in GB, and
-/// the time, in s, per record; without it, the records are processed in this process.
+/// Computes the rows of some records, unless these rows exist; returns a report as JSON. The
+/// analysis is JSON, too. `isolation` has the interpreter of the worker processes, the memory per
+/// record, in GB, and the time per record, in s. Without it, the records are processed in this
+/// process.
 #[pyfunction]
 #[pyo3(signature = (records, analysis, folder, isolation))]
 pub fn fleet_part(
@@ -114,7 +115,8 @@ pub fn fleet_rows<'py>(
     Ok(PyBytes::new(py, &rows))
 }
 
-/// Combines parts (JSON) that took this many seconds; returns the summary as text and as JSON.
+/// Combines the reports of parts (JSON), which took `elapsed_s` seconds in all; returns the summary
+/// as text and as JSON.
 #[pyfunction]
 pub fn fleet_summary(
     py: Python<'_>,

@@ -100,7 +100,7 @@ impl Machine {
         let (rate, input) = py.detach(|| {
             let n = system.dof();
             let mut input = DMatrix::zeros(2 * n, n);
-            // The step units are SI units for a step of one second.
+            // If the step is one second, the units of the step are SI units.
             input.view_mut((n, 0), (n, n)).copy_from(&StateTransition::force_input(system, 1.0));
             (StateTransition::rate(system, 1.0), input)
         });
@@ -154,7 +154,8 @@ impl Machine {
     }
 }
 
-/// Computes some modes of a described machine of any size (its JSON); returns JSON and text.
+/// Computes the lowest modes, or the modes nearest to a frequency (Hz), of a described machine of
+/// any size. The description is JSON; returns JSON and text.
 #[pyfunction]
 #[pyo3(signature = (description, count, near_hz))]
 pub fn selected_modes(

@@ -25,7 +25,8 @@ pub struct PageTexts {
 }
 
 impl PageTexts {
-    /// Returns the settings of the page, with the details that the record states under other names.
+    /// Returns the settings of the page. Details in the record are added if `about` has no detail
+    /// with the same name.
     ///
     /// # Errors
     /// `MechidError` if the geometry cannot be read.

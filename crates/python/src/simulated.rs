@@ -18,7 +18,7 @@ use crate::machine::Machine;
 use crate::{failure, work};
 
 /// Record of a simulated experiment: scheme, sampling rate, machine (`None` for a sparse one), then
-/// measured force and responses, then the same without noise.
+/// force and responses with noise, then force and responses without noise.
 type Simulated<'py> = (String, f64, Option<Machine>, Channels<'py>, Channels<'py>);
 
 /// Force, and each kind of response.
@@ -107,8 +107,9 @@ type Sampled<'py> = (
     (f64, f64, f64),
 );
 
-/// Creates a multisine: with phases by a law, or optimised for a low crest factor from this many
-/// starting points; its level is a quantity (`amplitude`, `rms` or `peak`) and its value.
+/// Creates a multisine, with phases by a law, or optimised for a low crest factor. `search` has the
+/// number of starting points and the seed; `level` has a quantity (`amplitude`, `rms` or `peak`)
+/// and its value.
 #[pyfunction]
 pub fn multisine<'py>(
     py: Python<'py>,

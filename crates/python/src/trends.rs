@@ -11,9 +11,9 @@ use pyo3::prelude::*;
 
 use crate::{failure, work};
 
-/// Simulates the runs of a study into a Parquet file: an experiment (a JSON file, or a name and a
-/// JSON text), and a number of seeds or the values of some fields. Returns the summary as text and
-/// as JSON.
+/// Simulates the runs of a study into a Parquet file. The experiment is a JSON file, or a name and
+/// a JSON text; the runs are a number of seeds, or the values of some fields. Returns the summary
+/// as text and as JSON.
 #[pyfunction]
 #[pyo3(signature = (file, text, runs, fields, out))]
 pub fn fleet_simulate(

@@ -16,8 +16,8 @@ use crate::failure::{self, Failure};
 /// Time between two checks for signals that the interpreter has received.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Pool of the process with this identifier. A forked child inherits the record of a pool whose
-/// threads it does not have, and therefore creates another pool.
+/// Thread pool, with the identifier of the process that created it. A forked child process inherits
+/// this value but not the threads, and therefore creates another pool.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 /// Runs a short computation on the calling thread, without the interpreter's lock.

@@ -16,7 +16,7 @@ pub enum ReportError {
         /// File of the system.
         file: String,
     },
-    /// An analysis of what is shown fails.
+    /// An analysis for a figure or a page fails.
     #[error(transparent)]
     Analysis(#[from] mechid_analysis::AnalysisError),
     /// A figure cannot be drawn.

@@ -13,7 +13,7 @@
 //! assert!(svg.starts_with("<svg") && svg.contains("Hz"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-// Feature badges on docs.rs, which sets this.
+// On docs.rs, which sets `docsrs`, badges show the features that an item needs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod error;

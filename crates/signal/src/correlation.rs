@@ -46,7 +46,7 @@ pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, SignalErr
 /// the coefficients beyond it and correlates them; the statistic accounts for this.
 ///
 /// # Errors
-/// The errors of [`whiteness`], with `span` samples more.
+/// The errors of [`whiteness`]; the minimum number of samples is larger by `span`.
 ///
 /// # Source
 /// Bartlett (1946), Supplement to the JRSS 8, 27–41, for the scatter of the coefficients; Box
@@ -70,8 +70,8 @@ pub fn whiteness_beyond(
 }
 
 /// Correlation of a residual with an input (one value per sample, any units) at the lags −`lags` …
-/// `lags`, in that order; at a positive lag the input comes first. With negative lags it shows
-/// feedback from output to input.
+/// `lags`, in that order; at a positive lag the input comes first. At negative lags, the
+/// correlation shows feedback from output to input.
 ///
 /// The statistic assumes a white residual and allows for a coloured input, whose coefficients are
 /// correlated.
@@ -125,7 +125,7 @@ pub fn cross_correlation_of_coloured(
 impl Correlation {
     /// Tests a sum of squared coefficients. Their covariance, multiplied by the number of samples,
     /// depends only on their distance in lags: `covariance` has its values at the distances 0, 1 ….
-    /// Half of the variance of the sum exceeds that for normal variables by `shared`.
+    /// `shared` is the excess of half the variance of the sum over its value for normal variables.
     fn tested(
         sum: f64,
         covariance: &[f64],
@@ -143,8 +143,8 @@ impl Correlation {
 
 /// Returns the probability that the sum of squares of `terms` normal variables of mean zero exceeds
 /// `sum`. The covariance of two variables depends only on their distance: `covariance` has its
-/// values at the distances 0, 1 …, and it is zero at larger ones. Half of the variance of the sum
-/// exceeds that for normal variables by `shared`.
+/// values at the distances 0, 1 …, and it is zero at larger ones. `shared` is the excess of half
+/// the variance of the sum over its value for normal variables.
 ///
 /// The sum has approximately the distribution of g χ²(h) with the same mean and variance.
 fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {

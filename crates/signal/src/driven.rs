@@ -21,7 +21,7 @@ use crate::spectrum::Spectrum;
 ///   factor of 3 in amplitude without any line.
 ///
 /// If these lines have less than half of the power of each channel, because the excitation is
-/// random or the period is wrong, all lines above a thousandth count.
+/// random or the period is wrong, all lines above a thousandth of the strongest amplitude count.
 ///
 /// # Errors
 /// The errors of [`Record::period_mean`].

@@ -316,7 +316,7 @@ pub(crate) fn finite(what: &'static str, value: f64) -> Result<f64, SignalError>
 /// Returns an error if `channels` channels of `samples` samples cannot be allocated.
 pub(crate) fn fits_in_memory(samples: usize, channels: usize) -> Result<(), SignalError> {
     let reserve = |len: usize| Vec::<f64>::new().try_reserve_exact(len).ok();
-    // The instants alone must be countable without a channel.
+    // Without channels, the instants alone must fit in memory.
     samples
         .checked_mul(channels.max(1))
         .and_then(reserve)

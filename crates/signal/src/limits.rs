@@ -99,9 +99,9 @@ pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
 /// standard deviations of the noise. Weaker ringing is lost in the noise that is set to zero.
 pub(crate) const RINGING_OVER_FLOOR: f64 = 1.0 / 3.0;
 
-/// Largest number of weak samples within the ringing of a filter: near its zero crossings it is
-/// below the noise, and half of it pulls. With more, slow forces of a swinging hammer would count
-/// as ringing.
+/// Maximum number of successive weak samples within the ringing of a filter. Near its zero
+/// crossings ringing is weaker than the noise, and half of its lobes are negative. A larger number
+/// would count slow forces of a swinging hammer as ringing.
 pub(crate) const RINGING_GAP: usize = 8;
 
 /// Default number of samples before a pulse, as a multiple of the number of samples in the pulse.
@@ -162,8 +162,8 @@ pub(crate) const CREST_GAIN: f64 = 1e-5;
 /// Largest damping; above it the norm is stationary to rounding.
 pub(crate) const LARGEST_DAMPING: f64 = 1e6;
 
-/// Maximum number of lines for which the Hessian is formed and factored; for more it is only
-/// applied. At this number the two cost the same.
+/// Maximum number of lines for which the Hessian is formed and factored. With more lines, only its
+/// products with vectors are computed. At this number both cost the same.
 pub(crate) const DENSE_HESSIAN: usize = 400;
 
 /// Residual, relative to the gradient, below which conjugate gradients stop.

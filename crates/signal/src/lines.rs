@@ -39,8 +39,8 @@ pub fn special_odd(last: usize) -> Vec<usize> {
     odd(last).into_iter().filter(|n| matches!(n % 8, 1 | 3)).collect()
 }
 
-/// Odd lines without one at random of every `group` consecutive ones, as detection lines for odd
-/// nonlinearities; `group` below 2 omits none.
+/// Odd lines, without one random line of every `group` consecutive odd lines. The omitted lines
+/// detect odd nonlinearities; `group` below 2 omits none.
 ///
 /// # Source
 /// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on random

@@ -141,8 +141,8 @@ pub fn add(
     Record::new(record.sampling(), data)
 }
 
-/// Returns white noise shaped in frequency. It is half of a period twice as long, because the two
-/// ends of a record of noise do not match.
+/// Returns white noise shaped in frequency. The samples are the first half of a period that is
+/// twice as long, because the two ends of a record of noise do not match.
 fn power_law(
     sampling: Sampling,
     exponent: f64,

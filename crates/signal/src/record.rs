@@ -159,8 +159,8 @@ impl Record {
         Self { sampling: self.sampling, data }
     }
 
-    /// Returns the mean over consecutive periods of `period` samples, without an incomplete last
-    /// one.
+    /// Returns the mean over consecutive periods of `period` samples; an incomplete last period is
+    /// omitted.
     ///
     /// # Errors
     /// [`SignalError::Window`] if the record is shorter than one period,

@@ -109,8 +109,8 @@ pub(crate) const LINES_PER_ORDER: usize = 8;
 /// Maximum number of bumps on a smooth spectrum.
 pub(crate) const MAX_BUMPS: usize = 24;
 
-/// Smallest part of a bump, relative to the bump, that the polynomial and the other bumps do not
-/// contain; a smaller one is rounding.
+/// Minimum part of a bump outside the span of the polynomial and the other bumps, relative to the
+/// bump; a smaller part is rounding.
 pub(crate) const BUMP_REMAINDER: f64 = 1e-8;
 
 /// Minimum number of complex deviations behind a noise level that is lower than on the neighbouring
@@ -126,8 +126,9 @@ pub(crate) const END_LEVERAGE: f64 = 0.25;
 /// Maximum number of steps of the search for the log power of a smooth noise spectrum.
 pub(crate) const SMOOTH_STEPS: usize = 200;
 
-/// Maximum length of a step of that search with the Hessian of an earlier step, relative to the
-/// step before; a longer step is computed again with its own Hessian.
+/// Maximum length of a step with the Hessian of an earlier step, relative to the step before, in
+/// the search for the log power of a smooth noise spectrum. A longer step is computed again with
+/// its own Hessian.
 pub(crate) const HESSIAN_REUSED: f64 = 0.25;
 
 /// Change of the log power (RMS) that ends the search for the final fit.
@@ -154,8 +155,9 @@ pub(crate) const BUMP_HIGHER: f64 = 3.0;
 /// floor.
 pub(crate) const PEAK_REACH: f64 = 10.0;
 
-/// Width of the groups of lines whose mean level represents them in the search for a bump, relative
-/// to their distance from its middle and at least to its half-width.
+/// Width of the groups of lines that the search for a bump represents by their mean level, relative
+/// to the distance of a group from the middle of the bump, or to the half-width of the bump if this
+/// is larger.
 pub(crate) const BUMP_GROUP: f64 = 0.03125;
 
 /// Number of flat bumps of different widths around which other shapes are tried.

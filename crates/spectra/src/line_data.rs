@@ -162,9 +162,9 @@ impl LineData {
         }
     }
 
-    /// Returns the same lines with the noise of inputs that act only for a few samples, in place of
-    /// any such noise before. The rows of a pulse are those of its record, and its channel is an
-    /// input.
+    /// Returns the same lines with the noise of inputs that act only for a few samples; it replaces
+    /// earlier noise of this kind. The rows of a pulse are those of its record, and its channel is
+    /// an input.
     ///
     /// # Errors
     /// [`SpectraError::Size`] for an input that does not exist or rows that are not those of one
@@ -180,7 +180,7 @@ impl LineData {
                 return Err(SpectraError::Size { what, expected, got });
             }
         }
-        // Unitary amplitudes.
+        // The amplitudes are unitary.
         let unit = |samples: usize| (samples as f64).sqrt().recip();
         let pulse_errors = PulseErrors::all(pulses, &self.omega, unit)?;
         Ok(Self { pulse_errors, ..self })

@@ -232,8 +232,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Raises the level around a line, once, by the ratio of the mean squared receptance near the
-    /// line to that around it.
+    /// Raises the level around a line, at most once, by the ratio of the mean squared receptance
+    /// near the line to the median squared receptance of the lines around it.
     fn allow_for_receptance(&mut self, at: usize) {
         if std::mem::replace(&mut self.is_resonant[at], true) {
             return;
@@ -288,7 +288,8 @@ impl<'a> Search<'a> {
         rows.map(of).sum()
     }
 
-    /// Returns the sinusoid between the neighbours of a line with the smallest residual around it.
+    /// Returns the sinusoid with the smallest residual around a line; its frequency is between the
+    /// two neighbouring lines.
     fn fit(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> Sinusoid {
         let rows = around(at, SINUSOID_FITTED, self.done.len()).filter(|row| self.whole[*row]);
         let rows: Vec<usize> = rows.collect();

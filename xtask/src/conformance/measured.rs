@@ -1,8 +1,8 @@
 //! Measured records of others: published numbers compared with those on the pages of the gallery.
 //!
-//! The records are not part of the project. Our numbers are those that the pages show, which the
-//! book's test compares with the program wherever the records are; so this page is the same with
-//! and without them.
+//! The records are not part of the project. Our numbers come from the pages of the gallery. Where
+//! the records are available, the book's test compares these pages with the program. This page is
+//! therefore the same with and without the records.
 
 use std::path::Path;
 
@@ -75,8 +75,10 @@ pub(super) fn records(root: &Path) -> Result<Vec<Judge>, String> {
         .collect()
 }
 
-/// Row of a line: page, quantity, expected value, kind and size of the tolerance, and where the
-/// page shows ours: beginning of the line, which of them, which word of it.
+/// Returns the row for a line of the file, which has eight cells: page, quantity, expected value,
+/// kind and size of the tolerance, and the position of our number on the page. The position is the
+/// beginning of its line, the index among the lines with this beginning, and the index of the word,
+/// both counted from 1.
 fn row(line: &StringRecord, page: &str) -> Option<Row> {
     let cells: Vec<&str> = line.iter().collect();
     let [_, quantity, expected, kind, tolerance, start, which, word] = cells.as_slice() else {

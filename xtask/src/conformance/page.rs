@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::{Judge, Row, Status};
 
-/// Maximum difference of a ratio on the page from the computed ratio that rounding on another
-/// processor explains.
+/// Maximum difference between a ratio on the page and the computed ratio that counts as rounding on
+/// another processor.
 const ROUNDING: f64 = 0.2;
 
 /// Returns the path of the page.

@@ -212,7 +212,7 @@ impl Ours {
         })
     }
 
-    /// Returns a value, the size that its rounding is judged by, and its unit.
+    /// Returns a value, the size to which its rounding error is compared, and its unit.
     fn value(&self, [what, at, of]: &[String; 3]) -> Result<(f64, f64, &'static str), String> {
         Ok(match what.as_str() {
             "eigenvalue" => {

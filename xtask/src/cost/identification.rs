@@ -13,7 +13,7 @@ use super::measure::{Growth, shortest};
 
 /// Number of samples for least squares.
 const ROWS: usize = 2048;
-/// Number of lines for maximum likelihood; the following number is that of its periods.
+/// Number of lines for maximum likelihood; `PERIODS` is the number of periods.
 const LINES: usize = 500;
 const PERIODS: usize = 4;
 

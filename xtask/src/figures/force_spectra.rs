@@ -58,7 +58,8 @@ impl Spectra {
     }
 
     fn panel(self, reading: Reading, lines: &[ForceLines], dof: usize, name: &str) -> Panel {
-        // The error of the discretised equation is a factor, of the continuous one a fraction.
+        // The error of the discretised equation is a factor, which needs a logarithmic axis. The
+        // error of the continuous equation is a fraction.
         let ordinate = match self.equation {
             Equation::Continuous => Axis::linear(name, "N"),
             Equation::Discretised => Axis::log10(name, "N"),

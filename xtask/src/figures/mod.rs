@@ -38,7 +38,7 @@ pub fn numbers() -> Vec<&'static str> {
 /// Computes the figures `wanted` asks for, in parallel; `tick` is called after each.
 ///
 /// # Errors
-/// The number of the first figure that fails, and the words of the library.
+/// Number of the first figure that fails, and the message of the library.
 pub fn compute(
     wanted: impl Fn(&str) -> bool,
     tick: impl Fn() + Sync,

@@ -140,7 +140,8 @@ fn unit(parameter: &str) -> &'static str {
     if parameter.starts_with('K') { "N/m" } else { "N·s/m" }
 }
 
-/// `count` values from `first` in tenths, `step` tenths apart: sums of 0.2 would drift.
+/// Returns `count` values from `first` on, `step` apart, both in tenths; integers avoid the
+/// rounding of repeated sums of 0.2.
 fn tenths(first: u32, step: u32, count: u32) -> Vec<f64> {
     (0..count).map(|index| f64::from(first + index * step) / 10.0).collect()
 }

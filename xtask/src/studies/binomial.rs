@@ -24,8 +24,8 @@ fn binomial(probability: f64, experiments: u64) -> Result<Binomial, String> {
 }
 
 impl Limits {
-    /// Computes the limits. Right intervals exceed each with a probability of at most
-    /// [`FALSE_ALARM`].
+    /// Computes the limits. With the stated coverage, the number is outside each limit with a
+    /// probability of at most [`FALSE_ALARM`].
     ///
     /// # Errors
     /// A message if there are no experiments.
@@ -37,7 +37,7 @@ impl Limits {
             return Err("no experiments".into());
         }
         let right = binomial(STATED, experiments)?;
-        // The smallest counts whose cumulative probabilities reach these.
+        // The limits are the smallest counts whose cumulative probabilities reach these two values.
         let [fewest, most] = [FALSE_ALARM, 1.0 - FALSE_ALARM].map(|p| right.inverse_cdf(p));
         Ok(Self { fewest, most })
     }

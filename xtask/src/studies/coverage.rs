@@ -30,7 +30,7 @@ pub struct Kind {
     /// True for noise on the force, false for noise on the responses.
     noisy_force: bool,
     responses: &'static [ResponseQuantity],
-    /// True for the kinds that every change runs; the others take too long.
+    /// True for the kinds of the short form, which runs for every change; the others take too long.
     pub is_short: bool,
 }
 

@@ -191,7 +191,7 @@ fn tables(text: &str) -> Vec<Printed> {
 }
 
 impl Printed {
-    /// Study, row, column and value of all cells beside the first of each row.
+    /// Study, row, column and value of all cells except the first of each row.
     fn cells(&self, study: &str) -> Vec<[String; 4]> {
         let Some((header, rows)) = self.lines.split_first() else { return Vec::new() };
         let rows = rows.iter().skip(1).filter(|row| row.len() > 1);

@@ -26,7 +26,7 @@ const COVERAGE_SHARE: f64 = 0.2;
 /// Settings of a run.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// First seed; the experiments take this one and those that follow.
+    /// First of the consecutive seeds of the experiments.
     pub seed: u64,
     /// Time budget of the long form; `None` for the short one.
     pub budget: Option<Duration>,
@@ -69,7 +69,7 @@ impl Coverage {
     /// stated one.
     ///
     /// # Errors
-    /// A message without experiments.
+    /// A message if there are no experiments.
     pub fn alarm(&self) -> Result<Option<String>, String> {
         let Limits { fewest, .. } = Limits::new(self.experiments)?;
         let Self { kind, parameter, experiments, held, failed } = self;
@@ -118,7 +118,7 @@ fn coverages(
 /// Returns sentences about coverages below the stated one.
 ///
 /// # Errors
-/// A message without experiments.
+/// A message if there are no experiments.
 pub fn alarms<'a>(all: impl IntoIterator<Item = &'a Coverage>) -> Result<Vec<String>, String> {
     let each: Result<Vec<_>, _> = all.into_iter().map(Coverage::alarm).collect();
     Ok(each?.into_iter().flatten().collect())

@@ -13,7 +13,7 @@ pub enum Machine {
         /// c, in N·s/m.
         damping: f64,
     },
-    /// The shaft on the journal bearing, Kyx entering with this sign.
+    /// The shaft on the journal bearing, with this sign of Kyx.
     Bearing {
         /// Sign of Kyx in the second row of K.
         kyx: KyxSign,
@@ -82,7 +82,7 @@ impl Machine {
         }
     }
 
-    /// K and C as the tables list them, Kyx with the sign under which it enters.
+    /// K and C as the tables list them: Kyx without the sign under which it enters K.
     pub fn listed(self, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> Vec<f64> {
         let sign = match self {
             Machine::Bearing { kyx } => kyx.factor(),

@@ -191,7 +191,8 @@ impl ResultRow {
             first_sample: window.map(|window| window.first_sample),
             last_sample: window.map(|window| window.last_sample),
             parameters: identified.parameters.iter().map(cell).collect(),
-            // Unknowns without a variance have no covariance in a table.
+            // Undetermined unknowns have an infinite variance; a row with such unknowns has no
+            // covariance.
             covariance: Some(identified.parameter_covariance.clone())
                 .filter(|_| identified.combinations.is_empty()),
             modes: identified.modes.iter().map(ModeCell::from_mode).collect(),

@@ -227,7 +227,8 @@ fn mean_with_noise(
     if count < 2 {
         return Ok((periods.mean()?, None));
     }
-    // The covariance is pooled over as many neighbouring lines as it needs for a weight.
+    // The covariance is pooled over enough neighbouring lines to have `WELL_KNOWN` degrees of
+    // freedom.
     let pooling = match WELL_KNOWN.div_ceil(count - 1) / 2 {
         0 => Pooling::PerLine,
         half_width => Pooling::Neighbours(half_width),

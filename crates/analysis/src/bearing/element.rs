@@ -23,7 +23,7 @@ pub(super) fn machine(coefficients: &[CoefficientRow]) -> Option<Machine> {
 }
 
 /// Returns an unknown whose prior is the estimate with its standard error; a known coefficient if
-/// this is zero.
+/// the standard error is zero.
 fn coefficient(row: &CoefficientRow) -> Option<Coefficient> {
     let (mean, error) = (row.estimate.value, row.estimate.standard_error?);
     let is_exact = error == 0.0;

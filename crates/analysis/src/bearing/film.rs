@@ -227,8 +227,8 @@ impl Fitted {
         Matrix2::from_diagonal_element(least)
     }
 
-    /// Returns M of rig and baseline if the film has no inertia, estimated from both; zero without
-    /// a baseline.
+    /// Returns the M that rig and baseline have in common if the film has no inertia, estimated
+    /// from both; zero without a baseline.
     fn common_mass(&self, base: Option<&Self>) -> Result<Matrix2<f64>, AnalysisError> {
         let Some(base) = base else { return Ok(Matrix2::zeros()) };
         let mass = |fitted: &Self| {

@@ -32,8 +32,8 @@ const INDEPENDENT: f64 = 0.1;
 /// Maximum relative difference of equal frequencies.
 const SAME: f64 = 1e-9;
 
-/// Solves G = H D at every frequency with two tests, or on pairs of neighbouring lines with one
-/// test each, which the fitted film interpolates to their middle; the fitted baseline is
+/// Solves G = H D at every frequency with two tests. With one test each, it solves pairs of
+/// neighbouring lines, which the fitted film interpolates to their middle. The fitted baseline is
 /// subtracted.
 pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLine>, AnalysisError> {
     let omega = tests.data.omega();
@@ -115,8 +115,8 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
     })
 }
 
-/// Returns the powers of both components of ΔG − H ΔD, by the covariance of displacement D and film
-/// force G at a line.
+/// Returns the powers of both components of ΔG − H ΔD, from the covariance of displacement D and
+/// film force G at a line.
 fn error_powers(covariance: &nalgebra::DMatrix<Complex<f64>>, h: &Complex2) -> [f64; 2] {
     let block = |i: usize, j: usize| -> Complex2 {
         covariance.fixed_view::<2, 2>(2 * i, 2 * j).into_owned()

@@ -29,7 +29,8 @@ pub const LARGEST_AMPLITUDE: f64 = 0.05;
 /// Half the width of an interval at 95 %, in standard errors.
 const NORMAL: f64 = 1.96;
 
-/// Minimum relative change of the width of an interval by the choice of the model for a remark.
+/// Minimum relative change of the width of an interval, due to the choice of the model, for a
+/// remark.
 const MOVED: f64 = 0.02;
 
 /// Units of k, c and m.
@@ -52,9 +53,9 @@ pub struct BearingSummary {
     pub coefficients: Vec<CoefficientRow>,
     /// Covariance of the coefficients.
     pub covariance: ParameterCovariance,
-    /// A machine of one element, `bearing`, at the degrees of freedom x and y: for descriptions of
-    /// machines of named elements. The prior of each coefficient is its estimate with the standard
-    /// error; `None` if these are withheld.
+    /// A machine of one element, `bearing`, at the degrees of freedom x and y, for use in
+    /// descriptions of machines of named elements. The prior of each coefficient is its estimate
+    /// with the standard error; `None` if the standard errors are withheld.
     pub machine: Option<Machine>,
     /// Likelihood-ratio test whether the inertia of the fluid is negligible; `None` if the noise is
     /// not known.

@@ -21,8 +21,8 @@ const STRONG_EVIDENCE: f64 = 6.0;
 /// such sample if the amplitude decays from there, and the first sample of the record if the
 /// amplitude grows over most of it.
 ///
-/// This sample is after a static release, after the last cycles of a shaker, and at the peak after
-/// an impact. The squares are about the mean of the last quarter.
+/// This sample follows a static release or the last cycles of a shaker; after an impact it is at
+/// the peak. The squares are about the mean of the last quarter.
 pub(super) fn release(record: &Record) -> usize {
     let sums = sums(record);
     let largest = sums.iter().copied().fold(0.0, f64::max);

@@ -9,7 +9,8 @@ const SHORTEST: usize = 32;
 /// Minimum range of a channel in an interval, in quantisation steps; with less, rounding distorts
 /// the motion.
 const STEPS: f64 = 12.0;
-/// Minimum of the largest range, in quantisation steps, for an end of the decay by quantisation.
+/// Minimum of the largest range of a channel, in quantisation steps; with less, quantisation does
+/// not end the decay.
 const LARGE: f64 = 8.0 * STEPS;
 
 /// End of the part of a decay that its converter resolves.

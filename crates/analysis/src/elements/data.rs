@@ -147,7 +147,8 @@ impl ElementData {
             let pulses: Vec<PulseNoise> = noisy().flat_map(of_force).collect();
             self.lines.with_pulse_noise(&pulses)?
         } else {
-            // Without noise, too, because lines with and without known noise cannot be joined.
+            // Lines get a covariance even if it is zero, because lines with and without known noise
+            // cannot be joined.
             let (p, q) = (self.lines.outputs().ncols(), self.lines.inputs().ncols());
             let mut covariance = DMatrix::zeros(p + q, p + q);
             for (force, channel) in noisy() {

@@ -51,9 +51,9 @@ impl ElementData {
     }
 }
 
-/// Reads the good hits of a record as open records with only the forces of their pulses. Hits
-/// without a gap are one record, unless the noise of their pulses takes too much memory beside that
-/// of the other `records`.
+/// Reads the good hits of a record as open records that contain only the forces of their pulses.
+/// Hits without a gap are one record, unless the noise of their pulses takes more than the share of
+/// memory of one of `records` records.
 fn from_hits(
     measurement: &Measurement,
     rule: &HitRule,
@@ -129,7 +129,7 @@ fn sensor_findings(block: &Block) -> Vec<(usize, Finding)> {
 impl Signals {
     fn new(block: &Block, how: &IdentifyElements) -> Result<Self, AnalysisError> {
         let instruments = &how.machine.instruments;
-        // Within a group the sensors come first, then the motions of the support.
+        // Among the columns of a quantity the sensors come first, then the motions of the support.
         let mut next = [0; 3];
         let mut response = |quantity: ResponseQuantity| {
             let of_kind = match quantity {

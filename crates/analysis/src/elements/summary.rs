@@ -56,7 +56,7 @@ pub struct ElementSummary {
     pub parameters: Vec<ElementRow>,
     /// Covariance of the unknowns, in the products of their units.
     pub parameter_covariance: ParameterCovariance,
-    /// Unknowns with only some combinations determined by the data.
+    /// Unknowns that the data determine only in some combinations.
     pub combinations: Vec<CombinationRow>,
     /// Logarithm of the likelihood, a pure number.
     pub log_likelihood: f64,
@@ -94,7 +94,7 @@ pub struct ElementSummary {
 /// One unknown with its uncertainty.
 #[derive(Debug, Clone, Serialize)]
 pub struct ElementRow {
-    /// SI unit at translations.
+    /// SI unit for translations; rotations have the corresponding unit, such as N·m/rad for N/m.
     pub unit: &'static str,
     /// Value, standard error, interval, prior.
     #[serde(flatten)]
@@ -112,7 +112,7 @@ pub struct SensorRow {
     pub relative_residual: f64,
 }
 
-/// Unknowns with only some combinations determined by the data.
+/// Unknowns that the data determine only in some combinations.
 #[derive(Debug, Clone, Serialize)]
 pub struct CombinationRow {
     /// The combinations, in a sentence.
@@ -269,7 +269,7 @@ fn candidates(
 /// Returns the modes of a small machine if all its entries are determined.
 fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, AnalysisError> {
     let is_small = estimate.assembly.dof() <= LISTED_MODES_DOF;
-    // A rotor with another speed on each line has other modes on each line.
+    // The speed of a synchronous rotor differs from line to line, and its modes with the speed.
     if !is_small || estimate.assembly.speed() == Speed::Synchronous {
         return Ok(Vec::new());
     }
@@ -278,8 +278,8 @@ fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, A
     ModeRow::all(&machine.modes()?, machine.is_exact())
 }
 
-/// Returns whether the sensors are late by more than the noise explains. If they are, the standard
-/// errors and intervals of the estimate include the change of the parameters by the delay.
+/// Returns the estimate, and whether the sensors are late by more than the noise explains. If they
+/// are, its standard errors and intervals include the change of the parameters due to the delay.
 pub(super) fn allowing_for_delay(
     estimate: MachineEstimate,
     checks: &[CheckRow],

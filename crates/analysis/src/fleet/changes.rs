@@ -5,7 +5,8 @@ use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// Minimum number of records on either side of a step, and of a drift; fewer are outliers.
+/// Minimum number of records on either side of a step, and in a drift; fewer changed records are
+/// outliers.
 const LEAST: usize = 4;
 
 /// Maximum number of random permutations for a p-value; its inverse is about the smallest p-value.
@@ -57,7 +58,7 @@ pub(super) struct Change {
     pub p_value: f64,
     /// `true` if no random permutation had as large a change: the p-value is an upper bound.
     pub is_bound: bool,
-    /// Difference of the levels of a step, or from the first to the last value of a drift.
+    /// Difference of the levels of a step, or of the first and the last value of a drift.
     pub size: f64,
 }
 

@@ -137,11 +137,11 @@ impl Part {
     ) -> Result<PartDone, AnalysisError> {
         let path = folder.join(&self.file_name);
         if let Some(done) = self.done(&path) {
-            // The rows of the last run count, also those that an earlier one had computed.
+            // The part written last counts, so a part from an earlier run gets the present time.
             let touched = File::options().append(true).open(&path);
             let touched = touched.and_then(|file| file.set_modified(SystemTime::now()));
             match touched {
-                // Nobody has written other rows into a folder that is read-only.
+                // A read-only folder has no later rows, so the time need not change.
                 Err(error) if is_read_only(&error) => {}
                 touched => {
                     let file = path_text(&path).into_owned();

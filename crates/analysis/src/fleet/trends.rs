@@ -52,7 +52,8 @@ pub struct Trends {
     pub superseded: usize,
     /// Number of ignored records without a number in their names.
     pub without_number: usize,
-    /// Number of different analyses and versions of the rows; several are not comparable.
+    /// Number of different analyses and versions among the rows; if it is above 1, the rows are not
+    /// comparable.
     pub analyses: usize,
     /// One series for each parameter, natural frequency and damping ratio.
     pub series: Vec<TrendSeries>,

@@ -26,11 +26,13 @@ pub const RECORD_SECONDS: f64 = 600.0;
 /// Maximum number of bytes kept from the error stream of a process.
 const LONGEST_MESSAGE: u64 = 4096;
 
-/// Maximum time for the start of a process; no record causes a failure before that.
+/// Maximum time for the start of a process. A failure before the end of the start is not due to a
+/// record.
 const START: Duration = Duration::from_secs(120);
 
-/// Maximum time from the end of the output of a process to its exit, and time between two checks.
+/// Maximum time from the end of the output of a process to its exit.
 const FAREWELL: Duration = Duration::from_secs(5);
+/// Time between two checks whether a process has ended.
 const POLL: Duration = Duration::from_millis(5);
 
 /// Messages with which a process ends if an allocation fails, or the system has no memory for a
@@ -82,8 +84,8 @@ impl Isolation {
         Ok(())
     }
 
-    /// Returns the memory that a record may take, in bytes: the limit, or what the system leaves
-    /// this process (`ulimit -v`) if that is less.
+    /// Returns the memory that a record may take, in bytes: the limit or, if this is less, the
+    /// memory that the system allows this process (`ulimit -v`).
     fn memory_bytes(&self) -> u64 {
         // The conversion saturates, at a size above any address space.
         let bytes = (self.record_memory_gb * 1e9) as u64;
@@ -173,7 +175,8 @@ impl Worker {
         };
         let patience = Duration::try_from_secs_f64(self.isolation.record_seconds);
         let patience = patience.unwrap_or(Duration::MAX);
-        // If the process has ended, the answer is an error.
+        // If the process has ended, the write fails, and the wait for the rows below returns the
+        // error.
         if let Some(orders) = &mut running.orders {
             let _ = frames::write(orders, &order);
         }

@@ -67,11 +67,11 @@ pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, Ana
 /// Estimates the frequency responses and the coherence of one or several records of the same
 /// machine from the averaged auto- and cross-spectra of the segments of all records.
 ///
-/// The numbers of forces and responses may differ from each other. The records need the same
-/// numbers of both, the same time step, and periods or segments of the same length;
-/// their own lengths may differ. Without periods and segments, records that end at rest or have the
-/// same force are averaged as a whole; others are cut into segments like one record. Each force
-/// need act only in one record.
+/// The number of forces may differ from the number of responses. The records need the same numbers
+/// of both, the same time step, and periods or segments of the same length; their own lengths may
+/// differ. Without periods and segments, records that end at rest or have the same force are
+/// averaged as a whole; others are cut into segments like one record. It is enough that each force
+/// acts in one record.
 ///
 /// # Errors
 /// As [`frf`]; [`AnalysisError::NoRecord`] without a record, and [`AnalysisError::Estimate`] if the
@@ -337,7 +337,7 @@ impl Segmentation {
         Self { segment: Some(samples), ..Self::default() }
     }
 
-    /// `true` if the segments are whole periods.
+    /// Returns whether the segments are whole periods.
     pub fn are_periods(&self) -> bool {
         self.segment.is_none()
     }

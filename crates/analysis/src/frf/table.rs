@@ -101,8 +101,8 @@ pub struct Response {
     pub motion: usize,
     /// Degree of freedom that is driven, counted from 1.
     pub force: usize,
-    /// Real part, one value per frequency, in the unit of the table; like the other values it is
-    /// not a number on the interleaved lines of another force.
+    /// Real part, one value per frequency, in the unit of the table. On lines that another force
+    /// excites (interleaved lines), this and the other values are not a number.
     pub real: Vec<f64>,
     /// Imaginary part, one value per frequency, in the unit of the table.
     pub imaginary: Vec<f64>,
@@ -335,10 +335,10 @@ impl FrfTable {
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
     }
 
-    /// Returns the responses for files of other programs; `points` has the point and direction of
-    /// each degree of freedom, such as `12+Z`. Without points, the names of the channels are used
-    /// if all of them are such points, as in a universal file; otherwise node and degree of freedom
-    /// have the same number, and the direction is +X.
+    /// Returns the responses for files of other programs. `points` has the point and direction of
+    /// each degree of freedom, such as `12+Z`. If `points` is empty and the names of all channels
+    /// are such points, as in a universal file, these names are used; otherwise node and degree of
+    /// freedom have the same number, and the direction is +X.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and for forces
@@ -485,7 +485,7 @@ impl Response {
         }
     }
 
-    /// Returns the values at other indices; a frequency without an index gets no value.
+    /// Returns the values at other indices; a frequency without an index has NaN.
     fn spread(self, places: &[Option<usize>]) -> Self {
         let spread = |values: &[f64]| -> Vec<f64> {
             places.iter().map(|at| at.map_or(f64::NAN, |at| values[at])).collect()

@@ -127,7 +127,8 @@ impl Acquisition {
             // White noise suffices until the equivalent force hardly changes.
             let is_last = round + 1 == ACQUISITION_ROUNDS;
             let of_round = if settled || is_last { pooling } else { Pooling::AllLines };
-            // The band-limited force may have led to a wrong minimum.
+            // The first round searches anew, because the band-limited force may have led to a wrong
+            // minimum.
             let fit = match round {
                 0 => output_error_pooling(&data, unknowns, of_round),
                 _ => output_error_from(&data, unknowns, &last.0, of_round)

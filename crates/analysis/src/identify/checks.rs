@@ -101,7 +101,8 @@ pub(crate) fn rows(
         };
         add(When::After, Some(at), &checks);
     }
-    // A nonlinearity disturbs the lines at the resonances most; no outside disturbance acts there.
+    // A nonlinearity disturbs the lines at the resonances most, so a misfit there does not show an
+    // outside disturbance of these lines.
     if rows.iter().any(|(_, _, finding)| matches!(finding, Finding::Distortion(_))) {
         rows.iter_mut().for_each(|(_, _, finding)| finding.forget_lines());
     }

@@ -19,8 +19,8 @@ pub(super) struct Compared {
 }
 
 impl Compared {
-    /// Compares a fit with its parts and, if the samples of its rows are given (an empty list: none
-    /// are known), with larger models.
+    /// Compares a fit with its parts. If `records` has the samples of its rows (an empty list: none
+    /// are known), it also compares the fit with larger models.
     pub(super) fn new(
         fit: &PartsOfFit<'_>,
         splits: &[(Split, RowParts)],
@@ -35,9 +35,9 @@ impl Compared {
         }
     }
 
-    /// Compares a fit of averaged responses, each with the degrees of freedom of its forces counted
-    /// from 0, with its bands of lines and, if there are several, with its records. `data` has all
-    /// of them.
+    /// Compares a fit of averaged responses with its bands of lines and, if there are several
+    /// `records`, with these. Each record has the degrees of freedom of its forces, counted from 0;
+    /// `data` has the data of all records.
     ///
     /// # Errors
     /// The errors of [`Frf::data`].
@@ -56,8 +56,9 @@ impl Compared {
         Ok(parts.map_or_else(Self::default, |fit| Self::new(&fit, &splits, Some(&[]), estimate)))
     }
 
-    /// Returns the comparison without the omitted term, if another explanation of the residual,
-    /// with which a fraction `remaining` of its power remains, explains more than the term.
+    /// Returns the comparison without the omitted term if another explanation of the residual
+    /// explains more than the term. `remaining` is the fraction of the residual power that remains
+    /// with the other explanation.
     pub(super) fn beside(mut self, remaining: Option<f64>) -> Self {
         let is_less_likely = |finding: &Finding| match (finding, remaining) {
             (Finding::TermLeftOut(term), Some(remaining)) => term.explained < 1.0 - remaining,

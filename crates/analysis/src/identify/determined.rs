@@ -15,11 +15,12 @@ use crate::text::significant;
 const NAMED: usize = 6;
 
 /// Refuses a fit of a linear system that is singular to rounding, that explains no more of the
-/// response than chance does, or in which the interval of every parameter contains zero, unless a
-/// fault of the channels or another model explains the failure. With several degrees of freedom the
-/// modes may still be determined; with one, the response is then indistinguishable from noise, and
-/// so is its mode. An estimate that noise biases may explain none of a response that is mostly
-/// signal.
+/// response than chance does, or in which the interval of every parameter contains zero.
+///
+/// A fit is not refused if a fault of the channels or another model explains the failure. If all
+/// intervals contain zero, the modes of several degrees of freedom may still be determined; with
+/// one degree of freedom, response and mode are indistinguishable from noise. An estimate that
+/// noise biases may explain none of a response that is mostly signal.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].

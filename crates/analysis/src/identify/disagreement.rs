@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use super::checks::CheckRow;
 use crate::{AnalysisError, text};
 
-/// Ratio of standard errors that the disagreement of model and data shows to those that follow from
-/// the noise, above 1.
+/// Ratio, above 1, of the standard errors that the disagreement of model and data requires to the
+/// standard errors that follow from the noise.
 #[derive(Debug)]
 struct ErrorScale {
     /// The ratio.
@@ -54,7 +54,7 @@ impl ErrorScale {
     }
 }
 
-/// Additions to the standard errors of a fit that model and data disagree about.
+/// Additions to the standard errors of a fit because model and data disagree by more than noise.
 #[derive(Debug, Default)]
 pub(super) struct Disagreement {
     /// Mean square error that omitted terms add to the covariance of the parameters, in the product
@@ -64,7 +64,7 @@ pub(super) struct Disagreement {
     /// a fault of the acquisition, another quantity), in the product of the units of two
     /// parameters.
     explained: Option<DMatrix<f64>>,
-    /// Scale of the standard errors; `None` for those that follow from the noise.
+    /// Scale of the standard errors; `None` if they follow from the noise alone.
     scale: Option<ErrorScale>,
 }
 
@@ -74,7 +74,7 @@ impl Disagreement {
         Self { omitted, explained, scale: None }
     }
 
-    /// Returns the additions that a check warns of, with the scale that the checks show. The
+    /// Returns the additions for which a check warns, with the scale that the checks give. The
     /// residual has `spare` degrees of freedom.
     pub(super) fn warned_of(self, checks: &[CheckRow], spare: usize) -> Self {
         let warns = |is_of: fn(&CheckRow) -> bool| {
@@ -123,7 +123,7 @@ impl Disagreement {
         })
     }
 
-    /// Ratio of the standard errors to those that follow from the noise.
+    /// Returns the ratio of the standard errors to those that follow from the noise.
     pub(super) fn error_scale(&self) -> f64 {
         self.scale.as_ref().map_or(1.0, |scale| scale.factor)
     }

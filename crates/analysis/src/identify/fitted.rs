@@ -41,7 +41,7 @@ pub struct Fitted {
     pub nonlinear: Option<WithTerms>,
     /// Additions to the standard errors of `estimate`.
     pub(super) disagreement: Disagreement,
-    /// Real equations used, of each degree of freedom.
+    /// Number of real equations per degree of freedom.
     pub equations: usize,
     /// The spectra of a fit in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
@@ -134,7 +134,7 @@ pub struct SampleResidual {
     pub fitted: Record,
     /// Force, samples × degrees of freedom, in N.
     pub force: Record,
-    /// Lags over which noise on the response correlates the residual.
+    /// Number of lags over which noise on the response correlates the residual.
     pub noise_span: usize,
 }
 
@@ -203,8 +203,9 @@ impl Fitted {
         })
     }
 
-    /// Includes the disagreement of model and data that the checks show in the standard errors;
-    /// with nonlinear terms, only further terms: the errors follow from the residual.
+    /// Adds the disagreement of model and data that the checks show to the standard errors. With
+    /// nonlinear terms it adds only the effect of further terms, because the standard errors
+    /// already follow from the residual.
     pub(super) fn count_disagreement(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
         let unjudged = std::mem::take(&mut self.disagreement);
         let judged = unjudged.warned_of(checks, self.estimate.degrees_of_freedom());
@@ -252,8 +253,8 @@ impl Fitted {
         Ok(Some(NonlinearPart { uncertain, channels, largest_displacement }))
     }
 
-    /// Returns the RMS of the residual of the equations over that of their right-hand sides, all
-    /// degrees of freedom together.
+    /// Returns the ratio of the RMS of the residual to the RMS of the right-hand side, for the
+    /// equations of all degrees of freedom together.
     pub(crate) fn nrmse(&self) -> f64 {
         let residuals = self.estimate.residual_nrmse();
         (residuals.iter().map(|e| e * e).sum::<f64>() / residuals.len() as f64).sqrt()
@@ -297,7 +298,7 @@ pub(super) fn unexplained_motion(
     for (row, omega) in data.omega().iter().enumerate() {
         let measured = data.displacement().row(row).transpose();
         let modelled = system.receptance(*omega)? * data.force().row(row).transpose();
-        // Low lines would have too much weight as displacements.
+        // Displacements would give the lines at low frequencies too much weight.
         let quantity = data.measured().per_displacement(*omega).norm_sqr();
         for channel in 0..data.dof() {
             let weight = match data.noise() {

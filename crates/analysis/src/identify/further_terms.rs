@@ -1,4 +1,5 @@
-//! Nonlinear terms that a fit with others lacks, and what they would change.
+//! Nonlinear terms that are missing in a fit with other such terms, and their effect on its
+//! parameters.
 
 use mechid_checks::{Finding, NamedChange, NonlinearTermsLeftOut, PValue};
 use mechid_estimate::{EstimateError, Unknowns};
@@ -16,7 +17,7 @@ use super::nonlinear::estimated;
 use super::options::Nonlinear;
 use crate::AnalysisError;
 
-/// Terms that explain a part of what a fit leaves.
+/// Terms that explain a part of the residual of a fit.
 pub(super) struct FurtherTerms {
     /// The terms, with the changes that they make.
     pub(super) finding: Finding,
@@ -28,8 +29,8 @@ pub(super) struct FurtherTerms {
 impl FurtherTerms {
     /// Adds terms of the usual kinds to a fit of whole periods, as long as the information
     /// criterion falls and their coefficients differ from zero; `None` if there are no such terms,
-    /// or if a fit with them fails. The fit with them uses the estimator of `fit` or, if it fails,
-    /// least squares on the equation of motion with and without them.
+    /// or if the larger fit fails. The larger fit uses the estimator of `fit`. If that fails, both
+    /// fits use least squares on the equation of motion.
     pub(super) fn from_periods(
         data: &SteadyExperiments,
         unknowns: &Unknowns,
@@ -69,8 +70,9 @@ impl FurtherTerms {
         Self::new(&fit.estimate, &larger.estimate, explained, p_value)
     }
 
-    /// Compares a fit with a larger one, whose last terms are the further ones; `None` if it has no
-    /// more. Noise alone makes further terms as certain with the probability `p_value`.
+    /// Compares a fit with a larger one, whose last terms are the further ones; `None` if the
+    /// larger one has no further terms. With the probability `p_value`, noise alone makes further
+    /// terms as certain.
     fn new(
         fit: &NonlinearEstimate,
         larger: &NonlinearEstimate,
@@ -121,8 +123,8 @@ fn with_terms(
     Ok(Some((larger, explained)))
 }
 
-/// Returns the probability that noise alone makes a coefficient differ as much from zero as that of
-/// the most certain of the added terms.
+/// Returns the smallest p-value of the coefficients of the added terms: the probability that noise
+/// alone makes the most certain one differ as much from zero.
 fn least_p_value<'a>(
     fit: &NonlinearEstimate,
     added: impl Iterator<Item = &'a str>,

@@ -239,8 +239,8 @@ impl Identify {
         !matches!(self.source, Source::Terms(_) | Source::Samples(_))
     }
 
-    /// Returns an error for a period of an open record, and for noise that an open record does not
-    /// show.
+    /// Returns an error if open records or hits have a period, or if the noise of each line is
+    /// requested: they have only one value at each line.
     fn check_open(&self, period_given: bool) -> Result<(), AnalysisError> {
         let (noise, setting, of_period) = match &self.source {
             Source::Hits(how) => {

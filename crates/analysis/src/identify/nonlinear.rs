@@ -130,9 +130,10 @@ pub struct DistortionRow {
     pub text: String,
 }
 
-/// Fits records with nonlinear terms. Whole periods: least squares on the equation of motion,
-/// optionally followed by output error. Open records, and records whose period is not given unless
-/// a setting needs periods: output error, started from a linear fit.
+/// Fits records with nonlinear terms. For whole periods it uses least squares on the equation of
+/// motion, optionally followed by output error. For open records it uses output error, started from
+/// a linear fit. If neither extent nor period is given, records count as open unless a setting
+/// needs periods.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
@@ -182,7 +183,7 @@ fn fitted(
     let further = FurtherTerms::from_periods(&data, unknowns, how, &stepped, &estimated);
     let (omitted, squared_change) =
         further.map(|further| (further.finding, further.squared_change)).unzip();
-    // Several periods show their noise, with which the misfit compares the residual.
+    // With several periods, the misfit compares the residual with their noise instead.
     let residuals = match misfit {
         Some(_) => Vec::new(),
         None => white_residuals(records, &white),
@@ -302,9 +303,9 @@ fn whole_periods(held: &Block) -> Result<SteppedRecord, AnalysisError> {
     Ok(SteppedRecord { force, response, extent: Extent::WholePeriod, periods })
 }
 
-/// Estimates the terms, by output error if `stepped` has records, and removes uncertain candidates:
-/// the least squares that selected them is biased by noise on the response. Also returns the
-/// residuals of output error; none of least squares, whose residual is that of the force.
+/// Estimates the terms, by output error if `stepped` has records. Removes uncertain candidates,
+/// because noise on the response biases the least squares that selected them. Also returns the
+/// residuals of output error; empty for least squares, whose residual is a force.
 pub(super) fn estimated(
     data: &SteadyExperiments,
     unknowns: &Unknowns,

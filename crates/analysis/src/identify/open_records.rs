@@ -267,7 +267,8 @@ impl Tested<'_> {
         }
         let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
         let between = between_samples(records, &kinds, dt, fit, pooling);
-        // AC coupling cannot explain more than a force that leaves only noise.
+        // If a force held or linear between samples leaves only noise, AC coupling cannot explain
+        // more.
         let leaves_noise = between.as_ref().is_some_and(|between| between.leaves_noise);
         let fault = if leaves_noise {
             None
@@ -294,9 +295,9 @@ fn remaining(finding: &Finding) -> f64 {
     }
 }
 
-/// Returns the estimate with a delay or a fault of the acquisition that a finding names, for
-/// records with their fit and responses of the given quantity; `None` for another finding, or if
-/// the fit fails.
+/// Returns the estimate with the delay or the fault of the acquisition that a finding names; `None`
+/// for another finding, or if the new fit fails. The responses of the records have the given
+/// quantity.
 fn refitted_with(
     finding: &Finding,
     (records, before): (&[FrequencyData], &OutputErrorFit),

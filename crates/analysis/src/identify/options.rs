@@ -76,7 +76,7 @@ impl Default for Source {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SpectralFit {
     /// Noise spectrum of maximum likelihood; `None`: maximum likelihood if at least two periods
-    /// determine the noise or it biases least squares, otherwise least squares.
+    /// determine the noise or if noise biases least squares, otherwise least squares.
     pub likelihood: Option<Pooling>,
     /// Spectral lines.
     pub lines: SpectralLines,
@@ -85,8 +85,8 @@ pub struct SpectralFit {
 /// Fit of the spectral lines of whole periods.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PeriodFit {
-    /// Estimator; `None`: maximum likelihood if at least two periods determine the noise or it
-    /// biases least squares, otherwise least squares.
+    /// Estimator; `None`: maximum likelihood if at least two periods determine the noise or if
+    /// noise biases least squares, otherwise least squares.
     pub estimator: Option<PeriodEstimator>,
     /// Spectral lines.
     pub lines: SpectralLines,
@@ -122,7 +122,7 @@ pub struct OpenNoise {
     pub response: Pooling,
     /// Standard deviation of the white noise on the samples of the force, in N: one level for all
     /// forces, or one for each degree of freedom. `None`: estimated above the band that the force
-    /// drives, for hits between the hits.
+    /// drives or, for hits, from the samples between the hits.
     pub force: Option<Vec<f64>>,
 }
 

@@ -70,7 +70,7 @@ pub(super) fn better_model_of(
     let (best, remaining) = better_model(data.omega(), deviation.as_ref(), &fitted, &models)?;
     let (cause, mut other) = others.swap_remove(best);
     if let Cause::Delay { seconds } = cause {
-        // The weights are those of the result, so that the change is that by the delay alone.
+        // The fit keeps the weights of the result, so that only the delay changes the parameters.
         let late = data.with_later_force(seconds);
         other = output_error_of_table(&late, result.unknowns()).ok().map(|fit| fit.estimate);
     }

@@ -93,11 +93,12 @@ pub struct ModeRow {
     /// `true` for a mode without restoring force: the interval of its natural frequency contains
     /// zero.
     pub is_rigid_body: bool,
-    /// Natural frequency, in Hz; for an overdamped pair, the one of the pair.
+    /// Natural frequency, in Hz; for an overdamped pair, the value that both modes share.
     pub natural_frequency_hz: Uncertain,
     /// Damped frequency, in Hz.
     pub damped_frequency_hz: Uncertain,
-    /// Damping ratio, a pure number; for an overdamped pair, the one of the pair, above 1.
+    /// Damping ratio, a pure number; for an overdamped pair, the value that both modes share, above
+    /// 1.
     pub damping_ratio: Uncertain,
     /// Eigenvalue of a mode that does not oscillate, in 1/s.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -166,7 +167,7 @@ impl ModeRow {
     }
 
     /// Returns the quantities of modes, with name and unit: natural frequency, damped frequency if
-    /// `damped`, damping ratio, and the poles of those that do not oscillate; an overdamped pair is
+    /// `damped`, damping ratio, and the poles of modes that do not oscillate. An overdamped pair is
     /// reported once.
     pub fn quantities(modes: &[Self], damped: bool) -> Vec<(String, Uncertain, &'static str)> {
         let mut quantities = Vec::new();
@@ -366,7 +367,8 @@ impl ProportionalDamping {
     }
 }
 
-/// Maximum number of entries known to be zero that a table shows; of more it shows only the number.
+/// Maximum number of entries known to be zero that a table lists; with more, it states only their
+/// number.
 const ZEROS_SHOWN: usize = 12;
 
 /// Returns the table of the parameters, followed by other rows. Many entries known to be zero are

@@ -169,8 +169,8 @@ impl RecordFindings {
 }
 
 /// Compares the records, the halves of their periods and the bands of lines, and tests terms that
-/// the model omits. Without noise in a record there are no halves, and the noise has the form of
-/// `spectrum`.
+/// the model omits. If the noise of a record is not known, the halves are not compared, and the
+/// noise has the form of `spectrum`.
 fn agreement(
     spectra: &[Spectra],
     weighted: &[FrequencyData],
@@ -210,8 +210,8 @@ fn agreement(
         splits.push((Split::Rows(halves), RowParts::Halves));
     }
     let parts = PartsOfFit::new(&joint, estimate, None, spectrum);
-    // Least squares of several periods ignores their noise: its estimate does not maximise the
-    // likelihood, as the score test assumes.
+    // Least squares of several periods ignores their noise, so its estimate does not maximise the
+    // likelihood. The score test assumes such a maximum.
     let is_one = spectra.iter().all(|(periods, _)| periods.count() == 1);
     let sampled = (spectrum.is_some() || is_one).then_some(&sampled[..]);
     Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, sampled, estimate)))
@@ -280,8 +280,8 @@ fn nonlinear_term(
     Ok(distortion_of_periods(&band, &experiments, first.response().1, unknowns).unwrap_or(None))
 }
 
-/// Returns a remark on a window that was used as one period and contains several: their scatter,
-/// which shows the noise, was not used.
+/// Returns a remark on a window that was used as one period although it contains several. The
+/// scatter of these periods shows the noise, but was not used.
 pub(super) fn unsaid_period(record: &Windowed) -> Option<String> {
     let (held, len) = (&record.held, record.held.force.len());
     let force = held.force.channel(*held.driven.first()?);
@@ -442,9 +442,10 @@ fn likelihood(
     })
 }
 
-/// Returns least squares if it explains the response as well as maximum likelihood, or if the
-/// residual of the latter is more than noise. Otherwise noise has biased least squares, and maximum
-/// likelihood is returned with this reason.
+/// Returns least squares if it explains the response as well as maximum likelihood. Also returns
+/// least squares if the residual of maximum likelihood is more than noise, unless least squares
+/// leaves a residual that is [`MUCH`] times as large. Otherwise noise has biased least squares:
+/// returns maximum likelihood with this reason.
 fn preferred(
     data: &FrequencyData,
     plain: SpectralEstimate,
@@ -459,8 +460,8 @@ fn preferred(
     };
     let unknown = likely.estimate.unknowns().independent() as f64;
     let equations = 2.0 * (data.dof() * data.len()) as f64;
-    // Two measures per parameter, in units of the residual of maximum likelihood: with equal
-    // weights, and with the weights of maximum likelihood.
+    // The excess of least squares is measured twice, in units of the residual of maximum
+    // likelihood: with equal weights, and with the weights of maximum likelihood.
     let unweighted = ((of_plain / of_likely).powi(2) - 1.0) * equations;
     let weighted = likely.estimate.squared_distance(&plain.estimate).unwrap_or(0.0);
     let excess = unweighted.max(weighted) / unknown;

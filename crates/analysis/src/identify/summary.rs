@@ -110,7 +110,7 @@ pub struct RecordRow {
 #[derive(Debug, Serialize)]
 pub struct FitRow {
     /// Ratio of the RMS of the residual to the RMS of the fitted quantity: the force or, with
-    /// maximum likelihood, the response, for which this is `unexplained_motion`.
+    /// maximum likelihood, the response. For the response this ratio is `unexplained_motion`.
     pub nrmse: f64,
     /// Ratio of the RMS of measured minus modelled response to the RMS of the measured response:
     /// the part that the linear model does not explain. `None` if it was not computed.
@@ -231,10 +231,10 @@ impl IdentificationSummary {
         let mut doubts = Vec::new();
         let is_misfit = |check: &&CheckRow| matches!(check.finding, Finding::Misfit(_));
         let mut misfits = self.checks.iter().filter(is_misfit);
-        // A growth within its standard errors is no warning of the checks.
+        // The checks do not warn of a growth that is within its standard errors.
         let growing = self.checks.iter().filter(|check| check.subject == Subject::Instability);
         doubts.extend(growing.filter(|check| !check.is_conspicuous()).map(CheckRow::sentence));
-        // The checks report a residual that is noise.
+        // If the checks compare the residual with the noise and do not warn, the residual is noise.
         let is_noise = misfits.next().is_some_and(|check| !check.is_conspicuous())
             && misfits.all(|check| !check.is_conspicuous());
         let unexplained =
@@ -246,7 +246,7 @@ impl IdentificationSummary {
                 100.0 * part
             ));
         }
-        // The checks report a negative mass.
+        // The checks already report a negative mass.
         let is_told = self.checks.iter().any(|check| check.subject == Subject::Mass);
         let negative = |p: &&ParameterRow| p.row == p.column && p.estimate.value < 0.0;
         for p in self.parameters.iter().filter(negative).filter(|p| !is_told || p.matrix != "mass")
@@ -273,7 +273,7 @@ impl IdentificationSummary {
         text += &self.mode_table();
         text.push('\n');
         if self.unscaled.is_some() {
-            // The result contains no system, so the shapes could not be computed later.
+            // A result without scale contains no system, so the shapes cannot be computed later.
             let measured = self.channels.first_response();
             let kind = measured.unwrap_or(ResponseQuantity::Displacement);
             text += &shape_table(&self.modes, |at| self.channels.response_name(kind, at));

@@ -246,7 +246,7 @@ impl CheckedFit {
     }
 }
 
-/// A fit with all that its checks look at.
+/// A fit with the data that its checks use.
 struct Scope<'a> {
     fit: &'a TableFit,
     data: &'a FrequencyData,
@@ -298,8 +298,8 @@ impl Scope<'_> {
         adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
         let row =
             |(when, name, finding): Row| CheckRow::new(when, name, &finding, &Channels::default());
-        // Under an exponential window, or without a scale, the changes are those of other
-        // parameters.
+        // With an exponential window, or without a scale, the fitted parameters are not those of
+        // the machine, so their changes do not apply.
         let is_same =
             !self.is_unscaled && self.tables.iter().all(|table| table.added_decay.is_none());
         let [omitted, explained] =

@@ -276,8 +276,8 @@ fn uncorrected(table: &FrequencyResponses, why: &str) -> String {
     format!("{}: {why}: the bias of the window was not corrected", table.file)
 }
 
-/// Returns remarks on the noise that a table states; `is_averaged` if its segments are used,
-/// `is_certain` if its coherence is 1 and states no noise.
+/// Returns remarks on the noise that a table states. `is_averaged` states whether the segments of
+/// the table are used, `is_certain` whether its coherence is 1, which states no noise.
 fn noise_remarks(
     table: &FrequencyResponses,
     how: &IdentifyResponses,
@@ -475,8 +475,8 @@ struct Averaged {
 const OF_LINE: f64 = 1e-3;
 
 impl Averaged {
-    /// Returns the stated segments of a table; `None` if it states none, or if its frequencies are
-    /// not their lines.
+    /// Returns the stated segments of a table; `None` if the table states none, or if its
+    /// frequencies are not lines of these segments.
     fn from_table(
         table: &FrequencyResponses,
         rows: &[usize],
@@ -506,8 +506,8 @@ struct Columns<'a> {
 }
 
 impl Columns<'_> {
-    /// Returns responses with their coherence: averages over the segments that the table states, or
-    /// over the given number.
+    /// Returns responses with their coherence: averages over the segments that the table states,
+    /// otherwise over the given number of averages.
     fn frequency_responses(
         &self,
         table: &FrequencyResponses,
@@ -539,8 +539,9 @@ impl Columns<'_> {
         Ok(Frf::new(omega, response, coherence, averages, self.measured)?)
     }
 
-    /// Returns the responses with the coherence of the table: one for all forces if it is multiple,
-    /// otherwise one for each force; `None` if the table has none.
+    /// Returns the responses with the coherence of the table: one item for all forces if the
+    /// coherence is multiple, otherwise one item for each force; `None` if the table has no
+    /// coherence.
     fn coherent(
         &self,
         table: &FrequencyResponses,

@@ -38,8 +38,8 @@ impl Unscaled {
         let (mut normalised, mut unscaled) = (unknowns.clone(), None);
         loop {
             match fit(&normalised) {
-                // Only the fit may reveal that a force channel is noise.
-                // Related equations have a common scale.
+                // Sometimes only the fit shows that a force channel contains noise alone.
+                // Related equations have a common scale, so this does not apply to them.
                 Err(AnalysisError::Estimate(EstimateError::OnlyRatios { dof, .. }))
                     if !unknowns.is_related()
                         && (unscaled.is_none() || !free.contains(&(dof - 1))) =>
@@ -57,9 +57,9 @@ impl Unscaled {
         }
     }
 
-    /// Returns the equations and the unknowns of one of the systems with the same modes: it has
-    /// unit masses on the degrees of freedom `free`, counted from 0, and no mass that couples other
-    /// equations to these.
+    /// Returns the equations without scale, and the unknowns of one of the systems with the same
+    /// modes. This system has unit masses on the degrees of freedom `free`, counted from 0, and no
+    /// mass that couples other equations to these.
     fn normalised(unknowns: &Unknowns, free: &[usize]) -> Result<(Self, Unknowns), AnalysisError> {
         let (mut normalised, mut equations) = (unknowns.clone(), Vec::new());
         for row in 0..unknowns.dof() {

@@ -92,8 +92,8 @@ enum Samples {
 pub struct Block {
     /// Name of the record for messages.
     pub file: String,
-    /// Samples × degrees of freedom, in N; for a long window only the first samples, also of the
-    /// responses.
+    /// Forces, samples × degrees of freedom, in N. Of a long window, forces and responses have only
+    /// the first samples.
     pub force: Record,
     /// Samples × degrees of freedom, in m.
     pub displacement: Option<Record>,

@@ -23,7 +23,8 @@ pub(crate) fn check_distinct(measurements: &[Measurement]) -> Result<(), Analysi
 }
 
 /// Returns whether the largest values, the channels and the windows of two records are equal,
-/// without reading their samples again. A record that is zero throughout has errors of its own.
+/// without reading their samples again. Records that are zero throughout do not count, because
+/// other errors report them.
 fn may_repeat(a: &Measurement, b: &Measurement) -> Result<bool, AnalysisError> {
     let moves = a.source.peaks.iter().any(|peak| *peak > 0.0);
     let is_alike = a.source.peaks == b.source.peaks && a.channels() == b.channels();

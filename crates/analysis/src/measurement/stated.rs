@@ -60,9 +60,10 @@ impl Channels {
         Ok(if kinds.count() == 1 { channels } else { Self::default() })
     }
 
-    /// Returns the same columns with the force at each degree of freedom that has a response: by
-    /// points such as `12+Z`, after which a universal file names its columns, or if there is only
-    /// one force and one response without points; otherwise empty.
+    /// Returns the same columns, with a force column for each degree of freedom that has a
+    /// response. Points such as `12+Z`, after which a universal file names its columns, pair forces
+    /// with responses. One force and one response without points are also a pair. All other columns
+    /// give an empty result.
     #[must_use]
     pub fn paired_by_point(self) -> Self {
         let Some(kind) = self.first_response() else { return Self::default() };
@@ -82,8 +83,8 @@ impl Channels {
         Self { force: force.collect(), ..self }
     }
 
-    /// Returns these channels with the number of a column in place of a name that several columns
-    /// have, if only one of them states the quantity.
+    /// Returns these channels without ambiguous names: if several columns have a name and only one
+    /// of them states the quantity, the number of that column replaces the name.
     pub(super) fn distinguished(&self, table: &Table) -> Self {
         let one = |column: &String, quantity: Quantity| {
             let Err(IoError::AmbiguousColumn { columns, .. }) = table.find(column) else {

@@ -166,14 +166,15 @@ fn two_rates(table: &Table, reading: &Reading) -> Option<[String; 3]> {
     Some([rate, source, of_file])
 }
 
-/// Maximum doubtful sampling rate, in Hz, of a time column without a unit, for any length: only
-/// very slow structures need no more. Milliseconds read as seconds give such a rate up to 2 kHz,
-/// and numbers of samples at any rate.
+/// Maximum sampling rate, in Hz, that is doubtful for a time column without a unit in a record of
+/// any length: only very slow structures need no higher rate. Milliseconds that are read as seconds
+/// give such a rate for true rates up to 2 kHz, sample numbers that are read as seconds for all
+/// true rates.
 const SLOW_HZ: f64 = 2.0;
 
-/// Maximum doubtful sampling rate, in Hz, of records longer than [`LONG_S`]: buildings have such
-/// rates, but seldom without a unit. Milliseconds read as seconds give such a rate up to 20 kHz in
-/// records of at least a second.
+/// Maximum sampling rate, in Hz, that is doubtful in records longer than [`LONG_S`]: records of
+/// buildings have such rates, but seldom without a unit. Milliseconds that are read as seconds give
+/// such a rate for true rates up to 20 kHz, in records of at least a second.
 const RATHER_SLOW_HZ: f64 = 20.0;
 
 /// Minimum duration, in s, for the limit [`RATHER_SLOW_HZ`].
@@ -193,9 +194,9 @@ const DAY_NUMBERS: f64 = 20_000.0;
 /// Number of seconds in a day.
 const DAY_S: f64 = 86_400.0;
 
-/// Returns a finding if a time column has a doubtful unit: without a unit the sampling rate may be
-/// so low and the record so long that it is in milliseconds, or the rate so high that it is in
-/// days.
+/// Returns a finding if a time column has a doubtful unit. Without a unit, the column may be in
+/// milliseconds if the sampling rate is very low and the record long, or in days if the rate is
+/// very high.
 pub(crate) fn doubtful_time(
     table: &Table,
     time: &TimeAxis<'_>,
@@ -225,7 +226,8 @@ pub(crate) fn doubtful_time(
 /// smaller error is negligible against the noise of frequencies.
 const RATE_ERROR: f64 = 1e-5;
 
-/// Maximum ratio of rounding to time step of rounded instants; even instants have 1.
+/// Maximum ratio of rounding to time step of instants that are rounded; equally spaced instants
+/// have 1.
 const EVEN: f64 = 0.99;
 
 /// Returns a remark if the digits of a time column make the sampling rate so uncertain that the
@@ -239,7 +241,7 @@ pub(crate) fn coarse_time(
     let instants = table.column(name).ok()?;
     let (first, last) = (instants.first()?, instants.last()?);
     let per_sample = (last - first) / (instants.len() - 1) as f64;
-    // Even instants are multiples of their own step.
+    // Equally spaced instants are multiples of the time step, which then appears as their rounding.
     let rounding = quantisation_step(instants)? / per_sample;
     let error = rounding / sampling.len() as f64;
     (rounding < EVEN && error > RATE_ERROR).then(|| {

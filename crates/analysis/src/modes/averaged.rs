@@ -27,16 +27,16 @@ pub(super) struct Averaged {
     pub spacing_hz: f64,
     /// Minimum distance, in lines, of independent errors.
     step: usize,
-    /// Ratio of the standard errors of lines `step` apart and of independent lines.
+    /// Ratio of the standard errors of lines `step` apart to those of independent lines.
     pub inflation: f64,
     /// Weights of the smoothing by the window; empty without smoothing.
     smoothing: Vec<f64>,
 }
 
 impl Averaged {
-    /// Returns the segments that a table states; `None` if it states none, if its frequencies are
-    /// not their lines, or if the segments are so long that the weights of their window take too
-    /// much time.
+    /// Returns the segments that a table states; `None` if the table states none, if its
+    /// frequencies are not lines of these segments, or if the segments are so long that the weights
+    /// of their window take too much time.
     pub fn new(table: &FrequencyResponses) -> Option<Self> {
         let stated = table.segments?;
         if stated.samples.saturating_mul(stated.samples.div_ceil(stated.hop)) > MOST_SEGMENT_WORK {

@@ -13,7 +13,7 @@ use crate::limits::MODAL_SIGNIFICANCE;
 use crate::measurement::{Block, Measurement, check_distinct};
 
 /// Identifies the modes of free decays, one in each record, from `from_s` to `to_s`, in s from the
-/// first sample of the window; `None`: found.
+/// first sample of the window; `None`: as for [`DecaySettings`].
 pub(super) fn modes(
     measurements: &[Measurement],
     settings: &ModesSettings,
@@ -39,8 +39,8 @@ pub(super) fn modes(
     Test { recorded, struck_apart: None, band_hz }.modes(records, checks, settings)
 }
 
-/// Returns whether the second half of a response has more power than the first, all channels
-/// divided by their power, beyond what noise of constant power does.
+/// Returns whether the second half of a response has more power than the first, by more than noise
+/// of constant power explains. Each channel is divided by its power.
 ///
 /// # Source
 /// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1 (F test).

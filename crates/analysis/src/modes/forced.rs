@@ -27,8 +27,8 @@ use crate::text::significant;
 /// Records of a test, and the band of the fit.
 pub(super) struct Test {
     pub recorded: Recorded,
-    /// The same records with a force of its own in the first of them; `None` unless one force acts
-    /// in several records, at points that are not stated.
+    /// The same records, but with the force of the first record as a separate input; `None` unless
+    /// one force acts in several records, at points that are not stated.
     pub struck_apart: Option<Recorded>,
     pub band_hz: [f64; 2],
 }
@@ -135,7 +135,7 @@ pub(super) fn modes_of_tables(
     } else {
         vec![None; estimate.modes().len()]
     };
-    // Errors of independent outputs are the least.
+    // Standard errors are at least those for independent errors of the outputs.
     let scale =
         |ratio: Option<f64>| tables.error_inflation() * ratio.unwrap_or(1.0).max(1.0).sqrt();
     let scales: Vec<f64> = scatter.into_iter().map(scale).collect();
@@ -161,7 +161,7 @@ pub(super) fn modes_of_tables(
     context.with(Fit { data, estimate, modes }, settings)
 }
 
-/// Returns the notes on tables: what their windows cost, and the remarks of their files.
+/// Returns the notes on tables: the effects of their windows, and the remarks of their files.
 fn notes_of_tables(tables: &Tables) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(decay) = tables.added_decay {

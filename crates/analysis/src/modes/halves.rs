@@ -49,8 +49,8 @@ impl Halves {
         Self::from_comparison(compared, hz, "the record")
     }
 
-    /// Takes the results of a comparison; `natural_hz` has the frequencies of the modes of the
-    /// whole, in Hz.
+    /// Takes the results of a comparison; `natural_hz` has the natural frequencies of the modes of
+    /// the whole test, in Hz.
     fn from_comparison(
         compared: Option<PartsComparison>,
         natural_hz: Vec<f64>,

@@ -63,8 +63,9 @@ impl Properties {
         Ok(constraints)
     }
 
-    /// Fits modes that have the properties. A property that the modes without it contradict is not
-    /// imposed. Also returns the settings of the fit, and the check of each property.
+    /// Fits modes that have the properties. A property is not imposed if the modes of the fit
+    /// without this property contradict it. Also returns the settings of the fit, and the check of
+    /// each property.
     pub(super) fn imposed<T>(
         self,
         settings: &ModesSettings,

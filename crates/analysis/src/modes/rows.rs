@@ -139,7 +139,8 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
     DroppedRow { frequency_hz, damping_ratio, reason }
 }
 
-/// Returns the note on delays that are part of the model: each, or the range of many.
+/// Returns the note on delays that are part of the model: a list or, if there are many, their
+/// range.
 fn delay_note(delays: &[OutputDelay], outputs: &[Output]) -> Option<String> {
     let words = |delay: &OutputDelay| {
         let direction = if delay.seconds > 0.0 { "late" } else { "early" };

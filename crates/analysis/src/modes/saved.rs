@@ -293,7 +293,7 @@ impl SavedCheck {
         (self.passed != Some(true)).then_some(self.text.as_str())
     }
 
-    /// Returns whether the check speaks against the numbers.
+    /// Returns whether the verdict is not good.
     pub fn is_conspicuous(&self) -> bool {
         self.verdict() != "good"
     }
@@ -314,7 +314,7 @@ impl From<SavedValue> for Uncertain {
         let interval = saved
             .interval
             .map(|[low, high]| [low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)]);
-        // A known value has no interval; an estimate with an infinite error has.
+        // A known value has no interval; an estimate with an infinite error has one.
         let infinite = interval.map(|_| f64::INFINITY);
         let standard_error = saved.standard_error.or(infinite);
         Self { value: saved.value.unwrap_or(f64::NAN), standard_error, interval }

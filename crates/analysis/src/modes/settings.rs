@@ -60,11 +60,13 @@ pub enum ModalTest {
     },
     /// Free decays, one in each record, with forces neither measured nor acting.
     Decay {
-        /// Beginning of each decay, in s from the first sample of the window; `None`: found.
+        /// Beginning of each decay, in s from the first sample of the window; `None`: detected in
+        /// the record.
         #[serde(default)]
         from_s: Option<f64>,
         /// End of the part of each decay that is used, in s from the first sample of the window;
-        /// `None`: the end of the window.
+        /// `None`: the end of the window, or the time at which a channel has fallen to its
+        /// rounding.
         #[serde(default)]
         to_s: Option<f64>,
     },

@@ -17,8 +17,8 @@ use crate::measurement::{Block, Channels, Hold, Measurement, check_distinct};
 /// Records of one test: inputs and outputs with their names.
 #[derive(Debug)]
 pub(super) struct Recorded {
-    /// Forces (N, samples × inputs) and responses (samples × outputs) of each record, or of its
-    /// hits without a gap.
+    /// Forces (N, samples × inputs) and responses (samples × outputs) of each record, or of each
+    /// group of its hits whose windows have no gap.
     pub parts: Vec<Part>,
     /// Names of the forces.
     pub inputs: Vec<String>,
@@ -32,7 +32,7 @@ pub(super) struct Recorded {
     pub hits: Vec<HitRow>,
 }
 
-/// One record, or hits of it without a gap.
+/// One record, or hits of a record whose windows have no gap.
 #[derive(Debug)]
 pub(super) struct Part {
     /// Forces, samples × inputs, in N; `None` without forces.
@@ -42,7 +42,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Returns the samples between two shares of the length.
+    /// Returns the samples between two positions, as fractions of the length from 0 to 1.
     fn between(&self, from: f64, to: f64) -> Result<Self, AnalysisError> {
         let len = self.responses.len() as f64;
         let [first, end] = [from, to].map(|share| (share * len).round() as usize);
@@ -130,7 +130,8 @@ impl Recorded {
         driven_band(self.parts.iter().filter_map(|part| part.forces.as_ref()))
     }
 
-    /// Returns the parts of all records between two shares of their length, from 0 to 1.
+    /// Returns the parts of all records between two positions, as fractions of their length from 0
+    /// to 1.
     pub fn between(&self, from: f64, to: f64) -> Result<Self, AnalysisError> {
         let parts =
             self.parts.iter().map(|part| part.between(from, to)).collect::<Result<_, _>>()?;
@@ -149,7 +150,7 @@ impl Recorded {
             let first: usize = lens[..*count].iter().sum();
             first.min(total - first)
         };
-        // The last one of equally good places.
+        // `max_by_key` returns the last of several equal maxima.
         let boundary = (1..lens.len()).max_by_key(smaller);
         if let Some(count) = boundary.filter(|c| smaller(c) as f64 >= SMALLER_HALF * total as f64) {
             let (first, second) = self.parts.split_at(count);
@@ -301,8 +302,8 @@ impl Columns {
         HitRow { force, ..hit }
     }
 
-    /// Returns the pairs of an input and an output at the same point, then the other ones with
-    /// opposite directions.
+    /// Returns the pairs of an input and an output at the same point: first those with the same
+    /// direction, then, for other inputs, those with opposite directions.
     fn driving_points(&self, responses: &[Option<String>]) -> [Vec<(usize, usize)>; 2] {
         let mut pairs = [Vec::new(), Vec::new()];
         for (input, place) in self.places.iter().enumerate() {
@@ -320,8 +321,9 @@ impl Columns {
 }
 
 impl Places {
-    /// Returns the points of the forces; if none are stated, those after which the columns are
-    /// named: of the columns of a record, or of the only column of each record.
+    /// Returns the points of the forces. If none are stated, these are the names of the force
+    /// columns, if all names are points: of the first record or, if every record has one force
+    /// column, of all records.
     fn forces_of(&self, measurements: &[Measurement]) -> Cow<'_, [String]> {
         let of_record = |measurement: &Measurement| measurement.source().names.force.clone();
         let names: Vec<Vec<String>> = measurements.iter().map(of_record).collect();
@@ -334,7 +336,8 @@ impl Places {
         }
     }
 
-    /// Returns the points of the responses; if none are stated, those after which they are named.
+    /// Returns the points of the responses; if none are stated, the names of the responses that are
+    /// points.
     fn response_places(&self, outputs: &[Output]) -> Result<Vec<Option<String>>, AnalysisError> {
         if self.responses.is_empty() {
             let names = outputs.iter().map(|output| output.name.clone());

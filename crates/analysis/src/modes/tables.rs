@@ -66,7 +66,7 @@ impl Tables {
         self.tables.iter().zip(self.averaged.iter().map(Option::as_ref))
     }
 
-    /// Lowest and highest frequency above zero, in Hz.
+    /// Returns the lowest and the highest frequency above zero, in Hz.
     pub fn range_hz(&self) -> [f64; 2] {
         let frequencies = self.tables.iter().flat_map(|table| &table.frequency_hz);
         frequencies
@@ -74,7 +74,7 @@ impl Tables {
             .fold([f64::INFINITY, 0.0], |[low, high], hz| [low.min(*hz), high.max(*hz)])
     }
 
-    /// Responses, with the quantities that the tables state.
+    /// Returns the responses, with the quantities that the tables state.
     pub fn outputs(&self) -> Vec<Output> {
         let functions = || self.tables.iter().flat_map(|table| &table.functions);
         let output = |point: &String| Output {
@@ -84,7 +84,7 @@ impl Tables {
         self.responses.iter().map(output).collect()
     }
 
-    /// Input and output at the same point, counted from 0.
+    /// Returns the pairs of input and output at the same point, counted from 0.
     pub fn driving_points(&self) -> Vec<(usize, usize)> {
         let output = |point| self.responses.iter().position(|other| other == point);
         let inputs = self.forces.iter().enumerate();
@@ -96,7 +96,7 @@ impl Tables {
         self.averaged.iter().flatten().any(Averaged::is_smoothed)
     }
 
-    /// Returns the largest ratio of a standard error to the one of independent lines.
+    /// Returns the largest ratio of a standard error to its value for independent lines.
     pub fn error_inflation(&self) -> f64 {
         self.averaged.iter().flatten().map(|averaged| averaged.inflation).fold(1.0, f64::max)
     }
@@ -168,8 +168,8 @@ impl Tables {
 }
 
 /// Returns the variance of some responses to a force (rows × responses), up to a factor: from their
-/// standard errors or, if there are none, from their coherence. `None` unless a table states either
-/// of every response, with noise on every row.
+/// standard errors or, if there are none, from their coherence. `None` if a response has neither of
+/// them, or if a variance is not positive and finite.
 ///
 /// # Source
 /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance from the coherence).

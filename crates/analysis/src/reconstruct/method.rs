@@ -276,7 +276,8 @@ fn lines(
 }
 
 /// Returns the source of the noise if it is not stated: the lines without force, if there are
-/// enough. Outside a band a force may act that is not reconstructed.
+/// enough. The lines outside a band are not such lines, because forces outside the band may act
+/// that are not reconstructed.
 fn outside(request: &Request, motion: &Measurement) -> Noise {
     let given = request.lines.as_ref().filter(|_| request.periodic);
     let needed = mechid_force::MIN_OUTSIDE_LINES;

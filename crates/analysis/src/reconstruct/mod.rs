@@ -71,7 +71,8 @@ pub struct ForceChunk<'a> {
 
 impl ForceChunk<'_> {
     /// Returns the columns of a table with their names: the force and, if known, its standard
-    /// error, in N; without the noise, it includes only the uncertainty of the machine.
+    /// error, in N. If the standard error does not include the noise of the record, it covers only
+    /// the uncertainty of the machine, and its name says so.
     pub fn columns(&self) -> Vec<(String, &[f64])> {
         let dofs = self.force.record().channels();
         let name = |base: &str, dof| numbered(base, dof, dofs);
@@ -132,7 +133,7 @@ pub fn reconstruct_with(
 }
 
 /// Reconstructs the force of a record of any length: it passes the force to `take` chunk by chunk,
-/// in order, and stores no more of it than the method needs.
+/// in order, and stores only the samples that the method needs.
 ///
 /// # Errors
 /// As [`reconstruct`], and the errors of `take`.
@@ -203,7 +204,7 @@ impl Task {
     }
 
     /// Reconstructs the force, in chunks if the method allows it and the whole force is not
-    /// requested; only otherwise is the force returned.
+    /// requested. Returns the force unless it is computed in chunks.
     fn find(
         &self,
         machine: &Machine,

@@ -19,7 +19,7 @@ pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.identified.summary();
     let mut doubts = sentences_with(&report.checks, Verdict::Bad);
     doubts.extend(report.doubts());
-    // The checks report a residual that is too large.
+    // The checks report a residual that is too large, but not one that is too small.
     if let Some(misfit) =
         contents.identified.fitted().misfit.filter(|misfit| misfit.ratio < OVERSTATED)
     {
@@ -90,7 +90,7 @@ fn is_predicted(fit_percent: f64) -> bool {
     fit_percent >= POOR_FIT
 }
 
-/// `true` if samples that were predicted had been fitted: then the prediction proves little.
+/// Returns whether predicted samples were also fitted; the prediction then proves little.
 pub fn was_fitted(contents: &Review<'_>) -> bool {
     let report = &contents.identified.summary();
     report.validation.iter().any(|predicted| {

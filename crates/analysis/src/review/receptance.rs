@@ -146,8 +146,8 @@ fn measured(
             segment(first)
         )
     };
-    // Towards half the sampling rate a held or linear force is smaller than its samples, as is the
-    // motion.
+    // Towards half the sampling rate, a force that is held or linear between its samples is smaller
+    // than its samples show, and so is the motion.
     let origin =
         origin + "; towards half the sampling rate the force between the samples shows, too";
     Ok((data, origin))

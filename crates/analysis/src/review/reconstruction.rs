@@ -17,7 +17,7 @@ pub struct Reconstruction {
     pub method: &'static str,
     /// Reconstructed force.
     pub force: IdentifiedForce,
-    /// Measured force; in the frequency domain its mean period, on the lines used alone.
+    /// Measured force; in the frequency domain, its mean period on the used lines only.
     pub measured: Record,
     /// Degrees of freedom on which a force acts, counted from 0.
     pub forced: Vec<usize>,

@@ -19,7 +19,8 @@ pub struct Residual {
     pub compared: Vec<Compared>,
     /// Correlations of each residual channel; empty if it is not tested separately.
     pub correlations: Vec<Correlations>,
-    /// The first quantity in the mean period, for several periods.
+    /// First measured quantity over the mean period, with its prediction; `None` without a mean
+    /// period.
     pub mean: Option<Compared>,
 }
 

@@ -146,8 +146,8 @@ struct Periods {
 }
 
 impl Periods {
-    /// Creates sums without a period of `period` samples; `held` are some samples of the channels,
-    /// for their scale.
+    /// Creates empty sums for periods of `period` samples; `held` are some samples of the channels,
+    /// which give their scale.
     fn new(period: usize, held: &Record) -> Self {
         let none = DMatrix::zeros(period, held.channels());
         let scale = |c: usize| Some(held.column(c).amax()).filter(|peak| *peak > 0.0);

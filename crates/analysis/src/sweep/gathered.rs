@@ -166,7 +166,7 @@ impl Decimated {
         Ok(Self { factor, skip: 0, last: None, gathered })
     }
 
-    /// Adds its samples from the next chunk of the record.
+    /// Adds every n-th sample of the next chunk of the record.
     pub fn push(&mut self, chunk: &Samples<'_>) -> Result<(), AnalysisError> {
         let len = chunk.force.len();
         if self.skip >= len {

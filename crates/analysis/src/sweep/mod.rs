@@ -97,7 +97,7 @@ pub fn sweep_experiment(
     how.summary(file, samples, &swept, Some(&system), (Some(natural_frequency_hz), &rate_hz))
 }
 
-/// Identifies every n-th sample of a record, without filtering, for every setting.
+/// Identifies the machine from every n-th sample of a record, without filtering, for every setting.
 ///
 /// Without a reference, the standard errors are compared; they do not include bias. A long text is
 /// read once for all settings and not buffered. `progress` is called after each setting.
@@ -244,7 +244,8 @@ impl SweepSettings {
     }
 }
 
-/// Returns the failure at the first setting, in its own words.
+/// Returns the error of a sweep without an estimate, with the reason of the failure at the first
+/// setting.
 fn nothing_found(swept: &Sweep<f64, Failure>) -> AnalysisError {
     let describe = |point: &SweepPoint<f64, Failure>| AnalysisError::EmptySweep {
         setting: point.setting,

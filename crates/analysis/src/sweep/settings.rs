@@ -63,7 +63,7 @@ impl FromStr for Settings {
                 [first, step, last] => [first, step, last],
                 _ => return Err("a range is written first:step:last, such as 1:0.5:16".into()),
             };
-            // The last setting survives the rounding of the steps towards it.
+            // The small addition keeps the last setting despite the rounding of the steps.
             let steps = ((last - first) / step + 1e-9).floor();
             let positive = |v: f64| v > 0.0 && v.is_finite();
             if !(positive(first) && positive(step) && positive(last) && steps >= 0.0) {

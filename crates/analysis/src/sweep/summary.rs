@@ -33,7 +33,7 @@ pub struct SweepSummary {
     pub points: Vec<Point>,
     /// Setting with the smallest error, in the unit of its [`Kind`].
     pub best_setting: f64,
-    /// Best setting where the settings are NPI, a pure number: cycles in a period.
+    /// Best setting if the settings are NPI: number of cycles in a period, a pure number.
     pub best_npi: Option<f64>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,

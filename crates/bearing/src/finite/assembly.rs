@@ -185,7 +185,7 @@ impl Element {
 
         let p_u = dot(&shape_u, pressure);
         let p_v = dot(&shape_v, pressure);
-        // ∂/∂ζ times the area of the element in (θ, ζ).
+        // `p_w` is ∂P/∂ζ times the area of the element in (θ, ζ).
         let p_w = p_v * along - p_u * skew;
         let area = WEIGHT * along * height;
         let [per_along, per_area] = [1.0 / along, 1.0 / (along * height)];

@@ -30,8 +30,8 @@ impl<'a> Search<'a> {
     /// Moves the journal to its equilibrium; returns the derivatives of the load there with respect
     /// to displacement and velocity.
     ///
-    /// Starts on a coarse mesh, where Newton's method converges from far away, and ends on the mesh
-    /// of the bearing: the finer the mesh, the better the initial fronts must be.
+    /// The search starts on a coarse mesh, where Newton's method converges from far away, and ends
+    /// on the mesh of the bearing: the finer the mesh, the better the initial fronts must be.
     pub(super) fn equilibrium(&mut self) -> Result<Matrix2x4<f64>, BearingError> {
         let Mesh { along, across } = self.bearing.mesh;
         let [coarse, middle] = [4, 2].map(|by| Mesh { along: along / by, across: across / by });

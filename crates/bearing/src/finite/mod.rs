@@ -107,7 +107,7 @@ impl FiniteBearing {
         Ok(Equilibrium::new(sommerfeld, search.position.into(), coefficients))
     }
 
-    /// Returns S of a load over 6 μ Ω R² (R/c)².
+    /// Returns the Sommerfeld number S of a load that is divided by 6 μ Ω R² (R/c)².
     fn sommerfeld_number(&self, load: f64) -> f64 {
         self.length_over_diameter / (3.0 * PI * load)
     }

@@ -21,7 +21,8 @@ impl Bore {
         Self { pads: vec![Pad { edges: [f64::NEG_INFINITY, f64::INFINITY], centre: [0.0; 2] }] }
     }
 
-    /// A circular bore with two axial grooves of `groove` rad each, at right angles to the load.
+    /// Returns a circular bore with two axial grooves of `groove` rad each, at right angles to the
+    /// load.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the groove is not between 0 and π rad.
@@ -29,8 +30,9 @@ impl Bore {
         Self::elliptical(0.0, groove)
     }
 
-    /// Two lobes whose centres are `preload` pad clearances above and below the middle, with two
-    /// axial grooves of `groove` rad each between them, at right angles to the load.
+    /// Returns a bore of two lobes whose centres are `preload` pad clearances above and below the
+    /// middle, with two axial grooves of `groove` rad each between them, at right angles to the
+    /// load.
     ///
     /// The preload (a ratio) is 1 − assembled clearance / pad clearance.
     ///
@@ -54,7 +56,7 @@ impl Bore {
         &self.pads
     }
 
-    /// Film thickness at the thinnest place over the pad clearance.
+    /// Returns the smallest film thickness, relative to the pad clearance.
     pub(super) fn thinnest(&self, position: Vector2<f64>) -> f64 {
         self.pads.iter().map(|pad| pad.thinnest(position)).fold(f64::INFINITY, f64::min)
     }

@@ -8,7 +8,7 @@ use crate::error::BearingError;
 
 /// The film of a short bearing as a nonlinear force on the journal.
 ///
-/// The film has pressure where the formula gives a positive one at this instant: on half the
+/// The film has pressure where the formula gives a positive pressure at this instant: on half the
 /// circumference, whose position depends on the velocity. The pressure, integrated over the length
 /// of the bearing, is −μ L³ (Ω/2 ∂h/∂θ + ∂h/∂t) / h³, in N per m of circumference, with the film
 /// thickness h at the angle θ.
@@ -47,7 +47,7 @@ pub struct FilmForce {
 }
 
 impl ShortFilm {
-    /// The film of a bearing.
+    /// Creates the film of a bearing.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] naming the value that is not positive and finite.

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-/// ∫ cosᵇθ sinᵃθ / (1 − ε cos θ)ⁿ dθ from α − π to α, for n = 3, a + b = 2 and n = 4, a + b = 3.
+/// Integrals ∫ cosᵇθ sinᵃθ / (1 − ε cos θ)ⁿ dθ from α − π to α, for a + b = 2 with n = 3 and for
+/// a + b = 3 with n = 4.
 ///
 /// # Source
 /// Sommerfeld's substitution 1 − ε cos θ = (1 − ε²) / (1 + ε cos γ) makes them trigonometric
@@ -21,7 +22,8 @@ impl Integrals {
         let e = eccentricity;
         let q = (1.0 - e) * (1.0 + e);
         let root = q.sqrt();
-        // Angle γ of the end, and of the start half a turn before it; γ passes ±π where θ does.
+        // The angles γ belong to the end and to the start half a turn before it; γ passes ±π where
+        // θ does.
         let (sin, cos) = end.sin_cos();
         let last = (root * sin).atan2(cos - e);
         let first = (-root * sin).atan2(-cos - e);

@@ -14,8 +14,8 @@ use film::HalfFilm;
 /// A short bearing: the oil flows axially, and the converging part of the film has pressure.
 ///
 /// The film covers half the circumference (Gümbel's condition, which for a short bearing is
-/// equivalent to that of Swift and Stieber). Good for lengths of up to half the diameter at
-/// moderate eccentricity.
+/// equivalent to that of Swift and Stieber). The model is good for lengths of up to half the
+/// diameter at moderate eccentricity.
 ///
 /// ```
 /// use mechid_bearing::ShortBearing;

@@ -27,8 +27,8 @@ pub struct ChannelArgs {
 }
 
 impl ChannelArgs {
-    /// Returns the columns; if none is named, those that state a force or a response in a file that
-    /// is read like the `record`.
+    /// Returns the columns. If none is named, returns the columns of the file that state a force or
+    /// a response; the file is read with the settings of `record`.
     pub fn in_file(&self, file: &Path, record: &RecordArgs) -> Result<Channels, CliError> {
         let named = self.channels();
         if !named.is_empty() || file == Path::new("-") {

@@ -1,5 +1,5 @@
-//! Arguments of `mechid identify` and `mechid report`: which records, what in them, and how to
-//! identify the machine.
+//! Arguments of `mechid identify` and `mechid report`: records, columns, and settings of the
+//! identification.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -239,7 +239,8 @@ struct Validated {
 impl FromStr for Validated {
     type Err = String;
 
-    /// Reads at most two numbers at the end, so that a name may contain colons.
+    /// Reads at most two numbers from the end of the text, so that the name of a record may contain
+    /// colons.
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |part: &str| part.parse::<usize>().ok();
         let (name, numbers) = match text.rsplit_once(':') {
@@ -362,7 +363,8 @@ impl FitArgs {
         &self.input.record
     }
 
-    /// Returns the file of a saved result or of a described machine: JSON, without columns to read.
+    /// Returns the file if it is a saved result or a described machine: a single JSON file for
+    /// which no columns are named.
     pub fn saved_result(&self) -> Option<&Path> {
         let record = self.input.record.as_path();
         let has_columns = !self.channels.channels().is_empty();

@@ -126,7 +126,8 @@ impl AboutArgs {
         title.or(self.about.as_ref().map(|_| "--about"))
     }
 
-    /// Returns the details of the file, then those that the record states under other names.
+    /// Returns the details in the `--about` file, then the details in the record whose names are
+    /// not in that file.
     pub fn details(&self, record: &Path) -> Result<Vec<(String, String)>, CliError> {
         let mut about = self.stated()?;
         for (name, value) in record_details(record) {
@@ -169,11 +170,11 @@ impl FigureArgs {
         files.reads(&self.about.about).writes(&self.plot.plot)
     }
 
-    /// Returns heading, details and command of the page of a record; `None` without a page. `words`
-    /// are the arguments of the program.
+    /// Returns heading, details and command for the page of a record; `None` if no page is
+    /// requested. `words` are the arguments of the program.
     ///
     /// # Errors
-    /// [`CliError::MisplacedOption`] if they are given without a page.
+    /// [`CliError::MisplacedOption`] if a heading or details are given, but no page is requested.
     pub fn settings(
         &self,
         record: &Path,

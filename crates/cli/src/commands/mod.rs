@@ -1,9 +1,9 @@
 //! The subcommands, one file each.
 //!
-//! To add one: a file with an arguments struct (`#[derive(clap::Args)]`, help texts with units and
-//! an example) and a method `run(&self) -> Result<Outcome, CliError>`; then a variant of
-//! [`Command`] and its two arms below. Errors of a library crate get a variant of
-//! [`CliError`].
+//! A new subcommand needs a file with an arguments struct (`#[derive(clap::Args)]`, help texts with
+//! units and an example) and a method `run(&self) -> Result<Outcome, CliError>`. It also needs a
+//! variant of [`Command`] and an arm in the matches below. Errors of a library crate get a variant
+//! of [`CliError`].
 
 mod bearing;
 mod completions;

@@ -228,7 +228,8 @@ impl ModesArgs {
         let mut records = vec![self.input.open(channels)?];
         for record in &self.more {
             let mut channels = channels.clone();
-            // Only the point of a hammer that is not named may differ from record to record.
+            // All records have the columns of the first one, except for the force column of a
+            // roving hammer: if no column is named, each record states its own.
             if let Some(Channels { force, .. }) = self.channels_of(record)
                 && force.len() == 1
                 && channels.force.len() == 1

@@ -80,9 +80,9 @@ impl<'a> ChangedRecords<'a> {
         Some(self.minimise(changed)? + of_pulses)
     }
 
-    /// Estimates the parameters of `changed` data and, from their residual, the noise as
-    /// [`output_error`] does for data without stated noise, with the last estimate as the only
-    /// initial estimate.
+    /// Estimates the parameters of `changed` data and, from their residual, the noise, as
+    /// [`output_error`] does for data without stated noise. The last estimate is the only initial
+    /// estimate.
     ///
     /// # Errors
     /// As [`output_error`].

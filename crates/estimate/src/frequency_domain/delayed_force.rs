@@ -71,8 +71,8 @@ impl<'a> DelayedForce<'a> {
         Some(Self { data, weight, driven: driven.len(), groups })
     }
 
-    /// Returns the sum over the driven equations of the ratio of residual power to the power of the
-    /// right-hand side, with the force `delay` (s) later. For related equations it is the ratio of
+    /// Returns the ratio of residual power to the power of the right-hand side, summed over the
+    /// driven equations, with the force `delay` (s) later. For related equations it is the ratio of
     /// all equations together, times the number of forces. `None` if it is not finite.
     ///
     /// # Source

@@ -54,7 +54,7 @@ impl ForceResponses {
     }
 }
 
-/// Columns over the residuals of one record, which have this range among all residuals.
+/// Columns over the residuals of one record, with the range of these residuals among all residuals.
 pub(super) type RecordColumns<T> = (Range<usize>, T);
 
 /// Returns orthonormal bases of the responses to the transient loads of every open record.
@@ -94,8 +94,9 @@ pub(super) fn remove(transients: &[RecordColumns<DMatrix<f64>>], columns: &mut D
     }
 }
 
-/// Returns the covariance of the errors of the pulses of every record, beside that of independent
-/// lines of this `level`, without what the transients explain; `None` if an effect is not finite.
+/// Returns the covariance of the residuals of every record with pulses: independent errors of the
+/// lines, of this `level`, plus the errors of the pulses without the part that the transients
+/// explain. `None` if an effect is not finite.
 pub(super) fn pulse_covariances(
     data: &FrequencyData,
     responses: &ForceResponses,
@@ -117,7 +118,8 @@ pub(super) fn pulse_covariances(
             }
             first += pulse.count();
         }
-        // The response that the residual contains to an error of the force has the opposite sign.
+        // The measured force contains its error, so the residual contains the response to the error
+        // with the opposite sign.
         effects /= -level.sqrt();
         let range = 2 * n * rows.start..2 * n * rows.end;
         let is_common = |rows: &Range<usize>| rows.start < range.end && range.start < rows.end;

@@ -63,7 +63,7 @@ impl LineBlock {
         r.select_rows(&self.columns).select_columns(&self.columns)
     }
 
-    /// Returns rows of the columns of this block as rows of the columns of a `wider` one.
+    /// Converts rows over the columns of this block to rows over the columns of a `wider` block.
     fn widened(&self, wider: &Self, rows: &DMatrix<f64>) -> DMatrix<f64> {
         let mut widened = DMatrix::zeros(rows.nrows(), wider.columns.len());
         for (from, column) in rows.column_iter().zip(&self.columns) {

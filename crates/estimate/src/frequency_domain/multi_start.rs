@@ -89,8 +89,8 @@ pub(super) fn search<P: Restartable>(
 /// Start of a search on all lines.
 enum Start {
     Near(DVector<f64>),
-    /// The search on fewer lines has ended far above the best minimum; its end, with the sum of
-    /// squares that all lines would have.
+    /// End of a search on fewer lines, far above the best minimum, with the sum of squares that all
+    /// lines would have.
     Far(Minimum),
 }
 
@@ -259,8 +259,8 @@ impl GlobalMinimum {
     }
 }
 
-/// Returns the best member of each family: that of the first family, then the others by rising sum
-/// of squares; members with the same sum of squares as another one come last.
+/// Returns the best member of each family. The first family comes first, then the others by rising
+/// sum of squares; members with the same sum of squares as another one come last.
 fn in_order(problem: &mut impl Restartable, families: Vec<Vec<DVector<f64>>>) -> Vec<DVector<f64>> {
     let mut best: Vec<(usize, f64, DVector<f64>)> = Vec::new();
     for (family, members) in families.into_iter().enumerate() {

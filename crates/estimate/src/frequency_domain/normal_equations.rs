@@ -93,7 +93,8 @@ impl Layout {
                 (free.len() + at, index(column))
             });
             let mut both: Vec<(usize, usize)> = of_row.chain(of_ends).collect();
-            // The order of `columns`, so that an equation with all columns can use them directly.
+            // The unknowns get the order of `columns`, so that an equation with all columns can use
+            // them directly.
             both.sort_unstable_by_key(|(_, column)| *column);
             let (places, columns) = both.into_iter().unzip();
             Equation { row, places, columns }
@@ -116,11 +117,12 @@ impl Layout {
     /// number of the Gram matrix is the square of that of J. This is harmless for regressors that
     /// are orthonormal over the lines weighted by ‖W_l‖; rounding of the Gram matrix slows the
     /// search but does not change the minimum, where Jᵀr = 0.
+    /// With a `tangent` S (entries and transient loads × unknowns), the unknowns are the
+    /// independent ones.
     ///
     /// # Source
     /// Van Loan (2000), J. Computational and Applied Mathematics 123, 85–100 (least squares with
-    /// Kronecker products). With a `tangent` S (entries and transient loads × unknowns), the
-    /// unknowns are the independent ones.
+    /// Kronecker products).
     pub(super) fn normal_equations(
         &self,
         factors: &mut [BlockFactors],
@@ -289,7 +291,7 @@ impl NormalEquations {
 fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 {
     let mut basis: Vec<DVector<f64>> = Vec::new();
     let mut projected = DMatrix::zeros(GRAM_LANCZOS.min(size), GRAM_LANCZOS.min(size));
-    // An arbitrary vector that is not orthogonal to the eigenvectors.
+    // The iteration begins with an arbitrary vector that is not orthogonal to the eigenvectors.
     let mut next = DVector::from_fn(size, |at, _| 1.0 + (0.7 * (at * at) as f64).sin());
     for at in 0..projected.nrows() {
         let norm = next.norm();
@@ -354,8 +356,8 @@ impl Coordinates {
         Some(gram)
     }
 
-    /// Returns 2 Re Σ φ̄ y for every unknown: Jᵀ applied to values whose W_lᴴ-weighted form is y, 2
-    /// lines × dof of each block, real parts first.
+    /// Returns 2 Re Σ φ̄ y for every unknown: Jᵀ applied to values that become y when weighted by
+    /// W_lᴴ. `weighted` has y for each block, 2 lines × dof, real parts first.
     pub(super) fn project<'b>(
         &self,
         weighted: impl Iterator<Item = (&'b BlockFactors, &'b DMatrix<f64>)>,

@@ -88,10 +88,10 @@ pub fn output_error_pooling(
     search_near(data, unknowns, None, residual)
 }
 
-/// Estimates as [`output_error`] from frequency responses; where the data state no noise, that of
-/// each response is white, in proportion to the response, or the sum of both, as the residual
-/// shows. If the residual also shows that the errors of neighbouring lines are correlated, as under
-/// the window of an analyser, the covariance of the parameters includes it
+/// Estimates as [`output_error`] from frequency responses. If the data state no noise, the noise of
+/// each response is white, proportional to the response, or the sum of both; the residual decides.
+/// If the residual also shows that the errors of neighbouring lines are correlated, as under the
+/// window of an analyser, the covariance of the parameters includes this correlation
 /// ([`OutputErrorFit::variance_ratio`]).
 ///
 /// # Errors

@@ -217,8 +217,8 @@ pub(super) struct Scale {
     /// Factor of the covariance for sampled weights, used without a [`WeightUncertainty`].
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
-    /// Inverse of the Fisher information with errors of pulses in the forces; `None` if it is that
-    /// of independent lines.
+    /// Inverse of the Fisher information with errors of pulses in the forces; `None` if the lines
+    /// have independent errors.
     pub(super) with_pulses: Option<DMatrix<f64>>,
     pub(super) degrees_of_freedom: usize,
     pub(super) misfit_ratio: f64,
@@ -242,8 +242,8 @@ impl Scale {
     }
 }
 
-/// Returns the free entries of M, C and K with their covariance, from the independent unknowns with
-/// theirs.
+/// Returns the free entries of M, C and K with their covariance, from the independent unknowns and
+/// the covariance of these unknowns.
 fn entries_with_covariance(
     unknowns: &Unknowns,
     independent: &[f64],

@@ -20,8 +20,8 @@ pub(super) struct PulseFit {
     /// Inverse of the Fisher information about the independent unknowns of M, C and K, divided by
     /// the level of the noise.
     pub(super) covariance: DMatrix<f64>,
-    /// Number of amplitudes that the lines determine, each counted by the share of the information
-    /// about it that they have.
+    /// Number of amplitudes that the lines determine. Each amplitude counts with the share of its
+    /// information that comes from the lines.
     pub(super) determined: f64,
 }
 
@@ -52,8 +52,9 @@ impl PulseFit {
     /// the responses with the common factor `level`. The model is linearised at the amplitudes
     /// `before`. `None` if a response does not exist or the sensitivities are linearly dependent.
     ///
-    /// The residual is r + P b − J Δθ with the effects P of the amplitudes b, of unit variance, and
-    /// the sensitivities J, all without the part that the transients explain.
+    /// The residual is r + P b − J Δθ: P are the effects of the amplitudes b, which have unit
+    /// variance, and J are the sensitivities. The part that the transients explain is removed from
+    /// all of them.
     ///
     /// # Source
     /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), sections 2.1.4 (Woodbury) and 5.3
@@ -98,8 +99,8 @@ impl PulseFit {
 }
 
 /// Returns columns over all residuals, whitened by the covariance of the errors of pulses, with the
-/// rows of the amplitudes below them. The last column is a residual with the amplitudes `before`
-/// already subtracted; the one returned has none subtracted.
+/// rows of the amplitudes below them. The last column is a residual from which the amplitudes
+/// `before` have been subtracted; in the returned residual they are not subtracted.
 fn whitened(
     columns: DMatrix<f64>,
     pulses: &[RecordColumns<PulseCovariance>],

@@ -76,7 +76,7 @@ pub(super) fn with_unknown_noise(
         let fit = finished(&reduced, unknowns, (weighted, is_white), subtracted)?;
         return Ok(OutputErrorFit { sinusoids, ..fit });
     };
-    // The amplitudes in the final weights.
+    // The amplitudes are estimated again with the final weights.
     let (searches, steps) = (weighted.fit.searches, weighted.fit.minimum.steps);
     let with_pulses = data.without_sinusoids(&sinusoids);
     let (pulses, data, weighted) = with_pulse_fit(&with_pulses, unknowns, weighted, amplitudes)?
@@ -104,9 +104,9 @@ struct WithoutPulses {
     is_rounding: bool,
 }
 
-/// Alternates between the errors of the pulses of the forces and a fit in white noise to the data
-/// without them, from a fit in which every line has errors of its own. `None` if there are no
-/// pulses or too many, or if the first round fails.
+/// Alternates between an estimate of the errors of the force pulses and a fit in white noise to the
+/// data without these errors. It begins with a fit in which every line has independent errors.
+/// `None` if there are no pulses or too many, or if the first round fails.
 fn without_pulses(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -127,7 +127,7 @@ fn without_pulses(
         if last.is_rounding {
             break;
         }
-        // The result is the round before if this one fails.
+        // If a round fails, the result is that of the round before.
         let Some(next) = round(&last.amplitudes, last.white.clone()) else { break };
         let pairs = next.amplitudes.iter().zip(&last.amplitudes);
         let change = pairs.map(|(next, last)| (next - last).abs()).fold(0.0, f64::max);
@@ -139,8 +139,8 @@ fn without_pulses(
     Some(last)
 }
 
-/// Finds the errors of pulses, linearised at the amplitudes `before`, and fits the data without
-/// them in the same noise; `None` as for [`PulseFit::new`].
+/// Estimates the errors of pulses, linearised at the amplitudes `before`, and fits the data without
+/// these errors in the same noise; `None` as for [`PulseFit::new`].
 fn with_pulse_fit(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -160,9 +160,9 @@ fn with_pulse_fit(
     Ok(Some((pulses, corrected, Weighted { fit, noise })))
 }
 
-/// Estimates the parameters of responses whose noise is white, in proportion to the response, or
-/// the sum of both: as in tables of frequency responses, whose averages are often equally coherent
-/// on all lines.
+/// Estimates the parameters from responses whose noise is white, proportional to the response, or
+/// the sum of both. Such noise occurs in tables of frequency responses, whose averages are often
+/// equally coherent on all lines.
 pub(super) fn with_response_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -215,8 +215,8 @@ fn response_noise(
     Ok(Some(noise.with_model(NoiseModel::Proportional { with_white })))
 }
 
-/// Returns the result of a fit in white or other noise, which the flag states, to data without the
-/// errors that were subtracted before.
+/// Returns the result of a fit to data without the errors that were subtracted before. The flag is
+/// `true` if the noise of the fit is white.
 fn finished(
     data: &FrequencyData,
     unknowns: &Unknowns,

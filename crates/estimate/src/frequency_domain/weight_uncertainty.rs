@@ -11,7 +11,7 @@ use crate::limits::MAX_LEVERAGES;
 pub(super) struct WeightUncertainty {
     /// Matrix to add to the inverse of the Fisher information.
     pub(super) excess: DMatrix<f64>,
-    /// Fewest degrees of freedom of the variance of a parameter.
+    /// Smallest number of degrees of freedom of the variance of a parameter.
     pub(super) degrees_of_freedom: f64,
 }
 

@@ -144,8 +144,8 @@ impl Sums {
                 for (at, (line, weighted)) in block.lines.iter().enumerate() {
                     let row = block.first + at;
                     let errors = block.white(at, p);
-                    // The modelled outputs are the measured ones without their errors: with the
-                    // transient, and with the most likely inputs.
+                    // The modelled outputs are the measured ones minus their errors. They include
+                    // the transient, and belong to the most likely inputs.
                     let input = data.inputs().row(row).transpose();
                     let likely = weighted.likely_input(input.clone(), &errors);
                     let mut modelled = data.outputs().row(row).transpose();

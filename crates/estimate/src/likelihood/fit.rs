@@ -96,7 +96,7 @@ fn check<M: ResponseModel>(
     let transient = residual.transient_unknowns();
     let unknowns = space.start.len() + transient;
     let numbers = residual.len();
-    // There is no residual with as many unknowns as numbers.
+    // If there are as many unknowns as measured numbers and priors, no residual remains.
     if numbers + space.priors.len() <= unknowns {
         return Err(LikelihoodError::TooFewLines { numbers, unknowns });
     }
@@ -148,9 +148,9 @@ struct Expected {
 }
 
 impl Expected {
-    /// Computes mean and variance for covariances of `freedom` degrees of freedom each and `total`
-    /// together, with `spare` real numbers more than parameters. Rows with a common covariance have
-    /// one statistic, Hotelling's T².
+    /// Computes the mean and the variance for sample covariances with `freedom` degrees of freedom
+    /// each and `total` together; `spare` is the number of real residuals minus the number of
+    /// parameters. Rows with a common covariance have one statistic, Hotelling's T².
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),

@@ -28,8 +28,8 @@ pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 
 /// Rise of the sum of squares after the first steps over that of the search with the lowest
 /// minimum, in units of the noise, above which a search ends. With the noise of
-/// [`FIRST_RELATIVE_NOISE`], which is more than that of most measurements, its end is less likely
-/// by a factor e²⁵.
+/// [`FIRST_RELATIVE_NOISE`], which is more than that of most measurements, the end of such a search
+/// is less likely by a factor e²⁵.
 pub(super) const HOPELESS_RISE: f64 = 50.0;
 
 /// Numbers (real and imaginary parts of the lines) per unknown in the first steps of every search:
@@ -42,8 +42,9 @@ pub(super) const SEARCH_NUMBERS: usize = 100;
 /// residual is curved, hardly change.
 pub(super) const SHORT_STEP: f64 = 1.0;
 
-/// Maximum number of responses to state loads, of the sensors and for each parameter over all lines,
-/// that are kept from a residual to its derivative, 64 MiB; more are computed again for each record.
+/// Maximum number of responses to state loads (of the sensors, and for each parameter, over all
+/// lines) that stay in memory between a residual and its derivative: 64 MiB. With more, they are
+/// computed again for each record.
 pub(super) const KEPT_RESPONSES: usize = 1 << 22;
 
 /// Maximum number of steps of a search.
@@ -53,18 +54,20 @@ pub(super) const STEPS: usize = 200;
 /// enough for the limit of an interval.
 pub(super) const PROFILE_STEPS: usize = 24;
 
-/// Smallest and largest factor from one distance to the next on the way to that limit.
+/// Smallest and largest factor from one distance to the next in the search for the limit of a
+/// profile interval.
 pub(super) const PROFILE_FACTORS: [f64; 2] = [1.5, 8.0];
 
-/// Ratio of the next distance to the extrapolated distance of that limit: a step a little too far
-/// gives both sides of it.
+/// Ratio of the next distance to the extrapolated distance of the limit of a profile interval: a
+/// step slightly beyond the limit gives a value on either side of the limit.
 pub(super) const PROFILE_MARGIN: f64 = 1.1;
 
-/// Maximum number of steps between a value on either side of that limit.
+/// Maximum number of steps between values on either side of the limit of a profile interval.
 pub(super) const PROFILE_SECANTS: usize = 20;
 
-/// Relative deviation from the required rise of the sum of squares at that limit that ends the
-/// search: the limit then differs by a two-thousandth of its distance from the estimate.
+/// Relative deviation from the required rise of the sum of squares that ends the search for the
+/// limit of a profile interval. The limit then differs by a two-thousandth of its distance from the
+/// estimate.
 pub(super) const PROFILE_TOLERANCE: f64 = 1e-3;
 
 /// Maximum relative difference of the sums of squares of two searches with the same minimum.
@@ -99,15 +102,15 @@ pub(super) const LEAST_KEPT: f64 = 0.1;
 pub(super) const MOST_STATES: usize = 150;
 
 /// Maximum number of degrees of freedom of a machine with a state load on each of them. In a larger
-/// machine the sensors respond to fewer independent loads, which are found first.
+/// machine the sensors respond to fewer independent loads, which are determined first.
 pub(super) const EACH_STATE_DOFS: usize = 24;
 
 /// Maximum number of lines on which the state loads are found: between two of them every mode still
 /// contributes much more than [`STATE_RESPONSE`] to the response.
 pub(super) const STATE_LINES: usize = 1000;
 
-/// Minimum response of the sensors to a state load relative to that to the others: the noise of
-/// measurements is a hundred times larger.
+/// Minimum response of the sensors to a state load, relative to the response to the other state
+/// loads: the noise of measurements is a hundred times larger.
 pub(super) const STATE_RESPONSE: f64 = 1e-6;
 
 /// Maximum number of known coefficients that are tried as unknowns where a machine does not explain
@@ -134,12 +137,13 @@ pub(super) const KNOWN_FREEDOM: f64 = 1e6;
 /// square of their number.
 pub(super) const COMPARED_RECORDS: usize = 16;
 
-/// Level of significance of the misfit of known noise below which standard errors and intervals are
-/// scaled by it: a correct model has wider intervals than necessary in one of a thousand fits.
+/// p-value of the misfit to known noise below which the misfit scales standard errors and
+/// intervals. In one of a thousand fits this makes the intervals of a correct model wider than
+/// necessary.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
 
-/// Maximum share of a gradient outside the determined combinations for a determined quantity; this
-/// much is rounding of the singular vectors.
+/// Maximum share of a gradient outside the determined combinations for a determined quantity; a
+/// share up to this limit is rounding of the singular vectors.
 pub(super) const UNDETERMINED_PART: f64 = 1e-5;
 
 /// Maximum ratio of the sum of the terms of a combination to the sum of their absolute values if

@@ -55,10 +55,10 @@ pub(super) fn starts(
 }
 
 /// Searches from one initial estimate after another: first with weights relative to the response,
-/// then with the weights of the noise. A search whose first steps end far above those of the lowest
-/// minimum, or where those of another search did, ends with them. No further search begins when
-/// enough of them have ended at the lowest minimum; `agreeing` returns this number for a sum of
-/// squares.
+/// then with the weights of the noise. A search stops after its first steps if they end far above
+/// the first steps of the lowest minimum, or at the same point as the first steps of another
+/// search. No further search begins when enough searches have ended at the lowest minimum;
+/// `agreeing` returns this number for a sum of squares.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search converges.
@@ -104,8 +104,9 @@ pub(super) fn search(
 }
 
 impl Minima {
-    /// Counts a search whose first steps end where those of an earlier search did: it would end at
-    /// the same minimum. Returns `false` if there is no such search.
+    /// Counts a search whose first steps end at the same point as the first steps of an earlier
+    /// search, because both would end at the same minimum. Returns `false` if there is no such
+    /// search.
     fn count_again(&mut self, near: &Minimum) -> bool {
         let is_known =
             |end: &&mut SearchEnd| end.near.iter().any(|before| is_same_point(before, near));
@@ -113,9 +114,9 @@ impl Minima {
         known.map(|end| end.searches += 1).is_some()
     }
 
-    /// Returns whether the first steps of a search end so far above those of the lowest minimum
-    /// that it is very unlikely to end lower. The rise is relative to the misfit of that minimum if
-    /// it is larger than the noise.
+    /// Returns whether the first steps of a search end so far above the first steps of the lowest
+    /// minimum that the search is very unlikely to end lower. The rise is relative to the misfit of
+    /// the lowest minimum if this misfit is larger than the noise.
     fn is_hopeless(&self, near: &Minimum) -> bool {
         let best = self.ends.first().and_then(|end| end.near.first());
         best.is_some_and(|best| {

@@ -8,9 +8,9 @@ use super::response_model::ResponseModel;
 use super::search::{Bounds, Effort, minimise};
 
 /// Returns the limit of an interval of a parameter below (`direction` −1) or above (+1) its
-/// estimate: the value with a sum of squares, minimised over all other parameters, that is larger
-/// by `rise`. It is the bound if the bound is nearer, and infinite if the sum never rises by
-/// `rise`. The search begins at the distance `first` from the estimate.
+/// estimate. At this limit the sum of squares, minimised over all other parameters, is larger by
+/// `rise`. If the bound is nearer, the limit is the bound; if the sum never rises by `rise`, the
+/// limit is infinite. The search begins at the distance `first` from the estimate.
 ///
 /// # Source
 /// Venzon & Moolgavkar (1988), Applied Statistics 37, 87–94; Raue et al. (2009), Bioinformatics 25,

@@ -24,8 +24,8 @@ pub(super) struct PriorRow {
     pub(super) deviation: f64,
 }
 
-/// Weighted errors e = y − G u − G_own − A τ of every line, with the inputs u and the outputs y;
-/// G_own is the response to loads of the model, and A τ is the transient: the real and imaginary
+/// Weighted errors e = y − G u − G_own − A τ of every line, with the inputs u and the outputs y.
+/// G_own is the response to loads of the model, and A τ is the transient. The real and imaginary
 /// parts of √2·L⁻¹e with L Lᴴ = E[e eᴴ] have unit variance and no correlation.
 ///
 /// With noisy inputs the covariance S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ depends on the parameters;
@@ -56,13 +56,13 @@ pub(super) struct LineErrors {
     pub(super) errors: DMatrix<Complex<f64>>,
     /// Receptance G of each line.
     pub(super) receptances: Vec<DMatrix<Complex<f64>>>,
-    /// Number of amplitudes of pulses that the lines determine, each counted by the share of the
-    /// information about it that they have.
+    /// Number of amplitudes of pulses that the lines determine. Each amplitude counts with the
+    /// share of its information that comes from the lines.
     pub(super) determined_amplitudes: f64,
 }
 
 /// Lines that are computed together: a block of rows of the residual of one record. The last block
-/// of a record with pulses has no line but the rows of their amplitudes.
+/// of a record with pulses has no lines, but the rows of the amplitudes of the pulses.
 pub(super) struct Block<L> {
     /// Index of the first row in the residual.
     pub(super) first_row: usize,
@@ -99,7 +99,8 @@ struct Fitted<'a> {
 
 /// Residual at one set of parameters, and what its derivative needs.
 pub(super) struct Evaluation<'a, L> {
-    /// Responses of the lines; `None` if they are many, and computed again for the derivative.
+    /// Responses of the lines; `None` if there are too many to keep. They are then computed again
+    /// for the derivative.
     pub(super) records: Option<Vec<RecordResidual<'a, L>>>,
     /// Residual of all records, then of the amplitudes of pulses and of the priors.
     pub(super) residual: DVector<f64>,
@@ -179,8 +180,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         record.blocks.iter().all(finite).then_some(record)
     }
 
-    /// Returns the residual of some lines of a record, with the effects of its linear unknowns
-    /// still in it.
+    /// Returns the residual of some lines of a record; it still contains the effects of the linear
+    /// unknowns of the record.
     fn block(
         &self,
         parameters: &[f64],
@@ -295,9 +296,9 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(jacobian)
     }
 
-    /// Visits the lines of each record with their responses and the factors L of their covariance,
-    /// and what its linear unknowns consist of; `None` if a response does not exist or a visit
-    /// fails.
+    /// Calls `visit` with the residual of each record: its lines with their responses and the
+    /// factors L of their covariance, and its linear unknowns. `None` if a response does not exist
+    /// or a visit fails.
     pub(super) fn for_each_record(
         &self,
         parameters: &[f64],
@@ -309,8 +310,9 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(())
     }
 
-    /// Returns columns X over all rows of the lines: because of the errors of pulses the covariance
-    /// of the residual is the identity minus X Xᵀ. `None` if the response does not exist.
+    /// Returns columns X, over all rows of the lines, with the effect of the errors of pulses: the
+    /// covariance of the residual is the identity minus X Xᵀ. `None` if the response does not
+    /// exist.
     pub(super) fn explained_by_pulses(&self, parameters: &[f64]) -> Option<DMatrix<f64>> {
         let mut columns = DMatrix::zeros(self.len(), self.amplitudes());
         let mut first = 0;

@@ -60,7 +60,7 @@ pub(super) struct Minimum {
     pub(super) numbers: usize,
     pub(super) steps: usize,
     pub(super) converged: bool,
-    /// Flag of each parameter at a bound that the sum of squares would decrease across.
+    /// Flags of the parameters: `true` at a bound across which the sum of squares would decrease.
     pub(super) at_bound: Vec<bool>,
 }
 
@@ -116,7 +116,7 @@ impl<'a> Local<'a> {
         damped.cholesky()
     }
 
-    /// Returns the change of all parameters from that of the scaled free ones.
+    /// Returns the change of all parameters from the change of the scaled free parameters.
     fn change(&self, scaled: &DVector<f64>, count: usize) -> DVector<f64> {
         let mut change = DVector::zeros(count);
         for (at, parameter) in self.free.iter().enumerate() {

@@ -26,8 +26,8 @@ pub(super) fn len(transient: Transient, outputs: usize, states: usize) -> usize 
 pub(super) struct RecordUnknowns<'a> {
     /// Number of unknowns of the transient.
     pub(super) transient: usize,
-    /// Reference frequency of the powers of s, the highest of the record, so that they are at most
-    /// 1.
+    /// Reference frequency of the powers of s: the highest frequency of the record, so that the
+    /// powers are at most 1.
     reference: f64,
     pulses: Vec<&'a PulseErrors>,
     /// Number of amplitudes of all pulses.

@@ -22,8 +22,9 @@ use crate::{Estimate, EstimateError};
 /// parameters does not appear as a missing force. The rest shows a wrong known mass or a wrong type
 /// of model.
 ///
-/// For a correct model the rest is white if random forces disturb the motion; white noise on the
-/// measured motion enters two neighbouring intervals, so its rest is correlated at lag 1 only.
+/// For a correct model the residual of this fit is white if random forces disturb the motion. White
+/// noise on the measured motion enters two neighbouring intervals, so its residual is correlated at
+/// lag 1 only.
 ///
 /// `between` is the factor and the interpolation of a refined fit: the prediction then takes this
 /// number of steps per interval, under the interpolated force. Motions between the samples are not

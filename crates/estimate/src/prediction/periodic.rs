@@ -7,8 +7,8 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
 
-/// Predicts displacement, velocity and acceleration of a machine in the steady state under the
-/// band-limited force (N) through the samples of whole periods, as a fit of spectra does.
+/// Predicts displacement, velocity and acceleration of a machine in the steady state. The force (N)
+/// is the band-limited one through the samples of whole periods, as in a fit of spectra.
 ///
 /// The prediction is zero at half the sampling rate (even length), where samples have no phase.
 ///

@@ -153,7 +153,7 @@ pub(super) struct Regression {
     /// True if the force at the next sample has coefficients, too.
     two_forces: bool,
     pub(super) solution: Solution,
-    /// Coefficients, regressors × 2n: the smallest of those that fit equally well.
+    /// Coefficients, regressors × 2n; if several sets fit equally well, the smallest one.
     coefficients: DMatrix<f64>,
 }
 

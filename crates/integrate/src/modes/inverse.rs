@@ -124,8 +124,8 @@ impl<'a> Inverse<'a> {
         growth.sqrt().recip()
     }
 
-    /// Applies the operator: returns the real parts of y and w = x + σ y, where y solves Q y = −(M
-    /// v + (C + σM) x) with Q = K + σC + σ²M; v and w are in units of s.
+    /// Applies the operator to z = [x; v/s]. Returns the real parts of y and w/s with w = x + σ y,
+    /// where y solves Q y = −(M v + (C + σM) x) with Q = K + σC + σ²M.
     pub(super) fn apply(&mut self, z: &DVector<f64>) -> DVector<f64> {
         let n = self.system.dof();
         let (x, v) = z.as_slice().split_at(n);

@@ -49,8 +49,8 @@ impl Reach {
             ModeSearch::Lowest => {
                 search.distance(first) >= search.distance(self.shift) || gap <= 0.5 * self.radius
             }
-            // A mode that is not found yet may lie on the far side of the first mode, as far from
-            // it as the last one: the radius must include this distance.
+            // An unknown mode may lie on the other side of the first mode, at the distance of the
+            // last mode from the first. The radius must include this distance.
             ModeSearch::NearOmega(_) => {
                 gap + (last - first).norm()
                     <= self.radius * (1.0 + limits::SAME_EIGENVALUE) + gap * limits::SAME_EIGENVALUE
@@ -80,8 +80,8 @@ pub(super) fn merge(
     modes
 }
 
-/// Returns the next shift, if not all modes wanted have converged from this one, or if they have
-/// (`all_converged`) but the radius is too small.
+/// Returns the next shift. If not all modes wanted have converged, it is near one that has not. If
+/// they have (`all_converged`) but the radius is too small, it follows from the first mode.
 pub(super) fn next_shift(
     found: &[Candidate],
     reach: &Reach,

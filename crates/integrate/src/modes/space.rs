@@ -138,8 +138,9 @@ impl Space {
     }
 }
 
-/// Returns up to `most` eigenvalues of the operator in the space, the largest first; a conjugate
-/// pair has one mode, and θ = 0 would mean an infinite eigenvalue.
+/// Returns up to `most` eigenvalues of the operator in the space, the largest first. A conjugate
+/// pair counts once. Eigenvalues θ ≈ 0 are omitted, because they belong to infinite eigenvalues of
+/// the system.
 fn largest_eigenvalues(
     square: &DMatrix<f64>,
     most: usize,
@@ -153,8 +154,8 @@ fn largest_eigenvalues(
     Ok(thetas)
 }
 
-/// Returns an eigenvector to `theta` that is independent of those `known` to the same multiple
-/// eigenvalue, if its space has another; `None` if numbers overflow.
+/// Returns an eigenvector for `theta`. For a multiple eigenvalue it is independent of the `known`
+/// eigenvectors, if there is another one; `None` if numbers overflow.
 fn next_eigenvector(
     square: &DMatrix<f64>,
     below: usize,

@@ -186,7 +186,8 @@ impl LocalNewton {
         }
     }
 
-    /// Replaces the linear accelerations `a` (n entries) by those with the nonlinear forces.
+    /// Replaces the linear accelerations `a` (n entries) by the accelerations with nonlinear
+    /// forces.
     pub(crate) fn correct(
         &mut self,
         time: f64,
@@ -275,7 +276,7 @@ impl LocalNewton {
         self.jacobian.fill_with_identity();
         for (mut column, tangent) in self.jacobian.column_iter_mut().zip(self.tangent.column_iter())
         {
-            // Most forces act between few degrees of freedom.
+            // Most slopes are zero, because most forces act between few degrees of freedom.
             for (of_one, slope) in self.local.column_iter().zip(tangent.iter()) {
                 if *slope != 0.0 {
                     column.axpy(*slope, &of_one, 1.0);

@@ -16,7 +16,8 @@ use crate::stepping::simulation::{Motion, Simulation};
 use crate::stepping::transition::Transition;
 use crate::system::System;
 
-/// The response that repeats with the force, whose samples are one period (samples × n, in N).
+/// Finds the response that repeats with the force. The samples of the force are one period (samples
+/// × n, in N).
 ///
 /// Over one period the scheme is an affine map of its state, z_N = Φ z_0 + g. The periodic
 /// state solves (I − Φ) z_0 = g; one pass from rest gives g, a second one the response. The cost is
@@ -26,7 +27,8 @@ use crate::system::System;
 ///
 /// For more than 300 degrees of freedom Φ is not formed: z_0 is found in the Krylov space of g, Φ
 /// g, Φ² g … (GMRES), at one pass per vector. Few vectors suffice if most of the motion decays
-/// within a period; if a thousand do not, the result is [`IntegrateError::PeriodNotClosed`].
+/// within a period. If a thousand vectors do not suffice, the result is
+/// [`IntegrateError::PeriodNotClosed`].
 ///
 /// # Errors
 /// The errors of [`integrate`](crate::integrate()); [`IntegrateError::LinearOnly`] if the system

@@ -33,8 +33,8 @@ impl PeriodicOrbit {
     /// Returns the 2n Floquet multipliers, largest first: the pure numbers that multiply
     /// disturbances of the orbit in each period, with an error of about 1e-9 of the largest.
     /// Multipliers of the memory of a scheme are omitted if they are smaller. For more than 64
-    /// degrees of freedom it is only the largest, by Arnoldi's iteration; the list is empty if
-    /// numbers overflow.
+    /// degrees of freedom the list contains only the largest multiplier, by Arnoldi's iteration; it
+    /// is empty if numbers overflow.
     pub fn multipliers(&self) -> &[Complex<f64>] {
         &self.multipliers
     }
@@ -64,9 +64,10 @@ impl PeriodicOrbit {
 /// with the force.
 ///
 /// Up to 64 degrees of freedom a Newton step costs two passes over the period for each number of
-/// the state. For more, the derivative of a period is not formed: the step is found in the Krylov
-/// space of its products (GMRES), at two passes each. Their number is small if most of the motion
-/// decays within a period, and large if many modes are lightly damped. For linear systems
+/// the state. For more degrees of freedom, the derivative of the state over a period is not formed.
+/// The step is then found in the Krylov space of products with this derivative (GMRES), at two
+/// passes for each product. Few products suffice if most of the motion decays within a period, but
+/// many lightly damped modes need many products. For linear systems
 /// [`integrate_periodic`](crate::integrate_periodic) finds the response directly.
 ///
 /// ```

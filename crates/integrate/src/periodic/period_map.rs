@@ -43,8 +43,8 @@ impl PeriodMap {
         };
         let steps = sampling.len();
         let over_period = -power_less_identity(&change, steps);
-        // Rounding is ε times the change of the matrix of a step for each step, and ε times the
-        // norm of the product for each product of matrices.
+        // The rounding error has two parts: ε times the norm of the change in each step, and ε
+        // times the norm of the result in each product of matrices.
         let rounding = f64::EPSILON
             * (steps as f64 * change.norm() + f64::from(steps.ilog2() + 1) * over_period.norm());
         let size = over_period.norm().max(1.0);
@@ -60,8 +60,7 @@ impl PeriodMap {
         Ok(Self { factored, following, scales })
     }
 
-    /// Returns the state at rest with the accelerations that the forces alone cause, taken from
-    /// `state`.
+    /// Returns `state` with y = 0 and with the accelerations that the forces alone cause.
     pub(crate) fn at_rest(&self, state: &[f64]) -> Vec<f64> {
         self.map(state, |rest| rest.fill(0.0))
     }

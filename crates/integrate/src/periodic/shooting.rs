@@ -110,7 +110,7 @@ impl<'a> Shooting<'a> {
         Ok((end - state).component_div(&self.scales))
     }
 
-    /// Returns the largest entry of a gap; NaN if it has one.
+    /// Returns the largest modulus of the entries of a gap, or NaN if an entry is NaN.
     pub(crate) fn missed(gap: &DVector<f64>) -> f64 {
         // `amax` would ignore NaN.
         gap.iter().fold(0.0, |most, r| if r.abs() <= most { most } else { r.abs() })

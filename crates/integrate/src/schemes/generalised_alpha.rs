@@ -17,8 +17,8 @@ pub enum AlphaAcceleration {
     /// the cost of a second solve.
     #[default]
     EquationOfMotion,
-    /// Acceleration carried from step to step: it belongs to t + (α_m − α_f)Δt, so that as the
-    /// acceleration at t it is of first order.
+    /// Acceleration carried from step to step. It belongs to t + (α_m − α_f)Δt; as an approximation
+    /// of the acceleration at t it is of first order.
     Carried,
 }
 

@@ -16,8 +16,9 @@ pub enum WilsonLoad {
     /// F(t) + θ [F(t+Δt) − F(t)]: extrapolation of the line through the two ends of the step.
     #[default]
     Projected,
-    /// F(t+Δt) + (θ − 1) [F(t+2Δt) − F(t+Δt)]: between the two samples around t + θΔt (θ ≤ 2;
-    /// extrapolated beyond). The last step of a record that ends is projected.
+    /// F(t+Δt) + (θ − 1) [F(t+2Δt) − F(t+Δt)]: interpolation between the two samples around t + θΔt
+    /// for θ ≤ 2, extrapolation for larger θ. In the last step of a record that does not repeat,
+    /// the load is projected.
     Interpolated,
 }
 

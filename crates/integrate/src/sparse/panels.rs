@@ -188,8 +188,9 @@ impl Panel {
 
 /// Returns the width of the panel from column `first` on that has the lowest cost per column.
 fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
-    // The rows of a column, except its diagonal, are among the rows of the column that its second
-    // row names. If this is the next column, the last column of a panel has the rows of all.
+    // Except for the diagonal, the rows of a column are also rows of column j, where j is its
+    // second row. If j is the next column for every column of a panel, the last column has the rows
+    // of all columns.
     let follows = |j: &usize| columns.column(*j).0.iter().nth(1) == Some(j + 1);
     let chain = 1 + (first..n - 1).take(WIDTHS[0] - 1).take_while(follows).count();
     // The unit of cost is an entry; a row and a panel cost several.

@@ -19,7 +19,7 @@ pub struct Accuracy {
     pub step_over_period: f64,
     /// Largest modulus of the eigenvalues of the amplification matrix, a pure number.
     pub spectral_radius: f64,
-    /// T̄/T − 1, a pure number, with the numerical period T̄ (both damped).
+    /// T̄/T_d − 1, a pure number, with the numerical period T̄ and the exact damped period T_d.
     pub period_elongation: Option<f64>,
     /// ζ̄ − ζ, the damping ratio the scheme adds, from λ = exp(−ζ̄ Ω̄ ± i Ω̄ √(1 − ζ̄²)).
     pub numerical_damping_ratio: Option<f64>,

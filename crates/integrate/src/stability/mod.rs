@@ -22,10 +22,12 @@ use crate::stepping::transition::Transition;
 use crate::system::System;
 use mechid_numerics::krylov::arnoldi::dominant;
 
-/// Spectral radius of the amplification matrix of `scheme` on `system` at a step of `dt` seconds.
+/// Returns the spectral radius of the amplification matrix of `scheme` on `system` at a step of
+/// `dt` seconds.
 ///
 /// All eigenvalues are computed, which takes the time of a few hundred solves of 3n equations. For
-/// more than 200 degrees of freedom it is an estimate of the largest after a hundred steps.
+/// more than 200 degrees of freedom, the result is an estimate of the largest modulus after about a
+/// hundred Arnoldi steps.
 ///
 /// # Errors
 /// The errors of [`Scheme::prepare_unchecked`].
@@ -57,17 +59,18 @@ pub fn spectral_radius(
     Ok(radius)
 }
 
-/// The largest step at which `scheme` does not make the motion of `system` grow, in seconds;
-/// `None` if there is no limit.
+/// Returns the largest step at which `scheme` does not make the motion of `system` grow, in
+/// seconds; `None` if there is no limit.
 ///
-/// The first step size at which the motion grows is searched for from a thousandth of the shortest
-/// time scale 1/|λ| of the system up to a million times that, in factors of √2, then bisected to
-/// rounding. An unstable system is allowed twice its own growth.
+/// The search covers steps from a thousandth of the shortest time scale 1/|λ| of the system up to a
+/// million times that, in factors of √2. The first step at which the motion grows is then refined
+/// to rounding by bisection. For an unstable system, twice the growth of the system itself is
+/// allowed.
 ///
-/// For more than 20 degrees of freedom, the limit is that of a single degree of freedom that moves
-/// along the fastest mode; it takes a hundred products with the matrices. If the system can only
-/// lose energy, factorisations then enclose its highest frequency to one part in 10⁴; for other
-/// systems it is known to about one part in a thousand.
+/// For more than 20 degrees of freedom, the limit is the limit of a single degree of freedom that
+/// moves along the fastest mode. Finding this mode takes a hundred products with the matrices. If
+/// the system can only lose energy, factorisations then enclose its highest frequency to one part
+/// in 10⁴. For other systems the highest frequency is known to about one part in a thousand.
 ///
 /// # Errors
 /// The errors of [`Scheme::prepare_unchecked`], and [`IntegrateError::Unstable`] if not even the

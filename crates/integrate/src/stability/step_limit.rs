@@ -113,7 +113,7 @@ impl Examined<'_> {
     }
 
     /// Returns the modulus of an eigenvalue of the amplification matrix whose motion grows more
-    /// than in the system, if a hundred steps find one.
+    /// than in the system, if Arnoldi's iteration finds one.
     fn growth_found(
         &self,
         equations: &Equations,

@@ -210,8 +210,8 @@ impl Collocations {
 }
 
 impl Before {
-    /// Returns the g that equals `force(g)` within `enough` or, if larger,
-    /// [`limits::STEP_RESIDUAL`] of itself; `None` if the search does not converge.
+    /// Returns the solution of g = `force(g)`; `None` if the search does not converge. The
+    /// tolerance is the larger of `enough` and [`limits::STEP_RESIDUAL`] times |g|.
     ///
     /// # Source
     /// The secant method: Ostrowski, *Solution of Equations and Systems of Equations* (1960),
@@ -274,7 +274,7 @@ struct Rows<const S: usize, const W: usize, const R: usize> {
 }
 
 impl<const S: usize, const W: usize, const R: usize> Rows<S, W, R> {
-    /// The loads are columns S and those after it.
+    /// Creates the map from its entries; columns from S on belong to the loads.
     fn from_fn(entry: impl Fn(usize, usize) -> f64) -> Self {
         Self {
             state: std::array::from_fn(|j| std::array::from_fn(|i| entry(i, j))),

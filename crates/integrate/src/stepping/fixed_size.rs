@@ -178,7 +178,7 @@ fn pairs<const S: usize, const W: usize, const O: usize>(
         std::array::from_fn(|j| streams[j][..steps].as_chunks::<2>().0.iter());
     let mut columns =
         columns.each_mut().map(|column| column[..steps].as_chunks_mut::<2>().0.iter_mut());
-    // 0 · v is 0 of a finite v, NaN of any other.
+    // The product 0 · v is 0 if v is finite and NaN otherwise.
     let mut watched = [0.0; O];
     for _ in 0..steps / 2 {
         let mut middle = [0.0; O];

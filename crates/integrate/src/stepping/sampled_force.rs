@@ -38,7 +38,7 @@ pub(crate) struct ForceTable<'a> {
     mid_step: Option<&'a Record>,
     /// The two rows that follow the last sample.
     after: [Vec<f64>; 2],
-    /// The degree of freedom of each channel, unless they are all in their order.
+    /// Degree of freedom of each channel; `None` if channel i acts on degree of freedom i.
     forced: Option<&'a [usize]>,
     dof: usize,
 }

@@ -4,7 +4,8 @@ use crate::error::IntegrateError;
 
 /// Degrees of freedom, counted from 0, of the forces and of the responses returned.
 ///
-/// With these an integration needs no memory that grows with degrees of freedom times samples.
+/// An integration with selected degrees of freedom needs no memory that grows with degrees of
+/// freedom times samples.
 #[derive(Debug, Clone, Copy)]
 pub struct SelectedDofs<'a> {
     /// Degree of freedom of each channel of the force, without repetition; no force acts on the

@@ -19,7 +19,7 @@ use crate::system::System;
 #[derive(Debug)]
 pub(crate) struct Motion<'a> {
     parts: Vec<DMatrix<f64>>,
-    /// The degree of freedom of each column, unless they are all in their order.
+    /// Degree of freedom of each column; `None` if column i belongs to degree of freedom i.
     observed: Option<&'a [usize]>,
     dof: usize,
     /// True if all values are known to be finite.
@@ -41,7 +41,8 @@ impl<'a> Motion<'a> {
         Self { observed: Some(observed), dof, ..Self::zeros(samples, observed.len()) }
     }
 
-    /// Zeroed pages come from the operating system unwritten, so that the steps write them once.
+    /// Creates a motion of zeros. The operating system supplies pages of zeros without writing
+    /// them, so only the steps write to this memory.
     fn with_parts(parts: usize, samples: usize, dof: usize) -> Self {
         let part = |_| DMatrix::from_vec(samples, dof, vec![0.0; samples * dof]);
         Self { parts: (0..parts).map(part).collect(), observed: None, dof, finite: false }

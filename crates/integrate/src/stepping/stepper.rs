@@ -86,8 +86,8 @@ pub trait Stepper: Send {
     /// The errors of [`change`](Self::change).
     ///
     /// # Panics
-    /// If `owed` is shorter than [`state_len`](Self::state_len), and where [`change`](Self::change)
-    /// does.
+    /// If `owed` is shorter than [`state_len`](Self::state_len), and in the cases of
+    /// [`change`](Self::change).
     ///
     /// # Source
     /// Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 4.3.

@@ -18,8 +18,8 @@ pub struct Transition {
 }
 
 impl Transition {
-    /// Creates the map of `stepper`, prepared for a linear system. A state `j` of 1, all others 0,
-    /// gives column j of D; a force of 1 N gives a column of B.
+    /// Creates the map of `stepper`, prepared for a linear system. A state with entry j equal to 1
+    /// and all others 0 gives column j of D; a force of 1 N gives a column of B.
     pub fn from_stepper(stepper: &mut dyn Stepper) -> Self {
         Self::read(stepper, || ())
     }

@@ -193,8 +193,8 @@ enum Between {
 }
 
 impl Excitation {
-    /// Returns the force over one period, in N, shifted by a fraction `within_step` of the step if
-    /// it is given, provided that the force is known between samples.
+    /// Returns the force over one period, in N. If `within_step` is given, the force is shifted by
+    /// this fraction of a step; this is an error for a force that is unknown between samples.
     pub fn sampled(
         &self,
         sampling: Sampling,

@@ -152,9 +152,9 @@ impl Experiment {
         }
     }
 
-    /// Returns the system in sparse matrices, if it has more than 64 degrees of freedom and Matrix
-    /// Market files or lists of entries describe it, or more than 300 and full matrices with at
-    /// most a tenth of their entries unequal to zero.
+    /// Returns the system in sparse matrices, if it is large: more than 64 degrees of freedom if
+    /// Matrix Market files or lists of entries describe it, more than 300 if full matrices do. At
+    /// most a tenth of the entries of full matrices may be unequal to zero.
     pub fn sparse_system(&self) -> Option<&SparseSystem> {
         self.sparse.as_ref()
     }
@@ -255,8 +255,8 @@ impl Experiment {
     /// Returns the initial state of a response that is not periodic.
     ///
     /// # Errors
-    /// [`IoError::Description`] if the number of values differs from that of the degrees of
-    /// freedom, [`IoError::Model`] for values that are not finite, and those of
+    /// [`IoError::Description`] if the number of values differs from the number of degrees of
+    /// freedom, [`IoError::Model`] for values that are not finite, and the errors of
     /// [`Experiment::system`].
     pub fn initial_state(&self) -> Result<InitialState, IoError> {
         let dof = self.dof()?;

@@ -179,7 +179,8 @@ impl Reader {
     }
 
     /// Reads the values of a data set and applies the factor and the offset of its attributes. Only
-    /// a limit refuses the file: a data set that is not used may hold anything.
+    /// an exceeded limit refuses the file; damaged data make only this data set unusable, because
+    /// it may not be needed.
     fn content(&mut self, dataset: &Dataset, attributes: &Attributes) -> Result<Content, Trouble> {
         let scaling = attributes.scaling().map_err(Trouble::Unusable)?;
         let (len, budget) = (self.len, &mut self.budget);
@@ -271,7 +272,7 @@ impl Reader {
     }
 }
 
-/// Returns names in an order in which numbers at their ends rise.
+/// Returns the names sorted so that the numbers at their ends are in rising order.
 fn in_natural_order(mut names: Vec<String>) -> Vec<String> {
     names.sort_by_key(|name| natural(name));
     names

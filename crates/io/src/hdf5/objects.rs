@@ -35,7 +35,8 @@ const IN_CELL: u32 = 1;
 /// Number of cells before the cells of the values.
 const FIRST_VALUE: usize = 2;
 
-/// Start of the names in the table, in bytes, behind its version, their number and eight offsets.
+/// Offset of the names in the table, in bytes: a version, the number of names and eight offsets
+/// come before them.
 const NAMES: usize = 40;
 
 /// Property of a timetable that holds all others.
@@ -119,8 +120,8 @@ impl Objects {
     }
 }
 
-/// Returns the properties of a record, by its number: each record has their count and then the
-/// properties, in an even number of words.
+/// Returns the properties of the record with this number. Each record has the number of its
+/// properties, then the properties, and ends at an even number of words.
 fn record(region: &[u32], number: u32) -> Option<&[u32]> {
     let mut at = 0_usize;
     let len = |at: usize| Some(PROPERTY_WORDS.saturating_mul(*region.get(at)? as usize));
@@ -217,7 +218,8 @@ impl Reader {
         Ok(true)
     }
 
-    /// Returns the elements of a cell array; none if it has none.
+    /// Returns the elements of a cell array; no elements if the array is empty, missing or
+    /// unusable.
     fn cells(&mut self, group: &Group, name: &str) -> Result<Vec<Object>, Fault> {
         let Ok(cells) = group.dataset(name) else { return Ok(Vec::new()) };
         if Attributes::from_dataset(&cells).has("MATLAB_empty") {
@@ -230,7 +232,7 @@ impl Reader {
         }
     }
 
-    /// Returns the texts of a cell array, empty where an element is none.
+    /// Returns the texts of a cell array; an element that is not a text becomes an empty text.
     fn texts(&mut self, group: &Group, name: &str) -> Result<Vec<String>, Fault> {
         let text = |cell: &Object| match cell {
             Object::Dataset(text) if !Attributes::from_dataset(text).has("MATLAB_empty") => {

@@ -22,8 +22,8 @@ pub fn bytes_of(column: &ColumnChunkMetaData, len: usize) -> Option<Range<usize>
 }
 
 /// Returns the unpacked size of the largest page of a column, in bytes; `None` if the headers of
-/// the pages are damaged, a dictionary has more values than bytes, or one is used before it is
-/// defined.
+/// the pages are damaged, if a dictionary has more values than bytes, or if a dictionary is used
+/// before it is defined.
 pub fn largest_page(column: &[u8]) -> Option<usize> {
     let (mut rest, mut largest, mut dictionary) = (Bytes(column), 0, false);
     while !rest.0.is_empty() {

@@ -147,7 +147,8 @@ struct Ids {
     name_bytes: usize,
 }
 
-/// Reason why the rows cannot be divided into records; it concerns the row after those read.
+/// Reason why the rows cannot be divided into records; it applies to the row after the last one
+/// read.
 enum Refusal {
     NoId,
     /// The rows of this record are not consecutive.

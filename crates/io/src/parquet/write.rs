@@ -148,7 +148,7 @@ fn single<T: DataType, V>(
     writer.close()
 }
 
-/// Writes one list per row; `optional` is 1 if its entries may be null.
+/// Writes one list per row; `optional` is 1 if the entries of the lists may be null.
 fn lists<T: DataType>(
     mut writer: SerializedColumnWriter<'_>,
     rows: impl Iterator<Item = impl Iterator<Item = Option<T::T>>>,

@@ -50,8 +50,8 @@ pub(super) struct Batch {
     pub unusable: Vec<Option<Unusable>>,
     /// Lines of the samples.
     pub lines: Lines,
-    /// Line and number of fields of the rows of empty fields at the end, which count as samples
-    /// only if other rows follow.
+    /// Line and number of fields of each row of empty fields at the end of the block. These rows
+    /// count as samples only if other rows follow.
     pub empty: Vec<(u64, usize)>,
     /// The row at which reading stopped.
     pub bad_row: Option<BadRow>,

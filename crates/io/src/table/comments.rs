@@ -127,8 +127,9 @@ impl Comments {
         without_names.map(|(_, line)| units_of(&line.fields, line.are_units))
     }
 
-    /// Returns remarks on the comments with names or units that were not read, because their number
-    /// is not that of the `columns`; if the columns have names from elsewhere, only on units.
+    /// Returns remarks on comments that were not read because the number of their names or units is
+    /// not that of the `columns`. If the columns have names from elsewhere, only comments with
+    /// units get a remark.
     pub fn remarks(&self, columns: usize, has_names: bool) -> impl Iterator<Item = String> {
         let unread = self.unfitting.iter().filter(move |line| line.has_units || !has_names);
         unread.map(move |Unfitting { text, fields, has_units }| {
@@ -155,9 +156,10 @@ pub(super) fn units_of(fields: &[String], are_units: bool) -> Vec<String> {
 }
 
 impl Unfitting {
-    /// Detects names or units in a comment whose number of fields is not that of the columns: a
-    /// word says so, at least half of the fields have a unit or the name of a quantity, or the
-    /// comment directly above the table has only single words between delimiters.
+    /// Detects names or units in a comment whose number of fields is not that of the columns.
+    /// Either a word says so, or the comment is directly above the table and its delimiters are not
+    /// single blanks. In the second case, at least half of the fields have a unit or the name of a
+    /// quantity, or all fields are single words.
     fn new(text: &str, layout: Layout, is_adjacent: bool) -> Option<Self> {
         let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
         let stated = names.or(units);
@@ -187,7 +189,7 @@ impl CommentLine {
     ) -> Option<Self> {
         let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
         let (fields, by_blanks) = fields_of(names.or(units).unwrap_or(text), widths, layout)?;
-        // Words of the definition of one column are no names of all columns.
+        // Words in the definition of one column are not the names of all columns.
         (!by_blanks || !is_numbered_with_unit(text)).then_some(())?;
         // Words of a sentence may be units, too: `sampled in s`.
         let are_all_units = || fields.iter().all(|field| are_units(std::slice::from_ref(field)));

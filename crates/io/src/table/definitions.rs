@@ -106,8 +106,9 @@ impl Definition {
         has_words.then(|| Self { key, text: text.into() })
     }
 
-    /// Returns the text of the unit, as in a header of the name and the text; empty if there is
-    /// none, or only that of a range or a sensitivity (`5 kN`, `10 mV/g`).
+    /// Returns the text of the unit, read as in a header that consists of the name and the text. It
+    /// is empty if there is no unit, or only the unit of a range or a sensitivity (`5 kN`,
+    /// `10 mV/g`).
     fn unit(&self) -> String {
         let text = match &self.key {
             Key::Name(name) => format!("{name} {}", self.text),

@@ -16,10 +16,11 @@ const MIN_NUMBERS: usize = 2;
 /// Texts above the rows of numbers.
 #[derive(Debug, Default)]
 pub(super) struct Above {
-    /// Names and units, if they are not just in the first row and perhaps the second.
+    /// Names and units; `None` if they are in the first row and perhaps the second, or if there are
+    /// none.
     pub heading: Option<Heading>,
-    /// Further units of the columns, in comments and in other rows: one text per column in each,
-    /// empty for a column without a unit.
+    /// Further texts for the units of the columns, from comments and other rows. Each list has one
+    /// text per column, empty for a column without a unit.
     pub further_units: Vec<Vec<String>>,
     /// Remarks on comments that were not read.
     pub remarks: Vec<String>,
@@ -36,7 +37,8 @@ pub(super) struct Heading {
     pub begin: usize,
     /// Row of the names, counted from 0; `None` if they are in a comment.
     pub names_row: Option<usize>,
-    /// Smallest number of fields, up to the last one that is not empty, in the first rows.
+    /// Number of fields in the first row of numbers, up to the last one that is not empty; a
+    /// comment in an extra field does not count.
     pub filled: usize,
 }
 
@@ -59,7 +61,7 @@ pub(super) fn first_rows(text: &[u8], layout: Layout) -> Vec<Beginning<'_>> {
     rows.into_iter().zip(fields).map(|(row, fields)| Beginning { row, fields }).collect()
 }
 
-/// Numbers of fields in the rows of a table that are not empty.
+/// Numbers of fields in the rows of a table, up to the last field that is not empty.
 struct Filled {
     /// Number in the first row, without a comment.
     first: usize,

@@ -64,8 +64,9 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Returns the seconds since the beginning of the first day or hour. The clock has begun again
-    /// if it goes back by more than half of its period; a second record seldom begins so.
+    /// Returns the seconds since the beginning of the first day or hour. If the time goes back by
+    /// more than half of the period, the clock has begun again; the start of a second record seldom
+    /// causes such a step.
     pub fn continued(&mut self, seconds: f64) -> f64 {
         if self.last_s - seconds > 0.5 * self.period_s {
             self.passed_s += self.period_s;

@@ -37,14 +37,14 @@ pub struct Tally {
 impl RecordFile {
     /// Reads columns to the end, by their indices, counted from 0, and the time axis from the
     /// column `instants`, in its stated unit. In the same pass, `take` receives every sample of
-    /// each column that is usable so far, in order: the index of the column in `columns`, the
-    /// number of the first sample, counted from 0, and this and further samples, in the unit of the
-    /// column.
+    /// each column that is usable so far, in order. Its arguments are the index of the column in
+    /// `columns`, the number of the first sample, counted from 0, and the samples from this one on,
+    /// in the unit of the column.
     ///
     /// # Errors
     /// Errors of a column or of the time axis are part of the result, as in
     /// [`Table::column`](super::Table::column) and [`Table::sampling`](super::Table::sampling);
-    /// those of the file are those of [`Table::read_with`](super::Table::read_with).
+    /// errors of the file are as in [`Table::read_with`](super::Table::read_with).
     ///
     /// # Panics
     /// If there is no such column.

@@ -66,7 +66,7 @@ impl LvmHeader {
         let last =
             ends.next().filter(|end| table.is_none_or(|table| *end < table)).unwrap_or(first);
         let mut bytes = last + start[last..].iter().position(|b| *b == terminator)? + 1;
-        // Skips empty lines above the names.
+        // Empty lines above the names are skipped.
         while let Some(len) = start[bytes..].iter().position(|b| *b == terminator)
             && start[bytes..bytes + len].trim_ascii().is_empty()
         {
@@ -121,7 +121,7 @@ struct ChannelRows {
     units: Vec<String>,
     starts: Vec<String>,
     steps: Vec<String>,
-    /// `true` if a field that no channel lacks follows the field of another channel directly.
+    /// `true` if no empty field separates the channels in a row that has a field for every channel.
     are_packed: bool,
 }
 
@@ -151,7 +151,8 @@ impl ChannelRows {
     }
 }
 
-/// Returns whether a field has text where a row with one field per column has none: above instants.
+/// Returns whether a field above a column of instants has text; it is empty if the row has one
+/// field per column.
 fn is_packed(fields: &[String]) -> bool {
     fields.iter().skip(1).step_by(2).any(|field| !field.is_empty())
 }

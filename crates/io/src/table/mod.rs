@@ -262,7 +262,7 @@ impl Table {
     }
 
     /// Returns the unit of the numbers of a column, by its index counted from 0: the name states it
-    /// in brackets (`Force [kN]`, `[mm] x`), after a stroke (`F / kN`) or as a word (`force_lbf`),
+    /// in brackets (`Force [kN]`, `[mm] x`), after a slash (`F / kN`) or as a word (`force_lbf`),
     /// or the line of units does. [`Table::to_si`] returns the factor.
     ///
     /// # Panics
@@ -449,9 +449,9 @@ impl Table {
         list.join(", ")
     }
 
-    /// Returns the index, counted from 0, of the column with this name; if there is none, of the
-    /// one with this name without its unit (`Fx` for `Fx [N]`), then of the one with this name in
-    /// another case; finally, of the one with this number, counted from 1.
+    /// Returns the index, counted from 0, of a column. The first match is used: the name of the
+    /// column, its name without the unit (`Fx` for `Fx [N]`), its name in another case, and finally
+    /// its number, counted from 1.
     ///
     /// # Errors
     /// [`IoError::MissingColumn`], [`IoError::AmbiguousColumn`].
@@ -551,7 +551,8 @@ impl Table {
         self.signal(Record::new(sampling, data))
     }
 
-    /// Returns the indices of the columns `wanted`, each used once and not as the time column, too.
+    /// Returns the indices of the columns `wanted`; an error if a column is used twice, also as the
+    /// time column.
     fn record_columns(
         &self,
         time: &TimeAxis<'_>,
@@ -569,7 +570,7 @@ impl Table {
         made.map_err(|source| IoError::Signal { file: self.file.clone(), source })
     }
 
-    /// Returns the indices of columns, each used once.
+    /// Returns the indices of columns; an error if a column is used twice.
     fn distinct(&self, wanted: &[&str]) -> Result<Vec<usize>, IoError> {
         let columns: Vec<usize> = wanted.iter().map(|w| self.find(w)).collect::<Result<_, _>>()?;
         for (second, column) in columns.iter().enumerate() {

@@ -4,8 +4,8 @@
 /// distinguished from rounding.
 const COARSEST: f64 = 1.0;
 
-/// Maximum rounding error, in steps, of fewer instants than [`FEW`], with which almost any spacing
-/// agrees.
+/// Maximum rounding error, in steps, of fewer than [`FEW`] instants, because almost any spacing
+/// agrees with a few instants.
 const COARSEST_OF_FEW: f64 = 0.5;
 
 /// Minimum number of instants with which rounding can be distinguished from uneven steps.
@@ -29,9 +29,8 @@ const BEGINNING: usize = 1024;
 /// The unit of the last digit is determined from the numbers themselves: the largest numbers of
 /// decimal places and of significant digits so far. The true value of each instant is within half a
 /// unit of the printed one; the instants are equally spaced as long as a straight line passes
-/// through all of these intervals. There is one if the concave envelope of their lower ends lies
-/// below the convex envelope of their upper ends, which can be tested in one pass and with few
-/// corners.
+/// through all of these intervals. Such a line exists if the concave envelope of the lower ends
+/// lies below the convex envelope of the upper ends. This test needs one pass and few corners.
 #[derive(Debug)]
 pub(super) struct PrintedInstants {
     count: usize,
@@ -51,7 +50,7 @@ pub(super) struct PrintedInstants {
     intervals: Intervals,
 }
 
-/// Intervals through which a straight line should pass, at their numbers.
+/// Intervals over the numbers of the instants; a straight line should pass through all of them.
 #[derive(Debug, Clone, Default)]
 struct Intervals {
     /// Corners of the concave envelope of the lower ends.

@@ -18,7 +18,7 @@ const NAMES: [&str; 8] = [
 /// Words for time, in lower case.
 const WORDS: [&str; 5] = ["time", "zeit", "temps", "tiempo", "tempo"];
 
-/// Words beside a word for time, in lower case, that leave it the time of the samples.
+/// Words, in lower case, beside a word for time that still mean the time of the samples.
 const BESIDE: [&str; 18] = [
     "absolute",
     "acquisition",

@@ -135,8 +135,8 @@ impl Units {
         }
     }
 
-    /// Returns the factor that converts a frequency response to SI units, from its labels or,
-    /// without them, from the factors of the file; and the labels that were used.
+    /// Returns the factor that converts a frequency response to SI units, and the labels that were
+    /// used. The factor comes from the labels or, without them, from the factors of the file.
     fn factor(stated: Option<&Self>, labels: &[String; 2]) -> (f64, Vec<String>) {
         let [motion, force] = labels;
         let of_label = |label: &String, is_force: bool| {

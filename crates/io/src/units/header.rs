@@ -1,4 +1,4 @@
-//! Units in the names of columns: in brackets, after a stroke, or as a word.
+//! Units in the names of columns: in brackets, after a slash, or as a word.
 
 use std::ops::Range;
 
@@ -82,8 +82,9 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
 /// Maximum relative difference between two sizes of one unit, from the rounding of factors.
 const SAME_SIZE: f64 = 1e-9;
 
-/// Returns the texts in a header that state a unit clearly: in brackets, in the name outside of
-/// them and in a separate text; `None` for the output of an amplifier in the separate text.
+/// Returns the texts in a header that clearly state a unit: in brackets, in the name outside of
+/// brackets, and in a separate text. The unit is `None` for the output of an amplifier in the
+/// separate text.
 fn other_units(
     notes: &[&str],
     outside: &str,
@@ -111,8 +112,8 @@ fn other_units(
     units.chain(of_words).chain(amplifier.map(|note| (note.to_owned(), None))).collect()
 }
 
-/// Returns a statement as a doubtful one that also names another text of the header, if the units
-/// contradict each other.
+/// Returns a statement. If another text of the header contradicts its unit, the statement becomes a
+/// doubtful one that names both texts.
 fn with_contradiction(stated: StatedUnit, others: Vec<(String, Option<Unit>)>) -> StatedUnit {
     let Some(used) = stated.used() else { return stated };
     let is_other = |unit: &Option<Unit>| {
@@ -131,8 +132,8 @@ fn with_contradiction(stated: StatedUnit, others: Vec<(String, Option<Unit>)>) -
     }
 }
 
-/// Returns the clearest of the statements in brackets, in the name `outside` of them and in a
-/// separate text.
+/// Returns the clearest statement of a unit: in brackets, in the name `outside` of brackets, or in
+/// a separate text.
 fn first_stated(
     in_brackets: Option<StatedUnit>,
     outside: &str,
@@ -143,7 +144,7 @@ fn first_stated(
     if in_brackets.as_ref().is_some_and(is_used) {
         return in_brackets;
     }
-    // The stroke of `velmm/s` belongs to the unit, and a unit of time alone cannot follow it.
+    // The slash of `velmm/s` belongs to the unit; a unit of time alone cannot follow a slash.
     let is_of_unit = |statement: &StatedUnit| {
         let is_time = statement.unit.as_ref().is_some_and(|unit| unit.quantity == Quantity::Time);
         is_time && wanted.is_some_and(|wanted| wanted != Quantity::Time)
@@ -169,7 +170,7 @@ fn first_stated(
         .or(of_text)
 }
 
-/// Returns a name without the unit that it states in brackets, after a stroke or as its last words.
+/// Returns a name without the unit that it states in brackets, after a slash or as its last words.
 /// Brackets at the end are always removed.
 pub(crate) fn without_unit(name: &str) -> String {
     let name = name.trim();
@@ -235,11 +236,11 @@ fn without_copy_number(name: &str) -> &str {
     }
 }
 
-/// Splits a name at the stroke before its unit: `F / kN`, `v / mm/s`.
+/// Splits a name at the slash before its unit: `F / kN`, `v / mm/s`.
 fn stroke(name: &str) -> Option<(&str, Expression)> {
     let (before, after) = name.split_once('/')?;
     let unit = Expression::parse(after)?;
-    // The stroke of `vel_m/s` belongs to the unit.
+    // The slash of `vel_m/s` belongs to the unit.
     let is_unit_word = |span: &Range<usize>| {
         let word = &name[span.clone()];
         word.contains('/') && word.len() < name.len() && Unit::parse(word).is_some()
@@ -247,7 +248,7 @@ fn stroke(name: &str) -> Option<(&str, Expression)> {
     if split_words(name).iter().any(is_unit_word) {
         return None;
     }
-    // The stroke of `acc 100 mV/g` belongs to a sensitivity.
+    // The slash of `acc 100 mV/g` belongs to a sensitivity.
     let last_word = before.rsplit_once([' ', '_']).and_then(|(_, word)| Expression::parse(word));
     if last_word.is_some_and(|unit| unit.dimension.is_electric()) {
         return None;

@@ -44,15 +44,14 @@ const OTHER_WORDS: [&str; 27] = [
     "digits",
 ];
 
-/// Spellings of units that are a unit only after a comma or a similar sign, as the last word:
-/// `p, bar` has a unit, `force_bar` is a mean value, `F_mg` a weight and `acc_lb` a corner.
+/// Spellings that are a unit only as the last word, after a comma or a similar sign: `p, bar` has a
+/// unit, but `force_bar` is a mean value, `F_mg` a weight and `acc_lb` a corner.
 const MARKED: [&str; 22] = [
     "bar", "psi", "mg", "lb", "oz", "kp", "gf", "tf", "gn", "g0", "g_0", "dm", "km", "mil", "thou",
     "pond", "gal", "ms", "us", "ns", "sec", "gee",
 ];
 
-/// Spellings of units that are a unit only after the word `in`: `acc, rad` is radial and `acc, V`
-/// vertical.
+/// Spellings that are a unit only after the word `in`: `acc, rad` is radial and `acc, V` vertical.
 const AFTER_IN: [&str; 5] = ["V", "N", "rad", "mHz", "C"];
 
 /// Words, in lower case, before a number or a unit of a condition: `acc at 50 Hz`, `gain per mm`.
@@ -64,7 +63,7 @@ const CONDITIONS: [&str; 11] =
 enum Separator {
     /// A blank, an underscore or a similar sign, which also separates other words.
     Common,
-    /// A comma, colon, semicolon, stroke, equals sign, or a dash between blanks.
+    /// A comma, colon, semicolon, slash, equals sign, or a dash between blanks.
     Mark,
     /// The word `in`.
     In,

@@ -86,7 +86,7 @@ pub(super) fn multiplier(name: &str) -> Option<&str> {
                 let is_word = !before.is_some_and(char::is_alphanumeric);
                 is_word && number >= 100.0 && is_power_of_ten
             }
-            // The number of a channel or of a point follows a stroke, too: `rig/10`, `12+Z/1-X`.
+            // The number of a channel or of a point may follow a slash, too: `rig/10`, `12+Z/1-X`.
             '/' => {
                 let is_apart = before.is_none_or(char::is_whitespace);
                 let least = if is_apart { 10.0 } else { 1000.0 };
@@ -98,8 +98,9 @@ pub(super) fn multiplier(name: &str) -> Option<&str> {
     })
 }
 
-/// Returns whether a text beside a unit begins with a factor: `1/1000`, `%`, `x1000`, `0.1`. A
-/// number after the unit is one only if it is a power of ten from 10; others count channels.
+/// Returns whether a text beside a unit begins with a factor: `1/1000`, `%`, `x1000`, `0.1`. After
+/// a unit, a number is a factor only if it is a power of ten and at least 10; other numbers count
+/// channels.
 pub(super) fn may_be_factor(text: &str, is_after_unit: bool) -> bool {
     let number = |word: &str| match number_and_rest(word) {
         Some((number, "")) => Some(number),

@@ -69,8 +69,8 @@ pub(super) fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWor
         .or_else(|| unclear(name, &words))
 }
 
-/// Returns the last words after the first one that are a unit of this quantity; of any quantity
-/// without other meanings if none is given.
+/// Returns the last words after the first one that are a unit of this quantity. If no quantity is
+/// given, the words are a unit of any quantity and have no other meaning.
 fn unit_of_quantity(
     name: &str,
     words: &[Range<usize>],

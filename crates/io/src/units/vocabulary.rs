@@ -369,7 +369,7 @@ pub(super) const VOCABULARY: &[Entry] = &[
     entry(&["mV", "millivolt", "millivolts", "mvolt"], D::VOLTAGE, 1e-3),
     entry(&["µV", "uV", "microvolt", "microvolts"], D::VOLTAGE, 1e-6),
     entry(&["kV"], D::VOLTAGE, 1e3),
-    // A sensor with an output of 4 to 20 mA.
+    // Some sensors have an output of 4 to 20 mA.
     entry(&["mA", "milliamp", "milliamps", "milliampere"], D::CURRENT, 1e-3),
     entry(&["C", "coulomb"], D::CHARGE, 1.0),
     entry(&["nC"], D::CHARGE, 1e-9),
@@ -379,6 +379,6 @@ pub(super) const VOCABULARY: &[Entry] = &[
         D::COUNT,
         1.0,
     ),
-    // A strain gauge has its own kind of counts.
+    // Microstrains, the output of a strain gauge, have the dimension of counts.
     entry(&["µε", "uε", "ustrain", "µstrain", "microstrain", "microstrains"], D::COUNT, 1e-6),
 ];

@@ -53,7 +53,8 @@ pub enum SimulateError {
         /// The growing free response.
         instability: Instability,
     },
-    /// The periodic response of a nonlinear or large machine is unstable, so that a run leaves it.
+    /// The periodic response of a nonlinear or large machine is unstable, so a simulation departs
+    /// from this response.
     #[error(
         "the periodic response is unstable: each period multiplies a disturbance by {} (the largest \
          Floquet multiplier), so the machine leaves it; choose \"response\": \"from-rest\" to see how \
@@ -75,7 +76,8 @@ pub enum SimulateError {
     NoPeriodicOrbit {
         /// Period of the force, in seconds.
         period: f64,
-        /// Change in a period, relative to the largest displacement, velocity or acceleration.
+        /// Change of the state over a period, relative to the largest displacement, velocity or
+        /// acceleration.
         missed: f64,
     },
     /// The response of an unstable machine overflows.

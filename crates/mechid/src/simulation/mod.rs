@@ -131,7 +131,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     })
 }
 
-/// Steps through one period of the force, until the response is periodic, or through all of them.
+/// Computes the periodic response from one period of the force, or the response to all periods from
+/// initial conditions.
 fn by_steps(
     experiment: &Experiment,
     scheme: &dyn Scheme,

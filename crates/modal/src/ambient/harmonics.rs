@@ -69,7 +69,7 @@ pub fn harmonics(record: &Record, band_hz: [f64; 2]) -> Result<Vec<Harmonic>, Am
         let lines = padded_lines(record.channel(channel), padded);
         for index in from..to {
             let statistic = f_statistic(&lines, index, &sums);
-            // Neighbouring quarter lines are one test; allow for the best of them.
+            // Neighbouring quarter lines count as one test; the factor allows for the best of them.
             let p_value = (PADDING as f64 * tested as f64 * distribution.sf(statistic)).min(1.0);
             if p_value < HARMONIC_LEVEL {
                 let frequency_hz = index as f64 * step_hz;
@@ -141,7 +141,7 @@ fn measured(record: &Record, mut harmonic: Harmonic) -> Harmonic {
     harmonic
 }
 
-/// Returns the frequency near `frequency_hz` of the largest amplitude.
+/// Returns the frequency near `frequency_hz` at which the amplitude is largest.
 fn refined(samples: &[f64], mut frequency_hz: f64, dt: f64) -> f64 {
     let mut step = 1.0 / (PADDING as f64 * samples.len() as f64 * dt);
     for _ in 0..REFINEMENTS {

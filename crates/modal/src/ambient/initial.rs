@@ -34,9 +34,9 @@ const QUANTITIES: [(Kernel, f64); 5] = [
 /// Returns the maximum of the likelihood for the quantity (displacement, velocity or acceleration,
 /// filtered or not) that explains the lines best; `None` if none has a likelihood.
 ///
-/// Quantities are compared with the poles of the subspace models: they differ in the tails of the
-/// resonances, and with free poles a wrong one would find a better maximum elsewhere, at damping
-/// ratios of sinusoids.
+/// The comparison of quantities keeps the poles of the subspace models. Quantities differ in the
+/// tails of the resonances. With free poles, a wrong quantity would find a better maximum at other
+/// poles, with the damping ratios of sinusoids.
 pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
@@ -72,7 +72,8 @@ fn initial_parameters(
     for (r, mode) in modes.iter().enumerate() {
         let (frequency, damping) = (parameters.layout.frequency(r), parameters.layout.damping(r));
         parameters.values[frequency] = mode.pole.norm().ln();
-        // The search cannot leave a resonance as narrow as a line, which a sinusoid has.
+        // A search that starts at a resonance as narrow as a line, like that of a sinusoid, cannot
+        // leave it.
         let narrowest = MIN_DECAY_TIMES / (mode.pole.norm() * band.span.duration);
         parameters.values[damping] = mode.damping_ratio().max(narrowest).ln();
         let turn = Complex::cis(phase - mean_phase(&mode.vector));
@@ -166,7 +167,8 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
             }
             let eigen = crate::decomposition::hermitian_eigen(sum)?;
             let best = eigen.eigenvalues.imax();
-            // Likelihood ratio of a power of 1 + excess along one direction against 1.
+            // This is the likelihood ratio of a power of 1 + excess along one direction against a
+            // power of 1.
             let excess: f64 = eigen.eigenvalues[best] / total;
             let gain = 2.0 * (excess - excess.ln_1p()) * total * total / squares;
             let near = band.omega.partition_point(|w| *w < centre).min(band.omega.len() - 1);

@@ -101,5 +101,5 @@ pub(super) const STRONG_EVIDENCE: f64 = 4.0;
 pub(super) const NUISANCE_POLES: usize = 4;
 
 /// Minimum number of squared amplitudes in a group of lines whose power is compared with the fitted
-/// spectrum: the cube root of a power has a normal distribution from far fewer on.
+/// spectrum. Far fewer are enough for the cube root of a power to have a normal distribution.
 pub(super) const MISFIT_GROUP: f64 = 100.0;

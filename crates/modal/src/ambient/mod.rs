@@ -152,7 +152,7 @@ impl AmbientEstimate {
     }
 }
 
-/// Returns the clusters in the band, the one with the most orders first.
+/// Returns the clusters in the band, by falling number of orders.
 fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2]) -> Vec<Pole> {
     let inside = |pole: &Pole| {
         let frequency_hz = pole.natural_frequency_hz();

@@ -124,7 +124,7 @@ impl Choice<'_> {
             let mode = sound.remove(weakest);
             self.drop_mode(&fit.parameters, mode, DropReason::NumberReached { number });
         }
-        // Poles may pass each other in the search.
+        // A search may change the order of the poles by frequency.
         let omega = |mode: &usize| fit.parameters.omega(*mode);
         sound.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
         Chosen { fitted, sound }

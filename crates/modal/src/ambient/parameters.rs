@@ -165,7 +165,8 @@ impl Parameters {
         result
     }
 
-    /// Returns the parameters with one more mode, whose force is independent, as the last.
+    /// Returns the parameters with one more mode at the end, whose force is independent of the
+    /// others.
     pub fn with_mode(&self, pole: Complex<f64>, shape: &DVector<Complex<f64>>) -> Self {
         let modes = self.layout.modes;
         let layout = Layout::new(modes + 1, self.layout.outputs, self.layout.noise_terms);
@@ -194,8 +195,7 @@ impl Parameters {
         Self { kernel: self.kernel, layout, values }
     }
 
-    /// Returns the parameters for outputs in other units, which differ from the present ones
-    /// (`from`) by the ratio to `to`.
+    /// Returns the parameters for outputs in the units `to` instead of the present units `from`.
     pub fn with_units(&self, from: &[f64], to: &[f64]) -> Self {
         let mut result = self.clone();
         for (output, (from, to)) in from.iter().zip(to).enumerate() {

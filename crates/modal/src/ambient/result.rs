@@ -22,7 +22,7 @@ pub enum Uncertainty {
     Known {
         /// Standard error, in the unit of the value.
         standard_error: f64,
-        /// Transient of the interval, in the unit of the value.
+        /// Lower and upper end of the interval, in the unit of the value.
         interval: [f64; 2],
     },
     /// The record is too short: the distribution of the estimate is not known well enough for an
@@ -74,7 +74,7 @@ impl ModalValue {
         self
     }
 
-    /// Returns the value for a comparison; without a known standard error as an exact one.
+    /// Returns the value for a comparison; a value without a known standard error counts as exact.
     fn measured(&self) -> Measured {
         Measured::new(self.value, self.standard_error().unwrap_or(0.0))
     }
@@ -116,8 +116,8 @@ pub struct AmbientMode {
 pub enum DropReason {
     /// The likelihood gains less than the penalty of the parameters.
     SmallGain {
-        /// Increase of 2 ln L by the mode; beside a model without the mode but with more
-        /// polynomials of the noise, plus the penalty of these.
+        /// Increase of 2 ln L by the mode. If the model without the mode has more polynomials of
+        /// the noise, their penalty is added.
         gain: f64,
         /// Increase that was needed.
         needed: f64,
@@ -194,9 +194,9 @@ pub(super) struct FittedSpectrum {
 }
 
 impl AmbientEstimate {
-    /// Returns the same estimate with the standard errors of each of its modes multiplied by its
-    /// entry of `scales` (pure numbers): for halves of a record that disagree by more than their
-    /// errors.
+    /// Returns the same estimate; the standard errors of each mode are multiplied by the entry of
+    /// `scales` for this mode (a pure number). Use it if halves of a record disagree by more than
+    /// their errors.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.

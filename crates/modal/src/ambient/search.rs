@@ -52,9 +52,9 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Effort to compare quantities at initial estimates. Their poles are better than their
-    /// amplitudes: beside wrong amplitudes a damping ratio would fall to that of a sinusoid, and no
-    /// search returns from there.
+    /// Effort to compare quantities at initial estimates. The initial poles are more accurate than
+    /// the initial amplitudes. With wrong amplitudes, a search with free poles would lower a
+    /// damping ratio to that of a sinusoid, and no later search would raise it again.
     pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true };
     /// Effort to approach the maximum with coarse lines.
     pub const SHORT: Self = Self { iterations: 6, slow: 0.5, holds_poles: false };
@@ -192,7 +192,8 @@ impl Path<'_> {
         if self.updates > 0 {
             fit.information = information(&fit.parameters, self.lines.coarse, self.lines.span)?;
             self.updates = 0;
-            // Steps that were refused for the updates do not concern the new information.
+            // Steps that were refused with the updated information may succeed with the new
+            // information.
             self.damping = self.damping.min(FIRST_DAMPING);
         }
         Some(())
@@ -234,7 +235,7 @@ pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort)
     let [pooled, coarse] = around(&first.parameters);
     let lines = SearchLines { pooled: &pooled, coarse: &coarse, span };
     let Fit { parameters, information: nearby, .. } = first;
-    // Information from nearby is computed anew as soon as a step is refused.
+    // This information belongs to nearby parameters: it is computed anew if a step is refused.
     let mut fit = search_with_information(parameters, nearby, TRUSTED_UPDATES, lines, effort)?;
     fit.information = information(&fit.parameters, &pooled, span)?;
     // The cost is computed on all lines, so that fits with different pooling can be compared.
@@ -318,9 +319,9 @@ fn moved(parameters: &Parameters, step: &DVector<f64>) -> Parameters {
 }
 
 impl Fit {
-    /// Returns the covariance of the parameters, the inverse of the information. A combination that
-    /// the lines do not determine, such as correlations of the forces on all modes by one force, has
-    /// a large variance; `None` if the information is not finite.
+    /// Returns the covariance of the parameters, the inverse of the information; `None` if the
+    /// information is not finite. A combination that the lines do not determine has a large
+    /// variance, for example the correlations if one force drives all modes.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let (scaled, scale) = scaled(&self.information, LEAST_INFORMATION);
         let inverse = match scaled.clone().cholesky() {

@@ -68,8 +68,8 @@ impl FitWithTransient {
 /// Searches from the parameters of `fit`, in alternation with the transient, until the likelihood
 /// rises no more.
 ///
-/// The information of the transient itself on the poles is not used: its share is that of one line
-/// among those of a resonance.
+/// The information of the transient itself on the poles is not used: it contributes as much as one
+/// line of the many lines of a resonance.
 ///
 /// # Source
 /// After Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.
@@ -177,7 +177,7 @@ impl TransientSums {
 }
 
 impl BandLines {
-    /// Returns the lines without the predicted transient: the remaining ones have no leakage.
+    /// Returns the lines without the predicted transient, and therefore without leakage.
     fn without_transient(&self, predicted: &Prediction) -> Self {
         let mean = predicted.mean.map(Complex::from);
         let mut amplitudes = self.amplitudes.clone();

@@ -244,8 +244,8 @@ fn least_squares(jacobian: DMatrix<f64>, residual: &DVector<f64>) -> Option<DVec
     Some(step)
 }
 
-/// Returns the channel in which the sum of some modes is largest, and the amplitude there and the
-/// pole per sample of each of them.
+/// Returns the channel in which the sum of some modes is largest and, for each of these modes, its
+/// amplitude in this channel and its pole per sample.
 fn reference_response(
     data: &Data,
     fit: &Fit,
@@ -255,7 +255,7 @@ fn reference_response(
     let complex = |channel: usize, mode: usize| {
         let (linear, pole) = (&fit.channels[channel].linear, &fit.poles[mode]);
         let amplitude = Complex::new(linear[2 * mode], -linear[2 * mode + 1]);
-        // Refers the amplitude to the first sample.
+        // This factor refers the amplitude to the first sample.
         let back = (-pole.growth * pole.origin(data.len()) as f64).exp();
         [amplitude * back, Complex::new(pole.growth, pole.turn)]
     };
@@ -306,8 +306,8 @@ fn initial_flow(modes: &[[Complex<f64>; 2]], len: usize, order: usize) -> Option
 /// modes near it, by the Bayesian information criterion; `energies` are the energies of the modes,
 /// `scale` is the unit of each channel of the data.
 ///
-/// The modes nearest to the strongest one are replaced, one, two … of them, and the order of the
-/// polynomials rises from two.
+/// The linear modes nearest to the strongest one are replaced: one, then two, and so on. The order
+/// of the polynomials rises from two.
 ///
 /// # Source
 /// Londoño, Neild & Cooper (2015), Journal of Sound and Vibration 339, 205–223 (backbones from
@@ -373,8 +373,8 @@ fn is_promising(target: &Target<'_>, start: &Flow) -> bool {
     expected_gain().is_some_and(|gain: f64| gain > penalty)
 }
 
-/// Returns frequency and damping from the first amplitude down to the noise of the channel or the
-/// amplitude at the end of the record.
+/// Returns frequency and damping from the first amplitude down to the noise of the channel or to
+/// the amplitude at the end of the record, whichever is larger.
 fn points(
     target: &Target<'_>,
     fitted: &Fitted,

@@ -184,8 +184,8 @@ impl<'a> Spread<'a> {
         Uncertain { value, standard_error, degrees_of_freedom }
     }
 
-    /// Variance of Re Σ w_c A_c, A_c being the complex amplitude of a mode in channel c, relative
-    /// to its origin.
+    /// Returns the variance of Re Σ w_c A_c, with the complex amplitude A_c of a mode in channel c,
+    /// relative to its origin.
     fn variance(&self, mode: usize, weights: &[(usize, Complex<f64>)]) -> f64 {
         let mut through_poles = DVector::zeros(self.poles.nrows());
         let mut variance = 0.0;
@@ -201,7 +201,7 @@ impl<'a> Spread<'a> {
         variance + through_poles.dot(&(&self.poles * &through_poles))
     }
 
-    /// Complex amplitude of a mode in a channel, relative to its origin.
+    /// Returns the complex amplitude of a mode in a channel, relative to its origin.
     fn amplitude(&self, mode: usize, channel: usize) -> Complex<f64> {
         let linear = &self.fit.channels[channel].linear;
         Complex::new(linear[2 * mode], -linear[2 * mode + 1])
@@ -217,7 +217,7 @@ pub(super) fn estimate(
     scale: &[f64],
 ) -> Option<Result<FreeDecayEstimate, FreeDecayError>> {
     let spread = Spread::new(data, fit)?;
-    // Squares of the unit itself may be beyond the largest number.
+    // The scales are relative to the largest one, because its square may overflow.
     let unit = scale.iter().copied().fold(0.0, f64::max);
     let relative: Vec<f64> = scale.iter().map(|scale| scale / unit).collect();
     let energies = energies(data, fit, &relative);
@@ -255,7 +255,7 @@ pub(super) fn estimate(
     }))
 }
 
-/// Sum of squares of each mode over samples and channels.
+/// Returns the sum of squares of each mode over samples and channels.
 fn energies(data: &Data, fit: &Fit, scale: &[f64]) -> Vec<f64> {
     let mut energies = vec![0.0; fit.poles.len()];
     for basis in data.chunks(&fit.poles) {
@@ -270,7 +270,7 @@ fn energies(data: &Data, fit: &Fit, scale: &[f64]) -> Vec<f64> {
     energies
 }
 
-/// A mode, its amplitude in the unit of `scale`.
+/// Returns a mode with its amplitude in the unit of `scale`.
 fn mode(
     spread: &Spread<'_>,
     record: &Record,
@@ -308,7 +308,7 @@ fn mode(
     };
     let cube = size * size * size;
     let weight = whole.conj() * (scale[reference] / whole.norm());
-    // Refers the amplitude to the first sample.
+    // This factor refers the amplitude to the first sample.
     let back = (-growth * spread.fit.poles[at].origin(len) as f64).exp();
     let variance = spread.variance(at, &[(reference, weight)]) * back * back;
     let mode = IdentifiedMode {

@@ -8,8 +8,8 @@ use super::autoregression::Autoregression;
 use super::limits::{MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING};
 use super::poles::{Pole, columns, linear_columns};
 
-/// Samples × channels, each scaled to unit RMS about its mean; `constant` states whether each has a
-/// constant.
+/// Record as samples × channels, each channel scaled to unit RMS about its mean; `constant` states
+/// whether each channel has a constant.
 #[derive(Debug)]
 pub(super) struct Data {
     pub samples: DMatrix<f64>,
@@ -78,8 +78,8 @@ impl Data {
     /// Returns the triangular factor of \[linear columns | columns of poles times k/N | channels\]
     /// after whitening.
     ///
-    /// Modes that have died away before a chunk have no columns there: most modes of a long record
-    /// take a small part of it.
+    /// Modes that have decayed before a chunk have no columns there: most modes of a long record
+    /// last for only a small part of the record.
     fn triangle(
         &self,
         poles: &[Pole],

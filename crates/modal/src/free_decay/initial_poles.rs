@@ -53,7 +53,7 @@ pub(super) fn strongest(residual: &DMatrix<f64>) -> Option<Pole> {
 pub(super) struct Subspace {
     vectors: DMatrix<f64>,
     channels: usize,
-    /// Samples from one row of a channel to the next.
+    /// Number of samples from one row of a channel to the next.
     stride: usize,
     len: usize,
 }

@@ -120,8 +120,8 @@ pub(crate) const SMALLEST_AMPLITUDE: f64 = 1e-3;
 /// drift.
 pub(crate) const SLOWEST_RETURN: f64 = 1.0;
 
-/// Number of refinements of the rates of decays without oscillation; each step equals the last or
-/// half of it.
+/// Number of refinements of the rates of decays without oscillation; each step is as large as the
+/// step before, or half as large.
 pub(crate) const RATE_REFINEMENTS: usize = 40;
 
 /// Number of samples at which a second excitation is tested, over the record and again near the

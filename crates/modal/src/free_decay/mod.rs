@@ -82,8 +82,8 @@ impl Default for FreeDecay {
 /// # Errors
 /// [`FreeDecayError::SilentChannel`] if a channel is constant, [`SignalError::TooShort`],
 /// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than
-/// can be fitted, [`FreeDecayError::NoOscillation`] if decays without oscillation describe it
-/// better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
+/// can be fitted, [`FreeDecayError::NoOscillation`] if decays without oscillation describe the
+/// response better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
 /// [`FreeDecayError::Grows`] if most of the response grows, [`FreeDecayError::NotConverged`] if the
 /// record does not determine the number of modes.
 ///
@@ -181,7 +181,8 @@ fn check_oscillation(data: &Data, fit: &Fit, dt: f64) -> Result<(), FreeDecayErr
     }
 }
 
-/// Returns a power of two near the peak of each channel, and the RMS about the mean relative to it.
+/// Returns a power of two near the peak of each channel, and the RMS about the mean relative to
+/// this power.
 fn units(record: &Record) -> Result<Vec<[f64; 2]>, FreeDecayError> {
     let unit = |channel: usize| {
         let x = record.channel(channel);

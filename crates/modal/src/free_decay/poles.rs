@@ -41,7 +41,7 @@ impl Pole {
         Self { growth: self.growth.clamp(least, MOST_GROWTH / len as f64), turn }
     }
 
-    /// Returns whether more than rounding remains of the response at a sample.
+    /// Returns whether the response at a sample is still above rounding.
     pub(super) fn is_alive(&self, sample: usize) -> bool {
         self.growth * sample as f64 >= -DEAD
     }
@@ -53,7 +53,8 @@ impl Pole {
 }
 
 /// Returns the columns e^{σk} cos ωk and e^{σk} sin ωk of each pole, then the constant if there is
-/// one, then both of each pole times k/N; rows are the samples `first` … `end − 1` of N = `len`.
+/// one, then both columns of each pole times k/N; rows are the samples `first` … `end − 1` of N =
+/// `len`.
 pub(super) fn columns(
     poles: &[Pole],
     constant: bool,

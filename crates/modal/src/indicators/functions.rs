@@ -53,7 +53,7 @@ pub fn multivariate_mode_indicator(
         let (real, imaginary) = (response.map(|z| z.re), response.map(|z| z.im));
         let in_phase = real.tr_mul(&real);
         let power = &in_phase + imaginary.tr_mul(&imaginary);
-        // Eigenvalues of A f = λ (A + B) f, by the Cholesky factor of A + B.
+        // The Cholesky factor of A + B reduces A f = λ (A + B) f to a symmetric eigenvalue problem.
         let lower = power.cholesky().ok_or(failed.clone())?.unpack();
         let half = lower.solve_lower_triangular(&in_phase).ok_or(failed.clone())?;
         let whitened = lower.solve_lower_triangular(&half.transpose()).ok_or(failed.clone())?;

@@ -166,7 +166,7 @@ impl Assembly {
         !self.loads.is_empty()
     }
 
-    /// Returns the loads of the unbalance of elements, at `omega` (rad/s).
+    /// Returns the loads of the unbalance elements, at `omega` (rad/s).
     pub fn own_loads(&self, omega: f64) -> Vec<ParameterLoad> {
         let load = |own: &OwnLoad| {
             let forces = unbalance(own.at, omega, self.speed);

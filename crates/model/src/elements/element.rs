@@ -28,7 +28,8 @@ pub enum Element {
         /// Loss factor η of the stiffness: k (1 + iη).
         loss_factor: Coefficient,
     },
-    /// General 2 × 2 block between two directions at one point and at another point: a bearing.
+    /// Bearing: a general 2 × 2 block of coefficients between two directions at one point and the
+    /// same directions at another point or the support.
     Bearing(Box<Bearing>),
     /// Known matrices of a part of the machine, each multiplied by a factor.
     Matrices(Box<MatrixElement>),
@@ -48,7 +49,7 @@ pub enum Element {
 pub struct Bearing {
     /// Degrees of freedom of x and y.
     pub at: [String; 2],
-    /// Degrees of freedom of x and y of the housing; the support without them.
+    /// Degrees of freedom of x and y of the housing; `None` if the bearing ends at the support.
     pub to: Option<[String; 2]>,
     /// Stiffness k, in N/m.
     pub stiffness: [Coefficient; 4],
@@ -58,7 +59,7 @@ pub struct Bearing {
     pub mass: [Coefficient; 4],
 }
 
-/// Matrices over some degrees of freedom, d × d; missing ones are zero.
+/// Matrices over some degrees of freedom, d × d; a matrix that is `None` is zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatrixElement {
     /// Degrees of freedom of the rows and columns.

@@ -15,7 +15,7 @@ pub enum MachineError {
     /// A name appears twice.
     #[error("the {what} {name:?} appears twice")]
     Repeated {
-        /// Kind of thing with this name.
+        /// Kind of item with this name.
         what: &'static str,
         /// Name concerned.
         name: String,

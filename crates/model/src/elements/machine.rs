@@ -16,7 +16,7 @@ pub struct ProportionalDamping {
     /// β, in s.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Coefficient::is_zero"))]
     pub beta: Coefficient,
-    /// Loss factor η of all links and matrices without a separate one.
+    /// Loss factor η of all links and matrices that have no separate loss factor.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Coefficient::is_zero"))]
     pub loss_factor: Coefficient,
 }

@@ -33,7 +33,7 @@ impl UncertainNonlinearSystem {
     ///
     /// # Errors
     /// [`ModelError::NoSuchMode`] if fewer modes oscillate without damping,
-    /// [`ModelError::Parameter`] for an amplitude that is not positive, and as
+    /// [`ModelError::Parameter`] for an amplitude that is not positive, and the errors of
     /// [`NonlinearSystem::changed`].
     ///
     /// # Source

@@ -121,10 +121,10 @@ impl UncertainNonlinearSystem {
     /// products of their units.
     ///
     /// # Errors
-    /// [`ModelError::CovarianceShape`] if it is not one row and column per parameter,
+    /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,
     /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
-    /// [`ModelError::RepeatedParameter`] if a parameter is named twice, and as
-    /// [`NonlinearSystem::changed`] if the system does not have this parameter.
+    /// [`ModelError::RepeatedParameter`] if a parameter is named twice, and the errors of
+    /// [`NonlinearSystem::changed`] if the system does not have a parameter.
     pub fn new(
         system: NonlinearSystem,
         parameters: Vec<NonlinearParameter>,

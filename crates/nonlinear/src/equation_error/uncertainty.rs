@@ -14,9 +14,9 @@ use crate::shape::Shape;
 
 impl Fit {
     /// Returns the covariance of all parameters: from the scatter of the periods if the residual
-    /// does not exceed it, otherwise from blocks of time. For a record too short for blocks, it is
-    /// the scatter increased to the size of the residual or, for a single period, that for a white
-    /// residual.
+    /// does not exceed it, otherwise from blocks of time. For a record too short for blocks, the
+    /// covariance is the scatter increased to the size of the residual or, for a single period, the
+    /// covariance for a white residual.
     pub(super) fn uncertainty(
         &self,
         equations: &Equations<'_>,

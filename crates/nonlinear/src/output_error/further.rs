@@ -28,9 +28,9 @@ pub struct FurtherFit {
 /// Adds terms of the usual kinds to an output-error fit, as long as the information criterion
 /// falls; `None` if there are no such terms.
 ///
-/// The candidates are selected in the fit linearised at its parameters: their forces of no size
-/// change the simulated response by known amounts. The selected terms are then fitted with all
-/// parameters.
+/// The candidates are selected in the fit linearised at its parameters, where an infinitesimal
+/// force of a candidate changes the simulated response by a known amount. The selected terms are
+/// then fitted with all parameters.
 ///
 /// # Errors
 /// As [`output_error`].
@@ -44,7 +44,7 @@ pub fn further_output_error(
     measured: ResponseQuantity,
     fit: &NonlinearFit,
 ) -> Result<Option<FurtherFit>, EstimateError> {
-    // Under its noise, a model that lacks a term leaves a residual that shows the term best.
+    // The weights of the most likely noise make a missing term most visible in the residual.
     let weighted = search(records, measured, &fit.estimate, Weights::AnyNoise)?;
     let linearised = Linearised::new(records, measured, &weighted)?;
     let Some((start, p_value)) = linearised.start()? else { return Ok(None) };
@@ -54,7 +54,7 @@ pub fn further_output_error(
     Ok(Some(FurtherFit { fit: larger, explained: 1.0 - remaining, p_value }))
 }
 
-/// A fit with candidates of no size, linearised at its parameters.
+/// Fit with candidates whose coefficients are zero, linearised at its parameters.
 struct Linearised<'a> {
     fit: &'a NonlinearFit,
     /// Terms that are tried.
@@ -92,7 +92,8 @@ impl<'a> Linearised<'a> {
         problem.weigh(&mut residual);
         let mut jacobian = DMatrix::zeros(samples, count);
         problem.jacobian(&mut jacobian);
-        // Free entries, terms, candidates, constants, initial states; candidates have no constants.
+        // The columns are free entries, terms, candidates, constants and initial states; candidates
+        // have no constants.
         let first = problem.free.len() + estimate.terms.len();
         let tried = first..first + candidates.len();
         let of_fit: Vec<usize> = (0..first).chain(tried.end..count).collect();
@@ -186,7 +187,7 @@ impl<'a> Linearised<'a> {
     }
 }
 
-/// Returns the terms that a fit lacks, with friction up to the velocities that it simulates.
+/// Returns the terms that a fit lacks; the simulated velocities scale the friction.
 fn candidates(
     records: &[SteppedRecord],
     measured: ResponseQuantity,

@@ -125,7 +125,7 @@ fn search(
             Ok((theta, more)) if weights == Weights::AnyNoise || problem.is_white() => {
                 return problem.finish(&theta, start, steps + more);
             }
-            // The residual is not that noise: the fit that leaves the least of it is the best.
+            // The residual is not this noise: the fit with the smallest residual is then the best.
             _ => problem.noise = None,
         }
     }

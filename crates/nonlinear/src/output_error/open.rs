@@ -9,8 +9,8 @@ use super::{NonlinearFit, SteppedRecord, Weights, output_error};
 use crate::estimate::NonlinearEstimate;
 use crate::limits::{OPEN_WINDOWS, OUTPUT_FORGOTTEN};
 
-/// Estimates by [`output_error`] on open records, beginning with a linear fit and terms without
-/// force.
+/// Estimates by [`output_error`] on open records, beginning with a linear fit and terms whose
+/// coefficients are zero.
 ///
 /// If a stiffness is slightly wrong, the simulated response loses its phase relation to the
 /// measured one, and the cost of a long record has many minima. Therefore the records are first cut

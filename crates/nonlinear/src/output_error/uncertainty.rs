@@ -45,9 +45,9 @@ impl Problem<'_> {
     }
 
     /// Returns the covariance of all parameters: from the noise of the periods if the residual does
-    /// not exceed it, otherwise from blocks of time. For a record too short for blocks, it is the
-    /// scatter increased to the size of the residual or, for a single period, that for a white
-    /// residual.
+    /// not exceed it, otherwise from blocks of time. For a record too short for blocks, the
+    /// covariance is the scatter increased to the size of the residual or, for a single period, the
+    /// covariance for a white residual.
     pub(super) fn uncertainty(
         &self,
         theta: &DVector<f64>,
@@ -157,7 +157,7 @@ impl Problem<'_> {
     }
 
     /// Returns the most likely noise of the records about the motion at these parameters; `None` if
-    /// their periods show it, or if it cannot be found.
+    /// the periods show the noise, or if the search fails.
     pub(super) fn noise(&self, theta: &DVector<f64>) -> Option<Vec<(NoisePath, Filter)>> {
         if self.records.iter().all(|record| !record.deviations.is_empty()) {
             return None;
@@ -244,8 +244,8 @@ fn lines_of(record: &Prepared, samples: DMatrix<f64>) -> Option<DMatrix<Complex<
     Some(Spectrum::from_record(&record).lines().clone())
 }
 
-/// Returns the factor of a line's products in the equivalent sum over `samples` samples, and
-/// whether the line is real.
+/// Returns the weight of a line in a sum of products over lines that equals the sum over `samples`
+/// samples, and whether the line is real.
 fn product_weight(line: usize, samples: usize) -> (f64, bool) {
     let is_real = line == 0 || 2 * line == samples;
     (samples as f64 * if is_real { 1.0 } else { 0.5 }, is_real)

@@ -129,7 +129,7 @@ const LONG: [&str; 124] = [
     "response",
 ];
 
-/// Letters of the short names, after a sign.
+/// Letters and digits of the short names; a sign precedes them.
 const LETTERS: &[u8; 62] = b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
 
 /// Words of the language with a shorter equivalent.

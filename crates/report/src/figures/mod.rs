@@ -54,8 +54,8 @@ pub trait ToFigure {
     /// As [`ToFigure::figure`].
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError>;
 
-    /// Returns an HTML page of the figure, which has zoom and cursor and loads no other file; of
-    /// several responses, it shows one large and all small.
+    /// Returns an HTML page of the figure, which has zoom and cursor and loads no other file. If
+    /// there are several responses, the page shows one large and all small.
     ///
     /// # Errors
     /// As [`ToFigure::figure`].

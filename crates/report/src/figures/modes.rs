@@ -37,7 +37,7 @@ pub fn figure(modes: &Modes) -> Result<Figure, ReportError> {
 /// Draws the stabilisation diagram and the mode indicator of a saved result; `None` without poles
 /// and indicator. Behind the poles is the sum of the responses, if the indicator was saved.
 pub fn diagrams(title: &str, diagrams: &Diagrams) -> Option<Figure> {
-    // The sum of the squared singular values is that of the squares of all responses.
+    // The sum of the squared singular values equals the sum of the squares of all responses.
     let sum = |indicator: &ModeIndicator| -> Vec<f64> {
         let square = |at: usize| indicator.singular_values.iter().map(move |v| v[at].powi(2));
         (0..indicator.frequency_hz.len()).map(|at| square(at).sum::<f64>().sqrt()).collect()
@@ -52,7 +52,7 @@ pub fn diagrams(title: &str, diagrams: &Diagrams) -> Option<Figure> {
     (!figure.panels().is_empty()).then(|| figure.share_x())
 }
 
-/// Returns every k-th value, so that few enough remain to be shown.
+/// Returns every k-th value, at most [`SHOWN`] values in all.
 fn thinned(values: &[f64]) -> Vec<f64> {
     values.iter().copied().step_by(values.len().div_ceil(SHOWN).max(1)).collect()
 }

@@ -38,17 +38,18 @@ const FINE: usize = 800;
 /// separated.
 const SEPARABLE: f64 = 100.0;
 
-/// Maximum relative difference of frequencies that are the same line of several records.
+/// Maximum relative difference between frequencies of several records that count as the same line.
 const SAME_LINE: f64 = 1e-9;
 
 /// Maximum number of degrees of freedom for which each pair of response and force has separate
 /// panels.
 const GRID: usize = 8;
 
-/// Returns magnitude and phase of the response per unit force, x_i / F_j in the measured quantity
-/// or in that of the style, measured and fitted, for every pair of degrees of freedom that the
-/// records determine: on the lines where F_j acts alone, and where as many records as degrees of
-/// freedom have independent forces. `None` if no line separates the forces.
+/// Returns magnitude and phase of the response per unit force x_i / F_j, measured and fitted, in
+/// the quantity of the style or, without one, in the measured quantity. The pairs are those of the
+/// degrees of freedom that the records determine: on lines where F_j acts alone, and on lines where
+/// as many records as degrees of freedom have independent forces. `None` if no line separates the
+/// forces.
 ///
 /// The panels form a matrix, with a row for each response and a column for each force; with more
 /// than eight degrees of freedom all pairs are drawn together.

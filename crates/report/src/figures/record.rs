@@ -7,10 +7,11 @@ use mechid_signal::message;
 
 use crate::ReportError;
 
-/// Smallest amplitude on the axis, relative to the largest: below it is rounding.
+/// Minimum amplitude that is considered for the range of the axis, relative to the largest
+/// amplitude; smaller ones are rounding errors.
 const FAINTEST: f64 = 1e-5;
 
-/// Largest lower end of the axis, relative to the largest amplitude.
+/// Maximum lower end of the axis, relative to the largest amplitude and without the margin.
 const REACH: f64 = 1e-2;
 
 /// Maximum number of characters of a title above a panel.

@@ -85,8 +85,8 @@ fn levels(x: &[f64], v: &[f64], force: &[f64]) -> Vec<Curve> {
 }
 
 /// Returns the force of the springs over the displacement, or of the dampers over the velocity, for
-/// one degree of freedom while the others are at rest; points are the model plus its residual at
-/// each sample.
+/// one degree of freedom while the others are at rest. The points are the sum of the force of the
+/// model and the residual at each sample.
 fn side(
     fitted: &WithTerms,
     dof: usize,

@@ -42,8 +42,9 @@ impl ModeShapes {
         (!modes.is_empty() && names.len() > 1).then_some(Self { geometry, modes })
     }
 
-    /// Takes the shapes of a result at the places of its responses or, if a geometry has these
-    /// instead, at their columns. `None` as of [`from_modes`](Self::from_modes).
+    /// Returns the shapes of a result at the points of its responses or, if the geometry names its
+    /// points after the columns, at the points of the columns. `None` as for
+    /// [`from_modes`](Self::from_modes).
     pub fn from_saved(modes: &SavedModes, geometry: Option<&Geometry>) -> Option<Self> {
         let (shaped, places) = modes.shapes();
         Self::from_modes(&shaped, &places, geometry)

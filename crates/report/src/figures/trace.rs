@@ -20,8 +20,9 @@ pub struct Trace {
 /// Maximum difference, in degrees, of two angles that are equal up to rounding.
 const ALIKE: f64 = 1e-6;
 
-/// Returns an angle, where ±180° (up to rounding) gets the sign of the previous angle, or −180°
-/// without one: otherwise the phase of an undamped system could alternate.
+/// Returns an angle, in degrees. If it is ±180° (up to rounding), it gets the sign of the previous
+/// angle, and is −180° without a previous one: otherwise the phase of an undamped system could
+/// alternate.
 fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
     match angle.abs() > 180.0 - ALIKE {
         true if previous.is_some_and(|previous| previous > 90.0) => 180.0,

@@ -90,8 +90,8 @@ const EDGE: f64 = 0.04;
 /// Margin of an axis, as a fraction of it.
 const MARGIN: f64 = 0.08;
 
-/// Returns the range of the ordinate: of the values without outliers, so that an outlier does not
-/// hide the others, and of the median.
+/// Returns the range of the ordinate. It includes the median and the values without outliers, so
+/// that an outlier does not hide the other values.
 fn range(series: &TrendSeries, usual: &[&TrendPoint]) -> (f64, f64) {
     let ends = usual.iter().flat_map(|point| match point.interval {
         Some([low, high]) => {

@@ -16,9 +16,9 @@ pub(super) const SHAPES: &str = "Mode shapes: the structure at its largest defle
 pub(super) const LIKENESS: &str = "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, \
                                    0 for orthogonal ones.";
 
-/// Returns a page of named figures, with a choice if there are several, and of mode shapes if there
-/// are any, with the heading, the details and the command of the settings: HTML that loads no other
-/// file and runs only the script of its figures.
+/// Returns a page of named figures and, if there are any, of mode shapes, as HTML that loads no
+/// other file and runs only the script of its figures. If there are several figures, the page
+/// offers a choice. The settings give its heading, details and command.
 ///
 /// # Errors
 /// [`ReportError::Plot`] without a figure, or if one cannot be drawn.

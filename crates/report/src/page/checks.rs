@@ -3,13 +3,13 @@
 use maud::{Markup, html};
 use mechid_analysis::identify::checks::{CheckRow, When};
 
-/// Returns the checks that speak against the numbers, a sentence each.
+/// Returns a sentence for each conspicuous check, which makes the results doubtful.
 pub fn conspicuous(checks: &[CheckRow]) -> Vec<String> {
     let doubtful = checks.iter().filter(|check| check.is_conspicuous());
     doubtful.map(|check| format!("{}: {}", check.subject, check.sentence())).collect()
 }
 
-/// Returns how many checks are good, and their subjects.
+/// Returns a sentence with the number of good checks and their subjects; none if no check is good.
 pub fn merits(checks: &[CheckRow]) -> Vec<String> {
     let good = checks.iter().filter(|check| !check.is_conspicuous());
     let (count, all) = (good.clone().count(), checks.len());

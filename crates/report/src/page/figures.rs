@@ -28,7 +28,8 @@ const WIDTH: f64 = 480.0;
 /// Width of a figure that fills a row, px.
 const WIDE: f64 = 760.0;
 
-/// Height of a panel with its labels, px: of the first panel in a figure and of any other.
+/// Heights of panels with their labels, px: of the first panel in a figure, and of each other
+/// panel.
 const PANEL: [f64; 2] = [190.0, 150.0];
 
 /// Heights for a figure that fills a row, px.
@@ -102,7 +103,8 @@ fn times(record: &Record) -> Vec<f64> {
 }
 
 /// Draws the time history of the window above the amplitudes of its mean period, for each channel,
-/// by its name and unit; `held` are the samples to draw if the data have all of them.
+/// by its name and unit. The history has the samples of `held` if these are all samples, otherwise
+/// the extremes in `whole`.
 fn history(
     (name, unit): (&dyn Fn(usize) -> String, &str),
     (held, whole): (&Record, &Gathered),
@@ -125,7 +127,7 @@ fn history(
     channels.iter().map(of_channel).collect()
 }
 
-/// Returns a thin line on top of a thick one, which it hides if they agree.
+/// Returns the measured values as a thick line, and the modelled values as a thin line on top.
 fn overlay(t: &[f64], measured: &[f64], name: &str, modelled: &[f64]) -> [Curve; 2] {
     [
         Curve::line("measured", t, measured).color(Color::GREY).width(2.6),
@@ -178,7 +180,8 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
 /// predicted response.
 ///
 /// # Errors
-/// [`ReportError::NothingToDraw`].
+/// [`ReportError::Analysis`] if the system has no receptance at a line, [`ReportError::Plot`] if
+/// the figure cannot be drawn.
 pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
     let system = identified.estimate().system().map_err(AnalysisError::from)?;
     let origin = &measured.origin;
@@ -241,7 +244,7 @@ pub fn fit(part: &RecordReview<'_>, compared: &Compared) -> Result<Drawn, Report
     over_time(part.id("fit"), compared, shown(block), caption)
 }
 
-/// Draws the same for a record that was not fitted.
+/// Draws measured and predicted response, with their difference, for a record that was not fitted.
 pub fn validation(source: &Block, compared: &Compared) -> Result<Drawn, ReportError> {
     let extent = extent(source);
     let caption = format!(
@@ -332,7 +335,8 @@ pub fn residual_spectrum(
     )
 }
 
-/// Returns the panel of a correlation coefficient with the bound that 95 % of noise stays within.
+/// Returns the panel of a correlation coefficient, with bounds that contain 95 % of the
+/// coefficients of noise.
 fn correlation_panel(
     x: Axis,
     residual: &str,

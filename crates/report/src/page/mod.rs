@@ -119,12 +119,12 @@ trait Captions {
     /// Returns the identifier of a figure of this record.
     fn id(&self, figure: &str) -> String;
 
-    /// Returns a caption for a figure of the buffered samples, with their numbers if they are not
-    /// all samples.
+    /// Returns the caption of a figure of the buffered samples, with the first and the last sample
+    /// number if not all samples are buffered.
     fn buffered_caption(&self, caption: &str) -> String;
 
-    /// Returns a caption for a figure of [`RecordReview::period`], with the numbers of its samples
-    /// if they are not all samples.
+    /// Returns the caption of a figure of [`RecordReview::period`], with the first and the last
+    /// sample number if the figure does not cover all samples.
     fn period_caption(&self, caption: &str) -> String;
 }
 
@@ -175,7 +175,7 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
 }
 
 /// Returns a document with a heading, its sections (identifier, name, body) and the command that
-/// writes it again. It calls the files by their names without folders, except in the command.
+/// writes it again. Names of files have no folders, except in the command.
 fn document(
     title: &str,
     heading: &Markup,
@@ -209,8 +209,8 @@ fn document(
     page.into_string() + "\n"
 }
 
-/// Returns a part of a page in which files have no folders; of files with the same name, these
-/// stay.
+/// Removes the folders from the names of files in a part of a page. Files with the same name in
+/// different folders keep their folders.
 fn without_folders(part: &Markup, files: &[String]) -> Markup {
     let escaped = |text: &str| html! { (text) }.into_string();
     let is_alone = |file: &&String| {

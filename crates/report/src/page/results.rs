@@ -32,17 +32,17 @@ pub struct Words {
     pub files: Vec<String>,
     /// Further parts of the line below the heading.
     pub subtitle: Vec<String>,
-    /// Findings that speak against the numbers.
+    /// Findings that make the results doubtful.
     pub warnings: Vec<String>,
-    /// Findings that speak for them.
+    /// Findings that support the results.
     pub merits: Vec<String>,
     pub tables: Vec<Markup>,
     /// Caption of the figures.
     pub caption: String,
 }
 
-/// Returns a page of figures with the words of their result: HTML that loads no other file and runs
-/// only the script of its figures.
+/// Returns a page of figures with the texts and tables of their result: HTML that loads no other
+/// file and runs only the script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Plot`] without a figure, or if one cannot be drawn.
@@ -119,7 +119,7 @@ fn as_text(text: &str) -> Markup {
     html! { div.scroll role="region" tabindex="0" aria-label="Result" { pre { code { (text.trim_end()) } } } }
 }
 
-/// Returns the words on a bearing at one speed.
+/// Returns texts and tables for the page of a bearing at one speed.
 pub fn bearing_words(found: &BearingSummary) -> Words {
     let (warnings, merits) = verdicts(&found.checks, &found.remarks);
     let mut subtitle = Vec::new();
@@ -213,7 +213,7 @@ fn fit_of_bearing(found: &BearingSummary) -> Vec<Vec<String>> {
     rows
 }
 
-/// Returns the words on a bearing at several speeds and loads.
+/// Returns texts and tables for the page of a bearing at several speeds and loads.
 pub fn campaign_words(found: &BearingTable) -> Words {
     let of_all = found.rows.iter().map(|row| verdicts(&row.checks, &row.remarks).0);
     let files: Vec<String> = found.rows.iter().flat_map(|row| row.tests.iter().cloned()).collect();
@@ -228,7 +228,7 @@ pub fn campaign_words(found: &BearingTable) -> Words {
     }
 }
 
-/// Returns the words on a reconstructed force.
+/// Returns texts and tables for the page of a reconstructed force.
 pub fn force_words(found: &ForceSummary) -> Words {
     let extent = match found.periods {
         None => "open record".to_owned(),
@@ -296,7 +296,7 @@ fn facts_of_force(found: &ForceSummary) -> Vec<Vec<String>> {
     facts
 }
 
-/// Returns the words on frequency responses.
+/// Returns texts and tables for the page of frequency responses.
 pub fn response_words(found: &FrfTable) -> Words {
     let row = |response: &Response| {
         let largest = response.magnitude.iter().copied().enumerate();
@@ -355,7 +355,7 @@ pub fn response_words(found: &FrfTable) -> Words {
     }
 }
 
-/// Returns the words on the contents of a record.
+/// Returns texts and tables for the page of the contents of a record.
 pub fn record_words(inspected: &Inspected) -> Words {
     let summary = inspected.summary();
     let mut subtitle = vec![
@@ -440,7 +440,7 @@ fn fit_table(fit: &FitRow, model: &str) -> Markup {
     Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit.rows(model) }.html()
 }
 
-/// Returns the words on an identified machine.
+/// Returns texts and tables for the page of an identified machine.
 pub fn identified_words(identified: &Identified) -> Words {
     let summary = identified.summary();
     let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);
@@ -474,7 +474,7 @@ pub fn identified_words(identified: &Identified) -> Words {
     }
 }
 
-/// Returns the words on a machine that was identified from tables of responses.
+/// Returns texts and tables for the page of a machine that was identified from tables of responses.
 pub fn table_words(identified: &IdentifiedResponses) -> Words {
     let summary = identified.summary();
     let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);

@@ -88,7 +88,8 @@ impl CrestSearch {
 
     /// Returns the phases of a starting point.
     fn start(&self, multisine: &Multisine, start: usize) -> Result<Vec<f64>, SignalError> {
-        // Distant seeds, so that searches with neighbouring seeds share no starting point.
+        // The seeds are far apart, so that searches with neighbouring seeds share no starting
+        // point.
         let seed = self.seed.rotate_left(32).wrapping_add(start as u64);
         let random = Phases::Random { seed }.values(multisine.lines(), multisine.amplitudes())?;
         if start > 0 {

@@ -85,8 +85,8 @@ fn band_lines(sampling: Sampling, low_hz: f64, high_hz: f64) -> Result<Vec<usize
     Ok(lines)
 }
 
-/// Removes all other lines from white noise and scales the rest to the same expected variance: each
-/// line (with its mirror image) has two of `len` equal shares.
+/// Removes all other lines from white noise and scales the rest to the same expected variance. Each
+/// line, with its mirror image, has the fraction 2/`len` of the variance of white noise.
 fn keep_lines(white: &Record, lines: &[usize]) -> Result<Record, SignalError> {
     let gain = (white.len() as f64 / (2 * lines.len()) as f64).sqrt();
     let spectrum = Spectrum::from_record(white);

@@ -68,8 +68,8 @@ impl Default for HitRule {
 impl FromStr for HitRule {
     type Err = String;
 
-    /// Reads `trigger=0.5,double=5,weak=25,bounce=0.1,before=20,samples=512`, any of them, in per
-    /// cent, seconds and samples. An empty text is the usual rule.
+    /// Parses settings such as `trigger=0.5,double=5,weak=25,bounce=0.1,before=20,samples=512`, in
+    /// per cent, seconds and samples. Each is optional; an empty text gives the default rule.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut rule = Self::default();
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
@@ -137,7 +137,8 @@ pub struct Hit {
     /// Samples around the peak with a force, counted from 0: the pulse, light rebounds of the
     /// hammer, and the ringing of anti-aliasing filters as far as it exceeds the noise.
     pub contact: Range<usize>,
-    /// Largest force without the offset, in its unit; negative if the hits are.
+    /// Largest force without the offset, in its unit; negative if the force of the hits is
+    /// negative.
     pub peak: f64,
     /// Samples that belong to the hit, counted from 0: some before the pulse, and the response
     /// after it.
@@ -348,11 +349,11 @@ impl Hit {
     }
 }
 
-/// Returns a range of samples with the ringing before and after it: further pushes above a part of
-/// the `floor` of a hit, with gaps of at most [`limits::RINGING_GAP`] samples.
+/// Returns a range of samples with the ringing before and after it: further positive forces above a
+/// fraction of the `floor` of a hit, with gaps of at most [`limits::RINGING_GAP`] samples.
 ///
-/// Ringing pushes and pulls in turn. A long pull alone is the undershoot of an AC-coupled
-/// transducer, and no force.
+/// Ringing changes sign from lobe to lobe. A long negative part alone is the undershoot of an
+/// AC-coupled transducer, not a force.
 fn with_ringing(push: &[f64], range: Range<usize>, floor: f64) -> Range<usize> {
     let is_loud = |k: &usize| push[*k] > limits::RINGING_OVER_FLOOR * floor;
     let Range { mut start, mut end } = range;

@@ -178,8 +178,8 @@ pub fn resample(
 }
 
 /// Returns the values within the steps, at t = (k + `part`) Δt for every sample k, with `part` a
-/// pure number from 0 to 1: the force for a Runge-Kutta stage. After the last sample its value
-/// continues, unless the record is interpolated as a period.
+/// pure number from 0 to 1: the force for a Runge-Kutta stage. After the last sample, its value is
+/// held, unless the record is interpolated as a period.
 ///
 /// ```
 /// use mechid_signal::{Interpolation, Multisine, Phases, Sampling, resample::within_steps};

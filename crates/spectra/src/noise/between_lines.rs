@@ -56,7 +56,8 @@ impl BetweenLines {
         }
     }
 
-    /// Returns the number of buffered periods, once it is complete.
+    /// Returns the number of buffered periods if all periods of the group are buffered; otherwise
+    /// `None`.
     pub(crate) fn complete(&self) -> Option<usize> {
         (self.held == self.periods).then_some(self.periods)
     }

@@ -44,7 +44,8 @@ pub struct ResponseNoise {
 impl ResponseNoise {
     /// Chooses the most likely noise of residuals, which are circular Gaussian numbers: white, in
     /// proportion to the response, or, if Schwarz's criterion accepts its second unknown, the sum
-    /// of both. Each residual is a pair of its squared magnitude and that of the response.
+    /// of both. Each residual is a pair of two squared magnitudes, of the residual and of the
+    /// response.
     ///
     /// # Source
     /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring);
@@ -104,7 +105,7 @@ impl ResponseNoise {
                 return None;
             }
             let before = self;
-            // The decrease per step is limited for the reason of `motion_level`.
+            // The decrease per step is limited for the same reason as in `motion_level`.
             self = Self {
                 white: white.max(0.1 * before.white),
                 relative: relative.max(0.1 * before.relative),

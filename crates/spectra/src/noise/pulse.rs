@@ -24,8 +24,8 @@ pub struct PulseNoise {
     pub samples: Range<usize>,
 }
 
-/// Errors of an input due to the noise of a pulse: sums of a few patterns over the lines of a
-/// record, whose amplitudes are independent and have unit variance.
+/// Errors of an input due to the noise of a pulse: a sum of a few patterns over the lines of a
+/// record. The amplitudes of the patterns are independent and have unit variance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PulseErrors {
     rows: Range<usize>,
@@ -40,8 +40,9 @@ pub struct PulseErrors {
 
 impl PulseErrors {
     /// Decomposes the noise of pulses on the lines of their records at `omega` (rad/s). The
-    /// amplitude of a line is `unit` times the sum over the samples of the record, given their
-    /// number. Patterns with hardly any power on the lines of a record are omitted.
+    /// amplitude of a line is the sum over the samples of the record times a factor, which `unit`
+    /// returns for the number of samples. Patterns with hardly any power on the lines of a record
+    /// are omitted.
     ///
     /// # Errors
     /// [`SpectraError::Numerics`] if the decomposition fails.
@@ -52,7 +53,8 @@ impl PulseErrors {
     ) -> Result<Vec<Self>, SpectraError> {
         let mut errors = Vec::new();
         for pulse in pulses {
-            // Noise of parts of a pulse is independent; the decomposition takes the cube of a part.
+            // The parts of a pulse have independent noise. Division limits the cost of the
+            // decomposition, which grows with the cube of the length of a part.
             for start in pulse.samples.clone().step_by(PULSE_SAMPLES) {
                 let samples = start..pulse.samples.end.min(start + PULSE_SAMPLES);
                 let part = PulseNoise { samples, ..pulse.clone() };

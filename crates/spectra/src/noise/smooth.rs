@@ -222,7 +222,7 @@ impl Trial {
         form.bumps.push(bump);
         let mut column = DVector::from_fn(self.basis.nrows(), |line, _| bump.at(line));
         let length = column.norm();
-        // The second pass removes what the rounding of the first has left.
+        // The second pass removes the components that rounding leaves after the first.
         for _ in 0..2 {
             column -= &self.basis * self.basis.tr_mul(&column);
         }
@@ -300,7 +300,8 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
     Smooth { form, basis, log_power, cost: f64::INFINITY }
 }
 
-/// Returns log powers of each channel in a basis near the logarithms of the sample variances.
+/// Returns log powers of each channel that lie in the span of the basis and are near the logarithms
+/// of the sample variances.
 fn initial_log_powers(basis: &DMatrix<f64>, variances: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let initial = |variances: DVectorView<'_, f64>| {
         let floor = (SMOOTH_FLOOR * variances.mean()).max(f64::MIN_POSITIVE);

@@ -77,9 +77,9 @@ impl NoiseSpectrum {
         })
     }
 
-    /// Returns the covariances of one of every `step` rows, those of
-    /// [`FrequencyData::thinned`](crate::FrequencyData::thinned), as known ones; `None` for a step
-    /// of 0.
+    /// Returns the covariances of one of every `step` rows, the same rows as in
+    /// [`FrequencyData::thinned`](crate::FrequencyData::thinned). They count as known. `None` for a
+    /// step of 0.
     pub fn thinned(&self, step: usize) -> Option<Self> {
         let rows = thinned_rows(self.omega.len(), step);
         let omega = rows.iter().map(|row| self.omega[*row]).collect();

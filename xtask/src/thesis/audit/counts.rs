@@ -13,7 +13,8 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Numbers whose settings the text does not state, `unstated` of them, are unexplained.
+    /// Counts judged numbers, and `unstated` numbers whose settings the text does not state; the
+    /// latter count as unexplained.
     fn from_judged<'a>(judged: impl Iterator<Item = &'a Judged>, unstated: usize) -> Self {
         let mut counts = Self::default();
         counts.verdicts[Verdict::Unexplained as usize] = unstated;

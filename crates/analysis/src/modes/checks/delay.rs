@@ -19,7 +19,7 @@ struct Phase {
     damping_ratio: f64,
     /// Phase of the residue times 2jω_d, in rad.
     phase: f64,
-    /// Variance of `phase` by the errors of the mode, in rad².
+    /// Variance of `phase` due to the errors of the mode, in rad².
     variance: f64,
 }
 
@@ -37,7 +37,7 @@ pub(super) fn tests(
     let test = |&(input, output): &(usize, usize)| {
         let power = derivative(outputs[output].quantity?) as i32;
         let residue = |mode: &IdentifiedMode| turned_residue(mode, output, input, power);
-        // Another check finds a wrong sign.
+        // Another check reports a wrong sign, so this test removes it.
         let negative = modes.iter().filter(|mode| residue(mode).re < 0.0).count();
         let sign = if 2 * negative > modes.len() { -1.0 } else { 1.0 };
         let phase = |mode: &IdentifiedMode| Phase {
@@ -72,15 +72,15 @@ pub(super) fn tests(
 struct Delay {
     /// Delay, in s.
     seconds: f64,
-    /// Probability of one as large without a delay.
+    /// Probability of a delay at least as large if there is none.
     p_value: f64,
 }
 
 /// Returns the delay that explains the phases; `None` with fewer than two.
 ///
 /// Without a delay the phases scatter about zero (viscous damping), about −ζ (structural damping),
-/// or between the two. The p-value is that of the damping that explains the phases better, and 1 if
-/// the two give delays of opposite signs.
+/// or between the two. The p-value is the larger one of these two cases, and 1 if they give delays
+/// of opposite signs.
 fn delay(phases: &[Phase]) -> Option<Delay> {
     let viscous = delay_about(phases, |_| 0.0)?;
     let structural = delay_about(phases, |phase| -phase.damping_ratio)?;
@@ -91,8 +91,9 @@ fn delay(phases: &[Phase]) -> Option<Delay> {
 
 /// Returns the delay for modes with an `expected` phase, in rad.
 ///
-/// The scatter between the modes is estimated by moments and added to the errors of the phases; the
-/// variance of the delay is that of the residuals, at least that of the weights.
+/// The scatter between the modes is estimated by the method of moments and added to the variances
+/// of the phases. The variance of the delay follows from the residuals, but is at least the
+/// variance that follows from the weights.
 ///
 /// # Source
 /// Knapp & Hartung (2003), Statistics in Medicine 22, 2693–2710.
@@ -113,7 +114,7 @@ fn delay_about(phases: &[Phase], expected: impl Fn(&Phase) -> f64) -> Option<Del
 struct Proportional {
     /// Delay, in s.
     delay: f64,
-    /// Variance of the delay by the weights, in s².
+    /// Variance of the delay that follows from the weights, in s².
     variance: f64,
     /// Weighted sum of the squared residuals.
     square: f64,

@@ -70,8 +70,8 @@ fn several(names: &[String]) -> impl Iterator<Item = (usize, &String)> {
     names.iter().enumerate().filter(|_| names.len() > 1)
 }
 
-/// Returns the probability that two numbers of each mode, which are zero but for their errors, have
-/// these sums of squares or more; `None` without a mode.
+/// Returns the probability that the sums of squares of two numbers of each mode are at least as
+/// large as these if the numbers differ from zero only by their errors; `None` without a mode.
 fn zero_p_value(squares: impl Iterator<Item = f64>) -> Option<f64> {
     let (modes, sum) = squares.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
     let law = ChiSquared::new(2.0 * f64::from(modes)).ok()?;

@@ -45,8 +45,8 @@ pub(super) fn channel_checks(
     Ok(rows)
 }
 
-/// Returns the check of the share of the variance of each response that the modes explain, or the
-/// failed check that a mode moves it.
+/// Returns, for each response, the check of the share of its variance that the modes explain. If
+/// this check fails and the check that some mode moves the response fails, too, returns the latter.
 pub(super) fn output_checks(
     explained: &[f64],
     modes: &[ModalModeRow],

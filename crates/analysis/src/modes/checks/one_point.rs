@@ -7,7 +7,8 @@ use crate::modes::summary::ModalCheck;
 use crate::text::significant;
 
 /// Returns the check that one force in all records explains them as well as one force in the first
-/// record and another one in all others, whose lines are `apart`; `None` if the second fit fails.
+/// record and another one in all others. `apart` has the lines with these two forces; `None` if the
+/// fit to them fails.
 ///
 /// # Source
 /// Schwarz (1978), Annals of Statistics 6, 461–464 (Bayesian information criterion).

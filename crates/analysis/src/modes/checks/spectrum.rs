@@ -7,7 +7,7 @@ use crate::modes::summary::ModalCheck;
 use crate::text::significant;
 
 /// Returns the check of the power of the record relative to the fitted spectrum, and the factor on
-/// the standard errors because of a significant misfit, otherwise 1.
+/// the standard errors: 1 unless the misfit is significant.
 pub(in crate::modes) fn spectrum_check(misfit: &SpectrumMisfit) -> (ModalCheck, f64) {
     let p_value = significant(misfit.p_value, 2);
     let passed = misfit.p_value >= SIGNIFICANCE;

@@ -33,9 +33,9 @@ enum Noise<'a> {
     Both(&'a NoiseSpectrum, Vec<usize>),
 }
 
-/// Sum of squares of the weighted errors e = X − G(ω) F of every row, with G = (K + iωC − ω²M)⁻¹:
-/// the real and imaginary parts of √2·L⁻¹e with L Lᴴ = E[e eᴴ] have unit variance and no
-/// correlation.
+/// Sum of squares of the weighted errors e = X − G(ω) F of every row, with G = (K + iωC − ω²M)⁻¹.
+/// The weight is L⁻¹ with L Lᴴ = E[e eᴴ]: the real and imaginary parts of √2·L⁻¹e have unit
+/// variance and no correlation.
 ///
 /// With a noisy force the covariance [I −G] E[z zᴴ] [I −G]ᴴ depends on the parameters; the sum of
 /// squares is the likelihood after the true force and displacement of each row have been

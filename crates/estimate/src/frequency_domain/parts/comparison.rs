@@ -21,8 +21,8 @@ pub struct PartsComparison {
     pub degrees_of_freedom: usize,
     /// Probability that noise alone makes the parts differ as much.
     pub p_value: f64,
-    /// Ratio of standard errors from the scatter of the parts to those from the noise, for the
-    /// parameter with the largest disagreement or, if that is larger, for all together.
+    /// Ratio of standard errors from the scatter of the parts to those from the noise: the larger
+    /// of the largest ratio of a single parameter and the ratio of all parameters together.
     pub error_scale: f64,
     /// The largest difference of a part from the others in units of its standard error.
     pub largest: Option<Difference>,
@@ -49,8 +49,8 @@ pub(crate) struct Scores<'a> {
     pub(crate) root: &'a DMatrix<f64>,
     /// Values of the parameters, each in its unit.
     pub(crate) values: &'a DVector<f64>,
-    /// Change of the coefficients of Q by a change of the residual by D_p Q, for the selection D_p
-    /// of the rows of every part p.
+    /// Change of the coefficients of Q if the residual changes by D_p Q, one matrix for each part
+    /// p; D_p selects the rows of the part.
     pub(crate) effects: Vec<DMatrix<f64>>,
     /// Scores Qᵀ D_p e of the parts, one below the other, with the residual e.
     pub(crate) scores: DVector<f64>,
@@ -191,8 +191,8 @@ impl PartsOfFit<'_> {
     /// Compares the parameters that the parts of a split determine; `None` with fewer than two
     /// parts or too few residuals for an estimate of the noise.
     ///
-    /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's distribution of d
-    /// degrees of freedom and those of the level of the noise.
+    /// For scores s with a covariance V of rank d, sᵀV⁺s/d divided by the noise level follows
+    /// Fisher's distribution with d degrees of freedom and those of the noise level.
     ///
     /// # Source
     /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40,

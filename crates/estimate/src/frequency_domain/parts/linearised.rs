@@ -120,8 +120,8 @@ impl Linearised {
             - information.tr_mul(&self.effect_of(columns))
     }
 
-    /// Returns how much of each basis column the parameters take up of a change of the residual by
-    /// each of these columns, (QᵀV⁻¹Q)⁻¹QᵀV⁻¹ times the columns.
+    /// Returns the change of the coefficients of the basis columns for a change of the residual by
+    /// each of these columns: (QᵀV⁻¹Q)⁻¹QᵀV⁻¹ times the columns.
     pub(super) fn effect_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.information {
             Some(information) => {

@@ -50,13 +50,12 @@ impl PartsOfFit<'_> {
     /// each parameter to first order. `records` has the samples of the rows; without them
     /// nonlinear terms are not tested. `None` if no term can be tested.
     ///
-    /// C are the weighted changes of the response by a term, and Z what remains of them without the
-    /// part that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and the
+    /// C has the weighted changes of the response by a term as columns, and Z is C without the part
+    /// that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and the
     /// parameters change by −(QR)⁺C a, where QR are their sensitivities and e is the residual.
     /// Around the estimate of the smaller model, the mean square error of the larger one is the
     /// covariance of these changes plus their square. Terms that explain the residual equally well
-    /// are weighted by
-    /// their likelihoods, as in an average of models.
+    /// are weighted by their likelihoods, as in an average of models.
     ///
     /// # Source
     /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for
@@ -83,7 +82,7 @@ impl PartsOfFit<'_> {
         Some(OmittedTerms {
             term: best.term,
             explained: best.part,
-            // Bonferroni's bound for the smallest of all.
+            // This is Bonferroni's bound for the smallest p-value of all terms.
             p_value: (explained.len() as f64 * least).min(1.0),
             changes: best.changes.clone(),
             errors,

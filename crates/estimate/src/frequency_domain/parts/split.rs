@@ -109,7 +109,8 @@ impl Cuts {
     }
 }
 
-/// Returns bands of lines with the same information, the sum of the leverages of their residuals.
+/// Returns bands of lines with equal information, which is the sum of the leverages of their
+/// residuals.
 fn bands(fit: &PartsOfFit<'_>) -> Vec<(Part, Cut)> {
     let n = fit.data.dof();
     let leverage = |row: usize| fit.linear.basis.rows(2 * n * row, 2 * n).norm_squared();

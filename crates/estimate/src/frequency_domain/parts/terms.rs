@@ -99,7 +99,7 @@ pub struct SampledRows {
     pub sampling: Sampling,
 }
 
-/// Force (N, by a factor) and displacement (m, by a factor) of a term, rows × n.
+/// Force and displacement of a term, rows × n, each up to a factor (from N and m).
 struct Change {
     force: ComplexMatrix,
     displacement: ComplexMatrix,
@@ -210,7 +210,8 @@ impl<'a> LikelyMotion<'a> {
         })
     }
 
-    /// Returns the force of a unit of an entry; in a symmetric matrix, of the mirrored entry, too.
+    /// Returns the force due to a unit of an entry and, in a symmetric matrix, also of the mirrored
+    /// entry.
     fn by_entry(&self, entry: Parameter) -> Change {
         let (n, omega) = (self.fit.data.dof(), self.fit.data.omega());
         let (row, column) = (entry.row(), entry.column());

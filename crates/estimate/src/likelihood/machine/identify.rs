@@ -40,9 +40,9 @@ pub struct MachineEstimate {
     /// Residual in units of the noise: row 2(p·line + output) is a real part, the next row the
     /// imaginary part.
     pub residual: DVector<f64>,
-    /// Columns Q (pure numbers), with the rows of [`MachineEstimate::residual`], whose covariance
-    /// is the identity minus Q Qᵀ: an orthonormal basis of the sensitivities, then what the errors
-    /// of pulses explain.
+    /// Columns Q (pure numbers), with the rows of [`MachineEstimate::residual`]: the covariance of
+    /// the residual is the identity minus Q Qᵀ. First come orthonormal columns that span the
+    /// sensitivities, then the columns that the errors of pulses explain.
     pub explained: DMatrix<f64>,
     /// Comparisons of parts of the data: bands of lines, and records if there are several.
     pub parts: Vec<PartsComparison>,

@@ -29,8 +29,8 @@ pub struct FreedCoefficient {
     pub value: f64,
     /// Standard error of the value, in this unit.
     pub standard_error: f64,
-    /// Probability that the likelihood of any of the coefficients rises by more if all known values
-    /// are right.
+    /// Probability that the likelihood rises by more for any of the coefficients as a further
+    /// unknown, if all known values are right.
     pub p_value: f64,
     /// Ratio of the sum of squares in units of the noise to its expectation, with this unknown;
     /// `None` if the noise comes from the residual.
@@ -80,7 +80,8 @@ struct Freed {
 }
 
 impl Freed {
-    /// `None` if the model does not exist or its fit would take too long.
+    /// Creates the model of `assembly` at the values of the estimate; `None` if the model does not
+    /// exist or its fit would take too long.
     fn new(
         estimate: &MachineEstimate,
         data: &LineData,

@@ -97,14 +97,14 @@ pub struct MachineLine<'a> {
     joints: DMatrix<Complex<f64>>,
     /// Frequency factor of each term between the joints.
     factors: Vec<Complex<f64>>,
-    /// Response S (I − H Δ) of the sensors to motions of a measured part, and the forces on it per
-    /// input.
+    /// Response S (I − H Δ) of the sensors to motions of a measured part, and the forces on this
+    /// part per input.
     part: Option<[DMatrix<Complex<f64>>; 2]>,
 }
 
 impl MachineModel {
-    /// Prepares a machine for lines at `omega` (rad/s). With `open` records the difference between
-    /// the initial and the final state acts on it: the state loads.
+    /// Prepares a machine for lines at `omega` (rad/s). With `open` records, state loads act on the
+    /// machine; they describe the difference between its initial and its final state.
     ///
     /// # Errors
     /// [`LikelihoodError::NoResponse`] if the machine has no response at its initial values,
@@ -230,8 +230,9 @@ impl MachineModel {
         Some([from_joints, loads])
     }
 
-    /// Returns the readings of the sensors, with their `factors`, for the motions of `columns`
-    /// loads; a motion has the index of the place, r for the support, and that of the load.
+    /// Returns the readings of the sensors, with their `factors`, for the motions under `columns`
+    /// loads. `motion` returns the motion of a degree of freedom (its index in `places`, r for the
+    /// support) under a load (its index).
     fn read(
         &self,
         factors: &[Complex<f64>],
@@ -246,7 +247,7 @@ impl MachineModel {
     }
 
     /// Returns S (I − H Δ) at the degrees of freedom of a measured part, and the forces f − Δ x on
-    /// it per input.
+    /// this part per input.
     fn part(
         &self,
         (omega, readings_of): (f64, &[Complex<f64>]),

@@ -53,8 +53,8 @@ fn responding(
     let joints = places.dofs[..places.joints].iter().map(|dof| vec![(*dof, 1.0)]);
     let readings: Vec<_> = sensors.chain(joints).collect();
     let lines = spread(omega);
-    // Loads with these units give displacements of similar size at all degrees of freedom, whatever
-    // their units are.
+    // Loads scaled with these units give displacements of similar size at all degrees of freedom,
+    // even if the units of the degrees of freedom differ.
     let [low, high] = [lines.first(), lines.last()].map(|line| line.copied().unwrap_or(1.0));
     let pairs = nominal.diagonal(low).into_iter().zip(nominal.diagonal(high));
     let unit: Vec<f64> = pairs.map(|(a, b)| a.norm().max(b.norm()).sqrt()).collect();
@@ -91,7 +91,7 @@ fn spread(omega: &[f64]) -> Vec<f64> {
     (0..count).map(|at| all[at * (all.len() - 1) / (count - 1).max(1)]).collect()
 }
 
-/// Orthonormal vectors that span others, and the components of these.
+/// Orthonormal basis of a set of vectors, and the components of the vectors in this basis.
 #[derive(Default)]
 struct Basis {
     vectors: Vec<DVector<f64>>,

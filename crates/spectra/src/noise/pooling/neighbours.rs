@@ -80,8 +80,8 @@ impl Neighbours {
         Some(cost)
     }
 
-    /// Returns two sums for each line of a range: of the covariances before it within the range,
-    /// and of its covariance and those after it.
+    /// Returns two sums for each line of a range: the sum of the covariances of the lines before it
+    /// in the range, and the sum of its own covariance and of those of the lines after it.
     fn ends(&self, range: Range<usize>) -> [DMatrix<Complex<f64>>; 2] {
         let (count, samples) = (range.len(), self.samples.columns_range(range));
         let [mut before, mut from] = [(); 2].map(|()| DMatrix::zeros(samples.nrows(), count + 1));

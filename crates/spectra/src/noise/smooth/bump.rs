@@ -25,8 +25,8 @@ enum Shape {
     Flat,
     /// Height that decreases linearly from the middle to both ends.
     Tent,
-    /// Height ln(1 + A/(1 + x²)) over its value ln(1 + A) at the `top`, with x = 1 at a distance of
-    /// `half_width` lines: a resonance on a floor.
+    /// Height ln(1 + A/(1 + x²)) divided by its maximum ln(1 + A), which is `top`. A is
+    /// `above_floor`, and x is 1 at a distance of `half_width` lines: a resonance on a floor.
     Peak { above_floor: f64, half_width: f64, top: f64 },
 }
 
@@ -283,8 +283,8 @@ impl Levels {
         }
     }
 
-    /// Returns the mean of all lines over that of a band with this sum, and over that of all other
-    /// lines; 1 for a quiet band that is too narrow.
+    /// Returns two ratios: the mean of all lines to the mean of a band with this sum, and the mean
+    /// of all lines to the mean of the other lines. Both are 1 for a quiet band that is too narrow.
     #[inline]
     fn ratios(&self, inside: f64) -> [f64; 2] {
         let other = ((self.total - inside) / self.others).max(SMOOTH_FLOOR);

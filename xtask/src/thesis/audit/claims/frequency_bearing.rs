@@ -82,7 +82,8 @@ fn ends(view: &View, table: &str, method: Method) -> [f64; 2] {
     [2.0, 20.0].map(|npi| view.error(table, method, npi))
 }
 
-/// Tests that the first is the worst, written as "each other below it".
+/// Tests that the mean error of `method` is the largest; the mean of each other method must be
+/// smaller.
 fn worst(view: &View, table: &str, method: Method) -> Vec<bool> {
     let rivals = Method::ALL.into_iter().filter(|m| *m != method);
     rivals.map(|m| view.mean(table, m) < view.mean(table, method)).collect()

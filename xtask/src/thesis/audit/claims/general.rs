@@ -105,7 +105,8 @@ fn interpolation(view: &View) -> Result<Finding, String> {
     Ok(Finding::new(tests, format!("{head}. {}.", words.join(". "))))
 }
 
-/// Errors of all modal parameters at the NPI of 2, 4 … 20 with the smallest largest error.
+/// Returns the NPI among 2, 4 … 20 with the smallest maximum error, and the errors of all modal
+/// parameters at this NPI.
 fn best_rerun(view: &View, method: Method) -> Result<(f64, Vec<f64>), String> {
     let sweep: Result<Vec<(f64, Vec<f64>)>, String> = (1..=10)
         .map(|half| f64::from(2 * half))
@@ -145,7 +146,7 @@ fn modal(view: &View, methods: &[(Method, &str)]) -> Result<Finding, String> {
     Ok(Finding::new(tests, numbers))
 }
 
-/// The smallest of the larger of both errors over NPI, and where it is.
+/// Returns the NPI at which the larger of the errors in K and C is smallest, and this error.
 fn satisfactory(view: &View, tables: [&str; 2], method: Method) -> (f64, f64) {
     let [k, c] = tables.map(|t| view.series(t, method));
     let both: Vec<(f64, f64)> = k.iter().zip(&c).map(|(k, c)| (k.0, k.1.max(c.1))).collect();

@@ -19,11 +19,11 @@ use super::markdown::table;
 /// Verdict on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Holds {
-    /// Every test of it passes.
+    /// All tests of the claim pass.
     Yes,
-    /// More than half of them pass.
+    /// More than half of the tests pass.
     Mostly,
-    /// At most half of them pass.
+    /// At most half of the tests pass, but at least one.
     Hardly,
     /// No test passes.
     No,

@@ -110,7 +110,8 @@ pub const CLAIMS: &[Claim] = &[
 
 const TABLES: [&str; 2] = ["5.2.2", "5.2.3"];
 
-/// Columns of both tables in which every error from this NPI on exceeds the one before.
+/// Finds the columns of both tables in which the error rises from each NPI to the next, from NPI 6
+/// on.
 fn drift(view: &View) -> Result<Finding, String> {
     let rising = |table, method| {
         let tail: Vec<f64> = view
