@@ -179,27 +179,42 @@ pub(crate) enum SystemSource {
     File(PathBuf),
 }
 
+/// Content of the files that a description names.
+pub(crate) struct LoadedSystem {
+    /// The machine, if it is a large one.
+    pub(crate) sparse: Option<SparseSystem>,
+    /// Nonlinear terms of the file with the system.
+    pub(crate) nonlinear: Option<NonlinearDescription>,
+    /// Paths of the files.
+    pub(crate) files: Vec<PathBuf>,
+}
+
 impl SystemSource {
-    /// Reads the files that the description names, relative to `folder`; returns the machine if it
-    /// is a large one, and the nonlinear terms of a file with the system.
-    pub(crate) fn load(
-        &mut self,
-        file: &str,
-        folder: &Path,
-    ) -> Result<(Option<SparseSystem>, Option<NonlinearDescription>), IoError> {
+    /// Reads the files that the description names, relative to `folder`.
+    pub(crate) fn load(&mut self, file: &str, folder: &Path) -> Result<LoadedSystem, IoError> {
         #[derive(Deserialize)]
         struct Machine {
-            system: SystemDescription,
+            system: SystemSource,
             nonlinear: Option<NonlinearDescription>,
         }
         let path = match self {
-            Self::Described(system) => return Ok((system.load(file, folder)?, None)),
+            Self::Described(system) => {
+                let files = system.files(folder);
+                let sparse = system.load(file, folder)?;
+                return Ok(LoadedSystem { sparse, nonlinear: None, files });
+            }
             Self::File(path) => folder.join(path),
         };
-        let (file, Machine { mut system, nonlinear }) = json::read::<Machine>(&path)?;
+        let (file, Machine { system, nonlinear }) = json::read::<Machine>(&path)?;
+        let Self::Described(mut system) = system else {
+            let what = "its `system` is the name of another file: name that file instead".into();
+            return Err(IoError::Description { file, what });
+        };
+        let mut files = system.files(json::folder(&path));
         let sparse = system.load(&file, json::folder(&path))?;
-        *self = Self::Described(system.into());
-        Ok((sparse, nonlinear))
+        files.push(path);
+        *self = Self::Described(system);
+        Ok(LoadedSystem { sparse, nonlinear, files })
     }
 
     /// Returns whether all matrices are lists of rows.
@@ -257,6 +272,17 @@ pub(crate) struct SystemDescription {
 }
 
 impl SystemDescription {
+    /// Returns the paths of the Matrix Market files that the description names, relative to
+    /// `folder`.
+    fn files(&self, folder: &Path) -> Vec<PathBuf> {
+        let named = [Some(&self.mass), self.damping.as_ref(), self.stiffness.as_ref()];
+        let path = |entries: &Entries| match entries {
+            Entries::File(path) => Some(folder.join(path)),
+            _ => None,
+        };
+        named.into_iter().flatten().filter_map(path).collect()
+    }
+
     /// Reads the Matrix Market files that the description names, relative to `folder`; returns the
     /// machine if it is a large one.
     pub(crate) fn load(

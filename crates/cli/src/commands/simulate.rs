@@ -4,7 +4,9 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::io::{CsvFile, Experiment, ExperimentStudy, StudyRuns, Table, output_name};
+use mechid::io::{
+    CsvFile, Experiment, ExperimentStudy, StudyRuns, Table, output_name, refuse_replaced_inputs,
+};
 use mechid::{RunsSummary, SimulationSummary};
 use serde::Serialize;
 
@@ -122,7 +124,7 @@ impl SimulateArgs {
     }
 
     fn one(&self, words: &[OsString]) -> Result<Outcome, CliError> {
-        let simulation = mechid::simulate(&Experiment::read(&self.experiment)?)?;
+        let simulation = mechid::simulate(&self.experiment()?)?;
         let (names, columns): (Vec<String>, Vec<&[f64]>) = simulation.columns().into_iter().unzip();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let mut file = CsvFile::begin(&self.output, simulation.force.sampling(), &names)?;
@@ -133,12 +135,21 @@ impl SimulateArgs {
             .with_plot(&self.plot, words, || Ok(simulation.figure(&report.record)))
     }
 
+    /// Reads the experiment; refuses an output that would replace a file that it names.
+    fn experiment(&self) -> Result<Experiment, CliError> {
+        let experiment = Experiment::read(&self.experiment)?;
+        let outputs: Vec<_> = std::iter::once(&self.output).chain(&self.plot.plot).collect();
+        refuse_replaced_inputs(experiment.files(), &outputs)?;
+        Ok(experiment)
+    }
+
     fn many(&self, option: &'static str, runs: &StudyRuns) -> Result<Outcome, CliError> {
         let ending = self.output.extension().and_then(|ending| ending.to_str());
         if !ending.is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
             let why = "writes a Parquet file: the name of --output must end in .parquet";
             return Err(CliError::MisplacedOption { option, why });
         }
+        self.experiment()?;
         let study = ExperimentStudy::read(&self.experiment, runs)?;
         let mut progress = |done| log::trace!(target: "mechid", "run {done} of {}", study.runs());
         let (file, summary) = mechid::simulate_runs(&study, &self.output, &mut progress)?;

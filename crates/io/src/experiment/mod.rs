@@ -7,7 +7,7 @@ mod scheme;
 mod study;
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mechid_model::{InitialState, SecondOrderSystem, SparseSystem};
 use mechid_signal::{Record, Sampling, message};
@@ -22,7 +22,7 @@ pub use self::scheme::{
     SchemeChoice, SubStepLoad,
 };
 pub use self::study::{ExperimentStudy, StudyField, StudyRuns};
-use crate::system::{NonlinearDescription, SystemSource, too_many};
+use crate::system::{LoadedSystem, NonlinearDescription, SystemSource, too_many};
 use crate::{IoError, escaped, json};
 
 /// Simulated experiment. An unknown field in the file is an error.
@@ -46,6 +46,9 @@ use crate::{IoError, escaped, json};
 pub struct Experiment {
     #[serde(skip)]
     file: String,
+    /// Paths of the files that the description names.
+    #[serde(skip)]
+    files: Vec<PathBuf>,
     system: SystemSource,
     /// The machine in sparse matrices, if it is a large one.
     #[serde(skip)]
@@ -116,14 +119,19 @@ impl Experiment {
     /// Sets the name for messages, and reads the system or its matrices in files relative to
     /// `folder`. Nonlinear terms of the description replace those of the file with the system.
     fn loaded(mut self, file: String, folder: &Path) -> Result<Self, IoError> {
-        let (sparse, of_file) = self.system.load(&file, folder)?;
-        let nonlinear = self.nonlinear.take().or(of_file);
-        Ok(Self { file, sparse, nonlinear, ..self })
+        let LoadedSystem { sparse, nonlinear, files } = self.system.load(&file, folder)?;
+        let nonlinear = self.nonlinear.take().or(nonlinear);
+        Ok(Self { file, sparse, nonlinear, files, ..self })
     }
 
     /// Name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
+    }
+
+    /// Paths of the files that the description names: matrices, and a file with the system.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
     }
 
     /// Returns the same experiment at another sampling rate, in Hz; the number of samples in a

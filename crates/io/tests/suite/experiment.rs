@@ -278,6 +278,12 @@ fn the_system_may_be_that_of_another_file() {
     let read = Experiment::read(folder.path().join("run.json")).unwrap();
     assert_eq!(read.nonlinear().unwrap().unwrap().coefficients, [2e6]);
 
+    let names: Vec<_> = read.files().iter().map(|path| path.file_name().unwrap()).collect();
+    assert_eq!(names, ["m.mtx", "found.json"]);
+    written("again.json", &description("\"run.json\"", FORCE, ""));
+    let error = Experiment::read(folder.path().join("again.json")).unwrap_err().to_string();
+    assert!(error.contains("run.json: its `system` is the name of another file"), "{error}");
+
     written("run.json", &description("\"results/lost.json\"", FORCE, ""));
     let error = Experiment::read(folder.path().join("run.json")).unwrap_err();
     assert!(matches!(&error, IoError::Read { file, .. } if file.ends_with("lost.json")), "{error}");
