@@ -119,7 +119,9 @@ pub fn identify_ambient(
         return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
     }
     let modes = fitted_modes(&fitted, &band, &accepted, &sinusoids)?;
-    let misfit = fitted.misfit();
+    // The leakage of a record without intervals is not known well enough.
+    let is_long = modes.iter().all(AmbientMode::has_interval);
+    let misfit = if is_long { fitted.misfit() } else { None };
     let parameters = fitted.fit.parameters;
     let factor = parameters.factor().select_rows(&accepted);
     Ok(AmbientEstimate {

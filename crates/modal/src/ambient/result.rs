@@ -173,7 +173,8 @@ pub struct AmbientEstimate {
     /// Logarithm ln L of the likelihood of the lines, with each output divided by its RMS value in
     /// the band.
     pub log_likelihood: f64,
-    /// Power of the record relative to the fitted spectrum; `None` if it cannot be computed.
+    /// Power of the record relative to the fitted spectrum; `None` if it cannot be computed, or if
+    /// the record is too short for the intervals of a mode.
     pub misfit: Option<SpectrumMisfit>,
     /// Correlation coefficients of the forces on the modes, modes × modes.
     pub force_correlation: DMatrix<f64>,

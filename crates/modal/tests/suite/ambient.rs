@@ -107,7 +107,7 @@ fn intervals_hold_the_truth() {
 /// five zeros in the band.
 #[test]
 fn forces_whose_spectrum_is_not_flat_are_seen() {
-    let record = tower().accelerations(20.0, 3000, 0.1, 60);
+    let record = tower().accelerations(20.0, 6000, 0.1, 60);
     let misfit = |record: &Record| identified(record, AmbientSettings::default()).misfit.unwrap();
     let right = misfit(&record);
     assert!(right.p_value > 0.01 && right.error_scale() < 1.2, "{right:?}");
