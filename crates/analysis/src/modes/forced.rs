@@ -259,7 +259,7 @@ impl Context {
             &reported,
             &self.inputs,
             &self.outputs,
-            &self.driving_points,
+            [&self.driving_points, &self.opposite_points],
             estimate.delays(),
             settings.properties.reciprocal,
         ));

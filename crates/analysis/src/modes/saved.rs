@@ -287,8 +287,7 @@ impl SavedCheck {
         }
     }
 
-    /// Returns the finding; `None` for a check of a test that passed, which has the sentence of its
-    /// failure.
+    /// Returns the finding; `None` for a check that passed.
     pub fn text_to_show(&self) -> Option<&str> {
         (self.passed != Some(true)).then_some(self.text.as_str())
     }

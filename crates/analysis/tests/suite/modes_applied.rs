@@ -173,10 +173,16 @@ fn forces_against_the_direction_of_their_sensors_give_modal_masses() {
         settings.places.forces = places.map(str::to_owned).to_vec();
         settings.places.responses = ["1+Z", "2+Z", "3+Z", "4+Z"].map(str::to_owned).to_vec();
         let found = mechid_analysis::modes(&[measurement(forces, &motion)], &settings).unwrap();
-        found.summary().modes.iter().map(|row| row.modal_mass.unwrap()).collect()
+        let masses: Vec<f64> =
+            found.summary().modes.iter().map(|row| row.modal_mass.unwrap()).collect();
+        let mut checks = found.summary().checks.iter();
+        let passes = checks.all(|check| check.code != "driving_point" || check.passed);
+        assert_eq!(passes, masses.iter().all(|mass| *mass > 0.0), "{found}");
+        masses
     };
     let upwards = masses(&forces, ["1+Z", "4+Z"]);
     let against = masses(&downwards, ["1-Z", "4-Z"]);
+    assert!(masses(&forces, ["1-Z", "4-Z"]).iter().all(|mass| *mass < 0.0));
     assert_eq!(upwards.len(), 2);
     for (one, other) in upwards.iter().zip(&against) {
         // The largest entry of both shapes is 0.5 1/√kg.

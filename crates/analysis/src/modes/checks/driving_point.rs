@@ -9,7 +9,8 @@ use super::super::sources::Output;
 use super::tested::Tested;
 
 /// Returns, for each driving point, the test of positive modal masses: the residue of a
-/// displacement times 2jω_d has a positive real part.
+/// displacement times 2jω_d has a positive real part. `driving_points` have force and response in
+/// the same direction, then in opposite ones.
 ///
 /// The p-value is the smallest one of all modes, multiplied by the number of modes (Bonferroni).
 ///
@@ -20,14 +21,14 @@ pub(super) fn tests(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
-    driving_points: &[(usize, usize)],
+    [same, opposite]: [&[(usize, usize)]; 2],
 ) -> Vec<Tested> {
-    let test = |&(input, output): &(usize, usize)| {
+    let test = |(sign, &(input, output)): (f64, &(usize, usize))| {
         let power = derivative(outputs[output].quantity?) as i32;
         let worst = (1..).zip(modes).map(|(number, mode)| {
             let turned = turned_residue(mode, output, input, power);
             let deviation = relative_error(mode, output, input) * turned.norm() / 2f64.sqrt();
-            (number, turned.re / deviation)
+            (number, sign * turned.re / deviation)
         });
         let (number, ratio) = worst.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let p_value = (modes.len() as f64 * Normal::standard().cdf(ratio)).min(1.0);
@@ -46,7 +47,8 @@ pub(super) fn tests(
             ),
         })
     };
-    driving_points.iter().filter_map(test).collect()
+    let points = same.iter().map(|point| (1.0, point));
+    points.chain(opposite.iter().map(|point| (-1.0, point))).filter_map(test).collect()
 }
 
 /// Returns the residue of the displacement times 2jω_d: positive for proportional damping and a

@@ -99,17 +99,19 @@ fn share_checks(
 
 /// Returns the checks of the modes: unexcited inputs, modal masses and delays at driving points,
 /// and reciprocity between driving points unless it is imposed. Outputs with a delay in the model
-/// are not tested for one.
+/// are not tested for one. Only the modal masses are tested at `opposite` points, where the force
+/// acts against the direction of the response.
 pub(super) fn mode_checks(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
-    driving_points: &[(usize, usize)],
+    [driving_points, opposite]: [&[(usize, usize)]; 2],
     delays: &[OutputDelay],
     is_reciprocal: bool,
 ) -> Vec<ModalCheck> {
     let mut rows = idle::force_checks(modes, inputs);
-    let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, driving_points);
+    let points = [driving_points, opposite];
+    let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, points);
     let has_delay = |output: usize| delays.get(output).is_some_and(|delay| delay.seconds != 0.0);
     let others: Vec<_> =
         driving_points.iter().copied().filter(|(_, output)| !has_delay(*output)).collect();

@@ -4,7 +4,7 @@ use super::super::summary::ModalCheck;
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Test of a property of modes that every structure with constant M, C and K has.
+/// Test of a property of modes that a structure with constant M, C and K has, or that is imposed.
 pub struct Tested {
     /// Name of the check, in snake case.
     pub code: &'static str,
