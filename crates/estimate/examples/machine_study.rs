@@ -129,6 +129,9 @@ fn parts(estimate: &MachineEstimate) -> Option<f64> {
     Some(p_values.min_by(f64::total_cmp)? * estimate.parts.len() as f64)
 }
 
+/// p-value of an experiment by its seed.
+type PValue = Box<dyn Fn(u64) -> Option<f64>>;
+
 /// How often parts of right and of wrong data disagree.
 fn parts_rows(seeds: u64, is_wanted: impl Fn(&str) -> bool) {
     let chain = |noise: NoiseSource| {
@@ -143,7 +146,7 @@ fn parts_rows(seeds: u64, is_wanted: impl Fn(&str) -> bool) {
         let [right, model] = [1.0, modulus].map(|factor| rotor::Rotor::new(13, factor));
         move |seed| parts(&rotor::fit(&rotor::shaken(&right, 120, seed), &model).ok()?)
     };
-    let rows: [(&str, Box<dyn Fn(u64) -> Option<f64>>); 5] = [
+    let rows: [(&str, PValue); 5] = [
         ("parts, chain of five, known noise", Box::new(chain(NoiseSource::Automatic))),
         ("parts, chain of five, noise from residual", Box::new(chain(NoiseSource::SmoothResidual))),
         ("parts, open record", Box::new(|seed| parts(&long_chain::estimate(seed)?))),

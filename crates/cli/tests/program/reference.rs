@@ -50,7 +50,7 @@ fn is_named(section: &str, path: &str) -> bool {
         .filter_map(|field| path.strip_suffix(field))
         .any(|parent| row(parent).is_some_and(|row| row.contains("uncertain")));
     // The page of file formats describes the fields of a machine.
-    let of_description = path.starts_with("analysis.machine.");
+    let of_description = ["analysis.machine.", "machine."].iter().any(|m| path.starts_with(m));
     if of_description && section.contains("formats.md#machines-of-named-elements") {
         return true;
     }

@@ -149,7 +149,8 @@ impl Rotor {
 pub fn shaken(rotor: &Rotor, lines: usize, seed: u64) -> LineData {
     let omega: Vec<f64> =
         (0..lines).map(|line| TAU * (10.0 + 240.0 * line as f64 / lines as f64)).collect();
-    let force = random_phases(lines, 1, seed) * Complex::from(10.0);
+    // Another seed than that of the noise, which must not be coherent with the force.
+    let force = random_phases(lines, 1, 5000 + seed) * Complex::from(10.0);
     let outputs = response_rows(rotor, &omega, |row| {
         let mut load = DVector::zeros(4 * rotor.nodes);
         load[rotor.shaker().1] = force[(row, 0)];
