@@ -182,7 +182,7 @@ pub(crate) const LINEARITY_SENSITIVITIES: usize = 1 << 22;
 /// Number of lines on either side in the averages of a residual spectrum.
 pub(crate) const LINEARITY_NEIGHBOURS: usize = 10;
 
-/// Mismatch above which a force does not repeat, relative to its RMS.
+/// Mismatch above which a force does not repeat, relative to √2 times its RMS.
 pub(crate) const PERIOD_WORST: f64 = 0.1;
 
 /// Maximum ratio between squared mismatches of lags at which the force repeats equally well.
@@ -194,7 +194,8 @@ pub(crate) const PERIOD_ROUNDING: f64 = 1e-12;
 /// Maximum difference in length between a claimed and a neighbouring period, in samples.
 pub(crate) const PERIOD_NEIGHBOURS: usize = 2;
 
-/// Mismatch above which a force does not repeat, even with noise on the force, relative to its RMS.
+/// Mismatch above which a force does not repeat, even with noise on the force, relative to √2 times
+/// its RMS.
 pub(crate) const PERIOD_REPEATS: f64 = 0.5;
 
 /// Minimum reduction of the squared mismatch, relative to its scatter, for a neighbouring period to

@@ -18,7 +18,8 @@ use super::whiteness::{Residual, Whiteness};
 
 /// Tests the power of the residual against the noise if `source` states the origin of the noise
 /// power ([`Finding::Misfit`]), parts of the data against each other
-/// ([`Finding::PartsAgreement`]), priors against the data ([`Finding::PriorAgreement`]), and whether
+/// ([`Finding::PartsAgreement`]), priors against the data ([`Finding::PriorAgreement`]), and
+/// whether
 /// several searches agree ([`Finding::SearchAgreement`]).
 ///
 /// # Source

@@ -191,10 +191,11 @@ pub enum PeriodFault {
     Neighbour {
         /// Number of samples after which it repeats best.
         period: usize,
-        /// Ratio of the RMS difference from one of these periods to the next to the RMS of the
-        /// force (pure number).
+        /// Ratio of the RMS difference from one of these periods to the next to √2 times the RMS of
+        /// the force (pure number).
         mismatch: f64,
-        /// RMS difference after the claimed period, relative to the RMS of the force (pure number).
+        /// RMS difference after the claimed period, relative to √2 times the RMS of the force (pure
+        /// number).
         claimed_mismatch: f64,
     },
     /// The force repeats after the claimed period except at one sample, where samples are missing
@@ -203,7 +204,7 @@ pub enum PeriodFault {
         /// First sample that does not repeat, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         sample: usize,
-        /// RMS difference elsewhere, relative to the RMS of the force (pure number).
+        /// RMS difference elsewhere, relative to √2 times the RMS of the force (pure number).
         mismatch: f64,
     },
     /// The force repeats after a different number of samples, and the claimed period is not a
@@ -211,8 +212,8 @@ pub enum PeriodFault {
     Other {
         /// Number of samples after which it repeats.
         period: usize,
-        /// Ratio of the RMS difference from one of these periods to the next to the RMS of the
-        /// force (pure number).
+        /// Ratio of the RMS difference from one of these periods to the next to √2 times the RMS of
+        /// the force (pure number).
         mismatch: f64,
         /// Number of samples of the force.
         samples: usize,

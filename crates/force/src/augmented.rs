@@ -268,7 +268,7 @@ impl Augmented {
                 },
             };
             // A difference of a hundredth in the log-likelihood moves no parameter by more than a
-            // tenth of its uncertainty.
+            // seventh of its uncertainty.
             let step = if order > 2 { 0.3 } else { 1.0 };
             let point = minimise(cost, &start, step, 0.01, 60 * (forces + 1));
             let Some(tuned) = self.trial(&process, noise, &point) else { continue };

@@ -86,7 +86,7 @@ pub(crate) const PERIODIC_GMRES_RESIDUAL: f64 = 1e-9;
 pub(crate) const PERIODIC_SEARCHES: usize = 8;
 
 /// Maximum number of passes over the period after a linear periodic state is computed from the
-/// matrix of the period map. Each pass corrects the state.
+/// matrix of the period map. The first pass gives the response; the others follow a correction.
 pub(crate) const PERIODIC_PASSES: usize = 4;
 
 /// Ratio of successive corrections above which the remaining gap is rounding.

@@ -68,7 +68,7 @@ impl Axis {
     }
 
     /// Labels multiples of `step` on a linear axis, such as 45 for a phase in degrees. A step with
-    /// more than forty labels is ignored.
+    /// fewer than two or more than forty labels is ignored.
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);

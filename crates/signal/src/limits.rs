@@ -99,9 +99,9 @@ pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
 /// standard deviations of the noise. Weaker ringing is lost in the noise that is set to zero.
 pub(crate) const RINGING_OVER_FLOOR: f64 = 1.0 / 3.0;
 
-/// Maximum number of successive weak samples within the ringing of a filter. Near its zero
-/// crossings ringing is weaker than the noise, and half of its lobes are negative. A larger number
-/// would count slow forces of a swinging hammer as ringing.
+/// Maximum distance, in samples, of a loud sample from the ringing of a filter before it. Near its
+/// zero crossings ringing is weaker than the noise, and half of its lobes are negative. A larger
+/// number would count slow forces of a swinging hammer as ringing.
 pub(crate) const RINGING_GAP: usize = 8;
 
 /// Default number of samples before a pulse, as a multiple of the number of samples in the pulse.

@@ -12,7 +12,7 @@ use crate::spectrum::Spectrum;
 
 /// A periodic signal F(t) = Σ A_n cos(n ω0 t + φ_n), known exactly at any t.
 ///
-/// The fundamental ω0 is not stored, so the same multisine serves any period.
+/// The fundamental ω0 is not part of it: the same multisine serves any period.
 ///
 /// ```
 /// use mechid_signal::{Multisine, Phases, Sampling, lines};

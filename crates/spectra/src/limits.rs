@@ -19,7 +19,8 @@ pub(crate) const LARGEST_EVIDENCE: f64 = 6.9;
 pub(crate) const AVERAGE_WEAK: f64 = 0.01;
 
 /// Number of neighbouring lines over which the evidence for coherence is averaged: over this many,
-/// without a signal, the mean of −ln p stays below [`MEAN_EVIDENCE`] in all but one of 10⁵ cases.
+/// without a signal, the mean of −ln p stays below [`MEAN_EVIDENCE`] in all but one of 20,000
+/// cases.
 pub(crate) const AVERAGE_STRETCH: usize = 8;
 
 /// Half the width, in lines, of the peak into which a window spreads one line.

@@ -99,8 +99,8 @@ impl PulseFit {
 }
 
 /// Returns columns over all residuals, whitened by the covariance of the errors of pulses, with the
-/// rows of the amplitudes below them. The last column is a residual from which the amplitudes
-/// `before` have been subtracted; in the returned residual they are not subtracted.
+/// rows of the amplitudes below them. The last column is a residual without the effects of the
+/// amplitudes `before`; the returned residual contains them.
 fn whitened(
     columns: DMatrix<f64>,
     pulses: &[RecordColumns<PulseCovariance>],

@@ -129,8 +129,8 @@ pub(super) const CONFIRMED: usize = 2;
 /// misfit shows whether the minimum is the correct one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 
-/// Number of degrees of freedom that stands for a noise level that is known exactly: with more,
-/// Fisher's distribution does not change.
+/// Number of degrees of freedom of a noise level that is known exactly: with more, Fisher's
+/// distribution does not change.
 pub(super) const KNOWN_FREEDOM: f64 = 1e6;
 
 /// Maximum number of records of a fit that are compared with each other: the cost grows with the

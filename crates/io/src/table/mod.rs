@@ -51,6 +51,7 @@ const MOST_LISTED: usize = 50;
 /// | delimited text | none of the others | fields of a row |
 /// | MATLAB level 5, versions 5 to 7.2 | its first words | vectors, matrix columns, struct fields |
 /// | MATLAB 7.3, HDF5 | its first bytes | data sets by path, matrix columns, struct fields |
+/// | Parquet | its first bytes | columns, fields of structs |
 /// | universal file, datasets 58, 58b | `    -1` in its first line | functions of time, by node |
 /// | gzip around any of them | its first two bytes | |
 ///
@@ -60,8 +61,8 @@ const MOST_LISTED: usize = 50;
 ///   comma needs another delimiter.
 /// - The first row names the columns if any of its fields is not a number; otherwise columns have
 ///   numbers only. A second row without any number gives their units.
-/// - Lines that start with `#`, and empty lines, are skipped; so are header lines above the table,
-///   by [`ReadOptions::skip_lines`].
+/// - Comment lines (`#`, `%`, `!`, `;`), which may name columns, and empty lines are skipped; so
+///   are header lines above the table, by [`ReadOptions::skip_lines`].
 /// - UTF-16 is read if the file begins with a byte order mark.
 ///
 /// A column is chosen by its name, or by its number counted from 1; a column that is not used may

@@ -44,8 +44,8 @@ pub(crate) struct Header {
     pub quantity: String,
     /// Labels of the units of the ordinate and of its denominator; empty without one.
     pub units: [String; 2],
-    /// Data types of the ordinate and of its denominator: 8, 11 and 12 are a response, 13 is a
-    /// force.
+    /// Data types of the ordinate and of its denominator: 8, 11 and 12 are a response, 9 and
+    /// 13 a force.
     pub ordinate: [u32; 2],
     /// The line with the numbers, for messages.
     pub form_at: usize,

@@ -350,7 +350,7 @@ impl Hit {
 }
 
 /// Returns a range of samples with the ringing before and after it: further positive forces above a
-/// fraction of the `floor` of a hit, with gaps of at most [`limits::RINGING_GAP`] samples.
+/// fraction of the `floor` of a hit, at most [`limits::RINGING_GAP`] samples apart.
 ///
 /// Ringing changes sign from lobe to lobe. A long negative part alone is the undershoot of an
 /// AC-coupled transducer, not a force.

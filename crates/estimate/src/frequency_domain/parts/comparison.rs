@@ -104,8 +104,8 @@ impl Scores<'_> {
         self.covariance.view((part * count, part * count), (count, count)).into_owned()
     }
 
-    /// Compares the scores of some `parts` with their covariance; `parameters` are the names. `None`
-    /// with too few residuals for an estimate of the noise.
+    /// Compares the scores of some `parts` with their covariance; `parameters` are the names.
+    /// `None` with too few residuals for an estimate of the noise.
     pub(crate) fn compare(
         &self,
         level: &Level,

@@ -204,8 +204,8 @@ impl MachineModel {
         (change, factors)
     }
 
-    /// Returns Hᵀ from the joints, j × r, and the response H to each load, r × loads, of the machine
-    /// with the change Δ; `None` if it is singular.
+    /// Returns Hᵀ from the joints, j × r, and the response H to each load, r × loads, of the
+    /// machine with the change Δ; `None` if it is singular.
     fn coupled(
         &self,
         nominal: &NominalLine,
