@@ -76,7 +76,7 @@ pub enum LikelihoodError {
         "the sensors respond to {got} independent differences between the initial and the final state of an \
          open record in this band; at most {most} are supported: choose a narrower band, or whole periods"
     )]
-    ManyStates {
+    LargeOpen {
         /// Number of state loads.
         got: usize,
         /// Largest number supported.

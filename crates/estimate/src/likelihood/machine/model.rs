@@ -108,7 +108,7 @@ impl MachineModel {
     ///
     /// # Errors
     /// [`LikelihoodError::NoResponse`] if the machine has no response at its initial values,
-    /// [`LikelihoodError::ManyStates`] for too many state loads.
+    /// [`LikelihoodError::LargeOpen`] for too many state loads.
     pub fn new(
         assembly: &Assembly,
         omega: &[f64],

@@ -19,7 +19,7 @@ use crate::likelihood::limits::{EACH_STATE_DOFS, MOST_STATES, STATE_LINES, STATE
 ///
 /// # Errors
 /// [`LikelihoodError::NoResponse`] if the nominal machine is singular,
-/// [`LikelihoodError::ManyStates`] for more than [`MOST_STATES`] loads.
+/// [`LikelihoodError::LargeOpen`] for more than [`MOST_STATES`] loads.
 ///
 /// # Source
 /// Ours; the reduction is that of snapshots by proper orthogonal decomposition, Sirovich (1987),
@@ -37,7 +37,7 @@ pub(super) fn state_loads(
         responding(nominal, assembly, places, omega)?
     };
     match loads.ncols() {
-        got if got > MOST_STATES => Err(LikelihoodError::ManyStates { got, most: MOST_STATES }),
+        got if got > MOST_STATES => Err(LikelihoodError::LargeOpen { got, most: MOST_STATES }),
         _ => Ok(loads),
     }
 }
