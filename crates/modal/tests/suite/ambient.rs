@@ -104,17 +104,17 @@ fn intervals_hold_the_truth() {
 }
 
 /// A mean over twelve samples filters the record as it would filter the forces: their spectrum has
-/// five zeros in the band.
+/// four zeros in the band.
 #[test]
 fn forces_whose_spectrum_is_not_flat_are_seen() {
-    let record = tower().accelerations(20.0, 6000, 0.1, 60);
+    let record = mast().record(Quantity::Velocity, 30.0, 6000, 0.05, 60);
     let misfit = |record: &Record| identified(record, AmbientSettings::default()).misfit.unwrap();
     let right = misfit(&record);
     assert!(right.p_value > 0.01 && right.error_scale() < 1.2, "{right:?}");
     let len = record.len() - 11;
     let mean = |k: usize, channel: usize| record.channel(channel)[k..k + 12].iter().sum::<f64>();
     let data = DMatrix::from_fn(len, record.channels(), mean);
-    let filtered = Record::new(Sampling::from_rate_hz(20.0, len).unwrap(), data).unwrap();
+    let filtered = Record::new(Sampling::from_rate_hz(30.0, len).unwrap(), data).unwrap();
     let wrong = misfit(&filtered);
     assert!(wrong.p_value < 1e-9 && wrong.error_scale() > 1.5, "{wrong:?}");
 }
