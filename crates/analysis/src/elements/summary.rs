@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use mechid_checks::{
-    Finding, Verdict, adjust_p_values, after_machine_fit, delay_of_sensors, whiteness_of_lines,
+    Finding, Subject, Verdict, adjust_p_values, after_machine_fit, delay_of_sensors,
+    whiteness_of_lines,
 };
 use mechid_estimate::likelihood::machine::{Candidate, CandidateGain, MachineEstimate};
 use mechid_estimate::likelihood::{
@@ -350,6 +351,11 @@ fn notes_of(estimate: &MachineEstimate, checks: &[CheckRow]) -> impl Iterator<It
         let mut causes: Vec<String> =
             checks.iter().filter(is_cause).map(|check| check.subject.to_string()).collect();
         causes.dedup();
+        // The misfit scales the errors at a level of its own, also if its check does not warn
+        // among many others.
+        if causes.is_empty() {
+            causes.push(Subject::Misfit.to_string());
+        }
         let (factor, checks) = (likelihood.error_scale, causes.join(", "));
         notes.push(ElementNote::ScaledErrors { factor, checks });
     }

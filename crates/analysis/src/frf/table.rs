@@ -215,9 +215,11 @@ impl FrfTable {
             segments: *segments,
         };
         let remarks = records.iter().flat_map(|recorded| recorded.held.unit_notes());
-        let others = measured.responses().into_iter().map(|(other, _)| other);
-        let unused = others.filter(|other| *other != kind).map(|other| {
-            format!("the responses are those of the {kind}; the {other} is not used: name it alone")
+        let kinds = measured.responses().into_iter().map(|(measured, _)| measured);
+        let unused = kinds.filter(|measured| *measured != kind).map(|unused| {
+            format!(
+                "the responses are those of the {kind}; the {unused} is not used: name it alone"
+            )
         });
         let remarks = remarks.chain(unused);
         let (motions, forces) = (measured.response().0.channels(), measured.force.channels());

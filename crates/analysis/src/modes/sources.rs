@@ -240,7 +240,7 @@ pub(crate) fn driven_band<'a>(
             }
         }
     }
-    if low < high { Ok([low, high]) } else { Err(AnalysisError::IdleInputs) }
+    if low.is_finite() { Ok([low, high]) } else { Err(AnalysisError::IdleInputs) }
 }
 
 /// Inputs of the force columns of each record.
@@ -391,4 +391,22 @@ pub(crate) fn all_responses(block: &Block) -> Result<Record, AnalysisError> {
         .flat_map(|(_, record)| (0..record.channels()).map(|at| record.channel(at)))
         .collect();
     Ok(Record::from_channels(block.force.sampling(), &columns)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_signal::Sampling;
+
+    use super::*;
+
+    #[test]
+    fn a_band_may_be_one_line_and_needs_one() {
+        let record = |force: [f64; 3]| {
+            Record::from_channels(Sampling::new(0.1, 3).unwrap(), &[&force]).unwrap()
+        };
+        let [low, high] = driven_band([&record([1.0, 0.0, 0.0])]).unwrap();
+        assert!((low - 10.0 / 3.0).abs() < 1e-12 && low == high, "{low} {high}");
+        let idle = driven_band([&record([0.0; 3])]);
+        assert!(matches!(idle, Err(AnalysisError::IdleInputs)), "{idle:?}");
+    }
 }
