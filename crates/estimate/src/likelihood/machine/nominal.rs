@@ -274,12 +274,12 @@ impl<'a> Nominal<'a> {
     fn load_columns(&self, omega: f64, states: &DMatrix<f64>) -> Vec<Vec<(usize, Complex<f64>)>> {
         let (n, speed) = (self.assembly.dof(), self.assembly.speed());
         let inputs = self.assembly.inputs().iter().map(|input| input.load(n, omega, speed));
-        let own = self.assembly.own_loads(omega).into_iter().map(|(_, load)| load);
+        let of_machine = self.assembly.own_loads(omega).into_iter().map(|(_, load)| load);
         let states = states.column_iter().map(|column| {
             let loads = column.iter().enumerate().filter(|(_, load)| **load != 0.0);
             loads.map(|(dof, load)| (dof, Complex::from(*load))).collect()
         });
-        inputs.chain(own).chain(states).collect()
+        inputs.chain(of_machine).chain(states).collect()
     }
 
     /// Writes the rows of a measured part from its receptance.

@@ -84,11 +84,11 @@ fn responding(
 
 /// Returns at most [`STATE_LINES`] of the frequencies, rising, with the lowest and the highest.
 fn spread(omega: &[f64]) -> Vec<f64> {
-    let mut all = omega.to_vec();
-    all.sort_by(f64::total_cmp);
-    all.dedup();
-    let count = all.len().min(STATE_LINES);
-    (0..count).map(|at| all[at * (all.len() - 1) / (count - 1).max(1)]).collect()
+    let mut rising = omega.to_vec();
+    rising.sort_by(f64::total_cmp);
+    rising.dedup();
+    let count = rising.len().min(STATE_LINES);
+    (0..count).map(|at| rising[at * (rising.len() - 1) / (count - 1).max(1)]).collect()
 }
 
 /// Orthonormal basis of a set of vectors, and the components of the vectors in this basis.
@@ -113,10 +113,10 @@ impl Basis {
                 *component += part;
             }
         }
-        let rest = vector.norm();
-        if rest > 0.1 * STATE_RESPONSE {
-            components.push(rest);
-            self.vectors.push(vector / rest);
+        let length = vector.norm();
+        if length > STATE_RESPONSE {
+            components.push(length);
+            self.vectors.push(vector / length);
         }
         self.components.push(components);
     }
@@ -137,8 +137,8 @@ impl Basis {
         let vectors = DMatrix::from_columns(&self.vectors);
         let eigen = hermitian_eigen(gram).ok()?;
         let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
-        let kept = directions.filter(|(power, _)| **power >= least);
-        let kept: Vec<_> = kept.map(|(_, direction)| &vectors * direction).collect();
-        (!kept.is_empty()).then(|| DMatrix::from_columns(&kept))
+        let leading = directions.filter(|(power, _)| **power >= least);
+        let leading: Vec<_> = leading.map(|(_, direction)| &vectors * direction).collect();
+        (!leading.is_empty()).then(|| DMatrix::from_columns(&leading))
     }
 }
