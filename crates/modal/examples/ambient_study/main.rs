@@ -36,16 +36,20 @@ struct Case {
     rate_hz: f64,
     len: usize,
     noise: Noise,
+    /// Number of samples of a moving mean of the record: forces whose spectrum has zeros; 1 for
+    /// white forces.
+    mean: usize,
 }
 
 impl Case {
     fn record(&self, seed: u64) -> Record {
-        match self.quantity {
+        let white = match self.quantity {
             Quantity::Acceleration => {
                 self.structure.accelerations(self.rate_hz, self.len, self.noise, seed)
             }
             quantity => self.structure.record(quantity, self.rate_hz, self.len, self.noise, seed),
-        }
+        };
+        ambient_generator::moving_mean(&white, self.mean)
     }
 }
 
@@ -89,6 +93,7 @@ fn cases() -> Vec<Case> {
         rate_hz,
         len: (rate_hz * seconds) as usize,
         noise: level.into(),
+        mean: 1,
     };
     let with_pole = |name, pole| {
         let case = case(name, &tower, Quantity::Acceleration, 20.0, 300.0, 0.1);
@@ -111,6 +116,10 @@ fn cases() -> Vec<Case> {
         with_pole("the same, noise that rises with frequency", -0.5),
         with_pole("the same, noise that falls steeply", 0.9),
         case("bridge, accelerations, 300 s", &bridge, Quantity::Acceleration, 20.0, 300.0, 0.1),
+        Case {
+            mean: 12,
+            ..case("one sensor, coloured forces", &single, Quantity::Velocity, 30.0, 200.0, 0.05)
+        },
     ]
 }
 
@@ -231,7 +240,7 @@ impl<'a> Study<'a> {
             let taken = tally_modes(&mut tallies, &estimate.modes, truth);
             false_modes += estimate.modes.len() - taken;
             changed += usize::from(halves_differ(&record, &estimate));
-            unfit += usize::from(estimate.misfit.is_none_or(|misfit| misfit.p_value < 0.01));
+            unfit += usize::from(estimate.misfit.is_some_and(|misfit| misfit.p_value < 0.01));
         }
         let seconds = seconds / seeds as f64;
         eprintln!("{}: {seconds:.2} s a record, {failed} failed", case.name);

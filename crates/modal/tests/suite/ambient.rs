@@ -11,7 +11,7 @@ use mechid_modal::indicators::mac;
 use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
-use crate::ambient_generator::{Noise, Quantity, Structure};
+use crate::ambient_generator::{Noise, Quantity, Structure, moving_mean};
 
 /// Four modes, two of them 3 % apart, at four sensors, under three white forces.
 fn tower() -> Structure {
@@ -111,10 +111,7 @@ fn forces_whose_spectrum_is_not_flat_are_seen() {
     let misfit = |record: &Record| identified(record, AmbientSettings::default()).misfit.unwrap();
     let right = misfit(&record);
     assert!(right.p_value > 0.01 && right.error_scale() < 1.2, "{right:?}");
-    let len = record.len() - 11;
-    let mean = |k: usize, channel: usize| record.channel(channel)[k..k + 12].iter().sum::<f64>();
-    let data = DMatrix::from_fn(len, record.channels(), mean);
-    let filtered = Record::new(Sampling::from_rate_hz(30.0, len).unwrap(), data).unwrap();
+    let filtered = moving_mean(&record, 12);
     let wrong = misfit(&filtered);
     assert!(wrong.p_value < 1e-9 && wrong.error_scale() > 1.5, "{wrong:?}");
 }

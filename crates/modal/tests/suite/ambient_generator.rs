@@ -183,3 +183,13 @@ fn complex(parts: &DVector<f64>) -> Vec<Complex<f64>> {
     let m = parts.len() / 2;
     (0..m).map(|r| Complex::new(parts[r], parts[m + r])).collect()
 }
+
+/// Returns the means over `count` successive samples of a record: its spectrum then has zeros, as
+/// under forces whose spectrum has them.
+pub fn moving_mean(record: &Record, count: usize) -> Record {
+    let len = record.len() + 1 - count;
+    let mean =
+        |k: usize, at: usize| record.channel(at)[k..k + count].iter().sum::<f64>() / count as f64;
+    let sampling = record.sampling().with_len(len).unwrap();
+    Record::new(sampling, DMatrix::from_fn(len, record.channels(), mean)).unwrap()
+}
