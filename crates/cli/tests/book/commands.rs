@@ -144,7 +144,7 @@ impl Workspace {
 fn has_line(root: &Path, script: &str, line: &str) -> Result<Run, String> {
     let checks = std::fs::read_to_string(root.join(script)).unwrap();
     let unlocked = |line: &str| line.trim_end_matches(" --locked").to_owned();
-    match checks.lines().any(|check| unlocked(check) == unlocked(line)) {
+    match checks.lines().any(|check| unlocked(check.trim_start()) == unlocked(line)) {
         true => Ok(Run::Always),
         false => Err(format!("`{script}` has no such line: {line}")),
     }
