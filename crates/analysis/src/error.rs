@@ -25,7 +25,7 @@ pub enum AnalysisError {
     /// The data determine none of the unknowns, or too few for a machine.
     #[error(
         "{combinations}: add a sensor or a force, or state a coefficient or its prior; \
-         \"candidates\" of the description show what a measurement would add"
+         \"candidates\" in the description of the machine show what a measurement would add"
     )]
     Undetermined {
         /// Unknowns, and the combinations that the data determine, a sentence each.
@@ -411,8 +411,8 @@ pub enum AnalysisError {
     },
     /// No input varies.
     #[error(
-        "no measured force or other input varies in any record: it excites nothing. Without it the \
-         record is a free decay, or with `ambient` the response to forces that were not measured"
+        "no measured force or other input varies in any record, so no input excites the machine. Leave the \
+         inputs out: the record is then a free decay, or with `ambient` the response to forces that were not measured"
     )]
     IdleInputs,
     /// The force has no spectral line in the band.
@@ -458,7 +458,7 @@ pub enum AnalysisError {
     /// Second derivatives are only for the fit of the equation of motion.
     #[error(
         "with the acceleration alone, a sliding polynomial gives second derivatives of force and \
-         response, which only the equation of motion takes: leave `between_samples` out"
+         response, which only the fit of the equation of motion uses: leave `between_samples` out"
     )]
     TwiceDifferentiated,
     /// Instrumental variables need two halves of the periods, which averaged frequency responses do
@@ -735,8 +735,8 @@ fn kebab(name: &str) -> String {
 fn unclear_time(unclear: Option<&(String, String)>) -> String {
     unclear.map_or_else(String::new, |(column, text)| {
         format!(
-            " in a unit of time (\"{text}\" of column {column} is not understood: state it as `unit`, or name the column \
-             to take it as seconds)"
+            " in a unit of time (\"{text}\" of column {column} is not a known unit: state the unit (`unit`), or \
+             name the column to read it in seconds)"
         )
     })
 }

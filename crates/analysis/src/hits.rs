@@ -168,8 +168,8 @@ impl Struck {
                 Ok(Self { dof, found, idle })
             }
             _ => Err(wrong(format!(
-                "a hammer strikes one degree of freedom, but {} forces act in {}: name the column of the \
-                 struck one, and 0 for the others",
+                "a hammer strikes one degree of freedom, but {} forces act in {}: name the force column of the \
+                 struck degree of freedom, and 0 for the others",
                 held.driven.len(),
                 held.file
             ))),

@@ -18,7 +18,7 @@ pub enum BearingError {
     },
     /// The journal touches the bore, without a film between them.
     #[error(
-        "the journal touches the bore: eccentricity {eccentricity} of the clearance",
+        "the journal touches the bore: its eccentricity is {eccentricity} times the clearance and must be below 1",
         eccentricity = message::number(*eccentricity)
     )]
     Contact {
@@ -27,8 +27,8 @@ pub enum BearingError {
     },
     /// The equations of the film cannot be solved at this position of the journal.
     #[error(
-        "the equations of the film are singular with the journal at ({}, {}) clearances \
-         along and across the load",
+        "the equations of the film have no solution (singular matrix) with the journal at ({}, {}) times the \
+         clearance, along and across the load",
         message::number(position[0]),
         message::number(position[1])
     )]
@@ -39,8 +39,8 @@ pub enum BearingError {
     /// The ends of the film did not settle within the iterations allowed.
     #[error(
         "the ends of the film did not converge in {iterations} iterations \
-         (last change {change:.1e} rad) with the journal at ({}, {}) clearances; \
-         a finer mesh may help",
+         (last change {change:.1e} rad) with the journal at ({}, {}) times the clearance, \
+         along and across the load; a finer mesh may help",
         message::number(position[0]),
         message::number(position[1])
     )]
@@ -55,7 +55,7 @@ pub enum BearingError {
     /// No equilibrium was found within the iterations allowed.
     #[error(
         "no equilibrium was found for the Sommerfeld number {sommerfeld} in {iterations} \
-         iterations (last step {step:.1e} clearances); a finer mesh may help",
+         iterations (last step {step:.1e} times the clearance); a finer mesh may help",
         sommerfeld = message::number(*sommerfeld)
     )]
     EquilibriumNotConverged {

@@ -69,8 +69,8 @@ impl Check for Bias {
         } else {
             write!(
                 f,
-                "noise on the response biases the estimate ({p_value}): by {reference} \
-                 {parameter} is {other} instead of {value}, {errors:.1} standard errors away; \
+                "noise on the response biases the estimate ({p_value}): {parameter} is {value}, but \
+                 {other} by {reference}, {errors:.1} standard errors away; \
                  prefer maximum likelihood on whole periods"
             )
         }

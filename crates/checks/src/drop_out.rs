@@ -142,8 +142,8 @@ impl Check for DropOut {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} is {} from sample {} on, {} in a row, while it changes before and after: {}; \
-             leave it out of the window",
+            "{} is {} from sample {} on, {} in a row, but changes before and after: {}; \
+             choose a window without these samples",
             names.channel(self.channel),
             message::number(self.level),
             self.sample + 1,

@@ -192,7 +192,9 @@ impl ModeLimit {
             }
             (ModeLimit::BetweenSamples, Verdict::Good) => String::new(),
             (ModeLimit::BetweenSamples, Verdict::Doubtful) => {
-                ", so few that the force between samples matters: sample faster, or state it (`between_samples`)".into()
+                ", so few that the change of the force between samples matters: sample faster, or \
+                 state this change (`between_samples`)"
+                    .into()
             }
             (ModeLimit::AtSamples | ModeLimit::BetweenSamples, _) => {
                 ", so few that it may be the alias of a mode above the Nyquist frequency: sample faster"

@@ -104,8 +104,8 @@ impl Check for Instability {
         write!(
             f,
             "mode {number} ({frequency} Hz) is unstable ({p_value}): its free response grows \
-             at {growth} 1/s and doubles every {doubling} s. Possible causes: a machine that \
-             feeds its own vibration (oil film, control), a channel of the wrong sign or with \
+             at {growth} 1/s and doubles every {doubling} s. Possible causes: self-excited \
+             vibration (oil film, control), a channel of the wrong sign or with \
              a delay"
         )
     }

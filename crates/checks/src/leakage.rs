@@ -92,8 +92,8 @@ impl Check for Leakage {
             (Verdict::Good, _) => Ok(()),
             (_, true) => write!(
                 f,
-                ": its damping follows from leakage, and the intervals are not reliable; use segments of \
-                 {samples_needed} samples or more, or fit the record as an open one (without \
+                ": this is too narrow to separate its damping from leakage, and the intervals are not reliable; \
+                 use segments of {samples_needed} samples or more, or fit the record as an open one (without \
                  `from_frf`)"
             ),
             (_, false) => write!(

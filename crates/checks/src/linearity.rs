@@ -357,14 +357,14 @@ impl Check for Linearity {
         if self.verdict() == Verdict::Good {
             return write!(
                 f,
-                "the residual is uncorrelated with the square and the cube of the displacement and with the cube \
-                 and the sign of the velocity as forces ({p_value})"
+                "the residual is uncorrelated with forces proportional to the square and the cube of the displacement \
+                 and to the cube and the sign of the velocity ({p_value})"
             );
         }
         let displacement = names.response(ResponseQuantity::Displacement, self.dof);
         write!(
             f,
-            "the residual is correlated with the {power} {displacement} as a force ({p_value}): \
+            "the residual is correlated with a force proportional to the {power} {displacement} ({p_value}): \
              the machine is nonlinear at this level of the force, and its parameters hold at this level only"
         )
     }

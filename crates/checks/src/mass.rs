@@ -87,8 +87,8 @@ impl Check for NegativeMass {
         if self.verdict() == Verdict::Good {
             return write!(
                 f,
-                "m{i}{i} is {mass} kg, negative within its noise: {errors} standard errors \
-                 ({p_value})"
+                "m{i}{i} is {mass} kg, negative but within the noise: {errors} standard errors \
+                 below zero ({p_value})"
             );
         }
         write!(

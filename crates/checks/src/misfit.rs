@@ -87,7 +87,7 @@ impl Display for NoiseSource {
         f.write_str(match self {
             NoiseSource::Periods => "estimated from the periods",
             NoiseSource::Coherence => "that follows from the coherence",
-            NoiseSource::Stated => "that the standard errors state",
+            NoiseSource::Stated => "that follows from the standard errors",
             NoiseSource::Force => "on the lines where the noise of the force dominates",
         })
     }
@@ -96,12 +96,11 @@ impl Display for NoiseSource {
 impl Concentration {
     fn sentence(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let hz: Vec<String> = self.frequencies_hz.iter().map(|hz| line_hz(*hz)).collect();
-        let hold = if hz.len() == 1 { "holds" } else { "hold" };
         let share = (100.0 * self.share).floor();
         write!(
             f,
-            "{} Hz {hold} {share} % of the misfit: run-out, mains or another disturbance? Leave out \
-             with `without_hz` {}",
+            "{share} % of the misfit is at {} Hz: run-out, mains or another disturbance? Exclude with \
+             `without_hz` {}",
             listed(&hz),
             hz.join(",")
         )?;

@@ -119,10 +119,15 @@ impl TermLeftOut {
                 return write!(f, "another value of the known {entry}");
             }
             OmittedTerm::Nonlinear { power, dof, other: None } => {
-                return write!(f, "a force with the {power} {}", name(dof));
+                return write!(f, "a force proportional to the {power} {}", name(dof));
             }
             OmittedTerm::Nonlinear { power, dof, other: Some(other) } => {
-                return write!(f, "a force with the {power} {} less {}", name(dof), name(other));
+                return write!(
+                    f,
+                    "a force proportional to the {power} the difference {} minus {}",
+                    name(dof),
+                    name(other)
+                );
             }
             _ => "another term",
         })
@@ -165,7 +170,7 @@ impl Check for TermLeftOut {
                 ": choose a narrow band (`band_hz`), in which viscous damping has the same effect"
             }
             OmittedTerm::KnownEntry { .. } => {
-                ": leave it free (`mass`, `structure`), or measure more degrees of freedom"
+                ": leave this entry free (`mass`, `structure`), or measure more degrees of freedom"
             }
             _ => ": choose a narrower band (`band_hz`), or measure more degrees of freedom",
         })
@@ -199,7 +204,7 @@ impl Check for NonlinearTermsLeftOut {
         let p_value = self.p_value;
         write!(
             f,
-            "{term}{laws} {verb} {percent} % of the power of the force that the model leaves ({p_value}); with {name}"
+            "{term}{laws} {verb} {percent} % of the residual power of the force ({p_value}); with {name}"
         )?;
         write_changes(self.changes.clone(), f)?;
         write!(f, ": fit {name}, too (`nonlinear`), or measure at a lower level of the force")

@@ -248,14 +248,14 @@ impl PeriodFault {
         match *self {
             PeriodFault::Neighbour { period, mismatch, claimed_mismatch } => write!(
                 f,
-                "the period is {period} samples: from one period to the next the force differs by {} of its \
-                 RMS, after {claimed} samples by {}",
+                "the period is {period} samples, not {claimed}: successive periods of the force differ by {} of its \
+                 RMS; with {claimed} samples they differ by {}",
                 percent(mismatch),
                 percent(claimed_mismatch)
             ),
             PeriodFault::Interruption { sample, mismatch } => write!(
                 f,
-                "the force repeats every {claimed} samples, to {} of its RMS, but not across sample {} \
+                "the force repeats every {claimed} samples, within {} of its RMS, but not across sample {} \
                  of the window, as if samples were missing or inserted there: use the samples on one side only",
                 percent(mismatch),
                 sample + 1
@@ -266,16 +266,16 @@ impl PeriodFault {
                     Some(compared) if compared < period => write!(
                         f,
                         "the first {compared} of {samples} samples of the force repeat {period} samples \
-                         later, to {mismatch} of its RMS"
+                         later, within {mismatch} of its RMS"
                     )?,
                     _ => write!(
                         f,
-                        "the force repeats every {period} samples, to {mismatch} of its RMS"
+                        "the force repeats every {period} samples, within {mismatch} of its RMS"
                     )?,
                 }
                 write!(
                     f,
-                    ", and {claimed} samples are no whole number of such periods: the lines used are \
+                    ", and {claimed} samples are not a whole number of such periods: the lines used are \
                      not those of the force"
                 )
             }

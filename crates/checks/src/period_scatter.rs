@@ -68,7 +68,7 @@ impl Check for PeriodScatter {
                 ": noise, drift, or a transient that has not decayed; leave out the beginning, or \
                  average more periods"
             }
-            Verdict::Bad => ": hardly a steady response of this period; check `period`",
+            Verdict::Bad => ": probably not a steady response with this period; check `period`",
         })
     }
 }

@@ -64,9 +64,15 @@ impl Check for PersistentExcitation {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         let (force, order, needed) = (names.force(self.force), self.order, self.needed);
         if order == 0 {
-            return write!(f, "{force} is zero: it is excluded, and no mass follows from it");
+            return write!(
+                f,
+                "{force} is zero: it is excluded, and no mass can be identified from it"
+            );
         }
         let more = if order < needed { "; excite more lines" } else { "" };
-        write!(f, "{force} is persistently exciting of order {order}, {needed} needed{more}")
+        write!(
+            f,
+            "{force} is persistently exciting of order {order} (order {needed} is needed){more}"
+        )
     }
 }

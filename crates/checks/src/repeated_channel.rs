@@ -62,7 +62,7 @@ impl Check for RepeatedChannel {
         write!(
             f,
             "{} and {} are equal in all {} samples: one of them is a copy, or the record is simulated \
-             without noise; leave a copy out",
+             without noise; leave one of them out",
             names.channel(self.original),
             names.channel(self.channel),
             self.samples

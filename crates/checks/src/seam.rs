@@ -65,12 +65,12 @@ impl Check for Seam {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "from the last sample to the first the curvature of the response is {:.1} times that elsewhere: ",
+            "the curvature of the response from the last sample to the first is {:.1} times that elsewhere: ",
             self.ratio
         )?;
         f.write_str(match self.verdict() {
             Verdict::Good => "consistent with a whole period",
-            Verdict::Doubtful => "hardly a steady state over one whole period",
+            Verdict::Doubtful => "probably not a steady state over one whole period",
             Verdict::Bad => "not a whole period; fit it as an open record",
         })
     }

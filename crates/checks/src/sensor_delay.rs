@@ -71,7 +71,7 @@ impl Check for SensorDelay {
         write!(
             f,
             "{late} about {size} ms {direction} ({}): a filter, a scanning converter or an error of \
-             the machine with the same effect; shift the channel, or make the delay of the sensors \
+             the model with the same effect; shift the channel, or make the delay of the sensors \
              a parameter",
             self.p_value
         )

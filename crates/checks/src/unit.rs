@@ -105,8 +105,8 @@ impl Check for TimeUnit {
         let Self { column, rate_hz, duration_s, unit, factor } = self;
         write!(
             f,
-            "the time in column {column} has no unit and is taken as seconds: {} Hz, {} s long; in {unit} \
-             it would be {} Hz: state the unit (`unit`) or `sample_rate`",
+            "the time in column {column} has no unit and is taken as seconds: the sampling rate is {} Hz and the \
+             duration {} s; in {unit} the rate would be {} Hz: state the unit (`unit`) or `sample_rate`",
             up_to_six_digits(*rate_hz),
             up_to_six_digits(*duration_s),
             up_to_six_digits(rate_hz / factor),

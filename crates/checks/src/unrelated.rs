@@ -61,7 +61,7 @@ impl Check for Unrelated {
         write!(
             f,
             "the response does not follow the force: the fit explains {} % of its power, no more than it \
-             would of noise; the parameters are meaningless. Check columns, cables and units",
+             would explain of noise; the parameters are meaningless. Check columns, cables and units",
             three_digits(100.0 * self.explained)
         )
     }

@@ -25,8 +25,8 @@ pub enum CliError {
     Io(#[from] IoError),
     /// Mode shapes without the geometry to draw them.
     #[error(
-        "no mode shapes: they need modes that oscillate, at two channels or more, and a point in --geometry for each of \
-         {names}"
+        "no mode shapes can be drawn: at least one mode must oscillate, at least two channels are needed, and \
+         --geometry, if given, must have a point for each of {names}"
     )]
     NoShapes {
         /// Names of the channels.
@@ -111,10 +111,10 @@ impl CliError {
             | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { file, at, limit })) => {
                 match (raises, limit.is_memory()) {
                     (true, true) => {
-                        format!("{error}; if the record is really this large, use --memory-gb")
+                        format!("{error} with --memory-gb")
                     }
                     (true, false) => {
-                        format!("{error}; if the record is really this large, use --raise-limits")
+                        format!("{error} with --raise-limits")
                     }
                     (false, _) => format!("{file}, {at}: {limit}, which this command cannot raise"),
                 }

@@ -98,7 +98,7 @@ fn noise_of_the_force_belongs_to_open_records() {
         ("--force-noise 1 --from-frf h1", ["--force-noise: ", "not to --from-frf"]),
         (
             "--force-noise 1 --method least-squares",
-            ["--method: ", "open records and hits take maximum-likelihood"],
+            ["--method: ", "open records and hits need maximum-likelihood"],
         ),
         ("--force-noise 1 --extent period", ["--force-noise: ", "it is for open records"]),
     ] {
@@ -158,7 +158,7 @@ fn ragged_rows() {
 #[test]
 fn lines_above_the_table() {
     let text = format!("Analyser 7\nRate;250\n\n{}", good());
-    let parts = ["a.csv: the table seems to begin on line 4, with 3 fields", "--skip-lines 3"];
+    let parts = ["a.csv: the table seems to begin on line 4, with 3 fields", "`skip_lines` 3"];
     identify(&text, "", &parts);
     refused(&text, "info a.csv", &parts);
     // With one line skipped too many, the names of the columns are lost.
@@ -167,7 +167,7 @@ fn lines_above_the_table() {
 
 #[test]
 fn json_for_a_record() {
-    let parts = ["a.csv is JSON, not a table of samples", "simulate", "force --system"];
+    let parts = ["a.csv is JSON, not a table of samples", "simulate", "as `system`"];
     identify("{ \"system\": { \"mass\": 1 } }", "", &parts);
 }
 

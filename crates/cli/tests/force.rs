@@ -162,7 +162,7 @@ fn bad_requests_say_what_to_change() {
         ("--displacement displacement --period 256 --method kalman", "open record"),
         ("--velocity velocity --period 256 --lines 200", "line"),
         ("--displacement displacement --period 256 --noise 0", "must be positive"),
-        ("--displacement displacement --method tikhonov", "more than the 512"),
+        ("--displacement displacement --method tikhonov", "at most 512 are possible"),
     ] {
         let arguments = format!("force run.csv --system machine.json {arguments}");
         let long = arguments.contains("tikhonov");

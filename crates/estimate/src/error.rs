@@ -57,7 +57,7 @@ pub enum EstimateError {
     },
     /// Two entries of a symmetric matrix are known, and differ.
     #[error(
-        "{lower} is given as {} and {upper} as {}: the matrix cannot be symmetric",
+        "{lower} is given as {} and {upper} as {}: a symmetric matrix needs equal values",
         message::number(*lower_value), message::number(*upper_value)
     )]
     Asymmetric {
@@ -86,7 +86,7 @@ pub enum EstimateError {
         /// The estimator.
         estimator: &'static str,
     },
-    /// The data leave some parameters undetermined, and all of them are needed.
+    /// The data do not determine some parameters, and all parameters are needed.
     #[error("the data do not determine {parameters}: {directions}")]
     Undetermined {
         /// Names of the parameters concerned.
@@ -111,7 +111,7 @@ pub enum EstimateError {
         /// Step of the other record, in seconds.
         got: f64,
     },
-    /// A sliding polynomial cannot be fitted, or has no such derivative.
+    /// A sliding polynomial cannot be fitted, or has no derivative of the requested order.
     #[error(
         "a polynomial of order {order} through {} is not possible: the window must have more samples \
          than the order, and the order must be at least that of the derivative", message::count(*samples, "sample")
@@ -166,8 +166,8 @@ pub enum EstimateError {
     },
     /// The noise covariance of a line cannot be inverted.
     #[error(
-        "the noise covariance at {frequency_hz} Hz is singular: a displacement has no noise, or there \
-         are no more periods than degrees of freedom; pool the covariance over more lines"
+        "the noise covariance at {frequency_hz} Hz is singular: a displacement has no noise, or the \
+         number of periods does not exceed the number of degrees of freedom; pool the covariance over more lines"
     )]
     SingularNoise {
         /// Frequency, in Hz.
@@ -176,7 +176,7 @@ pub enum EstimateError {
     /// No search for the best fit (maximum likelihood, output error or a constant) converged.
     #[error(
         "the search for the best fit failed: {} reached no minimum within {steps} \
-         steps. This says nothing about the model; more lines, more periods, a known mass or fewer \
+         steps. This does not show that the model is wrong; more lines, more periods, a known mass or fewer \
          unknowns make the search easier",
         if *searches == 1 { "one search".to_owned() } else { format!("{searches} searches") }
     )]

@@ -27,7 +27,7 @@ pub enum ForceError {
         needed: usize,
     },
     /// A record and its list of channels differ in size.
-    #[error("the record has {}, {described} are described", message::count(*record, "channel"))]
+    #[error("the record has {}, but {described} are described: describe each", message::count(*record, "channel"))]
     ChannelCount {
         /// Channels of the record.
         record: usize,
@@ -76,8 +76,8 @@ pub enum ForceError {
     },
     /// The time step is so long that the end of a step does not depend on the force during it.
     #[error(
-        "the time step {dt} s is too long for the machine: the force during a step leaves no \
-         trace at its end (reciprocal condition {reciprocal_condition:.1e}); sample faster"
+        "the time step {dt} s is too long for the machine: the motion at the end of a step does not \
+         depend on the force during it (reciprocal condition {reciprocal_condition:.1e}); sample faster"
     )]
     StepTooLong {
         /// The time step, in seconds.
@@ -88,7 +88,7 @@ pub enum ForceError {
     /// The free response of an unstable system exceeds the range of double precision.
     #[error(
         "the machine is unstable: its free response grows e-fold every {} s, by a factor of \
-         10^{:.0} within {} s, which leaves no digits for the force; use whole periods in steady \
+         10^{:.0} within {} s, too much to compute the force in double precision; use whole periods in steady \
          state, the Kalman smoother, a shorter record or a shorter time step",
         message::number_to(rate.recip(), 3),
         rate * duration / std::f64::consts::LN_10,
@@ -113,9 +113,9 @@ pub enum ForceError {
     },
     /// The measured channels do not show a force at this line.
     #[error(
-        "at line {line} (ω = {} rad/s) the machine transmits nothing of the force on \
-         degree of freedom {} (counted from 1) to the measured channels (reciprocal \
-         condition {reciprocal_condition:.1e}): leave the line out, measure another degree of \
+        "at line {line} (ω = {} rad/s) the measured channels do not determine the force on \
+         degree of freedom {} (counted from 1; reciprocal condition {reciprocal_condition:.1e}): \
+         leave the line out, measure another degree of \
          freedom or quantity, or name fewer forces",
         message::number_to(*omega, 6),
         dof + 1
@@ -144,8 +144,8 @@ pub enum ForceError {
     },
     /// Too few lines remain outside the chosen ones to estimate the noise.
     #[error(
-        "the noise level is estimated from the lines outside the chosen ones, but only {outside} of the \
-         {needed} needed remain: choose fewer lines, give a longer period, or state the level"
+        "the noise level is estimated from the lines that are not chosen, but only {outside} of them remain \
+         and {needed} are needed: choose fewer lines, give a longer period, or state the level (`noise`)"
     )]
     TooFewOutsideLines {
         /// Lines not chosen.
@@ -155,8 +155,8 @@ pub enum ForceError {
     },
     /// A channel is zero or not finite on the lines that determine its noise.
     #[error(
-        "channel {channel} (counted from 1) is zero or not finite outside the chosen lines, from which \
-         its noise is estimated: the sensor may be dead; leave it out, or state the noise level"
+        "channel {channel} (counted from 1) is zero or not finite on the lines that are not chosen, \
+         which determine its noise: the sensor may be dead; leave it out, or state the noise level (`noise`)"
     )]
     NoNoise {
         /// The channel, counted from 1.
@@ -170,10 +170,10 @@ pub enum ForceError {
         /// The value found, in the unit of that number.
         value: f64,
     },
-    /// An open record too long for the dense problem.
+    /// An open record has more unknowns than the limit.
     #[error(
-        "{unknowns} unknowns (samples × forces) are more than the {limit} an open record may \
-         have: take whole periods, a shorter window, or the Kalman smoother"
+        "the open record has {unknowns} unknowns (samples × forces), but at most {limit} are \
+         possible: take whole periods, a shorter window, or the Kalman smoother"
     )]
     TooLarge {
         /// Samples × forces.
@@ -183,8 +183,8 @@ pub enum ForceError {
     },
     /// The measured channels cannot show a force, at any frequency.
     #[error(
-        "at no frequency can the force on degree of freedom {} (counted from 1) be separated from the \
-         others in the measured channels: measure elsewhere, or name fewer forces",
+        "the measured channels cannot separate the force on degree of freedom {} (counted from 1) from the \
+         others at any frequency: measure elsewhere, or name fewer forces",
         dof + 1
     )]
     Unseen {
@@ -248,7 +248,9 @@ pub enum ForceError {
     #[error("no force reaches the measured channels, or all of them are zero: measure elsewhere")]
     Silent,
     /// Two force records have different numbers of channels.
-    #[error("the two forces to compare have {estimate} and {truth} channels")]
+    #[error(
+        "the two forces to compare need the same number of channels, got {estimate} and {truth}"
+    )]
     Compared {
         /// Channels of the estimate.
         estimate: usize,

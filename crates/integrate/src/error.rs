@@ -59,7 +59,8 @@ pub enum IntegrateError {
     },
     /// The forces within the steps differ from the force in number of samples or time step.
     #[error(
-        "the forces within the steps have {} at {got_dt} s, the force {expected} at {dt} s", message::count(*got, "sample"),
+        "the mid-step forces have {} with steps of {got_dt} s, but the force has {expected} with steps of {dt} s: \
+         they need the same sampling", message::count(*got, "sample"),
         got_dt = message::number(*got_dt), dt = message::number(*dt)
     )]
     MidStepSampling {
@@ -73,7 +74,9 @@ pub enum IntegrateError {
         dt: f64,
     },
     /// The scheme needs the force at an instant within the steps, but only samples were given.
-    #[error("{scheme} needs the force within each step: supply it, or choose held or linear")]
+    #[error(
+        "{scheme} needs the force within each step: supply it, or choose a held or linear force"
+    )]
     MidStepMissing {
         /// The scheme's name.
         scheme: String,
@@ -96,7 +99,7 @@ pub enum IntegrateError {
     /// The mass matrix M is singular, but the scheme solves the equation of motion for the
     /// acceleration.
     #[error(
-        "{scheme}: the mass matrix is singular (pivot {smallest:.1e} of its terms), so the acceleration \
+        "{scheme}: the mass matrix is singular (relative pivot {smallest:.1e}), so the acceleration \
          is not determined: every degree of freedom needs a mass; model rigid connections with fewer \
          degrees of freedom"
     )]
@@ -108,7 +111,8 @@ pub enum IntegrateError {
     },
     /// The effective mass matrix of the scheme is singular.
     #[error(
-        "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivot {smallest:.1e} of its terms)",
+        "{scheme}: the effective mass matrix is singular at Δt = {dt} s (relative pivot {smallest:.1e}): \
+         choose another step",
         dt = message::number(*dt)
     )]
     SingularEffectiveMass {
@@ -123,9 +127,10 @@ pub enum IntegrateError {
     /// The factors of a matrix need more memory than the limit.
     #[error(
         "the LU factors of the {} need at least {:.2} GB, more than the limit of {:.2} GB: the factors \
-         of a three-dimensional body have many additional entries. Use a coarser model, a scheme or a search that factors a diagonal matrix \
-         (central-difference with lumped masses), or raise the limit (`factor_memory_gb` of the system, \
-         `SparseSystem::with_factor_limit`); the time grows faster than the memory",
+         of a three-dimensional body have many additional entries. Use a coarser model, a scheme or \
+         search with a diagonal matrix (central-difference with lumped masses), or raise the limit \
+         (`factor_memory_gb` of the system, `SparseSystem::with_factor_limit`); the time then \
+         grows faster than the memory",
         message::count(*dof, "degree of freedom"), 1e-9 * *bytes as f64, 1e-9 * *limit as f64
     )]
     FactorsTooLarge {
@@ -138,7 +143,7 @@ pub enum IntegrateError {
     },
     /// The matrix K + σC + σ²M of a search for modes is singular.
     #[error(
-        "the dynamic stiffness of the {} at {omega} rad/s is singular (pivot {smallest:.1e} of its terms): \
+        "the dynamic stiffness of the {} at {omega} rad/s is singular (relative pivot {smallest:.1e}): \
          search for modes near another frequency",
         message::count(*dof, "degree of freedom"), omega = message::number(*omega)
     )]
@@ -153,7 +158,7 @@ pub enum IntegrateError {
     },
     /// The frequency near which modes are searched for is not positive and finite.
     #[error(
-        "modes are searched for near a positive frequency, got {omega} rad/s",
+        "the frequency near which modes are searched for must be positive and finite, got {omega} rad/s",
         omega = message::number(*omega)
     )]
     SearchFrequency {
@@ -162,8 +167,8 @@ pub enum IntegrateError {
     },
     /// Fewer modes than wanted converged to rounding accuracy.
     #[error(
-        "{found} of {} converged in a space of {vectors} vectors: ask for fewer, or for those near another \
-         frequency",
+        "only {found} of {} converged in a space of {vectors} vectors: ask for fewer modes, or for modes near \
+         another frequency",
         message::count(*wanted, "mode")
     )]
     ModesNotConverged {
@@ -201,7 +206,7 @@ pub enum IntegrateError {
     },
     /// A start from rest was requested, but the initial velocity is not zero.
     #[error(
-        "the start from rest needs zero initial velocity, component {component} is {velocity} m/s",
+        "the start from rest needs zero initial velocity, but component {component} is {velocity} m/s",
         velocity = message::number(*velocity)
     )]
     NotAtRest {
@@ -212,8 +217,9 @@ pub enum IntegrateError {
     },
     /// No unique response repeats with the period of the force: I − Φ is singular up to rounding.
     #[error(
-        "no response that repeats every {period} s is unique, because a free motion has this period, too \
-         (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})",
+        "the response that repeats every {period} s is not unique, because a free motion also has this period \
+         (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e}): add damping, or choose \
+         another period",
         period = message::number(*period)
     )]
     NoPeriodicState {
@@ -257,7 +263,7 @@ pub enum IntegrateError {
     },
     /// The nonlinear equation of a step has no solution that Newton's method finds.
     #[error(
-        "the nonlinear forces cannot be balanced at t = {time} s: Newton's method leaves an error of \
+        "the nonlinear equation of motion was not solved at t = {time} s: Newton's method leaves an error of \
          {residual:.1e} m/s² in the accelerations; choose smaller steps",
         time = message::number(*time)
     )]

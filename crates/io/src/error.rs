@@ -37,7 +37,7 @@ pub enum IoError {
         /// The input.
         input: String,
     },
-    /// The gzip around the file is damaged.
+    /// The gzip data of the file are damaged.
     #[error("{}", Message(format_args!("{file} is damaged or cut short (gzip: {source})")))]
     Gzip {
         /// The file.
@@ -113,15 +113,16 @@ pub enum IoError {
         limit: Limit,
     },
     /// The file is JSON, which contains descriptions and reports but no record.
-    #[error("{}", Message(format_args!("{file} is JSON, not a table of samples; simulate, sweep and stability read the description of an \
-         experiment, and modes, predict and force --system read a machine or a result of identify --json")))]
+    #[error("{}", Message(format_args!("{file} is JSON, not a table of samples; simulate, sweep and stability \
+         read the description of an experiment; modes, predict and force (as `system`) read a machine or a \
+         saved result")))]
     JsonRecord {
         /// The file.
         file: String,
     },
     /// Text precedes the table.
     #[error("{}", Message(format_args!("{file}: the table seems to begin on line {line}, with {}; if so, skip the lines \
-         above it with --skip-lines {}",
+         above it with `skip_lines` {}",
         message::count(*fields, "field"),
         line - 1)))]
     AboveTable {
@@ -244,7 +245,7 @@ pub enum IoError {
     },
     /// A column is in a unit of another quantity.
     #[error("{}", Message(format_args!(
-        "{file}, column {column}: its unit {unit} is one of {quantity}, {wanted} is needed"
+        "{file}, column {column}: its unit {unit} is a unit of {quantity}, but a unit of {wanted} is needed"
     )))]
     OtherQuantity {
         /// The file.
@@ -273,8 +274,8 @@ pub enum IoError {
         factor: f64,
     },
     /// A column has two units, two factors, or both.
-    #[error("{}", Message(format_args!("column {column} has two units or scales that were set: a `unit` or a `scale`, the \
-        factor to SI units, is enough")))]
+    #[error("{}", Message(format_args!("two units or scales were set for column {column}: set only one, a `unit` or a \
+        `scale` (the factor to SI units)")))]
     TwoUnits {
         /// Number and name of the column.
         column: String,
@@ -330,8 +331,9 @@ pub enum IoError {
         column: String,
     },
     /// Columns of one record were sampled at different instants.
-    #[error("{}", Message(format_args!("{file}: the columns of a record need the same time axis; {first} has steps of {first_step} \
-         s from {first_start} s, {second} of {second_step} s from {second_start} s",
+    #[error("{}", Message(format_args!("{file}: the columns of a record need the same time axis; column {first} \
+         begins at {first_start} s with steps of {first_step} s, column {second} at {second_start} s with steps \
+         of {second_step} s",
         first_start = message::number(*first_start),
         first_step = message::number(*first_step),
         second_start = message::number(*second_start),
@@ -451,7 +453,7 @@ pub enum IoError {
         /// Text of the choice.
         lines: String,
     },
-    /// The columns of a text are not those of frequency responses.
+    /// A text has no columns of frequency responses.
     #[error("{}", Message(format_args!("{file} has no frequency response: name columns h_1_1_real and h_1_1_imaginary, or \
          h_1_1_magnitude and h_1_1_phase_deg (response, then force); its columns are {available}")))]
     Responses {

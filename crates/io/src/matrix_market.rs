@@ -172,7 +172,7 @@ impl Header {
             "skew-symmetric" => Symmetry::SkewSymmetric,
             _ => {
                 return Err(lines.malformed(
-                    "general, symmetric and skew-symmetric are the symmetries of real matrices",
+                    "the symmetry (fifth word of the first line) must be general, symmetric or skew-symmetric",
                 ));
             }
         };
@@ -345,7 +345,7 @@ mod tests {
                 "%%MatrixMarket matrix coordinate pattern general\n".into(),
                 "real, double or integer",
             ),
-            ("%%MatrixMarket matrix coordinate real hermitian\n".into(), "symmetries"),
+            ("%%MatrixMarket matrix coordinate real hermitian\n".into(), "the symmetry"),
             (banner.into(), "line 2: the line with the size"),
             (format!("{banner}2 3 1\n"), "line 2: the matrix of a machine has as many rows"),
             (format!("{banner}2 2\n"), "line 2: rows, columns and number"),

@@ -95,8 +95,8 @@ fn frequencies_of_orders(table: &Table, orders: usize) -> Result<Vec<f64>, IoErr
     let Some((speed, in_hz)) = speed else {
         return Err(IoError::Description {
             file: table.file().into(),
-            what: "the frequencies are orders, multiples of a speed of rotation that it does not state: \
-                   multiply them by it, or add a column speed_hz or speed_rpm"
+            what: "the frequencies are orders (multiples of the speed of rotation), but the speed is not stated: \
+                   multiply the orders by the speed, or add a column speed_hz or speed_rpm"
                 .into(),
         });
     };

@@ -108,7 +108,7 @@ impl Described {
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
         "the machine has {dof} degrees of freedom in sparse matrices, too many for a computation that needs all entries \
-         of the matrices: simulate computes its response, stability the largest steps, and modes --modes COUNT \
+         of the matrices: simulate computes its response, stability the largest steps, and modes with `modes` \
          some of its modes; for other computations reduce it to the measured degrees of freedom"
     );
     IoError::Description { file: file.into(), what }
@@ -226,7 +226,7 @@ impl SystemSource {
         match self {
             Self::Described(system) => system.system(file),
             Self::File(path) => {
-                let what = format!("the system in {} is not read", path.display());
+                let what = format!("the system in {} has not been read", path.display());
                 Err(IoError::Description { file: file.into(), what })
             }
         }

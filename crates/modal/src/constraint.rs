@@ -72,7 +72,7 @@ impl ModalConstraint {
                 let value = f64::from(*derivative);
                 Err(ModalError::Setting { setting: "constraints", value, required })
             }
-            Self::RealShapes { .. } if inputs == 0 => refused(0, "used with measured forces"),
+            Self::RealShapes { .. } if inputs == 0 => refused(0, "at least one measured force"),
             Self::RealShapes { .. } => Ok(()),
             Self::Reciprocity { points } => {
                 if points.len() < 2 {

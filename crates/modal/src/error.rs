@@ -13,7 +13,7 @@ pub enum ModalError {
     NoOutput,
     /// There is neither an input nor an open record.
     #[error(
-        "there is neither an input nor an open record, so the modes of these data are not excited"
+        "the data have no excitation of the modes: neither an input nor an open record was given"
     )]
     NoExcitation,
     /// The lines are fewer than the unknowns of one mode.
@@ -38,9 +38,9 @@ pub enum ModalError {
         /// Indices of the inputs.
         inputs: Vec<usize>,
     },
-    /// Inputs that are multiples of one another on every line.
+    /// An input is a combination of the other inputs on every line.
     #[error(
-        "input {input} is a multiple of the other inputs (independent share {own_share:.1e}): their responses \
+        "input {input} is a combination of the other inputs (independent share {own_share:.1e}): their responses \
          cannot be separated; record a test in which it differs, or leave it out"
     )]
     DependentInputs {
@@ -51,7 +51,7 @@ pub enum ModalError {
         own_share: f64,
     },
     /// No mode is significant.
-    #[error("no mode in {from_hz:.6} Hz to {to_hz:.6} Hz: {} candidates, none significant", dropped.len())]
+    #[error("no mode between {from_hz:.6} and {to_hz:.6} Hz: none of {} candidates is significant", dropped.len())]
     NoMode {
         /// Lowest frequency, in Hz.
         from_hz: f64,
@@ -71,7 +71,7 @@ pub enum ModalError {
         to_hz: f64,
     },
     /// A setting is out of its range.
-    #[error("`{setting}` is {value}, but must be {required}")]
+    #[error("`{setting}`: expected {required}, got {value}")]
     Setting {
         /// Name of the setting.
         setting: &'static str,

@@ -188,7 +188,7 @@ impl ModalEstimate {
             return Err(refused(scales.len() as f64, "one for each mode"));
         }
         if let Some(bad) = scales.iter().find(|scale| !(scale.is_finite() && **scale > 0.0)) {
-            return Err(refused(*bad, "positive and finite"));
+            return Err(refused(*bad, "a positive and finite scale"));
         }
         let modes = self.modes.iter_mut().zip(&mut self.parameters);
         for ((mode, parameters), scale) in modes.zip(scales) {

@@ -139,7 +139,7 @@ fn check_settings(settings: &ModalSettings) -> Result<(), ModalError> {
     }
     let bad = settings.near_hz.iter().find(|hz| !(hz.is_finite() && **hz > 0.0));
     bad.map_or(Ok(()), |value| {
-        let required = "positive and finite";
+        let required = "a positive and finite frequency";
         Err(ModalError::Setting { setting: "near_hz", value: *value, required })
     })
 }

@@ -131,7 +131,7 @@ pub enum ModelError {
         dof: usize,
     },
     /// A word is not one of the choices.
-    #[error("there is no {what} `{name}`: {known}")]
+    #[error("there is no {what} `{name}`: choose one of {known}")]
     UnknownName {
         /// Kind of item to be named.
         what: &'static str,
@@ -157,7 +157,7 @@ pub enum ModelError {
     },
     /// No entry of M, C or K has this name.
     #[error(
-        "a system of {} has no parameter `{name}`: {}",
+        "a system of {} has no parameter `{name}`: its parameters are {}",
         message::count(*dof, "degree of freedom"),
         names(*dof)
     )]
@@ -211,7 +211,10 @@ pub enum ModelError {
     },
     /// The number of coefficients differs from the number of nonlinear terms, or a coefficient is
     /// not finite.
-    #[error("{} for {}: one finite number for each", message::count(*got, "coefficient"), message::count(*terms, "nonlinear term"))]
+    #[error(
+        "{} for {}: give one finite number for each",
+        message::count(*got, "coefficient"), message::count(*terms, "nonlinear term")
+    )]
     Coefficients {
         /// Number of finite coefficients.
         got: usize,
@@ -219,7 +222,7 @@ pub enum ModelError {
         terms: usize,
     },
     /// The system does not have this mode.
-    #[error("there is no mode {mode}: {} without damping", message::count(*modes, "oscillating mode"))]
+    #[error("there is no mode {mode}: the system without damping has {}", message::count(*modes, "oscillating mode"))]
     NoSuchMode {
         /// Requested mode, counted from 1.
         mode: usize,

@@ -136,7 +136,7 @@ mod tests {
         );
         assert_eq!(
             Parameter::named("k33", 2).unwrap_err().to_string(),
-            "a system of 2 degrees of freedom has no parameter `k33`: m11 … k22"
+            "a system of 2 degrees of freedom has no parameter `k33`: its parameters are m11 … k22"
         );
         assert!(Parameter::named("k11", 1).is_err());
     }

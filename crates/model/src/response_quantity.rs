@@ -102,7 +102,7 @@ mod tests {
         }
         assert_eq!(
             "speed".parse::<ResponseQuantity>().unwrap_err().to_string(),
-            "there is no response quantity `speed`: displacement, velocity, acceleration"
+            "there is no response quantity `speed`: choose one of displacement, velocity, acceleration"
         );
     }
 }

@@ -30,7 +30,7 @@ pub enum NumericsError {
         value: f64,
     },
     /// The sum of squares of the data overflows.
-    #[error("the squares of the data overflow: use other units, values below 1e150")]
+    #[error("the squares of the data overflow: use units in which the values are below 1e150")]
     Overflow,
     /// The squares of the data underflow.
     #[error(
@@ -59,14 +59,14 @@ pub enum NumericsError {
         /// Unknowns per right-hand side.
         unknowns: usize,
     },
-    /// Every unknown is already known.
-    #[error("there is nothing to estimate: every entry of M, C and K is known")]
+    /// Every entry of M, C and K is known.
+    #[error("every entry of M, C and K is known: at least one must be unknown")]
     NothingUnknown,
-    /// A matrix has no real logarithm: as a transition from sample to sample it does not belong to
-    /// a continuous system.
+    /// A transition matrix from sample to sample has no real logarithm, so it does not belong to a
+    /// system in continuous time.
     #[error(
-        "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \
-         has no logarithm, and no machine that is continuous in time has this motion: either a mode \
+        "the transition matrix from sample to sample has the eigenvalue {eigenvalue:.3e}, which is not \
+         positive, so it does not belong to a system in continuous time: either a mode \
          oscillates near or above half the sampling rate (sample faster), or a mode decays within one \
          sample, or noise hides a mode"
     )]
@@ -117,7 +117,7 @@ pub enum NumericsError {
         norm: f64,
     },
     /// A confidence level is outside (0, 1).
-    #[error("a confidence level lies between 0 and 1, got {level}")]
+    #[error("a confidence level must be between 0 and 1, got {level}")]
     Level {
         /// Given level, a probability.
         level: f64,

@@ -121,7 +121,7 @@ pub enum PlotError {
         path: PathBuf,
     },
     /// A file could not be written.
-    #[error("{} cannot be written", path.display())]
+    #[error("{} cannot be written: {source}", path.display())]
     Write {
         /// The file name.
         path: PathBuf,

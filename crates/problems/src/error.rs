@@ -9,8 +9,8 @@ use mechid_signal::SignalError;
 pub enum ProblemError {
     /// No periodic response exists, or it is not unique.
     #[error(
-        "no unique periodic response over {period} s \
-         (reciprocal condition about {reciprocal_condition:.1e} of I − Φᴺ, with the transition matrix Φᴺ over it): \
+        "there is no unique response with the period {period} s (I − Φᴺ has a reciprocal condition of about \
+         {reciprocal_condition:.1e}, where Φᴺ is the transition matrix over the period): \
          an undamped mode lies on a spectral line of the period, or the response overflows"
     )]
     NoPeriodicMotion {

@@ -110,13 +110,13 @@ def test_responses_of_arrays_and_of_a_file_are_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"response": np.ones((3, 2))}, "has not one entry, or one matrix"),
+        ({"response": np.ones((3, 2))}, "needs one entry, or one matrix"),
         ({"response": [1.0, 2.0, np.nan]}, "`response` has a value that is not finite"),
         ({"std_error": [0.1, 0.1]}, "`std_error` has the shape"),
         ({"coherence": np.ones((3, 2))}, "`coherence` of shape"),
         ({"response": [1.0, 2.0, 3.0]}, "`response` holds float64, one part or the magnitude"),
         ({"response": np.array([1, 2, 3])}, "give complex numbers, with real and imaginary parts"),
-        ({"points": ["x", "y"]}, "2 names of points and 1 of forces for 1 × 1"),
+        ({"points": ["x", "y"]}, "2 names of points and 1 of forces, but `response` has 1 × 1"),
     ],
 )
 def test_responses_of_other_shapes_are_refused(arguments: dict[str, Any], said: str) -> None:

@@ -42,7 +42,7 @@ pub enum SignalError {
         /// The value found, in the unit of the record.
         value: f64,
     },
-    /// A record is too short for what is asked of it.
+    /// A record is too short for the computation.
     #[error("the record has {}, but at least {needed} are needed", message::count(*samples, "sample"))]
     TooShort {
         /// Number of samples of the record.
@@ -75,7 +75,7 @@ pub enum SignalError {
         channels: usize,
     },
     /// The spectrum has another number of lines than its sampling.
-    #[error("{} where the sampling has {expected}", message::count(*got, "line"))]
+    #[error("the spectrum has {}, but its sampling has {expected}", message::count(*got, "line"))]
     SpectrumLength {
         /// Lines given.
         got: usize,
@@ -135,7 +135,7 @@ pub enum SignalError {
         line: usize,
     },
     /// A list does not have one entry per line.
-    #[error("{} but {got} {what}", message::count(*lines, "line"))]
+    #[error("{}, but {got} {what}: give one for each line", message::count(*lines, "line"))]
     PerLine {
         /// Name of the entries.
         what: &'static str,
@@ -228,9 +228,9 @@ pub enum SignalError {
         high: f64,
     },
     /// Too few samples or lines for the task.
-    #[error("{what} needs at least {least}, got {got}")]
+    #[error("{what}: expected at least {least}, got {got}")]
     TooFew {
-        /// Task, and the kind of samples or lines it needs.
+        /// Name of the items counted.
         what: &'static str,
         /// Number needed.
         least: usize,

@@ -78,15 +78,11 @@ pub fn band(sampling: Sampling, low_hz: f64, high_hz: f64) -> Vec<usize> {
 /// [`SignalError::TooFew`] if there are no inputs, or fewer lines than inputs.
 pub fn interleaved(lines: &[usize], inputs: usize) -> Result<Vec<Vec<usize>>, SignalError> {
     if inputs == 0 {
-        return Err(SignalError::TooFew {
-            what: "a set of interleaved lines, in inputs,",
-            least: 1,
-            got: 0,
-        });
+        return Err(SignalError::TooFew { what: "inputs of interleaved lines", least: 1, got: 0 });
     }
     if lines.len() < inputs {
         let got = lines.len();
-        return Err(SignalError::TooFew { what: "one line per input", least: inputs, got });
+        return Err(SignalError::TooFew { what: "lines, one per input", least: inputs, got });
     }
     let of = |k: usize| lines.iter().skip(k).step_by(inputs).copied().collect();
     Ok((0..inputs).map(of).collect())

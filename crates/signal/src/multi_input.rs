@@ -60,7 +60,7 @@ pub fn orthogonal(
 ) -> Result<Vec<Vec<Multisine>>, SignalError> {
     let n = inputs.len();
     let Some(first) = inputs.first() else {
-        return Err(SignalError::TooFew { what: "an orthogonal set of inputs", least: 1, got: 0 });
+        return Err(SignalError::TooFew { what: "inputs of an orthogonal set", least: 1, got: 0 });
     };
     if let Some(input) = inputs.iter().position(|m| m.lines() != first.lines()) {
         return Err(SignalError::DifferentLines { input });

@@ -153,7 +153,7 @@ impl FrequencyData {
             size("columns of a frequency response matrix", force_dof.len(), shape.1)?;
         }
         if let Some(&got) = force_dof.iter().find(|dof| **dof >= n) {
-            let what = "index of the degree of freedom of a force, at most";
+            let what = "largest index of a forced degree of freedom";
             return Err(NumericsError::Size { what, expected: n.saturating_sub(1), got }.into());
         }
         let mut combined: Option<Self> = None;
@@ -246,8 +246,16 @@ impl FrequencyData {
             check_size("rows up to the last of a pulse", rows, pulse.rows.end)?;
             let samples = pulse.sampling.len();
             for (what, expected, got) in [
-                ("force channel with noise, below", self.dof(), pulse.channel),
-                ("sample with noise, below", samples, pulse.samples.end.saturating_sub(1)),
+                (
+                    "index of a force channel with noise, below this number",
+                    self.dof(),
+                    pulse.channel,
+                ),
+                (
+                    "index of a sample with noise, below this number",
+                    samples,
+                    pulse.samples.end.saturating_sub(1),
+                ),
             ] {
                 if got >= expected {
                     return Err(NumericsError::Size { what, expected, got }.into());

@@ -169,7 +169,7 @@ impl BearingData {
             .into_iter()
             .partition(|line| rotates(*line as f64 * spacing_hz, how.rotation_hz, spacing_hz));
         if kept.is_empty() {
-            let why = "every line lies on a multiple of the rotation: excite lines between them";
+            let why = "every line is at a multiple of the rotation frequency: excite lines between these multiples";
             return Err(AnalysisError::Setting { setting: "lines", why: why.into() });
         }
         let lines = Lines::new(period, kept)?;

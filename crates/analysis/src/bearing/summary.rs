@@ -330,7 +330,7 @@ impl BearingSummary {
             text += &format!(", {} N load", compact(load, 6));
         }
         if !self.baseline.is_empty() {
-            text += &format!("\nless the baseline {}", self.baseline.join(", "));
+            text += &format!("\nminus the baseline {}", self.baseline.join(", "));
         }
         text += &format!(
             "\nmaximum likelihood on f − M a = H d, M = {} kg; {} lines{}\n\n",

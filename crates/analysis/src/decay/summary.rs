@@ -205,8 +205,9 @@ impl DecaySummary {
         let mut remarks = Vec::new();
         if !mode.decays() {
             remarks.push(format!(
-                "{name} does not decay: its growth rate is {} ± {} 1/s. A steady disturbance (mains, a \
-                 running machine), a lightly damped mode in a short record, or a force that still acts",
+                "{name} does not decay: its growth rate is {} ± {} 1/s. Possible causes: a steady \
+                 disturbance (mains, a running machine), a lightly damped mode in a short record, \
+                 or a force that still acts",
                 significant(growth.value, 2),
                 significant(growth.standard_error, 2)
             ));
@@ -221,14 +222,14 @@ impl DecaySummary {
         }
         if hz > 0.5 * HIGH * self.sample_rate_hz {
             remarks.push(format!(
-                "{name} is near half the sampling rate, {} Hz: it may be the image of a higher mode",
+                "{name} is near half the sampling rate, {} Hz: it may be the alias of a higher mode",
                 compact(0.5 * self.sample_rate_hz, 6)
             ));
         }
         let zeta = mode.mode.damping_ratio.value;
         if zeta > HEAVY {
             remarks.push(format!(
-                "{name} has a damping ratio of {} %: hardly an oscillation, it may represent an overdamped \
+                "{name} has a damping ratio of {} % and hardly oscillates: it may represent an overdamped \
                  mode, which is not part of the model",
                 significant(100.0 * zeta, 2)
             ));

@@ -74,7 +74,7 @@ fn from_hits(
     }
     let mut separate = from_windows(measurement, rule, how, Windows::Separate)?;
     separate.remarks.push(format!(
-        "{}: every hit was fitted with its own transient, because the noise of so many pulses in one record takes \
+        "{}: every hit was fitted with its own transient, because a joint fit of all pulses with their noise needs \
          too much memory; a smaller band or fewer hits may give smaller errors",
         separate.tests.first().map_or("", |test| &test.file)
     ));

@@ -421,7 +421,7 @@ impl fmt::Display for Trends {
         if outliers().next().is_some() {
             writeln!(
                 f,
-                "\noutliers, more than {OUTLIER} standard deviations from the level of their records:"
+                "\noutliers, more than {OUTLIER} standard deviations from the baseline (with its steps and drifts):"
             )?;
         }
         for (series, point) in outliers().take(LISTED) {

@@ -300,7 +300,7 @@ impl FromStr for Segmentation {
             Ok(overlap_percent) if (0.0..100.0).contains(&overlap_percent) => {
                 Ok(Self { segment, window: window?, overlap_percent })
             }
-            _ => Err(format!("an overlap lies from 0 to below 100 %, got {}", parts[1])),
+            _ => Err(format!("an overlap must be at least 0 and below 100 %, got {}", parts[1])),
         }
     }
 }
@@ -356,7 +356,7 @@ impl Segmentation {
         let Some(len) = self.segment else { return Ok(Segments::Periods(period)) };
         if !(0.0..100.0).contains(&self.overlap_percent) {
             let why = format!(
-                "an overlap lies from 0 to below 100 %, got {}",
+                "an overlap must be at least 0 and below 100 %, got {}",
                 mechid_signal::message::number(self.overlap_percent)
             );
             return Err(AnalysisError::Setting { setting: "segment_overlap", why });
@@ -462,7 +462,7 @@ impl Responses {
         let forces = if listed.len() == 1 { "force" } else { "forces" };
         let idle = (!listed.is_empty()).then(|| {
             format!(
-                "{of_record}{forces} {} taken as noise of the channel: weak, and without coherence with \
+                "{of_record}only noise in {forces} {}: weak, and without coherence with \
                  the other forces and the response",
                 listed.join(", ")
             )

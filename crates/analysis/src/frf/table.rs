@@ -218,7 +218,7 @@ impl FrfTable {
         let kinds = measured.responses().into_iter().map(|(measured, _)| measured);
         let unused = kinds.filter(|measured| *measured != kind).map(|unused| {
             format!(
-                "the responses are those of the {kind}; the {unused} is not used: name it alone"
+                "the responses are those of the {kind}; the {unused} is not used: to use it, name it alone"
             )
         });
         let remarks = remarks.chain(unused);
@@ -311,7 +311,7 @@ impl FrfTable {
             heading(&self.hits, &rate_hz)
         };
         text += &format!(
-            "{} from {}, worth {} averages; {lines}\n\n",
+            "{} from {}, equivalent to {} averages; {lines}\n\n",
             self.estimator,
             self.windows_text(),
             compact(self.segments.averages, 4),

@@ -52,7 +52,8 @@ impl FromStr for AcCoupling {
         });
         parsed.ok_or_else(|| {
             format!(
-                "a coupled channel is written as its name and the corner frequency in Hz, such as a1=0.5, not `{text}`"
+                "an AC-coupled channel is written as its name and the corner frequency in Hz, such as \
+                 a1=0.5, not `{text}`"
             )
         })
     }

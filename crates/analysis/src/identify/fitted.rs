@@ -189,14 +189,14 @@ impl Fitted {
         let error = 1.0 / (2.0 * spare as f64).sqrt();
         (error > UNCERTAIN_ERROR).then(|| {
             let how_few = match spare {
-                0 => "no equation is left that shows the errors".to_owned(),
+                0 => "no equation remains to estimate the errors".to_owned(),
                 _ => format!(
                     "the standard errors themselves are known to {} % only",
                     significant(100.0 * error, 2)
                 ),
             };
             format!(
-                "{} for {}: {how_few}, and the checks can hardly fail; use a longer record",
+                "{} for {}: {how_few}, and even a wrong model may pass the checks; use a longer record",
                 message::count(self.equations, "equation"),
                 message::count(of_one, "unknown")
             )

@@ -134,8 +134,8 @@ impl ForceNoise {
         };
         let of = match source {
             Some(ForceNoiseSource::Stated) => "as stated",
-            Some(ForceNoiseSource::BetweenHits) => "as between the hits",
-            Some(ForceNoiseSource::AboveBand) | None => "as above the excited band",
+            Some(ForceNoiseSource::BetweenHits) => "estimated between the hits",
+            Some(ForceNoiseSource::AboveBand) | None => "estimated above the excited band",
         };
         let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
         let high = levels.iter().copied().fold(0.0, f64::max);

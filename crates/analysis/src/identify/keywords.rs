@@ -264,7 +264,7 @@ impl Keywords {
             self.force_noise.is_some() || self.hits.is_some() || !acquisition.is_default();
         match self.extent.or(is_open.then_some(Extent::Open)) {
             Some(Extent::Open) if !is_likelihood => {
-                Err(refused("method", "open records and hits take maximum-likelihood"))
+                Err(refused("method", "open records and hits need maximum-likelihood"))
             }
             Some(Extent::WholePeriod) if self.force_noise.is_some() => Err(refused(
                 "force_noise",
@@ -300,12 +300,12 @@ impl Keywords {
             Some(Method::Instrumental) => {
                 return Err(refused(
                     "method",
-                    "nonlinear terms take least-squares or maximum-likelihood",
+                    "nonlinear terms need least-squares or maximum-likelihood",
                 ));
             }
         };
         if self.extent == Some(Extent::Open) && self.method == Some(Method::LeastSquares) {
-            return Err(refused("method", "open records take maximum-likelihood"));
+            return Err(refused("method", "open records need maximum-likelihood"));
         }
         let searched = |constant| self.search.contains(&constant);
         let search = ShapeConstants {

@@ -232,8 +232,8 @@ fn remarks(first: &Block, estimated: &NonlinearEstimate) -> Vec<String> {
     let mut remarks = one_motion_of(first);
     if estimated.standard_errors() == StandardErrors::White {
         remarks.push(
-            "the record is too short for standard errors from the scatter of blocks of time: they \
-             assume a white residual"
+            "the record is too short to estimate standard errors from the scatter of blocks of time: the \
+             standard errors assume a white residual"
                 .into(),
         );
     }

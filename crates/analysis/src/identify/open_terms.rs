@@ -57,7 +57,8 @@ pub(super) fn fit(
         discretisation: Discretisation::FirstOrderHold,
         extent: Extent::Open,
     };
-    let of_start = "the windows are not whole periods: the simulated response was fitted to their samples, each with its own initial state";
+    let of_start = "the windows are not whole periods: the simulated response was fitted to the samples of each \
+                    window, with its own initial state";
     Ok(Fitted {
         equations: estimate.equations() / unknowns.dof(),
         before_all: linear.before_all,
@@ -103,8 +104,8 @@ pub(super) fn no_period(records: &[Windowed]) -> Result<Option<AnalysisError>, A
         let looked = steady_periods(&held.force, held.response().0, held.period)?;
         if looked.iter().any(|finding| finding.verdict() > Verdict::Good) {
             let why = format!(
-                "candidates, delay, phase and weights of lines are for whole periods, but {} is not whole \
-                 periods: its end does not meet its beginning",
+                "candidates, delay, phase and weights of lines need whole periods, but {} does not consist of \
+                 whole periods: its end does not meet its beginning",
                 held.file
             );
             return Ok(Some(AnalysisError::Setting { setting: "nonlinear", why }));

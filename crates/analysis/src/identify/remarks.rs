@@ -12,11 +12,12 @@ pub(super) fn noise_remark(periods: usize, shows: bool, models: &[NoiseModel]) -
     let model = distinct.join("; ");
     match (periods, shows) {
         (0 | 1, _) => format!(
-            "one period does not show its noise: it was estimated from the residual, for the response alone; \
-             noise spectrum: {model}"
+            "one period does not show its noise: the noise was estimated from the residual, as noise on the \
+             response alone; noise spectrum: {model}"
         ),
         (_, false) => format!(
-            "the periods differ by rounding only: the noise was estimated from the residual, for the response alone; noise spectrum: {model}"
+            "the periods differ by rounding only: the noise was estimated from the residual, as noise on the \
+             response alone; noise spectrum: {model}"
         ),
         (periods, true) => format!("noise spectrum, from {periods} periods: {model}"),
     }
@@ -26,5 +27,5 @@ pub(super) fn noise_remark(periods: usize, shows: bool, models: &[NoiseModel]) -
 pub fn one_motion_of(measured: &Block) -> Vec<String> {
     let unused = measured.responses().len() > 1;
     let kind = measured.response().1;
-    Vec::from_iter(unused.then(|| format!("of the motions measured, the {kind} was used")))
+    Vec::from_iter(unused.then(|| format!("of the measured motions, only the {kind} was used")))
 }

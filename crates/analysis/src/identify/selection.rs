@@ -57,7 +57,8 @@ impl SelectionSummary {
             Criterion::Information => "information criterion",
             Criterion::HeldOut => "records held out",
         };
-        let mut rows = vec![["term", "force left", "criterion", ""].map(str::to_owned).to_vec()];
+        let mut rows =
+            vec![["term", "residual force", "criterion", ""].map(str::to_owned).to_vec()];
         let steps = self.steps.iter().map(|row| match &row.added {
             None => (row, ""),
             Some(name) if self.removed.contains(name) => (row, "removed: may be zero"),

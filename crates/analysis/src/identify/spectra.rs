@@ -288,8 +288,8 @@ pub(super) fn unsaid_period(record: &Windowed) -> Option<String> {
     let Repetition { period, mismatch } = repetition(force).filter(|_| held.period == len)?;
     (len >= 2 * period && len % period == 0).then(|| {
         format!(
-            "the force of {} repeats every {period} samples, to {} % of its RMS: with `period` {period} the {} periods \
-             are averaged, and their scatter shows the noise",
+            "the force of {} repeats every {period} samples, within {} % of its RMS: with `period` {period} the {} \
+             periods are averaged, and their scatter shows the noise",
             held.file,
             significant(100.0 * mismatch, 2),
             len / period

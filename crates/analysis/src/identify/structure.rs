@@ -65,13 +65,13 @@ impl FromStr for Form {
         }
         let Some((name, value)) = text.split_once('=') else {
             let words = WORDS.map(|(word, _)| word).join(", ");
-            return Err(format!("\"{text}\" is none of {words}, and no entry such as k13=0"));
+            return Err(format!("\"{text}\" is neither one of {words} nor an entry such as k13=0"));
         };
         match value.trim().parse::<f64>() {
             Ok(value) if value.is_finite() => {
                 Ok(Self::Entry { name: name.trim().to_owned(), value })
             }
-            _ => Err(format!("\"{value}\" is no value of {name}")),
+            _ => Err(format!("\"{value}\" is not a value of {name}")),
         }
     }
 }
@@ -211,11 +211,11 @@ mod tests {
         for (text, message) in [
             (
                 "chains",
-                "\"chains\" is none of symmetric, chain, diagonal-mass, proportional-damping, and no entry \
+                "\"chains\" is neither one of symmetric, chain, diagonal-mass, proportional-damping nor an entry \
                  such as k13=0",
             ),
-            ("k13=soft", "\"soft\" is no value of k13"),
-            ("k13=inf", "\"inf\" is no value of k13"),
+            ("k13=soft", "\"soft\" is not a value of k13"),
+            ("k13=inf", "\"inf\" is not a value of k13"),
         ] {
             assert_eq!(text.parse::<Structure>().unwrap_err(), message);
         }

@@ -242,7 +242,8 @@ impl IdentificationSummary {
         if let Some(part) = unexplained {
             let model = if self.nonlinear.is_some() { "model" } else { "linear model" };
             doubts.push(format!(
-                "the {model} leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a missing degree of freedom, or a record that is not periodic",
+                "the {model} does not explain {:.1} % of the motion: noise, a nonlinearity, a \
+                 missing degree of freedom, or a record that is not periodic",
                 100.0 * part
             ));
         }
@@ -414,7 +415,7 @@ impl FitRow {
         let mut rows = Vec::new();
         rows.extend(self.residual_name().map(|name| vec![name.into(), percent(self.nrmse)]));
         if let Some(unexplained) = self.unexplained_motion {
-            let name = format!("motion the {model} leaves unexplained");
+            let name = format!("motion not explained by the {model}");
             rows.push(vec![name, percent(unexplained)]);
         }
         rows.extend([
@@ -447,7 +448,8 @@ pub(crate) fn least_squares_remark(fitted: &Fitted, checks: &[CheckRow]) -> Opti
     let explained = checks.iter().any(CheckRow::is_bad);
     (fitted.least_squares && warned(When::After) && !warned(When::Before) && !explained).then(|| {
         "least squares treats the measured response as exact, and noise on it biases the parameters; \
-         this alone may explain the warnings after the fit. Repeat with `method` maximum-likelihood: warnings that remain concern the machine"
+         this alone may explain the warnings after the fit. Repeat with `method` maximum-likelihood: \
+         warnings that remain concern the model"
             .into()
     })
 }

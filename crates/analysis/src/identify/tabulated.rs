@@ -135,7 +135,8 @@ fn with_reciprocal<'a>(
     }
     completed.retain(|f| whole.contains(&f.reference));
     let remark = format!(
-        "{}: by reciprocity the responses at {} to forces at other points are used as the responses at these points to a force there",
+        "{0}: by reciprocity the responses at {1} to forces at other points are used as \
+         the responses at these points to a force at {1}",
         table.file,
         whole.join(", ")
     );

@@ -130,7 +130,7 @@ impl fmt::Display for Unscaled {
         write!(
             f,
             "no force acts on {forced}, and {their}: the modes do not depend on that, but {rows} of M, C and K \
-             {have} no scale then, and {they} not given; state masses (`mass`), or apply a force {there}"
+             {have} an unknown scale, so {they} not given; state masses (`mass`), or apply a force {there}"
         )
     }
 }

@@ -123,7 +123,7 @@ impl Validation {
     pub fn text(&self) -> String {
         let (first, last) = (self.first_sample, self.last_sample);
         let mut rows = vec![vec![
-            format!("predicted of {}, samples {first} to {last}", self.file),
+            format!("prediction of {}, samples {first} to {last}", self.file),
             "fit".into(),
         ]];
         for share in &self.channels {

@@ -197,7 +197,7 @@ impl Inspection<'_> {
         let omitted: Vec<String> = wanted.map(|s| table.label(s.column)).collect();
         (!omitted.is_empty()).then(|| {
             format!(
-                "the picture shows {DRAWN_COLUMNS} columns; not drawn, unless `columns` chooses them: {}",
+                "the picture shows {DRAWN_COLUMNS} columns; to draw others, choose them with `columns`: {}",
                 omitted.join(", ")
             )
         })

@@ -130,7 +130,7 @@ impl RecordSummary {
                 compact(s.step_s, 6),
                 compact(s.duration_s, 6),
                 s.stated_by.as_ref().map_or(String::new(), |number| format!(
-                    "; by {number} of the file, no time column"
+                    "; from {number} in the file, no time column"
                 ))
             ),
             None => "\nno time axis: give `time` or `sample_rate`\n".into(),

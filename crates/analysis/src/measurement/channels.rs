@@ -147,7 +147,7 @@ impl Channels {
     pub fn struck(&self, dofs: &[usize], records: usize) -> Result<Vec<Self>, AnalysisError> {
         let wrong = |why: String| AnalysisError::Setting { setting: "struck", why };
         let [force] = &self.force[..] else {
-            return Err(wrong(format!("one force column, not {}", self.force.len())));
+            return Err(wrong(format!("give one force column, not {}", self.force.len())));
         };
         if dofs.len() != records {
             let given = message::count(dofs.len(), "degree of freedom");
@@ -157,7 +157,7 @@ impl Channels {
         let count = count.unwrap_or(0);
         if let Some(dof) = dofs.iter().find(|dof| !(1..=count).contains(*dof)) {
             let responses = message::count(count, "response");
-            return Err(wrong(format!("degree of freedom {dof} of {responses}")));
+            return Err(wrong(format!("no degree of freedom {dof}, only {responses}")));
         }
         let column = |dof: usize, at: usize| if at + 1 == dof { force.as_str() } else { ABSENT };
         let of = |dof: &usize| Self {

@@ -209,7 +209,7 @@ fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisEr
             let listed = candidates.iter().map(|candidate| in_words(dropped(candidate)));
             let listed = message::list(listed, ", ", LISTED_CANDIDATES);
             let candidates =
-                if listed.is_empty() { listed } else { format!("; no modes are {listed}") };
+                if listed.is_empty() { listed } else { format!("; rejected candidates: {listed}") };
             AnalysisError::NoMode { from_hz, to_hz, candidates }
         }
         ModalError::DependentInputs { input, own_share } => {

@@ -130,7 +130,7 @@ fn difference(
     format!(
         "the first and the second half of {what} differ most in one mode: {} and {} Hz, damping \
          {damping} and {damping_of_other} %, MAC {} (p = {}): the structure changed or is \
-         nonlinear, or the model lacks something{scaled}",
+         nonlinear, or the model is incomplete{scaled}",
         uncertain(one.natural_frequency_hz, 1.0),
         uncertain(two.natural_frequency_hz, 1.0),
         significant(pair.mac.value, 4),

@@ -53,12 +53,12 @@ pub fn predict_with_modes(
     let [low, high] = system.band_hz.map(|hz| significant(hz, 4));
     let mut remarks = block.unit_notes();
     remarks.push(format!(
-        "the modes predict the response from {low} to {high} Hz, and are judged there"
+        "the modes predict the response only from {low} to {high} Hz; the errors are those of this band"
     ));
     if !steady && settle == 0 {
         remarks.push(
-            "the prediction begins at rest: initial motion of the record is neither in it nor in the \
-             standard errors; `settle` fits it to the first samples"
+            "the prediction begins at rest: the prediction and the standard errors do not include initial \
+             motion of the record; `settle` fits this motion to the first samples"
                 .into(),
         );
     }

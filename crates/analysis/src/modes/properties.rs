@@ -50,8 +50,8 @@ impl Properties {
         if self.reciprocal {
             if driving_points.len() < 2 || first.is_none() {
                 let why = format!(
-                    "it needs at least two driving points, a force at a response of the same kind, but \
-                     there are {}: state the points (`force_at`, `response_at`)",
+                    "it needs responses of one kind, and at least two driving points (a force and a response at one \
+                     point; there are {}): state the points (`force_at`, `response_at`)",
                     driving_points.len()
                 );
                 return Err(settings.refused("reciprocal", why));
@@ -106,7 +106,7 @@ fn test(estimate: &ModalEstimate, engine: &ModalSettings, constraint: usize) -> 
             passes: "the modes agree with real shapes, which are imposed".into(),
             fails: format!(
                 "the modes contradict real shapes, most at {hz:.4} Hz: damping that is not \
-                 proportional, or channels with different delays; they are not imposed"
+                 proportional, or channels with different delays; real shapes are not imposed"
             ),
         },
         _ => Tested {
@@ -117,7 +117,7 @@ fn test(estimate: &ModalEstimate, engine: &ModalSettings, constraint: usize) -> 
             fails: format!(
                 "the modes contradict reciprocity between the driving points, most at {hz:.4} Hz: a \
                  wrong calibration or place, forces that are not the ones measured, or a structure \
-                 that is not reciprocal; it is not imposed"
+                 that is not reciprocal; reciprocity is not imposed"
             ),
         },
     }

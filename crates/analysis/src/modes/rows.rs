@@ -118,21 +118,23 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(100.0 * standard_error, 2)
         ),
         DropReason::TooDamped => {
-            "it is too damped for a mode: the response of modes outside of the band".into()
+            "it is too damped for a mode: it represents modes outside of the band".into()
         }
         DropReason::OutsideBand => "its frequency left the band".into(),
         DropReason::Twin { other_hz } => format!(
-            "its shape is that of the mode at {} Hz, within whose width it lies",
+            "its shape is that of the mode at {} Hz, and it is within the width of that mode",
             significant(other_hz, 5)
         ),
         DropReason::Undriven { ratio } => format!(
-            "forces that were not measured drive it: {} times the measured ones",
+            "unmeasured forces drive it {} times as strongly as the measured ones",
             significant(ratio, 2)
         ),
         DropReason::NotStated => {
             "it is part of the model, but near no stated frequency (`near_hz`)".into()
         }
-        DropReason::BeyondNumber { .. } => "`modes` asks for fewer, and others explain more".into(),
+        DropReason::BeyondNumber { .. } => {
+            "`modes` asks for fewer modes, and the others explain more".into()
+        }
         _ => "it is not a mode of the record".into(),
     };
     let DroppedCandidate { frequency_hz, damping_ratio, .. } = *candidate;

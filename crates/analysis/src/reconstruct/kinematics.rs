@@ -67,8 +67,8 @@ impl KinematicConsistency {
             let right = (1.0 / ANOTHER_UNIT..ANOTHER_UNIT).contains(&ratio);
             (correlation.abs() > ALIKE && !right).then(|| {
                 format!(
-                    "{} is {} times the rate of {}: one of them is in another unit, of another \
-                     sign, or another column",
+                    "{} is {} times the rate of {}: one of them has a wrong unit or \
+                     sign, or is the wrong column",
                     columns[pair.rate],
                     significant(ratio, 3),
                     columns[pair.motion]

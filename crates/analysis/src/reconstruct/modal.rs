@@ -77,7 +77,7 @@ pub fn reconstruct_with_modes(
 /// Checks that modes can give the force with these settings.
 fn check_settings(run: &Measurement, how: &Reconstruct) -> Result<(), AnalysisError> {
     if !matches!(how.method, Method::Auto | Method::FrequencyDomain) {
-        let why = "modes give the force line by line: frequency-domain".into();
+        let why = "modes give the force line by line: choose frequency-domain".into();
         return Err(AnalysisError::Setting { setting: "method", why });
     }
     if run.window_settings().period.is_none() && how.lines.is_none() && !how.at_rest {
@@ -97,6 +97,6 @@ fn band(system: &ModalSystem, request: &Request) -> Result<[f64; 2], AnalysisErr
         return Ok([from.max(low), to.min(high)]);
     }
     let [low, high] = [low, high].map(|hz| significant(hz, 4));
-    let why = format!("the modes are those of {low} to {high} Hz");
+    let why = format!("it does not overlap the band of the modes, {low} to {high} Hz");
     Err(AnalysisError::Setting { setting: "band_hz", why })
 }

@@ -24,8 +24,8 @@ pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     let far = shares.filter(|(_, share)| *share > ALIKE);
     let (channel, share) = far.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
-        "the periods of {samples} samples differ from their mean by {} % of it ({}), and not as \
-         white noise does: the motion has another period, or is not steady",
+        "the periods of {samples} samples differ from their mean by {} % of its RMS ({}), and the \
+         differences are not white noise: the motion has another period, or is not steady",
         significant(100.0 * share, 2),
         recorded.columns()[channel],
     ))

@@ -24,7 +24,7 @@ pub fn remark(channels: &[Channel], request: &Request, how: &How) -> Option<Stri
     {
         return Some(format!(
             "the {responses} are insensitive to slow forces: with this method their noise at low frequencies appears as a large force; state the `lines` or the `band_hz` of the force, use \
-             `method` shrinkage, which finds where the noise prevails, or measure a displacement as well"
+             `method` shrinkage, which finds where the noise dominates, or measure a displacement as well"
         ));
     }
     let hz = |value| significant(value, 4);

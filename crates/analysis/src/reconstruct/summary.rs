@@ -130,7 +130,7 @@ impl ForceSummary {
             let _ = writeln!(text, "  force and standard error: of {low} to {high} Hz");
         }
         let error = if self.counts_machine_alone() {
-            "standard error of machine (N)"
+            "standard error, machine only (N)"
         } else {
             "standard error (N)"
         };

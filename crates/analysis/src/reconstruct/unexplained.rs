@@ -96,12 +96,12 @@ pub fn remark(
         format!("{share} of channel {} ({}{expected})", m.channel, m.column)
     });
     let unless = if excessive.iter().any(|m| m.expected.is_none()) {
-        "unless that is noise (`noise` states its level), "
+        "if this is not noise (`noise` states its level), "
     } else {
         ""
     };
     Some(format!(
-        "the identified force does not explain {}: {unless}{}; its standard error is not reliable",
+        "the identified force does not explain {}: {unless}{}; the standard error of the force is not reliable",
         listed(&named.collect::<Vec<_>>()),
         causes(request, dofs).join(", or ")
     ))

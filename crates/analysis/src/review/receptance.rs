@@ -148,8 +148,8 @@ fn measured(
     };
     // Towards half the sampling rate, a force that is held or linear between its samples is smaller
     // than its samples show, and so is the motion.
-    let origin =
-        origin + "; towards half the sampling rate the force between the samples shows, too";
+    let origin = origin
+        + "; near half the sampling rate, the response also depends on the force between the samples";
     Ok((data, origin))
 }
 

@@ -67,7 +67,9 @@ impl FromStr for Settings {
             let steps = ((last - first) / step + 1e-9).floor();
             let positive = |v: f64| v > 0.0 && v.is_finite();
             if !(positive(first) && positive(step) && positive(last) && steps >= 0.0) {
-                return Err(format!("settings are positive and ranges go upwards, got {part}"));
+                return Err(format!(
+                    "settings must be positive and ranges must increase, got {part}"
+                ));
             }
             if steps >= (LONGEST - settings.len().min(LONGEST)) as f64 {
                 return Err(format!("more than {LONGEST} settings"));

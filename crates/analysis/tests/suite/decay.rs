@@ -158,7 +158,7 @@ fn what_speaks_against_a_fit_is_told() {
     told(DecaySettings { modes: Some(1), from_s, ..DecaySettings::default() }, "coloured");
     // A start a hundredth of a second before the release gives a false mode, or a large residual.
     let early = DecaySettings { from_s: Some(RELEASE - 0.01), ..DecaySettings::default() };
-    told(early, "hardly an oscillation");
+    told(early, "hardly oscillates");
     told(DecaySettings { modes: Some(2), ..early }, "first samples");
     // The section has less than two cycles.
     let how = DecaySettings {

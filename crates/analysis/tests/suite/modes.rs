@@ -240,7 +240,10 @@ fn a_delay_of_displacements_is_named_and_does_not_change_the_masses() {
     assert_eq!(delays, ["delay", "delay"], "{found}");
     let text = &check(&found, "delay").text;
     let size: f64 = text.split(" is ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-    assert!((size / 1e3 / delay - 1.0).abs() < 0.02 && text.contains("ms late for"), "{text}");
+    assert!(
+        (size / 1e3 / delay - 1.0).abs() < 0.02 && text.contains("ms late relative to"),
+        "{text}"
+    );
 }
 
 /// Reference: the closed form, with all accelerations 1 ms late. The delay is part of the model,

@@ -102,7 +102,7 @@ fn a_record_that_begins_in_motion_is_predicted_from_its_first_samples() {
     for seed in 0..6 {
         let system = ModalSystem::new(&modes(&plain([1.0; 3], seed))).unwrap();
         let at_rest = predict_with_modes(&record, &system, &Predict::default()).unwrap();
-        assert!(at_rest.to_string().contains("`settle` fits it"), "{at_rest}");
+        assert!(at_rest.to_string().contains("`settle` fits this motion"), "{at_rest}");
         let settled = predict_with_modes(&record, &system, &Predict { settle: Some(64) }).unwrap();
         let channels = at_rest.summary().channels.iter().zip(&settled.summary().channels);
         for (rest, fitted) in channels {
@@ -150,7 +150,7 @@ fn what_modes_cannot_do_is_refused() {
     assert!(refused(Reconstruct::default()).contains("at rest"));
     let at_rest = Reconstruct { at_rest: true, ..Reconstruct::default() };
     let outside = at_rest.clone().band(Band { low_hz: 100.0, high_hz: 120.0 });
-    assert!(refused(outside).contains("the modes are those of"));
+    assert!(refused(outside).contains("does not overlap the band of the modes"));
     assert!(refused(at_rest.forced([3])).contains('3'));
     let refused = |samples: usize| {
         let settle = Predict { settle: Some(samples) };

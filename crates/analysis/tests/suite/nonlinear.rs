@@ -71,7 +71,7 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
         "before the fit: nonlinear: cubic stiffness of x1 (hardening)",
         "N/m³",
         "mode of the linear part",
-        "motion the model leaves unexplained",
+        "motion not explained by the model",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }

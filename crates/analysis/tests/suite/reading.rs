@@ -85,7 +85,7 @@ fn what_is_not_understood_is_a_warning_with_its_factor() {
     for (header, response, time, told) in [
         ("time,Force [mV],x [m]", Displacement, 1.0, "\"mV\" in the header of column 2"),
         ("time,force,a_g", Acceleration, 1.0, "with the factor 9.80665"),
-        ("time,force,x", Displacement, days, "in days it would be 128"),
+        ("time,force,x", Displacement, days, "in days the rate would be 128"),
     ] {
         let (_, warnings) = mass(open(header, response, [time, 1.0, 1.0], &Reading::default()));
         assert_eq!(warnings.len(), 1, "{header}: {warnings:?}");

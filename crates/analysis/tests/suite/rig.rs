@@ -128,7 +128,7 @@ fn noise_in_idle_channels_is_no_force_of_frequency_responses() {
         // All lines of the acting shakers are used, and hardly ever those of a channel with only
         // noise.
         kept += found.summary().fit.equations / (2 * 70) - DOFS;
-        let of_idle = |remark: &&String| remark.contains("taken as noise of the channel");
+        let of_idle = |remark: &&String| remark.contains("only noise in force");
         assert_eq!(found.summary().remarks.iter().filter(of_idle).count(), DOFS, "{found}");
         warned += u64::from(found.checks().iter().any(|check| check.is_conspicuous()));
     }
@@ -168,7 +168,10 @@ fn records_are_averaged_together() {
     assert_eq!(parts.segments.count, 4);
     assert_eq!(parts.records.iter().map(|r| r.segments).collect::<Vec<_>>(), [1, 3]);
     let text = parts.to_string();
-    assert!(text.contains("2 records, 4 periods of 256 samples, worth 4 averages"), "{text}");
+    assert!(
+        text.contains("2 records, 4 periods of 256 samples, equivalent to 4 averages"),
+        "{text}"
+    );
     for (a, b) in one.responses.iter().zip(&parts.responses) {
         for (a, b) in [(&a.real, &b.real), (&a.standard_error, &b.standard_error)] {
             let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -290,7 +293,7 @@ fn lines_of_a_disturbance_are_left_out() {
     for (found, expected) in named.frequencies_hz.iter().zip(run_out) {
         assert!((found - expected).abs() < 1e-9, "{named:?}");
     }
-    assert!(spoilt.to_string().contains("Leave out with `without_hz`"), "{spoilt}");
+    assert!(spoilt.to_string().contains("Exclude with `without_hz`"), "{spoilt}");
 
     let lines = LeftOut { lines: Some("12,24,36".parse().unwrap()), ..LeftOut::default() };
     let rotation = Disturbance::rotation(12.0 * line_hz);

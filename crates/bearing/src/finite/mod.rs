@@ -98,7 +98,8 @@ impl FiniteBearing {
         require("Sommerfeld number", sommerfeld, "positive and finite", sommerfeld > 0.0)?;
         // The same formula converts S to the load and back.
         let load = self.sommerfeld_number(sommerfeld);
-        require("Sommerfeld number", sommerfeld, "within the range of a film", load.is_normal())?;
+        let requirement = "such that the load is finite and not 0";
+        require("Sommerfeld number", sommerfeld, requirement, load.is_normal())?;
         let mut search = Search::new(self, load);
         let tangent = search.equilibrium()? / load;
         let block =

@@ -56,7 +56,7 @@ impl ShortBearing {
         require("eccentricity over clearance", eccentricity, "between 0 and 1", inside)?;
         let load = load(eccentricity);
         let sommerfeld = 1.0 / (4.0 * PI * self.length_over_diameter.powi(2) * load);
-        let requirement = "where the Sommerfeld number is finite";
+        let requirement = "such that the Sommerfeld number is finite";
         require("eccentricity over clearance", eccentricity, requirement, sommerfeld.is_normal())?;
         let attitude = attitude(eccentricity);
         let (sin, cos) = attitude.sin_cos();
@@ -92,7 +92,8 @@ impl ShortBearing {
         }
         let equilibrium = self.at_eccentricity(at(0.5 * (low + high)))?;
         let near = (equilibrium.sommerfeld_number() / sommerfeld - 1.0).abs() < 1e-6;
-        require("Sommerfeld number", sommerfeld, "within the range of a film", near)?;
+        let requirement = "less extreme (the journal is at the centre or touches the bore)";
+        require("Sommerfeld number", sommerfeld, requirement, near)?;
         Ok(equilibrium)
     }
 }

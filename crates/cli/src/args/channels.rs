@@ -11,8 +11,8 @@ use crate::error::CliError;
 /// Columns of force and response; one column per degree of freedom, in the same order everywhere.
 #[derive(Debug, Clone, Args)]
 pub struct ChannelArgs {
-    /// Force columns, in N, one per degree of freedom; 0 where no force acts. frf, identify and
-    /// modes need no names if every column states its unit
+    /// Force columns, in N, one per degree of freedom; 0 where no force acts. In frf, identify and
+    /// modes, no column has to be named if every column states its unit
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     pub force: Vec<String>,
     /// Displacement columns, in m

@@ -16,9 +16,9 @@ use crate::error::CliError;
 pub struct ElementArgs {
     /// Find the unknown coefficients of the machine in this description: degrees of freedom,
     /// elements (masses, springs and dampers, bearings, known matrices), sensors anywhere, and
-    /// inputs (forces, motion of the support, unbalance). Columns have the names of sensors and
-    /// inputs. With --period the record is read as whole periods, with --hits as the hits of a
-    /// hammer, otherwise as an open record (any part of a response)
+    /// inputs (forces, motion of the support, unbalance). The columns of the record must have the
+    /// names of the sensors and inputs. With --period the record is read as whole periods, with
+    /// --hits as the hits of a hammer, otherwise as an open record (any part of a response)
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
           "acceleration", "domain", "lines", "without_lines", "method", "extent",
           "between_samples", "ac_coupling", "mass", "structure", "struck", "nonlinear", "candidates",
@@ -41,7 +41,7 @@ pub struct ElementArgs {
     /// Seed of the random initial values [default: 0]
     #[arg(long, value_name = "SEED", requires = "machine")]
     seed: Option<u64>,
-    /// Level of the intervals, in per cent [default: 95]
+    /// Confidence level of the intervals, in per cent [default: 95]
     #[arg(long, value_name = "PERCENT", requires = "machine", value_parser = super::positive,
           allow_negative_numbers = true)]
     confidence: Option<f64>,

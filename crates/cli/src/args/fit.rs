@@ -46,30 +46,30 @@ pub struct FitArgs {
     /// Estimator of the parameters from the spectra: least-squares on the equation of motion
     /// (biased by noise on the response), instrumental (instrumental variables from the other half
     /// of the periods; unbiased), or maximum-likelihood on the response (unbiased, with the least
-    /// scatter) [default: maximum-likelihood if at least two periods show the noise, if noise
-    /// biases least squares, or with --from-frf; otherwise least-squares]
+    /// scatter) [default: maximum-likelihood if the noise is known from at least two periods, if
+    /// noise biases least squares, or with --from-frf; otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_parser = word::<Method>())]
     method: Option<Method>,
     /// Noise spectrum that weights the lines in maximum likelihood: white, smooth, neighbours:N
-    /// (means over N lines to either side), per-line, or auto, which chooses
+    /// (means over N lines to either side), per-line, or auto (automatic choice)
     #[arg(long, value_name = "NOISE")]
     pub(super) noise: Option<Pooling>,
     /// Standard deviation of the noise on the force samples, in N: one value for all forces, or one
-    /// per degree of freedom. It applies to open records, and makes the fit treat the record as an
-    /// open one [default: estimated above the excited band, or between hits]
+    /// per degree of freedom. It is for open records: with it, the record is fitted as an open
+    /// record [default: estimated above the excited band, or between hits]
     #[arg(long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true)]
     force_noise: Vec<f64>,
     /// Extent of the window: open (any part of a response; its transient is estimated with the
-    /// machine) or period (whole periods) [default: period with --period; otherwise open for
-    /// nonlinear terms and in the time domain (except for spectral derivatives), and period
-    /// unless a transient is found]
+    /// machine) or period (whole periods) [default: in the time domain open, or period with
+    /// spectral derivatives; in the frequency domain period with --period; without it, open for
+    /// nonlinear terms, and for a linear machine period unless a transient is found]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
-    /// Assumed force between the samples. For open records, hits and the time domain: held (as by
-    /// the converter that drives a shaker) or linear; the fit is exact if the assumption is true.
-    /// For the time domain only: euler (the dissertation's rule), with a bias in proportion to the
-    /// step [default: band-limited; in the time domain the equation of motion at the samples if
-    /// there is an acceleration, otherwise linear]
+    /// Assumed force between the samples. For open records, hits and the time domain: held
+    /// (constant, as from the D/A converter that drives a shaker) or linear; the fit is exact if
+    /// the assumption is true. For the time domain only: euler (Euler's rule), with a bias
+    /// proportional to the step [default: band-limited; in the time domain no assumption (equation
+    /// of motion at the samples) if there is an acceleration, otherwise linear]
     #[arg(long, value_name = "ASSUMPTION", value_parser = word::<Discretisation>())]
     between_samples: Option<Discretisation>,
     /// Channels behind a first-order high-pass filter, such as an AC-coupled input, each with its
@@ -87,7 +87,8 @@ pub struct FitArgs {
     mass: KnownMass,
     /// Known structure of M, C and K: symmetric; chain (masses in a row, with springs and dampers
     /// to neighbours and to the ground); diagonal-mass; proportional-damping (C = αM + βK); or the
-    /// value of an entry, such as k13=0. Several of them separated by spaces, or one per option
+    /// value of an entry, such as k13=0. Several may be given: separated by spaces, or one per
+    /// option
     #[arg(long, value_name = "FORM", value_delimiter = ' ')]
     structure: Vec<Form>,
     #[command(flatten)]
@@ -143,19 +144,20 @@ pub struct LineArgs {
 struct NonlinearArgs {
     /// Springs and dampers to fit in addition to mass, damping and stiffness, each `name: law`:
     /// powers of x1 and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and
-    /// (v1-v2), |v1| v1, v1^3/(1 + (v1/b)^2) with a number for b, gap(x1, 0.001) for a stop with
-    /// that clearance (m) on either side, tanh(v1/0.01) for friction smoothed below that velocity
-    /// (m/s), x1^0 for a constant force. They are fitted to whole periods if --period states their
-    /// length, otherwise to any record
+    /// (v1-v2), |v1| v1, v1^3/(1 + (v1/b)^2) with a number in place of b, gap(x1, 0.001) for a stop
+    /// with that clearance (m) on either side, tanh(v1/0.01) for friction smoothed below that
+    /// velocity (m/s), x1^0 for a constant force. They are fitted to whole periods if --period
+    /// states their length, otherwise to any record
     #[arg(long, value_name = "TERMS")]
     nonlinear: Option<Terms>,
     /// Candidate terms, written as for --nonlinear: the most useful ones are added one by one, as
     /// long as --criterion accepts them
     #[arg(long, value_name = "TERMS")]
     candidates: Option<Terms>,
-    /// Criterion for the addition of a candidate: information (extended Bayesian criterion, and a
-    /// coefficient that differs from zero) or held-out (error of the prediction of each record by
-    /// the fit to the others; needs at least three records or windows) [default: information]
+    /// Criterion for the addition of a candidate: information (the extended Bayesian criterion
+    /// decreases, and the coefficient differs from zero) or held-out (the fit to the other records
+    /// predicts each record with a smaller error; needs at least three records or windows)
+    /// [default: information]
     #[arg(long, value_name = "CRITERION", value_parser = word::<Criterion>())]
     criterion: Option<Criterion>,
     /// Further constants to estimate: laws (constants inside the laws; the given values are the
@@ -163,8 +165,8 @@ struct NonlinearArgs {
     /// equal filters)
     #[arg(long, value_name = "WHAT,…", value_parser = word::<Constant>(), value_delimiter = ',')]
     search: Vec<Constant>,
-    /// Weights of the lines, by the spectrum that the error of the equation of motion is assumed to
-    /// have: white-force (equal forces on all lines), response (equal responses on all lines),
+    /// Assumed spectrum of the error of the equation of motion, which weights the lines:
+    /// white-force (equal forces on all lines), response (equal responses on all lines),
     /// smooth-spectrum (estimated from the residual), or automatic (the most likely of the three)
     /// [default: automatic]
     #[arg(long, value_name = "WEIGHTING", value_parser = word::<Weighting>())]
@@ -175,9 +177,9 @@ struct NonlinearArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Time domain")]
 struct TimeArgs {
-    /// Method for velocity and acceleration if only the displacement, or only the acceleration, was
-    /// measured: the spectrum of whole periods, or a polynomial of an ORDER through a sliding
-    /// WINDOW of samples (odd)
+    /// Method for the other responses if only the displacement, or only the acceleration, was
+    /// measured: spectral (spectrum of whole periods) or savitzky-golay (polynomial of degree ORDER
+    /// through a sliding WINDOW, an odd number of samples)
     #[arg(long, value_name = "spectral|savitzky-golay:WINDOW:ORDER")]
     derivatives: Option<Derivatives>,
     /// Divide every interval into FACTOR steps, with linear, spline or band-limited interpolation
@@ -190,10 +192,10 @@ struct TimeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Frequency responses")]
 pub struct SegmentArgs {
-    /// Segments for a random excitation: number of samples; overlap in per cent (50); and window of
-    /// the samples: hann, hamming (a narrower peak, more leakage from far away), blackman (the
+    /// Segments for a random excitation: number of samples; overlap in per cent (default: 50); and
+    /// window: hann (default), hamming (a narrower peak, more leakage from far away), blackman (the
     /// least leakage, a wider peak) or rectangular (for bursts that begin and end at rest)
-    /// [default: the periods are the segments; without --period, chosen by the coherence]
+    /// [default: each period is a segment; without --period, the length is chosen by the coherence]
     #[arg(long, value_name = "SAMPLES:OVERLAP:WINDOW")]
     segment: Option<Segmentation>,
 }
@@ -209,7 +211,7 @@ pub struct TableArgs {
           "from_frf", "more_starts", "between_samples", "ac_coupling", "extent", "force_noise", "validate",
           "skip_lines", "record_column"])]
     pub(super) frf_table: bool,
-    /// Measured quantity of the responses per force, where the table does not state it
+    /// Measured quantity of the responses per force, if the table does not state it
     #[arg(long, value_name = "QUANTITY", value_parser = word::<ResponseQuantity>(), requires = "frf_table")]
     quantity: Option<ResponseQuantity>,
     /// Number of independent averages of the coherence, for the standard errors; not needed if the
@@ -338,7 +340,7 @@ impl FitArgs {
             return Ok(None);
         }
         if let Domain::Time = self.domain {
-            let (option, why) = ("--frf-table", "belongs to --domain frequency");
+            let (option, why) = ("--frf-table", "needs --domain frequency");
             return Err(CliError::MisplacedOption { option, why });
         }
         let tables = self.input.read_responses(&self.more)?;

@@ -17,8 +17,8 @@ pub struct HitRuleArgs {
     /// (smallest second peak of a double hit, in per cent of the first; 5), weak (smallest peak of
     /// a good hit, in per cent of the median of all peaks that reach a tenth of the largest; 25),
     /// bounce (time after the trigger within which a force belongs to the same hit, in s; 0.1),
-    /// before (number of samples before the pulse; twice those of the pulse), samples (length of a
-    /// hit, including the samples before it; up to the next hit)
+    /// before (number of samples before the pulse; twice the length of the pulse), samples (number
+    /// of samples of a hit, including those before the pulse; all up to the next hit)
     #[arg(long, value_name = "RULE", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     hits: Option<HitRule>,
 }
@@ -29,8 +29,8 @@ pub struct HitRuleArgs {
 pub struct HitArgs {
     #[command(flatten)]
     rule: HitRuleArgs,
-    /// Degree of freedom that is struck in each record, counted from 1, if the same --force column
-    /// serves all records
+    /// Degree of freedom that is struck in each record, counted from 1, if all records have the
+    /// same --force column
     #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
     struck: Vec<usize>,
 }

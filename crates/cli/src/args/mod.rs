@@ -56,8 +56,8 @@ impl PlotArgs {
 #[command(next_help_heading = "Mode shapes")]
 pub struct ShapeArgs {
     /// Places of the channels: a universal file (datasets 15 or 2411, and 82), or a table with rows
-    /// name,x,y,z in m and line,name,name [default: a row, or a grid, by names such as 1+Z and
-    /// 1.2+Z]
+    /// name,x,y,z in m and line,name,name [default: a row or a grid, from channel names such as 1+Z
+    /// and 1.2+Z]
     #[arg(long, value_name = "FILE")]
     geometry: Option<PathBuf>,
     /// Write geometry and complex shapes into this universal file (datasets 164, 15, 82, 55; SI
@@ -113,8 +113,8 @@ pub struct AboutArgs {
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
     /// File with further details for the page, one `name: value` per line, such as sensors,
-    /// operator, date, place and comment; what the head of the record states (comments above a
-    /// table, .lvm, universal file, Parquet) is shown, too
+    /// operator, date, place and comment; details in the head of the record (comments above a
+    /// table, .lvm, universal file, Parquet) are shown, too
     #[arg(long, value_name = "FILE")]
     pub about: Option<PathBuf>,
 }
@@ -186,7 +186,7 @@ impl FigureArgs {
         }
         match self.about.given() {
             Some(option) => {
-                let why = "belongs to a page, --plot FILE.html";
+                let why = "needs a page: --plot FILE.html";
                 Err(CliError::MisplacedOption { option, why })
             }
             None => Ok(None),
@@ -205,8 +205,8 @@ pub struct RecordArgs {
     /// are detected too; the header may be a comment (#, %, !) or that of LabVIEW (.lvm). MATLAB: a
     /// vector is one column, a matrix has the columns name[1], name[2] …, a field of a struct is
     /// called name.field. HDF5: a data set is one column, called by its path, such as run/force.
-    /// Universal file: a function of time is one column, called after its node and direction, such
-    /// as 12+Z, and brings its time axis. Parquet: times are read as seconds from the first one;
+    /// Universal file: a function of time is one column, named after its node and direction, such
+    /// as 12+Z, and has its own time axis. Parquet: times are read as seconds from the first one;
     /// the keys of the file may state units and sample_rate_hz.
     #[arg(value_name = "RECORD")]
     pub record: PathBuf,
@@ -220,20 +220,21 @@ pub struct RecordArgs {
     /// only one]
     #[arg(long, value_name = "ID", requires = "record_column")]
     pub record_id: Option<String>,
-    /// Factor that raises all limits on a file: 4 MiB a row of text, 4 KiB a name, 65536 columns, 1
-    /// GiB of a compressed file, 2^28 numbers held, and memory (--memory-gb)
+    /// Factor that raises all limits on a file: 4 MiB per row of text, 4 KiB per name, 65536
+    /// columns, 1 GiB of unpacked data from a compressed file, 2^28 numbers, and memory
+    /// (--memory-gb)
     #[arg(long, value_name = "FACTOR", value_parser = at_least_one)]
     pub raise_limits: Option<usize>,
     /// Maximum memory for the numbers of a file and the work on them, in GB [default: 0.27 GB plus
     /// 512 bytes per byte of the file, at most 8.6 GB]
     #[arg(long, value_name = "GB", value_parser = positive)]
     pub memory_gb: Option<f64>,
-    /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
-    /// of the line of units below it, otherwise in s [default: the file's own time axis, or a
-    /// column called time or t]
+    /// Time column: name or number, counted from 1; in the unit that its name (time_ms, Time [s])
+    /// or the line of units below it states, otherwise in s [default: the file's own time axis, or
+    /// a column called time or t]
     #[arg(long, value_name = "COLUMN", help_heading = "Time and window")]
     pub time: Option<String>,
-    /// Samples per second, in Hz, where there is no time column
+    /// Sampling rate, in Hz, if there is no time column
     #[arg(
         long,
         value_name = "HZ",
@@ -261,8 +262,8 @@ pub struct RecordArgs {
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "period",
           help_heading = "Time and window")]
     pub periods: Option<usize>,
-    /// Constant to subtract from every channel: the mean of the whole record, not only of the
-    /// window
+    /// Constant to subtract from every channel: none, or the mean of the whole record (not only of
+    /// the window) [default: none]
     #[arg(long, value_name = "WHAT", value_parser = word::<Detrend>(), help_heading = "Time and window")]
     pub detrend: Option<Detrend>,
 }

@@ -19,18 +19,18 @@ use crate::outcome::{Files, Outcome};
 /// Identify the stiffness, damping and mass coefficients of a journal bearing from rig tests
 ///
 /// The housing floats on the film of a rotating shaft in rigid supports; shakers in x and y excite
-/// it in one test each, or on alternate lines of one test. --force names the forces of the shakers,
-/// --acceleration the accelerations of the housing, --displacement the motion of the housing
-/// relative to the shaft, x before y. The window must hold whole periods; lines at multiples of
-/// --rotation-hz are excluded. Baseline tests (no film, shaft at rest) are subtracted with their
-/// uncertainty.
+/// it in two separate tests, or in one test on alternate spectral lines. --force names the forces
+/// of the shakers, --acceleration the accelerations of the housing, --displacement the motion of
+/// the housing relative to the shaft, x before y. The window must hold whole periods; lines at
+/// multiples of --rotation-hz are excluded. Baseline tests (no film, shaft at rest) are subtracted
+/// with their uncertainty.
 ///
 /// With --frf-table the files are frequency responses instead, two for each test: first the
 /// displacement, then the acceleration per shaker force.
 ///
 /// With --campaign the file is a JSON description of tests at several speeds and loads. It has a
-/// list `points`, each with `tests`, `baseline`, `rotation_hz` and `load`, and, common to all
-/// points, `channels`, `window` (or `frf_table`) and `settings` as --json prints them.
+/// list `points`; each point has `tests`, `baseline`, `rotation_hz` and `load`. Common to all
+/// points are `channels`, `window` (or `frf_table`) and `settings`, as --json prints them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid bearing x.csv y.csv --force fx,fy --acceleration ax,ay --displacement dx,dy \\
@@ -56,7 +56,7 @@ pub struct BearingArgs {
     campaign: bool,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Mass of the housing with all that moves with it, in kg
+    /// Mass of the housing and all parts that move with it, in kg
     #[arg(long, value_name = "KG", required_unless_present = "campaign")]
     stator_mass: Option<f64>,
     /// Speed of rotation, in Hz; the lines at this frequency and its multiples are excluded
@@ -66,8 +66,9 @@ pub struct BearingArgs {
     /// Static load, in N, for dimensionless coefficients
     #[arg(long, value_name = "N")]
     load: Option<f64>,
-    /// Coefficients to identify: eight of stiffness and damping, twelve with the mass of the fluid,
-    /// or automatic, which takes twelve if a likelihood-ratio test at 5 % finds inertia
+    /// Coefficients to identify: eight (stiffness and damping), twelve (also the added mass of the
+    /// fluid), or automatic (twelve if a likelihood-ratio test at 5 % finds inertia, otherwise
+    /// eight)
     #[arg(long, value_name = "WHICH", value_parser = word::<Coefficients>(), default_value = "automatic")]
     coefficients: Coefficients,
     #[command(flatten)]

@@ -22,13 +22,13 @@ use crate::worker::worker_program;
 /// Every record becomes one row: parameters, standard errors, covariance, modes, findings,
 /// warnings, notes, or the error of a record that cannot be identified. The records are divided
 /// into parts of --part-records records, in the order of their paths; a part is one file of the
-/// folder, complete or absent. Repeated, the command computes the missing parts: those that were
-/// not finished, and those in which a record, the analysis or the version of the program has
-/// changed.
+/// folder, complete or absent. If the command is repeated, it computes only the missing parts:
+/// those that were not finished, and those in which a record, the analysis or the version of the
+/// program has changed.
 ///
 /// Each worker is a separate process. A record that uses too much memory or time, or that ends its
-/// process, becomes a row with its error, and the others continue. Named pipes, sockets and devices
-/// are ignored.
+/// process, has an error in its row, and the others continue. Named pipes, sockets and devices are
+/// ignored.
 #[derive(Debug, Args)]
 #[command(after_help = "Exit code 1 means that all records were processed and some have no result.
 
@@ -39,23 +39,24 @@ pub struct FleetArgs {
     /// The records, of any format; a folder means all files in it
     #[arg(value_name = "RECORD", required = true)]
     records: Vec<PathBuf>,
-    /// The analysis: channels, reading, window and identify, as JSON
+    /// The analysis, a JSON file with the fields channels, reading, window and identify
     #[arg(long, value_name = "ANALYSIS.json")]
     analysis: PathBuf,
     /// The folder of results; it is created if it does not exist
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     output: PathBuf,
-    /// Records worked on at a time [default: as many as there are processors]
+    /// Number of records processed at a time [default: number of processors]
     #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     workers: Option<usize>,
     /// Number of records in a part, which is one file of the folder
     #[arg(long, value_name = "COUNT", default_value_t = RECORDS_PER_PART,
           value_parser = at_least_one)]
     part_records: usize,
-    /// Memory that a record may take, in GB, before its row becomes an error (on Linux)
+    /// Maximum memory for a record, in GB; a record that needs more has an error in its row (Linux
+    /// only)
     #[arg(long, value_name = "GB", default_value_t = RECORD_MEMORY_GB, value_parser = positive)]
     record_memory_gb: f64,
-    /// Time that a record may take, in s, before its row becomes an error
+    /// Maximum time for a record, in s; a record that needs more has an error in its row
     #[arg(long, value_name = "SECONDS", default_value_t = RECORD_SECONDS, value_parser = positive)]
     record_seconds: f64,
     #[command(flatten)]

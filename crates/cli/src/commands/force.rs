@@ -28,8 +28,8 @@ use crate::outcome::{Files, Outcome};
 ///
 /// The system may also be the result of `mechid modes --json`. Forces and responses are then those
 /// of the modal test, by name or in order, and --forced gives the numbers of its forces. The force
-/// is found line by line in the band of the test; the record must be whole periods, or begin and
-/// end at rest (--at-rest).
+/// is found line by line in the band of the test; the record must contain whole periods, or begin
+/// and end at rest (--at-rest).
 ///
 /// A long text is read in chunks. The methods continuous and discretised do not keep an open record
 /// in memory; every other method, --spectrum and --plot keep the columns used. For whole periods
@@ -76,8 +76,8 @@ pub struct ForceArgs {
     /// averaged [default: estimated]
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
-    /// Rule that chooses the regularisation parameter: likelihood (nearest to the posterior mean of
-    /// the force), gcv (generalised cross-validation) or l-curve (its corner)
+    /// Rule that chooses the regularisation parameter: likelihood (force nearest to its posterior
+    /// mean), gcv (generalised cross-validation) or l-curve (corner of the L-curve)
     #[arg(long, value_name = "RULE", value_parser = one_of::<ParameterRule>(&["likelihood", "gcv", "l-curve"]),
           default_value = "likelihood")]
     rule: ParameterRule,

@@ -17,9 +17,9 @@ use crate::outcome::{Files, Outcome};
 /// Estimate frequency responses and coherence from measured forces and motions
 ///
 /// With a periodic excitation the periods are the segments that are averaged (--period is the
-/// length of one). With a random excitation give --segment: segments overlap under a window. For a
-/// hammer test the good hits are averaged (--hits). A long text is read in chunks and not kept in
-/// memory.
+/// length of one). With a random excitation give --segment: the segments overlap, and a window
+/// weights them. For a hammer test the good hits are averaged (--hits). A long text is read in
+/// chunks and not kept in memory.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg

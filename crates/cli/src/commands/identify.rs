@@ -14,18 +14,18 @@ use crate::outcome::{Files, Outcome};
 ///
 /// In the frequency domain (the default) one kind of response is enough. For a periodic excitation
 /// the window must contain whole periods, which are averaged. For a random excitation, or any
-/// record that is not whole periods, the transient is estimated together with the machine; for a
-/// hammer test, the transient of each good hit (--hits), or with --machine of each run of good hits
-/// without a gap. In the time domain any record is possible.
-/// The equation of motion itself needs displacement, velocity and acceleration; displacement and
-/// velocity are enough with an assumption on the force between the samples. --derivatives computes
-/// what was not measured.
+/// record that is not whole periods, the transient is estimated together with the machine. For a
+/// hammer test (--hits) each good hit has its own transient; with --machine, each series of good
+/// hits without a gap has one. In the time domain any record is possible. The equation of motion at
+/// the samples needs displacement, velocity and acceleration; displacement and velocity are enough
+/// with an assumption on the force between the samples. --derivatives computes the responses that
+/// were not measured.
 ///
 /// With --frf-table the files are frequency responses measured elsewhere.
 ///
-/// With --machine, the unknown coefficients of a machine described by its elements are identified
-/// from sensors anywhere: springs and dampers of a chain, the bearings of a rotor, a frame on a
-/// shake table.
+/// With --machine, a file describes the elements of the machine, and their unknown coefficients are
+/// identified from sensors at any positions. Examples: springs and dampers of a chain, the bearings
+/// of a rotor, a frame on a shake table.
 ///
 /// A long text is read in chunks and not kept in memory: the fit uses all of it; checks and plots
 /// in the time domain use at most the first 262144 samples. The following are kept in memory:

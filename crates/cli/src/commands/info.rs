@@ -12,14 +12,16 @@ use crate::outcome::{Files, Outcome};
 
 /// Show what is in a record: format, columns, sampling, levels, strongest lines, period
 ///
-/// For every channel: mean, RMS and peak value in its own unit, the crest factor, the strongest
-/// lines of its spectrum with their amplitudes, and the period, in samples, if it repeats. The
-/// spectrum covers whole periods if the channel repeats or --period is given, otherwise the window,
-/// weighted by a Hann window. In a text of more than 262144 rows, the levels cover all samples of
-/// the window, lines and period its first 262144 samples.
+/// The report has, for every channel, mean, RMS and peak value in its own unit, the crest factor,
+/// the strongest lines of its spectrum with their amplitudes, and the period, in samples, if the
+/// channel repeats. The spectrum covers whole periods if the channel repeats or --period is given,
+/// otherwise all samples of the window, weighted by a Hann function. In a text of more than 262144
+/// rows, the levels cover all samples of the window; lines and period cover its first 262144
+/// samples.
 ///
-/// The picture shows the first eight columns: over time, in the whole window, and as spectra, of
-/// the mean period if there is one. The column of time has a spectrum only if --columns names it.
+/// The picture shows the first eight columns over time, in the whole window, and their spectra,
+/// from the mean period if there is one. The column of time has a spectrum only if --columns names
+/// it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid info record.csv

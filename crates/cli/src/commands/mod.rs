@@ -36,10 +36,10 @@ use crate::outcome::{Files, Outcome};
     version,
     max_term_width = 100,
     after_help = "Numbers are in SI units. Columns are chosen by name or by number, counted from 1. Records are \
-                  text\n(CSV and its relatives), MATLAB or HDF5 files, universal files (dataset 58), \
+                  text\n(CSV and similar), MATLAB or HDF5 files, universal files (dataset 58), \
                   Parquet, or any of\nthem in gzip.\n\n\
                   A file called - is standard input where it is read, standard output where it is written; the\n\
-                  report for people then goes to the error stream.\n\n\
+                  text report then goes to the error stream.\n\n\
                   Exit codes:\n  0    success\n  1    fleet: some of the records have no result\n  2    every failure, wrong options included: one message on \
                   the error stream, no file written\n  141  the reader of standard output has closed it"
 )]

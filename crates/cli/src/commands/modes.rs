@@ -29,23 +29,25 @@ use crate::{options, repeat};
 /// Find the modes: of a test with forces, of a table of frequency responses, of a free decay, of an
 /// ambient record, of a machine
 ///
-/// With --force the record has any number of measured forces and responses: of shakers, of a hammer
-/// (--hits excludes bad hits), or of a hammer that roves from point to point (one record per point,
-/// --force-at). Frequencies, damping ratios and shapes are estimated by maximum likelihood on the
-/// spectral lines of the whole records, without windows; the number of modes is chosen, too.
-/// Without --force the record is a free decay, or with --ambient the response to unmeasured forces.
-/// Several free decays of one structure, each with its own initial state, have common modes.
+/// With --force the record has any number of measured forces and responses. The forces are those of
+/// shakers, of a hammer (--hits excludes bad hits), or of a hammer that roves from point to point
+/// (one record per point, --force-at). Frequencies, damping ratios and shapes are estimated by
+/// maximum likelihood on the spectral lines of the whole records, without windows; the number of
+/// modes is chosen automatically. Without --force the record is a free decay, or with --ambient the
+/// response to unmeasured forces. Several free decays of one structure, each with its own initial
+/// state, have common modes.
 ///
 /// Without any column the file is a table of frequency responses: a universal file (datasets 58),
 /// or a table with the columns that `mechid frf --output` writes. A file in JSON is the description
-/// of a machine, or what `mechid identify --json` printed.
+/// of a machine, or a result of `mechid identify --json`.
 ///
 /// --compare compares the modes with another result, or with a finite-element model (datasets 55 of
-/// a universal file): pairs by frequency and shape, with differences over their standard errors.
+/// a universal file): it pairs modes by frequency and shape, and divides each difference by its
+/// standard error.
 ///
 /// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes to
-/// compute all of them: --modes computes the given number of lowest modes, or, with --near-hz, of
-/// the modes nearest to a frequency.
+/// compute all of them: --modes computes only this number of modes: the lowest ones or, with
+/// --near-hz, those nearest to a frequency.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid modes beam.csv --force hammer --acceleration a1 --band-hz 5:1200
@@ -73,8 +75,8 @@ pub struct ModesArgs {
     /// struck point of each record
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     force_at: Vec<String>,
-    /// Point of each response column, such as 3 or 12+Z; modal masses are given if a force acts at
-    /// the point of a response
+    /// Point of each response column, such as 3 or 12+Z; the report has modal masses if a force
+    /// acts at the point of a response
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     response_at: Vec<String>,
     /// Frequencies to use, in Hz [default: the band that the forces excite]
@@ -86,21 +88,23 @@ pub struct ModesArgs {
     /// Maximum number of modes
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
     max_modes: Option<usize>,
-    /// Frequencies, in Hz, of the modes to report, even if they are weak: the nearest ones, within
-    /// 2 %; for a machine with --modes, one frequency, whose nearest modes are computed
+    /// Frequencies, in Hz: only the mode nearest to each, within 2 %, is reported, even if it is
+    /// weak. For a machine with --modes: one frequency; the modes nearest to it are computed
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
     /// Impose real shapes: damping is proportional, so that all points of a mode move in phase or
-    /// in opposite phase. Modes that contradict it are named, and it is then not imposed
+    /// in opposite phase. If modes contradict this, the report names them, and real shapes are not
+    /// imposed
     #[arg(long)]
     real_shapes: bool,
     /// Impose reciprocity: between two points with force and response, the response is the same in
-    /// both directions. Modes that contradict it are named, and it is then not imposed
+    /// both directions. If modes contradict this, the report names them, and reciprocity is not
+    /// imposed
     #[arg(long)]
     reciprocal: bool,
-    /// Fit once more without this percentage at the end of each record, and predict the excluded
-    /// part
+    /// Make a second fit without this percentage at the end of each record, and predict the
+    /// excluded part with it
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     validate_percent: Option<f64>,
     /// Predict this record, with the same columns, from its forces
@@ -149,7 +153,8 @@ struct UnmeasuredArgs {
     /// Exclude the lines of the harmonics that are found in the record
     #[arg(long, requires = "ambient")]
     without_harmonics: bool,
-    /// Beginning of a free decay, in seconds from the first sample of the window [default: found]
+    /// Beginning of a free decay, in seconds from the first sample of the window [default:
+    /// detected]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     from: Option<f64>,
     /// End of the part of a free decay that is used, in seconds from the first sample of the window
@@ -175,7 +180,7 @@ impl ModesArgs {
         if let Some(option) = self.about.given()
             && !self.plot.is_page()
         {
-            let why = "of modes belongs to a page, --plot FILE.html";
+            let why = "needs a page: --plot FILE.html";
             return Err(CliError::MisplacedOption { option, why });
         }
         let mut channels = self.channels.channels();

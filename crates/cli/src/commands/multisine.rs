@@ -16,7 +16,7 @@ use crate::args::{PlotArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
-/// Make a multisine excitation, write its record and judge it
+/// Make a multisine excitation, write its record and report its properties
 ///
 /// A multisine is a sum of cosines on chosen lines of a period. The phases decide how its power is
 /// spread over time: with a low crest factor the shaker gives the most power for a given peak
@@ -56,7 +56,7 @@ pub struct MultisineArgs {
         help_heading = "Level"
     )]
     rms: Option<f64>,
-    /// Largest force, between samples too, in N
+    /// Peak force, including values between samples, in N
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Level")]
     peak: Option<f64>,
     /// Slope of the amplitudes from the first line on, in dB per decade
@@ -71,10 +71,10 @@ pub struct MultisineArgs {
     /// Seed of random phases and of the search for a low crest factor
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Starting points of the search for a low crest factor
+    /// Number of starting points of the search for a low crest factor
     #[arg(long, value_name = "COUNT", default_value_t = 16, value_parser = at_least_one)]
     starts: usize,
-    /// Inputs of the test, one column each
+    /// Number of inputs of the test, one column each
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = at_least_one,
           help_heading = "Several inputs")]
     inputs: usize,
@@ -98,7 +98,7 @@ pub struct MultisineArgs {
 /// Phase laws by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 enum PhaseLaw {
-    /// Schroeder's law for the spectrum at hand: a crest factor of about 1.7
+    /// Schroeder's law for the given spectrum: a crest factor of about 1.7
     #[default]
     Schroeder,
     /// Schroeder's two-valued law, phases 0 or π
@@ -107,7 +107,7 @@ enum PhaseLaw {
     Random,
     /// All zero: one peak per period
     Zero,
-    /// Searched for a low crest factor: about 1.4 for a flat spectrum
+    /// Optimised for a low crest factor: about 1.4 for a flat spectrum
     LowCrest,
 }
 

@@ -14,7 +14,8 @@ use crate::outcome::{Files, Outcome};
 /// Predict the response of an identified machine, linear or not, to a measured force
 ///
 /// The model may also be the result of `mechid modes --json`: the forces and responses are then
-/// those of the modal test, by name or in order, and the prediction holds in its band.
+/// those of the modal test, by name or in order, and the prediction is limited to the band of the
+/// test.
 ///
 /// With --period the prediction is the steady state under the mean of the periods. Otherwise it
 /// covers the whole window from its first sample on, from rest or from the initial state that
@@ -37,7 +38,7 @@ pub struct PredictArgs {
     #[command(flatten)]
     channels: ChannelArgs,
     /// Fit the initial state to this number of samples at the beginning of the response; the errors
-    /// do not count these samples [default: at rest]
+    /// exclude these samples [default: at rest]
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     settle: Option<usize>,
     /// File for the predicted response: time in s, then every measured kind of response

@@ -22,17 +22,17 @@ use crate::{options, repeat};
 
 /// Identify, and write a report: one HTML file with data, fit, intervals, residual and pictures
 ///
-/// Takes the options of `mechid identify`. The file is self-contained: it can be sent, printed and
-/// archived; its figures zoom and have a cursor. It ends with the command that writes it again.
+/// The options of `mechid identify` apply. The file is self-contained: it can be sent, printed and
+/// archived; its figures zoom and have a cursor. It ends with the command that reproduces it.
 ///
 /// A long text is read in chunks, and `mechid report` keeps as little of it in memory as `mechid
-/// identify`: levels, time histories and mean periods cover all samples; the residual in time and,
-/// for an open record, its spectrum and the reconstructed force cover the first 262144 samples, and
-/// the page says so.
+/// identify`. Levels, time histories and mean periods cover all samples. The residual over time
+/// covers the first 262144 samples; for an open record, the spectrum of the residual and the
+/// reconstructed force do, too. The page states this.
 ///
-/// With --machine the page is that of a machine of named elements. A file in JSON, without columns,
-/// is a saved result of `mechid modes` or `mechid identify`, or the description of a machine: the
-/// page is that of its modes.
+/// With --machine the page is that of a machine of named elements. A JSON file for which no columns
+/// are given is a saved result of `mechid modes` or `mechid identify`, or the description of a
+/// machine; the page then shows its modes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid report record.csv --force force --displacement displacement --output report.html
@@ -113,7 +113,7 @@ impl PageArgs {
             return self.outcome(&text, &identified, &elements_page(&identified, &settings)?);
         }
         if self.table.is_given() {
-            let (option, why) = ("--frf-table", "of a report belongs to --machine");
+            let (option, why) = ("--frf-table", "needs --machine in a report");
             return Err(CliError::MisplacedOption { option, why });
         }
         let identified = self.fit.identify()?;

@@ -21,13 +21,13 @@ use crate::outcome::{Files, Outcome};
 ///   system      mass, damping, stiffness (numbers, matrices as lists of rows, or names of Matrix
 ///               Market files), or mass, natural_frequency_hz, damping_ratio
 ///
-///   nonlinear   terms beside the system, such as "k3: x1^3, c2: |v1| v1", and coefficients, a
-///               list, as identify --json prints them
+///   nonlinear   terms in addition to the system, such as "k3: x1^3, c2: |v1| v1", and their
+///               coefficients, a list, as identify --json prints them
 ///
 ///   sampling    samples in one period, rate_hz
 ///
-///   excitation  a list of forces, each with dof (counted from 1) and a kind; without a kind a
-///               multisine:
+///   excitation  a list of forces, each with dof (counted from 1) and a kind (default:
+///               multisine):
 ///                 multisine  lines (all, odd, 1:2:99 …), amplitude of each line in N, phases
 ///                            (schroeder, schroeder-binary, random with seed, zero)
 ///                 harmonic   amplitude in N, frequency_hz, phase_rad
@@ -55,8 +55,8 @@ use crate::outcome::{Files, Outcome};
 ///
 ///   periods     number of periods in the record
 ///
-///   outputs     degrees of freedom whose response is recorded, counted from 1; if not given, all,
-///               but with more than 64 in sparse matrices those that a force acts on
+///   outputs     degrees of freedom whose response is recorded, counted from 1; default: all; if
+///               there are more than 64 in sparse matrices, only those on which a force acts
 ///
 ///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
 ///               fraction_of_rms; and a seed
@@ -82,13 +82,13 @@ pub struct SimulateArgs {
     /// a Parquet file, its name ending in .parquet
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: PathBuf,
-    /// Number of runs with different noise: the seed increases by 1 from run to run, from the one
-    /// described
+    /// Number of runs with different noise: the first run has the seed of the description, and the
+    /// seed increases by 1 from run to run
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "plot",
           help_heading = "Many runs")]
     runs: Option<usize>,
-    /// Table of the runs, a row each: its columns are the fields that change, by their paths in the
-    /// description, such as noise.seed, system.damping, excitation.2.amplitude
+    /// Table of the runs, one row per run; its columns are the fields that change, named by their
+    /// paths in the description, such as noise.seed, system.damping, excitation.2.amplitude
     #[arg(long, value_name = "RUNS.csv", conflicts_with_all = ["plot", "runs"],
           help_heading = "Many runs")]
     study: Option<PathBuf>,

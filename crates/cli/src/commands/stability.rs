@@ -18,19 +18,19 @@ use crate::outcome::{Files, Outcome};
 
 /// Show stability and accuracy of the time-stepping schemes
 ///
-/// For a free oscillation of period T stepped by Δt: the spectral radius (above 1 the motion grows
-/// without end), the relative elongation of the period, and the share of the amplitude lost per
-/// period. All values come from the stepping code itself. The conventions of a scheme on load and
-/// start have no effect on a free motion.
+/// The tables have, for a free oscillation of period T and the step Δt, the spectral radius (above
+/// 1 the motion grows without end), the relative elongation of the period, and the share of the
+/// amplitude lost per period. All values are computed by the code of the schemes. The options of a
+/// scheme for load and start have no effect on a free motion.
 ///
-/// With the description of an experiment (see mechid simulate) also the largest stable step of each
-/// scheme for that machine.
+/// With the description of an experiment (see mechid simulate) the report also has the largest
+/// stable step of each scheme for that machine.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  mechid stability --plot charts.svg\n  \
                   mechid stability --damping 0.05 --step 0.05,0.1,0.2 --theta 2\n  \
                   mechid stability machine.json")]
 pub struct StabilityArgs {
-    /// A machine to find the largest stable steps for: the description of an experiment
+    /// Description of an experiment; the largest stable steps are those for its machine
     #[arg(value_name = "SYSTEM.json")]
     experiment: Option<PathBuf>,
     /// Damping ratio of the oscillation, at least 0 and less than 1
@@ -54,7 +54,7 @@ pub struct StabilityArgs {
     #[arg(long, default_value_t = 1.4, allow_negative_numbers = true, help_heading = "Schemes")]
     theta: f64,
     /// ρ∞ of the generalised-α schemes and of ρ∞-Bathe, the spectral radius at very large steps;
-    /// HHT-α is shown from 0.5 on
+    /// HHT-α is shown only from 0.5 up
     #[arg(
         long = "rho-infinity",
         value_name = "RADIUS",

@@ -24,10 +24,10 @@ use crate::outcome::{Files, Outcome};
 /// the same. NPI is the number of cycles of the natural frequency ωn in a period, so that the step
 /// is 2π NPI / (samples · ωn). Errors are differences from the machine in the description.
 ///
-/// Every n-th sample of a measured record is used, without a filter; columns and window are chosen
-/// as in "mechid identify". Without --reference the standard errors are compared, which do not
-/// include bias. A long text is read once for all settings, in chunks; for spectra one long period
-/// is kept in memory, and the excited lines are determined from the first 262144 samples.
+/// For a measured record, every n-th sample is used, without a filter; columns and window are
+/// chosen as in "mechid identify". Without --reference the standard errors are compared; they do
+/// not include bias. A long text is read once for all settings, in chunks; for spectra one long
+/// period is kept in memory, and the excited lines are determined from the first 262144 samples.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid sweep examples/machine.json --npi 2,4,8 --estimator euler
@@ -42,15 +42,16 @@ pub struct SweepArgs {
     channels: ChannelArgs,
     #[command(flatten)]
     settings: SettingArgs,
-    /// Natural frequency that NPI counts, in Hz [default: the lowest of the machine]
+    /// Natural frequency whose cycles NPI counts, in Hz [default: the lowest of the machine]
     #[arg(long, value_name = "HZ")]
     natural_frequency_hz: Option<f64>,
-    /// Estimator: from sample to sample by Euler's rule (the dissertation's; biased in proportion
-    /// to the step), with the force held or linear between samples; the equation of motion at the
-    /// samples, with the acceleration; or least squares or maximum likelihood on the spectra
+    /// Estimator: from sample to sample, by Euler's rule (euler; its bias is proportional to the
+    /// step) or with a force that is held or linear between samples; by the equation of motion at
+    /// the samples (needs the acceleration); or by least squares or maximum likelihood on the
+    /// spectra
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "linear")]
     estimator: Estimator,
-    /// Find the mass of a described machine, too; without this it is taken from the description
+    /// Find the mass of a described machine, too; otherwise the mass of the description is used
     #[arg(long)]
     unknown_mass: bool,
     /// Masses, in kg, as for "mechid identify" [default: unknown for a record]

@@ -29,8 +29,8 @@ pub struct TrendsArgs {
     /// The folder of results
     #[arg(value_name = "FOLDER")]
     results: PathBuf,
-    /// Order of the records: as their names sort, or by the last number in the name (1500 of
-    /// speed-1500.csv)
+    /// Order of the records: order (sorted by name), or number (by the last number in the name,
+    /// such as 1500 in speed-1500.csv)
     #[arg(long, value_name = "ORDER", value_parser = word::<TrendAxis>(), default_value = "order")]
     over: TrendAxis,
     /// File for a page with all series, outliers and failures (-: standard output)
@@ -40,7 +40,7 @@ pub struct TrendsArgs {
     #[arg(long, value_name = "TEXT", requires = "output", help_heading = "Output")]
     title: Option<String>,
     /// File for a table with one row per value: quantity, record, value, standard error, outlier,
-    /// and the change that begins there
+    /// and the change that begins at this record
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     table: Option<PathBuf>,
     #[command(flatten)]

@@ -419,7 +419,7 @@ fn hits_of_a_hammer_and_the_page() {
     let message = refused(at, &format!("identify {fit} --period 512"));
     assert!(message.contains("hits are not periods: leave out --period"), "{message}");
     let message = refused(at, "report hits.csv --frf-table --output page.html");
-    assert!(message.contains("--frf-table of a report belongs to --machine"), "{message}");
+    assert!(message.contains("--frf-table needs --machine in a report"), "{message}");
 }
 
 /// A saved analysis with elements gives a row for every record of a fleet.

@@ -190,7 +190,7 @@ fn another_record_is_predicted() {
     let own = format!("{common} --period 300 --periods 1 --validate :301:200");
     let (done, text, message) = run(folder, &own);
     assert!(done, "{message}");
-    assert!(text.contains("predicted of a.csv, samples 301 to 500 "), "{text}");
+    assert!(text.contains("prediction of a.csv, samples 301 to 500 "), "{text}");
 
     // The next records are whole periods of a steady state.
     for (name, seed) in [("p.csv", 1), ("q.csv", 2)] {
@@ -412,7 +412,7 @@ fn frequency_responses_are_estimated_and_fitted() {
     }
     let (_, text, _) = run(folder, &format!("frf p.csv {common}"));
     assert!(
-        text.contains("H1 from 4 periods of 256 samples, worth 4 averages; 20 lines"),
+        text.contains("H1 from 4 periods of 256 samples, equivalent to 4 averages; 20 lines"),
         "{text}"
     );
     refused(
@@ -445,8 +445,8 @@ fn frequency_responses_are_estimated_and_fitted() {
         refused(folder, &format!("identify r.csv {common} {more}"), &[part]);
     }
     for (segment, part) in [
-        ("1024:100", "from 0 to below 100 %, got 100"),
-        ("1024:-1", "from 0 to below 100 %, got -1"),
+        ("1024:100", "at least 0 and below 100 %, got 100"),
+        ("1024:-1", "at least 0 and below 100 %, got -1"),
         ("1024:50:hanning", "is none of hann, hamming, blackman, rectangular"),
         ("0", "is not a number of samples"),
     ] {

@@ -192,7 +192,7 @@ fn what_a_large_machine_does_not_have_is_refused() {
     chain(home.path(), 400, "");
     let refused = refused(home.path(), "modes chain/chain.json");
     assert!(refused.contains("400 degrees of freedom in sparse matrices"), "{refused}");
-    assert!(refused.contains("modes --modes"), "{refused}");
+    assert!(refused.contains("modes with `modes`"), "{refused}");
     assert!(!home.path().join("x.csv").exists());
 }
 

@@ -242,7 +242,7 @@ fn columns_beyond_eight_and_the_time_are_left_out_and_told() {
     record(folder.path());
     let told = mechid(folder.path(), "info timed.csv --plot a.png");
     assert!(
-        told.contains("not drawn, unless --columns chooses them: 10 \"c9\", 11 \"c10\"\n"),
+        told.contains("to draw others, choose them with --columns: 10 \"c9\", 11 \"c10\"\n"),
         "{told}"
     );
     assert!(fs::read(folder.path().join("a.png")).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));

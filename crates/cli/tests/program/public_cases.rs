@@ -338,7 +338,7 @@ fn the_table_below_many_lines_is_found() {
     (0..50).for_each(|row| text += &format!("{},{},{}\n", 0.01 * f64::from(row), row % 5, row % 7));
     fs::write(home.path().join("a.csv"), text).unwrap();
     let message = refused(home.path(), "info a.csv");
-    assert!(message.contains("line 301, with 3 fields") && message.contains("--skip-lines 300"));
+    assert!(message.contains("line 301, with 3 fields") && message.contains("`skip_lines` 300"));
     assert!(mechid(home.path(), "info a.csv --skip-lines 300").contains("3 columns, 50 samples"));
 }
 

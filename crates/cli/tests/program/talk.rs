@@ -88,7 +88,7 @@ fn one_thing_is_told_as_one() {
     let told = mechid(folder.path(), &format!("identify {record} --mass 1"));
     assert!(told.contains("; 1 line, 1 (1 Hz)\n"), "{told}");
     let told = mechid(folder.path(), &format!("frf {record}"));
-    assert!(told.contains("worth 2 averages; 1 line, 1 Hz\n"), "{told}");
+    assert!(told.contains("equivalent to 2 averages; 1 line, 1 Hz\n"), "{told}");
     for (factor, ordinal) in [(3, "3rd"), (6, "6th"), (11, "11th"), (21, "21st")] {
         let told = refused(
             folder.path(),

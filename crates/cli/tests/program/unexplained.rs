@@ -83,7 +83,7 @@ fn a_force_sought_in_too_few_places_is_told() {
         let told = remarks(&found);
         for words in [
             "a force acts elsewhere than on degree of freedom 1 (`forced`)",
-            "its standard error is not reliable",
+            "the standard error of the force is not reliable",
         ] {
             assert!(told.contains(words), "{way}: {told}");
         }
@@ -104,7 +104,7 @@ fn a_force_that_explains_the_motion_is_not_doubted() {
     for way in ways() {
         let found = report(folder.path(), &way);
         let told = remarks(&found);
-        assert!(!told.contains("unexplained"), "{way}: {told}");
+        assert!(!told.contains("does not explain"), "{way}: {told}");
         for share in unexplained(&found) {
             assert!(share.unwrap() < 0.03, "{way}: {share:?}");
         }

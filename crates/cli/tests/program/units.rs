@@ -137,8 +137,9 @@ fn milliseconds_that_do_not_say_so_are_asked_about() {
         ),
         format!("report RECORD {roles} --output page.html"),
     ];
-    let asked = "the time in column 1 \"t\" has no unit and is taken as seconds: 0.128 Hz, 4000 s long; in ms \
-                 it would be 128 Hz: state the unit (--unit) or --sample-rate";
+    let asked = "the time in column 1 \"t\" has no unit and is taken as seconds: the sampling rate is \
+                 0.128 Hz and the duration 4000 s; in ms the rate would be 128 Hz: state the unit \
+                 (--unit) or --sample-rate";
     for call in calls {
         let told = |file: &str| mechid(folder, &call.replace("RECORD", file));
         assert!(told("bare.csv").contains(asked), "{call}: {}", told("bare.csv"));

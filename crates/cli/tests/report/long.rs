@@ -195,7 +195,7 @@ fn an_open_record_says_which_samples_it_shows() {
     for (id, part) in [
         ("force", "history of the window, and line amplitudes of samples 1 to 262144 taken as"),
         ("fit", "under the measured force over samples 1 to 262144; below"),
-        ("residual-spectrum", "of the residual, samples 1 to 262144: a residual of noise"),
+        ("residual-spectrum", "of the residual, samples 1 to 262144: the spectrum of pure noise"),
         ("correlations", "with the force, samples 1 to 262144; for pure noise, 95 %"),
         ("reconstructed-force", "their difference, samples 1 to 262144."),
     ] {

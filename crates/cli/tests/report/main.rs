@@ -206,7 +206,7 @@ fn the_page_says_what_is_in_the_record() {
     let force = row(&document, "Computed and measured force", "F");
     assert_eq!((&force[1], &force[2]), (&"31.02".to_owned(), &"31.02".to_owned()));
     let [(heading, _)] = &remarks(&document)[..] else { panic!("nothing speaks against it") };
-    assert_eq!(heading, "What speaks for the numbers");
+    assert_eq!(heading, "Evidence for the numbers");
 }
 
 /// Reference: a correct model leaves a residual with the power of the noise; a mode that the model
@@ -353,7 +353,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
         assert!(ids.contains(&format!("figure-{name}-2").as_str()), "{name}");
     }
     assert_eq!(ids.iter().filter(|id| **id == "figure-validation").count(), 1);
-    let fit = &row(&document, "What is predicted", "x")[1];
+    let fit = &row(&document, "Prediction of the responses", "x")[1];
     let fit: f64 = fit.strip_suffix(" %").unwrap().parse().unwrap();
     // A uniform number has the standard deviation of its width divided by √12.
     let motion: f64 = row(&document, "Channels over the window", "x")[4].parse().unwrap();
@@ -361,8 +361,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let expected = 100.0 * (1.0 - noise / motion.hypot(noise));
     assert!((fit - expected).abs() < 2.0, "{fit} {expected}");
     let remarks = remarks(&document);
-    let (_, merits) =
-        remarks.iter().find(|(heading, _)| heading.starts_with("What speaks")).unwrap();
+    let (_, merits) = remarks.iter().find(|(heading, _)| heading.starts_with("Evidence")).unwrap();
     assert!(merits.contains("noisy.csv, samples 1 to 512"), "{merits}");
     // Validation on fitted samples proves little; on other samples of the same record it counts.
     for (more, proves) in [

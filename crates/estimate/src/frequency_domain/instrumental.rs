@@ -173,7 +173,7 @@ fn open(parameters: &[Parameter]) -> EstimateError {
     let names: Vec<String> = parameters.iter().map(Parameter::to_string).collect();
     EstimateError::Undetermined {
         parameters: names.join(", "),
-        directions: "the two measurements have nothing in common".to_owned(),
+        directions: "the two measurements are not correlated".to_owned(),
     }
 }
 

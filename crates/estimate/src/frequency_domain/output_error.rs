@@ -65,7 +65,7 @@ pub fn output_error_near(
     nominal: Option<&SecondOrderSystem>,
 ) -> Result<OutputErrorFit, EstimateError> {
     if let Some(system) = nominal {
-        check_size("degrees of freedom of the machine expected", unknowns.dof(), system.dof())?;
+        check_size("degrees of freedom of the expected machine", unknowns.dof(), system.dof())?;
     }
     search_near(data, unknowns, nominal, Pooling::Automatic)
 }

@@ -153,7 +153,7 @@ impl EndLoads {
         records: &[FrequencyData],
     ) -> Result<Vec<FrequencyData>, EstimateError> {
         let len = records.iter().map(transient::len).sum();
-        check_size("loads of open ends", len, self.tau.len())?;
+        check_size("transient loads of the open records", len, self.tau.len())?;
         let mut loads = &self.tau[..];
         let closed = records.iter().map(|record| {
             let (tau, following) = loads.split_at(transient::len(record));

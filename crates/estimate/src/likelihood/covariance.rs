@@ -40,7 +40,7 @@ impl Information {
         minimum: &Minimum,
         inflation: f64,
     ) -> Result<Self, LikelihoodError> {
-        let failed = || LikelihoodError::Overflow { what: "the information of the data" };
+        let failed = || LikelihoodError::Overflow { what: "the Fisher information" };
         let linearisation = residual.linearise(&minimum.parameters).ok_or_else(failed)?;
         let count = minimum.parameters.len();
         let free: Vec<usize> = (0..count).filter(|at| !minimum.at_bound[*at]).collect();

@@ -32,11 +32,11 @@ pub enum LikelihoodError {
         value: f64,
     },
     /// Every coefficient is known.
-    #[error("every coefficient is known: there is nothing to identify")]
+    #[error("every coefficient is known: at least one must be unknown")]
     NoParameter,
     /// The number of unknowns is at least that of the measured numbers.
     #[error(
-        "{} cannot determine {}",
+        "{} cannot determine {}: use more lines or sensors, or state coefficients",
         message::count(*numbers, "measured number"),
         message::count(*unknowns, "unknown")
     )]
@@ -48,7 +48,10 @@ pub enum LikelihoodError {
     },
     /// The noise covariance of the outputs is singular: an output has no noise, or two outputs have
     /// the same noise.
-    #[error("the covariance of the outputs at {frequency_hz} Hz cannot be inverted")]
+    #[error(
+        "the noise covariance of the outputs at {frequency_hz} Hz cannot be inverted: an output has no noise, \
+         or two outputs have the same noise"
+    )]
     SingularNoise {
         /// Frequency of the line.
         frequency_hz: f64,
@@ -56,7 +59,7 @@ pub enum LikelihoodError {
     /// A sample covariance has too few degrees of freedom for a weight.
     #[error(
         "covariances with {degrees_of_freedom} statistical degrees of freedom cannot weight {outputs} \
-         outputs: more than {} are needed",
+         outputs: more than {} degrees of freedom are needed, from more periods or averages",
         outputs + 1
     )]
     FewDegreesOfFreedom {
@@ -66,15 +69,16 @@ pub enum LikelihoodError {
         outputs: usize,
     },
     /// The receptance does not exist.
-    #[error("the machine has no finite response at {at}")]
+    #[error("the response of the machine is not finite with these parameters: {at}")]
     NoResponse {
-        /// Place in the search.
+        /// Parameters for which the response is not finite.
         at: &'static str,
     },
     /// The initial and final states of open records need too many unknowns.
     #[error(
-        "the sensors respond to {got} independent differences between the initial and the final state of an \
-         open record in this band; at most {most} are supported: choose a narrower band, or whole periods"
+        "in this band the sensors respond to {got} independent state loads (differences between the initial and \
+         the final state of an open record), but at most {most} are supported: choose a narrower band, or \
+         whole periods"
     )]
     LargeOpen {
         /// Number of state loads.
@@ -83,15 +87,18 @@ pub enum LikelihoodError {
         most: usize,
     },
     /// No search converged.
-    #[error("none of {searches} searches of at most {steps} steps ended at a minimum")]
+    #[error(
+        "no search ended at a minimum ({searches} tried, at most {steps} steps each): give better initial \
+         values, narrower bounds or priors"
+    )]
     NotConverged {
         /// Number of searches.
         searches: usize,
         /// Maximum number of steps of each search.
         steps: usize,
     },
-    /// A matrix decomposition fails.
-    #[error("numbers overflow in {what}")]
+    /// A number exceeds the range of double precision.
+    #[error("the computation of {what} exceeds the range of double precision")]
     Overflow {
         /// Quantity that was computed.
         what: &'static str,

@@ -210,8 +210,8 @@ impl Excitation {
             (Between::Unknown(what), Some(_)) => Err(IoError::Description {
                 file: file.into(),
                 what: format!(
-                    "the scheme needs the force between samples, where {what} is not defined: choose load \
-                     held or linear"
+                    "the scheme needs the force between samples, but {what} is defined only at the samples: choose \
+                     `load` held or linear"
                 ),
             }),
             _ => Ok(samples.channel(0).to_vec()),

@@ -98,7 +98,7 @@ impl ExperimentStudy {
             StudyRuns::Seeds(count) => {
                 let noise = experiment.noise.ok_or_else(|| {
                     refused(
-                        "without noise all runs would be the same: describe it, with a seed".into(),
+                        "without noise all runs are the same: describe `noise` and a seed".into(),
                     )
                 })?;
                 if noise.seed.saturating_add(*count as u64) > LARGEST_WHOLE {

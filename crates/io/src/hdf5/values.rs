@@ -228,7 +228,7 @@ pub(super) fn references(
     }
     let objects = dataset.dereference();
     let objects = objects
-        .map_err(|error| Trouble::Unusable(format!("references that lead nowhere ({error})")))?;
+        .map_err(|error| Trouble::Unusable(format!("references without a target ({error})")))?;
     Ok(Content::References(objects))
 }
 

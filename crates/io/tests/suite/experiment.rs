@@ -392,7 +392,7 @@ fn wrong_excitations_say_what_is_wrong() {
     let random = r#"{ "kind": "random", "standard_deviation": 1 }"#;
     let experiment = parse(&description(SDOF, random, "")).unwrap();
     let e = experiment.force_within_steps(0.5).unwrap_err().to_string();
-    assert!(e.contains("a random force is not defined: choose load held or linear"), "{e}");
+    assert!(e.contains("a random force is defined only at the samples: choose `load` held"), "{e}");
 }
 
 #[test]

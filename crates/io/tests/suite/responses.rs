@@ -188,7 +188,7 @@ fn levels_orders_and_points_in_brackets() {
     let orders = parse("order,speed_rpm,real,imaginary\n1,1500,1,0\n2,1500,1,0\n").unwrap();
     assert_eq!(orders.frequency_hz, [25.0, 50.0]);
     let message = parse("order,real,imaginary\n1,1,0\n").unwrap_err().to_string();
-    assert!(message.contains("multiply them by it") && message.contains("speed_rpm"), "{message}");
+    assert!(message.contains("multiply the orders") && message.contains("speed_rpm"), "{message}");
 }
 
 #[test]

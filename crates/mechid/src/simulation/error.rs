@@ -47,7 +47,7 @@ pub enum SimulateError {
     /// An unstable machine does not reach a steady state.
     #[error(
         "the machine is unstable, {instability}: it reaches no periodic response; choose \
-         \"response\": \"from-rest\" and a record of a few doublings"
+         \"response\": \"from-rest\" and a record of a few doubling times"
     )]
     UnstablePeriodic {
         /// The growing free response.
@@ -57,7 +57,7 @@ pub enum SimulateError {
     /// from this response.
     #[error(
         "the periodic response is unstable: each period multiplies a disturbance by {} (the largest \
-         Floquet multiplier), so the machine leaves it; choose \"response\": \"from-rest\" to see how \
+         Floquet multiplier), so the motion departs from it; choose \"response\": \"from-rest\" to see how \
          the response develops, or another amplitude or frequency",
         multiplier_text(*.multiplier)
     )]
@@ -67,10 +67,10 @@ pub enum SimulateError {
     },
     /// The search for the periodic response of a nonlinear machine fails.
     #[error(
-        "no response that repeats every {period} s was found from rest and {SETTLING} periods: the best \
-         one changes by {missed:.1e} of its size in a period. Choose \"response\": \"from-rest\" to see \
-         how the response develops; if it repeats only after several periods of the force, describe \
-         these as one period (`samples`, `lines`)",
+        "no response that repeats every {period} s was found by a search that begins after {SETTLING} periods \
+         from rest: the best one changes by {missed:.1e} of its size in a period. Choose \
+         \"response\": \"from-rest\" to see how the response develops; if it repeats only after \
+         several periods of the force, describe these as one period (`samples`, `lines`)",
         period = message::number(*period)
     )]
     NoPeriodicOrbit {

@@ -21,10 +21,10 @@ pub enum AmbientError {
         /// Value of the samples, in the unit of the channel.
         value: f64,
     },
-    /// A channel has next to no signal in the band.
+    /// A channel has almost no signal in the band.
     #[error(
         "channel {}: its RMS value in the band is {rms:.2e}, {:.0e} times that of the \
-         strongest channel: the sensor is dead or in another unit",
+         strongest channel: the sensor is dead, or its unit is not that of the others",
         channel.saturating_add(1), ratio
     )]
     DeadChannel {
@@ -68,7 +68,7 @@ pub enum AmbientError {
     },
     /// The record is too short for the subspace method.
     #[error(
-        "{samples} samples in the band are too few for covariances over {lags} lags: record longer"
+        "{samples} samples after resampling to the band are too few for covariances over {lags} lags: record longer"
     )]
     TooShort {
         /// Number of samples after resampling to the band.
@@ -88,11 +88,14 @@ pub enum AmbientError {
         /// Half the sampling rate, in Hz.
         nyquist_hz: f64,
     },
-    /// A number of modes of zero was asked for.
+    /// The requested number of modes is zero.
     #[error("`modes` and `max_modes` must be at least 1")]
     NoModesAsked,
     /// Fewer modes were found than asked for.
-    #[error("{found} of {asked} modes were found between {from_hz} and {to_hz} Hz")]
+    #[error(
+        "only {found} of {asked} modes were found between {from_hz} and {to_hz} Hz: ask for fewer (`modes`), or \
+         widen `band_hz`"
+    )]
     FewerModes {
         /// Number of modes asked for (`modes`).
         asked: usize,
@@ -117,7 +120,7 @@ pub enum AmbientError {
         to_hz: f64,
     },
     /// A decomposition or a search failed.
-    #[error("{what} of {size} unknowns failed: the record may hold copies of one channel")]
+    #[error("{what} ({size} unknowns) failed: two channels of the record may be copies")]
     Numerics {
         /// Name of the step.
         what: &'static str,

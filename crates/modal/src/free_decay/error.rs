@@ -37,8 +37,9 @@ pub enum FreeDecayError {
     },
     /// No oscillation was found in a free response.
     #[error(
-        "no oscillation exceeds the noise in {}: the best one increases twice the log likelihood by \
-         {gained:.1}, but noise alone can increase it by {needed:.1}. Use the part of the record in which the response decays",
+        "no oscillation exceeds the noise in {}: the best one increases 2 × log likelihood by \
+         {gained:.1}, but noise alone can increase it by {needed:.1}. Use the part of the record in which the \
+         response decays",
         message::count(*samples, "sample")
     )]
     NoDecay {
@@ -71,8 +72,8 @@ pub enum FreeDecayError {
     /// No search for the best fit (maximum likelihood, output error or a constant) converged.
     #[error(
         "the search for the best fit failed: {} reached no minimum within {steps} \
-         steps. This says nothing about the model; more lines, more periods, a known mass or fewer \
-         unknowns make the search easier",
+         steps. The record may not determine this number of modes: give fewer (`modes`), or use a longer \
+         part of the decay",
         if *searches == 1 { "one search".to_owned() } else { format!("{searches} searches") }
     )]
     NotConverged {

@@ -54,7 +54,7 @@ fn constraints_that_name_no_channel_are_refused() {
     let points = vec![DrivingPoint { output: 0, input: 0 }, DrivingPoint { output: 9, input: 1 }];
     let wrong = settings(ModalConstraint::Reciprocity { points });
     let message = identify_modes(&pair(8).lines(0), &wrong).unwrap_err().to_string();
-    assert_eq!(message, "`constraints` is 9, but must be an output of the data");
+    assert_eq!(message, "`constraints`: expected an output of the data, got 9");
 }
 
 #[test]

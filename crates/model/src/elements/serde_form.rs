@@ -241,7 +241,7 @@ impl ElementForm {
     ) -> Result<Option<(DMatrix<f64>, Coefficient)>, MachineError> {
         let Some(form) = form else {
             return match factor {
-                Some(_) => Err(self.error(format!("`{what}_factor` without a matrix `{what}`"))),
+                Some(_) => Err(self.error(format!("`{what}_factor` needs a matrix `{what}`"))),
                 None => Ok(None),
             };
         };

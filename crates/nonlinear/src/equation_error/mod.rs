@@ -136,8 +136,9 @@ fn check_determined(names: &[String], open: &[Direction]) -> Result<(), Estimate
         let names = names.iter().enumerate().filter(|(at, _)| involved(*at));
         message::list(names.map(|(_, name)| name), ", ", NAMED_PARAMETERS)
     };
-    let direction =
-        |d: &Direction| format!("only a combination of {} shows", names_of(&|at| d.involved[at]));
+    let direction = |d: &Direction| {
+        format!("only a combination of {} is determined", names_of(&|at| d.involved[at]))
+    };
     Err(EstimateError::Undetermined {
         parameters: names_of(&|at| open.iter().any(|direction| direction.involved[at])),
         directions: message::list(open.iter().map(direction), "; ", NAMED_DIRECTIONS),

@@ -1,4 +1,4 @@
-"""Measure a force and a response, get the machine.
+"""Identify a machine from a measured force and response.
 
 >>> import mechid
 >>> found = mechid.identify("examples/machine.csv", force="force",
@@ -6,7 +6,7 @@
 >>> mass = found.parameters["m"].value  # kg
 
 Everything is in SI units, and in Hz where a name ends in ``_hz``. A record is a file, or arrays of
-shape ``(samples,)`` or ``(samples, degrees of freedom)``. Failures are `MechidError`, a
+shape ``(samples,)`` or ``(samples, degrees of freedom)``. A failure raises `MechidError`, a
 `ValueError` with a message that states the cause and the remedy.
 """
 

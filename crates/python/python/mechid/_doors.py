@@ -126,16 +126,16 @@ def identify(
         mappings, SEP 5 channels), or `Measurement` objects. Or the force and the displacement as
         arrays of shape (samples,) or (samples, degrees of freedom), in N and m.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
-        Estimator of the parameters. Default: maximum likelihood if the periods show the noise, if
-        noise biases least squares, or with `from_frf`; otherwise least squares.
+        Estimator of the parameters. Default: maximum likelihood if the noise is known from at least
+        two periods, if noise biases least squares, or with `from_frf`; otherwise least squares.
     noise : str, optional
         Noise spectrum that weights the lines in maximum likelihood: ``"white"``, ``"smooth"``,
         ``"neighbours:N"`` (means over N lines to either side), ``"per-line"``, or ``"auto"`` for an
         automatic choice.
     force_noise : float or sequence of float, optional
         Standard deviation of the noise on the force samples, in N: one value for all forces, or one
-        per degree of freedom. It applies to open records, and makes the fit treat the record as an
-        open one. Default: estimated above the excited band, or between hits.
+        per degree of freedom. It is for open records: with it, the record is fitted as an open
+        record. Default: estimated above the excited band, or between hits.
     lines : str, optional
         Spectral lines: ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as
         ``"1:2:335"``. Default: every line at which the force exceeds its noise.
@@ -159,8 +159,8 @@ def identify(
         Fit frequency responses, averaged over segments.
     segment : int or str or dict, optional
         Samples of a segment; ``"1024:50:hann"`` adds the overlap in per cent and the window
-        (hann, hamming, blackman, rectangular), as does a dict of ``segment``,
-        ``overlap_percent`` and ``window``.
+        (hann, hamming, blackman, rectangular). A dict has the keys ``segment``, ``overlap_percent``
+        and ``window``.
     between_samples : {"euler", "held", "linear"}, optional
         Assumed force between the samples: held or linear for open records, hits and the time
         domain, euler for the time domain only. Default: band-limited.
@@ -169,15 +169,16 @@ def identify(
         ``"a1=0.5"`` with the corner frequency in Hz, or a dict of ``channel`` and ``corner_hz``.
     extent : {"open", "period"}, optional
         Extent of the window: open (any part of a response; its transient is estimated with the
-        machine) or period (whole periods). Default: a period if `period` is given, otherwise a
-        period unless a transient is found; in the time domain, and with nonlinear terms, open.
+        machine) or period (whole periods). Default: in the time domain open, or period with
+        spectral derivatives. In the frequency domain period if `period` is given; otherwise open
+        for nonlinear terms, and for a linear machine period unless a transient is found.
     hits : bool or str or dict, optional
         Divide the records of a hammer test into hits, exclude bad ones and fit each of the others
-        as a separate record. A text such as ``"trigger=0.5,double=5"`` changes the rule, or a dict
-        of ``trigger_percent``, ``double_percent``, ``weak_percent``, ``bounce_s``, and the numbers
-        of samples ``before`` (before the pulse) and ``samples`` (of the whole hit).
+        as a separate record. The rule is changed by a text such as ``"trigger=0.5,double=5"``, or
+        by a dict of ``trigger_percent``, ``double_percent``, ``weak_percent``, ``bounce_s``, and
+        the numbers of samples ``before`` (before the pulse) and ``samples`` (of the whole hit).
     derivatives : str, optional
-        Method for velocity and acceleration that were not measured: ``"spectral"`` or
+        Method for the responses that were not measured: ``"spectral"`` or
         ``"savitzky-golay:WINDOW:ORDER"``.
     refine : str or dict, optional
         Number of steps in every sampling interval, and interpolation between the samples (linear,
@@ -189,7 +190,7 @@ def identify(
         Candidate terms, written as for `nonlinear`; those that improve the fit are added.
     criterion : {"information", "held-out"}, optional
         Criterion for the addition of a candidate: the extended Bayesian information criterion, or
-        the error of the prediction of each record by the fit to the others (at least three
+        the error with which the fit to the other records predicts each record (at least three
         records).
     search : sequence of {"laws", "delay", "phase"}
         Further constants to estimate: those inside the laws, the delay of the force, a phase error
@@ -197,9 +198,9 @@ def identify(
     weighting : {"automatic", "white-force", "response", "smooth-spectrum"}, optional
         Weighting of the lines of a fit with nonlinear terms.
     validate : Measurement or dict, optional
-        Record to predict that is not fitted. A dict of ``record``, ``start`` (first sample, counted
-        from 1) and ``samples`` (number of samples) selects a part of it; without ``record``, of the
-        first fitted record.
+        Record that is predicted and not fitted. A dict of ``record``, ``start`` (first sample,
+        counted from 1) and ``samples`` (number of samples) selects a part of it; without
+        ``record``, a part of the first fitted record.
     settings : dict, optional
         ``settings`` of another result, instead of the options above; the keys are those options.
     threads : int, optional
@@ -296,13 +297,13 @@ def identify_elements(
         Noise spectrum that weights the lines, as in `identify`.
     force_noise : float or sequence of float, optional
         Standard deviation of the noise on the samples of the forces, in N, for open records and
-        hits. Default: estimated above the band that they drive, or between the hits.
+        hits. Default: estimated above the band that the forces excite, or between the hits.
     starts : int, optional
         Maximum number of searches. Default: 12.
     seed : int
         Seed of the random initial values.
     confidence : float
-        Probability with which the intervals contain the unknowns.
+        Confidence level of the intervals, between 0 and 1.
     threads : int, optional
         Number of threads. Default: one per processor.
     **record
@@ -316,7 +317,8 @@ def identify_elements(
     Raises
     ------
     MechidError
-        If the description is inconsistent, a record cannot be read, or the data determine nothing.
+        If the description is inconsistent, a record cannot be read, or the data determine none of
+        the unknowns.
 
     Examples
     --------
@@ -558,9 +560,9 @@ def bearing_campaign(
     Parameters
     ----------
     campaign : mapping or path
-        Description, or its JSON file. It has ``points``, each with ``tests``, ``baseline``,
-        ``rotation_hz`` and ``load``, and, common to all points, ``channels``, ``window`` (or
-        ``frf_table``), ``baseline`` and ``settings`` as in `bearing`.
+        Description, or its JSON file. It has a list ``points``; each point has ``tests``,
+        ``baseline``, ``rotation_hz`` and ``load``. Common to all points are ``channels``,
+        ``window`` (or ``frf_table``), ``baseline`` and ``settings`` as in `bearing`.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -739,28 +741,28 @@ def modes(
     modes, max_modes : int, optional
         Number of modes, or its maximum. Default: as many as the record shows.
     near_hz : sequence of float
-        Frequencies, in Hz, of the modes to report, even if they are weak: the nearest ones, within
-        2 %. Other modes are part of the model, but not reported. Default: all modes.
+        Frequencies, in Hz: only the mode nearest to each, within 2 %, is reported, even if it is
+        weak. Other modes are part of the model, but not reported. Default: all modes.
     force_at, response_at : sequence of str or int
-        Points of the force and response columns, such as ``3`` or ``"12+Z"``. If several records
-        have one force column, of a roving hammer: the struck point of each record.
+        Points of the force and response columns, such as ``3`` or ``"12+Z"``. For a roving hammer
+        (several records with one force column): the struck point of each record.
     hits : bool or dict, optional
         Find the hits of a hammer and use the good ones; those without a gap are one record.
     ambient : bool
-        Whether forces act that are not measured, such as wind or traffic.
+        Whether the record is ambient: the forces, such as wind or traffic, are not measured.
     decay : bool
         Whether no force acts: each record is a free decay from its own initial state, and all have
-        the same modes. For one record, `decay` says more.
+        the same modes. For one record, the function `decay` returns more.
     without_hz : sequence of float
         Frequencies of nearby machines in an ambient record, in Hz, whose lines are excluded.
     without_harmonics : bool
-        Whether the lines of the harmonics that are found in an ambient record are excluded, too.
+        Whether to exclude the lines of the harmonics that are found in an ambient record, too.
     real_shapes : bool
-        Whether damping is proportional, so that all points of a mode move in phase or in opposite
-        phase. It is imposed unless the modes contradict it.
+        Whether to impose real shapes, unless the modes contradict them: damping is proportional, so
+        that all points of a mode move in phase or in opposite phase.
     reciprocal : bool
-        Whether the response between two points with force and response is the same in both
-        directions. It is imposed unless the modes contradict it.
+        Whether to impose reciprocity, unless the modes contradict it: between two points with force
+        and response, the response is the same in both directions.
     validate : float
         Share at the end of each record that a second fit excludes and predicts. Default: no such
         validation.
@@ -789,7 +791,7 @@ def modes(
         tables = [one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in sources]  # type: ignore[arg-type]
     records = [] if tables else [one._inner for one in measurements(sources, "modes", record)]
     if ambient and decay:
-        raise ValueError("`ambient` and `decay` exclude each other: forces act, or none does")
+        raise ValueError("`ambient` and `decay` exclude each other: with `ambient` forces act, with `decay` none does")
     if settings is None:
         if decay:
             test: dict[str, Any] = {"decay": {}}
@@ -823,7 +825,8 @@ def compare_modes(first: object, second: object) -> ModeComparison:
     """Compare two sets of modes: a structure before and after a change, or a test and a model.
 
     Modes are paired by frequency and shape, at the points that both sets have. Each difference has
-    its standard error and the probability of such a difference without a change.
+    its standard error and its p-value, the probability of at least this difference if the two
+    structures are equal.
 
     Parameters
     ----------
@@ -862,7 +865,7 @@ def _mode_set(source: object) -> tuple[str | os.PathLike[str], str | None]:
         shapes = np.asarray(source["shape"], dtype=np.complex128)
         if frequencies.ndim != 1 or shapes.ndim != 2 or shapes.shape[1] != len(frequencies):
             raise ValueError(
-                f"`shape` has the shape {shapes.shape}, expected (points, {len(frequencies)}): a column a mode"
+                f"`shape` has the shape {shapes.shape}, expected (points, {len(frequencies)}): one column per mode"
             )
         dampings = source.get("damping_ratio")
         modes: list[dict[str, Any]] = []
@@ -901,15 +904,15 @@ def reconstruct(
     ----------
     machine : Machine, Identified, Modes, or path
         The machine, or the modes of a test with forces; the standard error of the force includes
-        the uncertainty of identified ones. A path is that of the JSON of the program.
+        their uncertainty if they were identified. A path names a JSON file of the program.
     *sources, **record
         The record: a file, table or `Measurement` with response columns and no force. Give arrays
         by keyword: ``displacement=x, fs=…``.
     method : str
         Method, one of those of ``mechid force --method``.
     forced : sequence of int
-        Degrees of freedom, or forces of the modes, on which a force acts, counted from 1. Default:
-        all.
+        Numbers, from 1, of the degrees of freedom on which a force acts, or, for modes, of the
+        acting forces of the modal test. Default: all.
     lines : str, optional
         Spectral lines with force.
     band_hz : (float, float), optional
@@ -1024,14 +1027,14 @@ def sweep(
         A record, as in `identify`, or the description of an experiment (a mapping as for
         `simulate`, or the path of a JSON file), which is simulated at each setting.
     npi, rate_hz, decimate : sequence of float
-        Values of the setting, of one kind: cycles of the natural frequency in a period, sampling
-        rates in Hz, or n for every n-th sample.
+        Values of the setting; give one of the three: cycles of the natural frequency in a period,
+        sampling rates in Hz, or n for every n-th sample.
     estimator : str
         Estimator, one of those of ``mechid sweep --estimator``.
     unknown_mass, mass : optional
-        Whether to identify the mass of a described machine, too; known masses, as in `identify`.
+        Whether to identify the mass of a described machine, too; or known masses, as in `identify`.
     natural_frequency_hz : float, optional
-        Natural frequency that `npi` counts. Default: the lowest of the machine.
+        Natural frequency whose cycles `npi` counts. Default: the lowest of the machine.
     reference : Machine, Identified or path, optional
         Reference machine: the errors of a record's estimates are differences from it.
     settings : dict, optional
@@ -1181,7 +1184,7 @@ def integrate(
     displacement, velocity : array_like, optional
         Motion at the first sample, in m and m/s. Default: zero.
     allow_unstable : bool
-        Whether steps are allowed at which the free motion grows numerically.
+        Whether to allow steps at which the free motion grows numerically.
 
     Returns
     -------

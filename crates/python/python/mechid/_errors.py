@@ -29,7 +29,8 @@ class MechidError(ValueError):
     ----------
     code : str
         Identifier of the failure for programs, such as ``"analysis.window"`` or
-        ``"estimate.too-few-rows"``; it never changes. The reference of the book lists all of them.
+        ``"estimate.too-few-rows"``; it never changes. The reference of the book lists all
+        identifiers.
     fields : mapping
         The numbers and names of the message, such as ``{"first": 1, "last": 600, "len": 512}``.
     """
@@ -80,7 +81,7 @@ def careful(door: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]:
         try:
             return door(*given, **named)
         except OverflowError as error:
-            message = f"a number is negative, or too large for what it counts: {error}"
+            message = f"a number is negative or too large: {error}"
             raise MechidError(message, "Settings") from None
         except UnicodeError as error:
             raise MechidError(f"a text cannot be encoded in UTF-8: {error}", "Settings") from None

@@ -200,17 +200,17 @@ class Chart:
         member : str or int
             Name of the figure, or its number from 1.
         panel : str or int, optional
-            Panel to draw alone, by the quantity of its ordinate, such as ``"Phase"``, or its number
-            from 1. Default: all panels, or the first if ``ax`` is a single one.
+            The only panel to draw, by the quantity of its ordinate, such as ``"Phase"``, or by its
+            number from 1. Default: all panels, or the first if ``ax`` is a single axes.
         show : {"bode", "complex", "nyquist"}
             Responses per unit force as magnitude and phase, as real and imaginary part, or as
             imaginary over real part.
         quantity : {"receptance", "mobility", "accelerance"}, optional
             Quantity of responses per unit force. Default: the measured one.
         scale : {"log", "linear", "decibel"}, optional
-            Scale of their magnitude.
+            Scale of the magnitude of responses per unit force.
         phase : {"wrapped", "continuous"}
-            Whether their phase stays between −180° and 180°.
+            Phase of responses per unit force: between −180° and 180°, or without jumps.
         ax : matplotlib.axes.Axes or sequence of them, optional
             Axes to draw into, one for each panel. Default: those of a new figure.
 
@@ -243,7 +243,7 @@ class ShapeFigure:
     name, caption : str
         Name of the figure, and its caption on the page.
     members : tuple of str
-        The modes with frequency and damping.
+        Names of the modes, with frequency and damping.
     points : tuple of str
         Names of the points.
     positions : array

@@ -73,7 +73,8 @@ class RecordOptions(Window, total=False):
 
     ``force``, ``displacement``, ``velocity`` and ``acceleration`` are columns of a file or table,
     or arrays of shape (samples,) or (samples, degrees of freedom) in N, m, m/s and m/s². ``fs`` is
-    the sampling rate in Hz; arrays need it, and tables without a column or an index of time.
+    the sampling rate in Hz; it is needed for arrays, and for tables without a column or an index of
+    time.
 
     For files and tables: ``time`` names the time column, ``unit`` states units of columns
     (``{"acc": "g"}``) and ``scale`` factors that convert columns to SI units; both have priority
@@ -261,9 +262,9 @@ class Measurement:
             force acts.
         fs : float, optional
             Sampling rate, in Hz; it must not contradict `time` or SEP 5 channels. Default: that of
-            the time column, of the index or of SEP 5 channels (``fs`` or ``time``). The index is time
-            if it contains dates, is called time or has a unit of time; without a name, numbers whose
-            steps are not all 1 are time in s.
+            the time column, of the index or of SEP 5 channels (``fs`` or ``time``). The index is
+            time if it contains dates, is called time or has a unit of time. An index of
+            floating-point numbers without a name is time in s, unless all its steps are 1.
         time : str, optional
             The time column, or the name of the index.
         unit : mapping of str to str, optional
@@ -476,7 +477,7 @@ class _Sep5:
             if len(set(starts.values())) > 1:
                 told = ", ".join(f"{name!r}: {start}" for name, start in starts.items())
                 raise ValueError(
-                    f"the channels begin at different instants ({field}: {told}): cut them to the same one"
+                    f"the channels begin at different instants ({field}: {told}): cut them so that they begin together"
                 )
 
     def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
@@ -814,14 +815,14 @@ def measurements(
         known = [source for source in sources if isinstance(source, Measurement)]
         given = [name for name in ("fs", *_OF_TABLES, *_OF_FILES, *_KINDS) if name in options]
         if given:
-            raise TypeError(f"a Measurement knows its `{given[0]}`: leave it out")
+            raise TypeError(f"a Measurement already has its `{given[0]}`: leave it out")
         window = _window_of(options)
         return [record.window(**window) for record in known] if window else known
     if sources and all(isinstance(source, (str, os.PathLike)) for source in sources):
         return [Measurement.open(source, **options) for source in sources]  # type: ignore[arg-type]
     for name in _OF_FILES:
         if name in options:
-            raise TypeError(f"`{name}` belongs to files")
+            raise TypeError(f"`{name}` is only for files")
     if sources and all(_is_table(source) for source in sources):
         return [Measurement.from_table(source, **options) for source in sources]  # type: ignore[arg-type, misc]
     if len(sources) > 2:
@@ -983,8 +984,8 @@ class ResponseTable:
         values = _finite("response", given.astype(np.complex128, copy=False))
         if hz.ndim != 1 or values.ndim not in (1, 3) or len(values) != len(hz):
             raise ValueError(
-                f"`response` of shape {values.shape} has not one entry, or one matrix, for each frequency "
-                f"of `frequency_hz` of shape {hz.shape}"
+                f"`response` needs one entry, or one matrix, for each frequency: it has the shape {values.shape}, and "
+                f"`frequency_hz` has the shape {hz.shape}"
             )
         if given.dtype.kind in "biuf":
             raise ValueError(
@@ -1003,13 +1004,14 @@ class ResponseTable:
         if coherence is not None:
             coherent = _finite("coherence", np.asarray(coherence, dtype=np.float64))
             if coherent.shape not in ((len(hz), motions), (len(hz),) if motions == 1 else ()):
-                raise ValueError(f"`coherence` of shape {coherent.shape} is not frequencies × points")
+                raise ValueError(f"`coherence` of shape {coherent.shape} must have the shape ({len(hz)}, {motions})")
             coherent = coherent.reshape(len(hz), motions)
         names = [str(i + 1) for i in range(motions)] if points is None else [str(p) for p in points]
         driven = names[:columns] if forces is None else [str(force) for force in forces]
         if len(names) != motions or len(driven) != columns:
             raise ValueError(
-                f"{len(names)} names of points and {len(driven)} of forces for {motions} × {columns}"
+                f"there are {len(names)} names of points and {len(driven)} of forces, but `response` has "
+                f"{motions} × {columns} entries at each frequency"
             )
         layout = {
             "name": name,
@@ -1243,7 +1245,7 @@ def _array(name: str, values: object) -> NDArray[np.float64]:
     """Return an array of samples × degrees of freedom, of any layout; it is copied only if
     necessary."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
-        raise ValueError(f"`{name}` has masked values: fill or leave them out")
+        raise ValueError(f"`{name}` has masked values: fill them, or leave these samples out")
     array = np.asarray(values)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"`{name}` holds {array.dtype}, not real numbers")

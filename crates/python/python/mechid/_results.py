@@ -167,7 +167,7 @@ class Finding:
     verdict : {"good", "doubtful", "bad"}
         Result of the check.
     value : float or None
-        The number that decides; None if it is infinite.
+        The number that determines the verdict; None if it is infinite.
     text : str
         The finding, in a sentence.
     numbers : mapping
@@ -508,8 +508,8 @@ class Shaped(Drawn):
         text = _mechid.shapes_file(self.to_json(), None if geometry is None else os.fspath(geometry))
         if text is None:
             raise MechidError(
-                "no mode shapes: they need modes that oscillate, two channels or more, and a point of "
-                "`geometry` for each channel",
+                "no mode shapes can be drawn: at least one mode must oscillate, at least two channels are needed, "
+                "and `geometry`, if given, must have a point for each channel",
                 "Settings",
             )
         return text
@@ -557,7 +557,7 @@ class Estimated(Drawn):
 
     @property
     def unscaled(self) -> Mapping[str, Any] | None:
-        """Degrees of freedom without force and known mass, and equations that are not given.
+        """Degrees of freedom without force and without known mass, and equations without scale.
 
         Keys ``degrees_of_freedom`` and ``equations``, counted from 1. None if M, C and K are known;
         otherwise the data determine only the modes.
@@ -782,7 +782,8 @@ class Identified(Shaped, Estimated):
             15 or 2411, and 82), or a table with rows ``name,x,y,z`` in m and ``line,name,name``.
             Default: a row or a grid from the names of the channels.
         reconstruct_force : bool
-            Whether to reconstruct the force with the identified machine and compare it.
+            Whether to reconstruct the force with the identified machine, and compare it with the
+            measured force.
 
         Raises
         ------
@@ -1079,8 +1080,8 @@ class Machine(Bare, Shaped):
         *sources, **record
             The record, as in `identify`; arrays of force and, if measured, response.
         settle : int, optional
-            Number of samples at the beginning to which the initial state is fitted; the errors do
-            not count them. Default: at rest.
+            Number of samples at the beginning to which the initial state is fitted; the errors
+            exclude these samples. Default: at rest.
 
         Raises
         ------
@@ -1272,7 +1273,7 @@ class Inspected(Drawn):
     @property
     def _page(self) -> str:
         if not self._has_curves:
-            raise MechidError("the curves were not gathered: inspect with `curves` True", "Settings")
+            raise MechidError("the result has no curves to draw: call `inspect` with `curves=True`", "Settings")
         return self.to_html()
 
     @property
@@ -1411,8 +1412,8 @@ class Modes(Shaped):
         *sources, **record
             The record, as in `modes`; arrays of forces and, if measured, responses.
         settle : int, optional
-            Number of samples at the beginning to which the initial motion is fitted; the errors do
-            not count them. Default: at rest.
+            Number of samples at the beginning to which the initial motion is fitted; the errors
+            exclude these samples. Default: at rest.
 
         Raises
         ------
@@ -1574,7 +1575,7 @@ class ModeComparison(Bare, Plotted):
     @property
     def figures(self) -> Mapping[str, Figure]:
         """Figure of the modal assurance criterion, ``"assurance"``, to draw with Matplotlib."""
-        caption = "Likeness of the mode shapes: rows are the modes of the first set, columns those of the second."
+        caption = "Similarity of the mode shapes: rows are the modes of the first set, columns those of the second."
         return ReadOnly({"assurance": MatrixFigure("assurance", caption, ("",), self.mac)})
 
     def to_json(self) -> str:
@@ -1694,11 +1695,10 @@ class Predicted(Result):
 
     @cached_property
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
-        """Prediction of every measured response, in m, m/s or m/s²; without measured responses, of
-        all.
+        """Predicted responses by name, in m, m/s or m/s², one for each measured response.
 
-        Without measured responses, those of a machine are its displacements, called ``"displacement
-        1"`` …; those of modes have the names in the record of the test.
+        If the record has no responses: for a machine all displacements, called ``"displacement
+        1"`` …; for modes all responses, with the names in the record of the test.
         """
         return ReadOnly(dict(self._inner.columns()))
 
@@ -1706,7 +1706,7 @@ class Predicted(Result):
         for name, values in self._inner.responses():
             if name == quantity:
                 return values
-        raise MechidError("modes predict the responses of their test: take them from `columns`", "Settings")
+        raise MechidError("modes predict only the responses of their test, which are in `columns`", "Settings")
 
     @property
     def displacement(self) -> NDArray[np.float64]:
@@ -1778,10 +1778,10 @@ class Simulation:
         Raises
         ------
         ValueError
-            If it is a large machine in sparse matrices.
+            If the machine is large and has sparse matrices.
         """
         if self._machine is None:
-            raise ValueError("the machine is a large one in sparse matrices, which are in the description")
+            raise ValueError("the machine has large sparse matrices: take them from the description of the experiment")
         return self._machine
 
     def measurement(self, *quantities: str, **window: Unpack[Window]) -> Measurement:

@@ -63,7 +63,7 @@ class Stored:
 
 def _refuse(name: str) -> NoReturn:
     raise MechidError(
-        f"this result was pickled, which keeps only its numbers: call `{name}` before pickling",
+        f"this result was pickled, and keeps only its numbers: call `{name}` before pickling",
         "Python(Pickled {})",
     )
 

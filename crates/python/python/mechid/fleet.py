@@ -217,20 +217,20 @@ def run(
     """Identify many records, into a folder of Parquet files with one row per record.
 
     The records are divided into parts, in the order of their paths. A part is one file of the
-    folder, complete or absent; an existing part is not computed again. A run that was interrupted
-    at any time is therefore continued by the same call.
+    folder, complete or absent; an existing part is not computed again. Therefore the same call
+    continues an interrupted run.
 
     Parameters
     ----------
     records : path or iterable of paths
-        The records, of any format; a folder means the files in it, and a Parquet file the records
-        in it that the ``record_column`` of ``reading`` names.
+        The records, of any format; a folder means the files in it, and a Parquet file with many
+        records means those that the ``record_column`` of ``reading`` names.
     analysis : mapping or path
         The analysis: ``channels``, ``reading``, ``window`` and ``identify``; or the path of its
         JSON file.
     out : path
-        The folder of results; it is created if it does not exist. Every worker must reach it, and
-        the records, by the same paths.
+        The folder of results; it is created if it does not exist. The paths of the folder and of
+        the records must be valid for every worker.
     executor : concurrent.futures.Executor, optional
         Engine of the work: a pool of threads or processes, or that of a Dask client
         (``client.get_executor()``). Default: one thread per processor.
@@ -240,8 +240,8 @@ def run(
         Function that is called with the number of completed records and the number of all records.
     isolate : bool
         Whether to process records in separate processes, which every worker starts with its own
-        interpreter: a record that takes too much memory or time, or ends its process, becomes a row
-        with its error. If false, a worker computes in its own process.
+        interpreter: a record that takes too much memory or time, or ends its process, has an error
+        in its row. If false, a worker computes in its own process.
     record_memory_gb : float
         Memory that a record may take, in GB, including the 0.03 GB of its process; only Linux
         enforces it.
@@ -286,7 +286,7 @@ def run(
 def identify_batch(
     batch: pyarrow.RecordBatch | pyarrow.Table, analysis: Mapping[str, Any] | str | os.PathLike[str]
 ) -> pyarrow.Table:
-    """Identify the records of an Arrow batch: a table of results with one row per record.
+    """Identify the records of an Arrow batch, and return a table with one row per record.
 
     This is a pure function of its arguments, for engines that pass batches: ``mapInArrow`` and
     ``applyInArrow`` of Spark, ``map_batches`` of Ray, ``map_partitions`` of Dask.

@@ -190,7 +190,7 @@ def frf(
     scale : {"log", "linear", "decibel"}, optional
         Scale of the magnitude.
     phase : {"wrapped", "continuous"}
-        Whether the phase stays between −180° and 180°.
+        Phase between −180° and 180°, or without jumps.
     ax : matplotlib.axes.Axes, optional
         Axes to plot into.
 

@@ -43,7 +43,7 @@ fn history(reconstructed: &Reconstructed, dof: usize) -> Panel {
     let label = if summary.noise_uncertainty {
         "± 2 standard errors"
     } else {
-        "± 2 standard errors of the machine"
+        "± 2 standard errors (machine only)"
     };
     panel.curve(Curve::band(label, &times, &bound(-1.0), &bound(1.0))).curve(curve)
 }

@@ -13,7 +13,7 @@ pub(super) const SHAPES: &str = "Mode shapes: the structure at its largest defle
                                  the points reach their largest deflections at different times.";
 
 /// Caption of the modal assurance criterion.
-pub(super) const LIKENESS: &str = "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, \
+pub(super) const LIKENESS: &str = "Similarity of the mode shapes (modal assurance criterion): 1 for the same shape, \
                                    0 for orthogonal ones.";
 
 /// Returns a page of named figures and, if there are any, of mode shapes, as HTML that loads no

@@ -326,7 +326,8 @@ pub fn residual_spectrum(
         part.id("residual-spectrum"),
         (0..motion.channels()).map(of_channel).collect(),
         format!(
-            "{}: a residual of noise is flat; an effect missing in the model has the shape of a resonance or of the force.",
+            "{}: the spectrum of pure noise is flat; an effect missing in the model \
+             has the shape of a resonance or of the force.",
             part.period_caption(&format!(
                 "Spectra of the measured {} and of the residual",
                 compared.kind
@@ -347,7 +348,7 @@ fn correlation_panel(
 ) -> Panel {
     Panel::new(x, Axis::linear(format!("{residual}: {what}"), ""))
         .curve(Curve::stems("", at, coefficients).color(Color::BLUE))
-        .reference(Reference::horizontal("95 % of noise", bound))
+        .reference(Reference::horizontal("95 % bound of noise", bound))
         .reference(Reference::horizontal("", -bound))
         .legend(Legend::Above)
 }

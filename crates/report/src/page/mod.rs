@@ -281,7 +281,7 @@ fn heading(contents: &Contents<'_>) -> Markup {
             (remarks(&judgement::doubts(contents.review), &judgement::merits(contents.review)))
             (modes_found(&ShapedMode::rows(&report.modes)))
             @if let Some(part) = report.fit.unexplained_motion {
-                p.note { "Motion left unexplained: " strong { (significant(100.0 * part, 3)) " %" } }
+                p.note { "Unexplained motion: " strong { (significant(100.0 * part, 3)) " %" } }
             }
         }
     }
@@ -353,7 +353,7 @@ fn remarks(doubts: &[String], merits: &[String]) -> Markup {
         }
         @if !merits.is_empty() {
             aside.remarks.good aria-labelledby="merits-heading" {
-                h2 id="merits-heading" { "What speaks for the numbers" }
+                h2 id="merits-heading" { "Evidence for the numbers" }
                 ul { @for merit in merits { li { (merit) } } }
             }
         }

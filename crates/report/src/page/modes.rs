@@ -283,7 +283,7 @@ fn checks(modes: &SavedModes) -> Option<Markup> {
             }
         }
         @if !rows.is_empty() {
-            (Table { caption: "Candidates that are no modes", header: &["frequency, Hz", "damping ratio", "why"], numbers_from: 9, rows }.html())
+            (Table { caption: "Candidates that are not modes", header: &["frequency, Hz", "damping ratio", "why"], numbers_from: 9, rows }.html())
         }
     })
 }

@@ -82,7 +82,7 @@ fn verdicts(found: &[CheckRow], remarks: &[String]) -> (Vec<String>, Vec<String>
 /// (columns), as SVG.
 pub fn comparison_svg(found: &ModeComparison) -> String {
     let label = format!(
-        "Likeness of the mode shapes (modal assurance criterion): rows are the modes of {}, columns those of {}",
+        "Similarity of the mode shapes (modal assurance criterion): rows are the modes of {}, columns those of {}",
         base_name(&found.sets[0]),
         base_name(&found.sets[1])
     );
@@ -97,7 +97,7 @@ pub fn comparison_page(found: &ModeComparison, settings: &PageSettings) -> Strin
     let title = settings.title.clone().unwrap_or_else(default_title);
     let heading = html! { header { h1 { (title) } (about(&settings.about)) } };
     let caption = format!(
-        "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, 0 for orthogonal ones; rows \
+        "Similarity of the mode shapes (modal assurance criterion): 1 for the same shape, 0 for orthogonal ones; rows \
          are the modes of {first}, columns those of {second}."
     );
     let drawn = Drawn {
@@ -124,7 +124,7 @@ pub fn bearing_words(found: &BearingSummary) -> Words {
     let (warnings, merits) = verdicts(&found.checks, &found.remarks);
     let mut subtitle = Vec::new();
     if !found.baseline.is_empty() {
-        subtitle.push(format!("less the baseline {}", found.baseline.join(", ")));
+        subtitle.push(format!("minus the baseline {}", found.baseline.join(", ")));
     }
     subtitle.extend(found.rotation_hz.map(|hz| format!("{} Hz rotation", compact(hz, 6))));
     subtitle.extend(found.load.map(|load| format!("{} N load", compact(load, 6))));
@@ -237,7 +237,7 @@ pub fn force_words(found: &ForceSummary) -> Words {
     };
     let samples = message::count(found.samples, "sample");
     let error = if found.machine_uncertainty && !found.noise_uncertainty {
-        "standard error of machine, N"
+        "standard error (machine only), N"
     } else {
         "standard error, N"
     };
@@ -286,7 +286,7 @@ fn facts_of_force(found: &ForceSummary) -> Vec<Vec<String>> {
         let expected = channel
             .expected
             .map_or(String::new(), |share| format!(", expected {}", percent(share)));
-        let name = format!("Unexplained of {}", channel.column);
+        let name = format!("Unexplained part of {}", channel.column);
         facts.push(pair(&name, format!("{}{expected}", percent(share))));
     }
     if let Some(band) = found.band_hz {
@@ -344,7 +344,10 @@ pub fn response_words(found: &FrfTable) -> Words {
         files: found.records.iter().map(|record| record.file.clone()).collect(),
         subtitle: vec![
             found.estimator.to_owned(),
-            format!("{} segments of {samples}, worth {averages} averages", found.segments.count),
+            format!(
+                "{} segments of {samples}, equivalent to {averages} averages",
+                found.segments.count
+            ),
             message::count(found.frequency_hz.len(), "line"),
             format!("{} Hz", compact(found.sample_rate_hz, 8)),
         ],

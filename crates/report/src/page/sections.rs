@@ -149,7 +149,8 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     Ok(html! {
         (records)
         p.note {
-            "Peak factor: half the range over √2 times the RMS, 1 for a sine. Excited lines are those within "
+            "Peak factor: half the range divided by √2 times the RMS; it is 1 for a sine. Excited lines are \
+             those within "
             (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of \
              persistent excitation is the number of parameters that these lines can determine."
         }
@@ -319,7 +320,7 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
     let residual = fit.residual_name();
     rows.extend(residual.map(|name| pair(&name.replacen('r', "R", 1), percent(fit.nrmse))));
     if let Some(part) = fit.unexplained_motion {
-        rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
+        rows.push(pair("Motion not explained by the linear model", percent(part)));
     }
     if let Some(misfit) = &contents.review.identified.fitted().misfit {
         let what = format!("Power of the residual / power of the noise ({})", misfit.noise);
@@ -399,7 +400,7 @@ pub fn predicted(validation: &Validation) -> Markup {
     let row = |share: &Share| pair(&share.name, format!("{} %", significant(share.fit_percent, 4)));
     let rows = validation.channels.iter().map(row).collect();
     let header = ["motion", "fit"];
-    Table { caption: "What is predicted", header: &header, numbers_from: 1, rows }.html()
+    Table { caption: "Prediction of the responses", header: &header, numbers_from: 1, rows }.html()
 }
 
 /// Returns the section about a record that was not fitted.
@@ -421,7 +422,8 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
             @if judgement::was_fitted(contents.review) { " Some of these samples were fitted, so agreement proves little." }
         }
         (predicted(validation))
-        p.note { "Fit: 100 % minus the ratio of the difference to the motion about its mean, in RMS values; 0 % is no better than the mean." }
+        p.note { "Fit: 100 % minus the RMS of the difference, in per cent of the RMS of the motion about its mean; at \
+                  0 % the prediction is no better than this mean." }
         div.figures { (figure(&drawn)) }
     }))
 }

@@ -73,7 +73,7 @@ impl Prbs {
         crate::error::within("order of the sequence", f64::from(order), 2.0, 24.0)?;
         not_negative("amplitude", amplitude)?;
         if hold == 0 {
-            let what = "the duration of a chip, in samples,";
+            let what = "samples of a chip";
             return Err(SignalError::TooFew { what, least: 1, got: 0 });
         }
         Ok(Self { order, amplitude, hold })

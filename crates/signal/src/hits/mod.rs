@@ -217,12 +217,15 @@ impl fmt::Display for HitFault {
             }
             Self::Cut => f.write_str("the record begins or ends within the pulse"),
             Self::RecordEnds { samples, needed } => {
-                write!(f, "the record ends after {samples} samples of its window, {needed} needed")
+                write!(
+                    f,
+                    "the record ends after {samples} samples of this hit; {needed} are needed"
+                )
             }
             Self::NextHit { samples, needed } => {
                 write!(
                     f,
-                    "the next hit comes after {samples} samples of its window, {needed} needed"
+                    "the next hit comes after {samples} samples of this hit; {needed} are needed"
                 )
             }
         }

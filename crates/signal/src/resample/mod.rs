@@ -78,7 +78,7 @@ impl Interpolator {
         let sampling = record.sampling();
         if method != Interpolation::BandLimited && record.len() < 2 {
             let got = record.len();
-            return Err(SignalError::TooFew { what: "interpolation", least: 2, got });
+            return Err(SignalError::TooFew { what: "samples to interpolate", least: 2, got });
         }
         let hermite = |slopes: fn(&[f64]) -> Vec<f64>| {
             let columns = (0..record.channels()).flat_map(|c| slopes(record.channel(c)));
@@ -235,7 +235,7 @@ pub fn refine(
     method: Interpolation,
 ) -> Result<Record, SignalError> {
     if factor == 0 {
-        let what = "refining, in steps per interval,";
+        let what = "steps per interval";
         return Err(SignalError::TooFew { what, least: 1, got: 0 });
     }
     let intervals = match method {

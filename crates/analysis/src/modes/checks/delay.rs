@@ -58,7 +58,7 @@ pub(super) fn tests(
                 inputs[input], outputs[output].name
             ),
             fails: format!(
-                "{} is {size} ms {direction} for force {}: at this point the phases of the modes are \
+                "{} is {size} ms {direction} relative to force {}: at this point the phases of the modes are \
                  proportional to the frequency; a filter or a scanning converter delays one of \
                  the two channels",
                 outputs[output].name, inputs[input]

@@ -27,9 +27,9 @@ pub(in crate::modes) fn force_peak_check(modes: &[ModalModeRow]) -> Option<Modal
         passed: false,
         value: largest.len() as f64,
         text: format!(
-            "{} modes at {listed} Hz lie within one half-width ζf: hardly any structure has so many \
-             there, but the spectrum of unmeasured forces may have a peak; the damping ratios of modes \
-             nearby may be too high",
+            "{} modes at {listed} Hz lie within one half-width ζf: few structures have modes this \
+             close, but the spectrum of unmeasured forces may have a peak there; the damping ratios of \
+             nearby modes may be too high",
             largest.len()
         ),
     })

@@ -77,7 +77,7 @@ pub(super) fn prediction_checks(predicted: &[f64], names: &[String]) -> Vec<Moda
     let words = [
         "the modes predict",
         "in the part that was not fitted",
-        ": what was fitted is not only the response of the structure to these forces",
+        ": the fitted data contain more than the response of the structure to these forces",
     ];
     share_checks("predicted", predicted, names, words)
 }

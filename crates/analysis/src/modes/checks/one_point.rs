@@ -27,8 +27,8 @@ pub(in crate::modes) fn one_point_check(
         "the force acts at the same point in all records".to_owned()
     } else {
         format!(
-            "a force at another point in the first record than in the others explains the records far better \
-             (−2 log L falls by {}, where {} is needed): state the points of a hammer that roves (`force_at`, \
+            "the records are explained far better if the force in the first record acts at another point \
+             (−2 log L falls by {}, and {} is needed): for a roving hammer, state the points (`force_at`, \
              one for each record)",
             significant(gain, 3),
             significant(required, 3)

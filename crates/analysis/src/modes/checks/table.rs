@@ -89,8 +89,8 @@ fn leakage(
         Some(_) if passed => "a segment",
         None if passed => "the table",
         Some(_) if settled => {
-            "a segment: its damping follows from the bias of the window, and its intervals are not \
-             reliable; use longer segments, or fit the record itself"
+            "a segment: this is too narrow to separate its damping from the bias of the window, and its \
+             intervals are not reliable; use longer segments, or fit the record itself"
         }
         Some(_) => {
             "a segment: the bias of the window could not be separated from its damping, and its intervals \

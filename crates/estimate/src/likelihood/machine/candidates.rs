@@ -164,7 +164,7 @@ impl MachineEstimate {
         for parameter in assembly.parameters() {
             let parameters = self.assembly.parameters();
             let index = parameters.iter().position(|other| other.name == parameter.name);
-            let what = "a candidate without unknowns of its own: unknown parameters";
+            let what = "unknown parameters that only a candidate has";
             places.push(index.ok_or(LikelihoodError::Size { what, expected: 0, got: 1 })?);
         }
         let values: Vec<f64> = places.iter().map(|place| values[*place]).collect();

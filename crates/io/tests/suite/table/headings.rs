@@ -152,7 +152,7 @@ fn names_of_several_words_above_aligned_columns_are_read() {
         // The hint names the line above the names.
         let error = Table::parse("a.txt", format!("Rig 4\n{header}\n{rows}").as_bytes());
         let error = error.unwrap_err().to_string();
-        assert!(error.ends_with("--skip-lines 1"), "{header}: {error}");
+        assert!(error.ends_with("`skip_lines` 1"), "{header}: {error}");
     }
 }
 

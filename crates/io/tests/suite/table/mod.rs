@@ -124,7 +124,7 @@ fn units_have_a_factor_to_the_si() {
     assert_eq!(t.to_si(2, displacement).unwrap(), 1.0);
     assert_eq!(
         t.to_si(0, displacement).unwrap_err().to_string(),
-        "a.csv, column 1 \"F [kN]\": its unit kN is one of force, displacement is needed"
+        "a.csv, column 1 \"F [kN]\": its unit kN is a unit of force, but a unit of displacement is needed"
     );
 }
 
@@ -261,7 +261,7 @@ fn what_stands_above_the_table_is_left_out_when_told() {
             let lines = above.lines().count() as u64;
             let e = refused(&text);
             let begins = format!("begin on line {}, with 3 fields", lines + 1);
-            assert!(e.contains(&begins) && e.ends_with(&format!("--skip-lines {lines}")), "{e}");
+            assert!(e.contains(&begins) && e.ends_with(&format!("`skip_lines` {lines}")), "{e}");
             let path = folder.path().join("a.csv");
             std::fs::write(&path, &text).unwrap();
             let told = read_below(&path, lines).unwrap();

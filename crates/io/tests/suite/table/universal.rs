@@ -130,8 +130,8 @@ fn channels_with_other_instants_make_no_record() {
     let table = Table::parse("a.unv", &bytes).unwrap();
     assert_eq!(
         table.record(&TimeAxis::OfFile, &["1-X", "12+Z"]).unwrap_err().to_string(),
-        "a.unv: the columns of a record need the same time axis; 1 \"1-X\" has steps of 0.2 s from \
-         1 s, 2 \"12+Z\" of 0.25 s from 1 s"
+        "a.unv: the columns of a record need the same time axis; column 1 \"1-X\" begins at 1 s with \
+         steps of 0.2 s, column 2 \"12+Z\" at 1 s with steps of 0.25 s"
     );
     let late = with("1.00000e+00  2.50000e-01", "9.00000e+00  2.50000e-01", 0);
     let table = Table::parse("a.unv", &late).unwrap();
