@@ -39,8 +39,8 @@ pub enum AnalysisError {
     Modal(#[from] mechid_modal::ModalError),
     /// The record does not have all samples of the window.
     #[error(
-        "the window needs samples {first} to {last} (counted from 1), {file} has {len}: choose \
-         `start`, `period` and `periods` to fit"
+        "the window needs samples {first} to {last} (counted from 1), but {file} has {len}: \
+         choose `start`, `period` and `periods` so that the window fits"
     )]
     Window {
         /// The record.
@@ -110,13 +110,13 @@ pub enum AnalysisError {
     RepeatedRecord {
         /// The record given first.
         first: String,
-        /// The record that repeats it.
+        /// The record that repeats the first one.
         second: String,
     },
     /// A table of frequency responses does not contain all responses for its forces and points.
     #[error(
         "{file} has no response at {response} to a force at {force}: every point needs a response to \
-         every force, and every force a response at its own point (choose `points`){advice}"
+         every force, and every force needs a response at its point (choose `points`){advice}"
     )]
     NoResponse {
         /// The table.
@@ -156,7 +156,7 @@ pub enum AnalysisError {
     },
     /// Responses without power in the band.
     #[error(
-        "{columns}: constant or zero in the band, a sensor that is dead or not connected: leave it out"
+        "{columns}: constant or zero in the band; the sensor may be dead or not connected: leave it out"
     )]
     DeadResponses {
         /// Names of the responses.
@@ -164,7 +164,7 @@ pub enum AnalysisError {
     },
     /// Forces without power in the band.
     #[error(
-        "force {columns}: constant or zero in the band, a shaker that is off or not connected: leave it \
+        "force {columns}: constant or zero in the band; the shaker may be off or not connected: leave it \
          out of `force`"
     )]
     DeadForces {
@@ -173,8 +173,8 @@ pub enum AnalysisError {
     },
     /// A record does not decay.
     #[error(
-        "{file} does not decay: the second half of the response has more power than the first: an unstable \
-         system, a force that still acts, or a record that begins before the release"
+        "{file} does not decay: the second half of the response has more power than the first. Possible causes: an \
+         unstable system, a force that still acts, or a record that begins before the release"
     )]
     NoDecay {
         /// The record.
@@ -193,26 +193,27 @@ pub enum AnalysisError {
     /// A force is a combination of the others on every line.
     #[error(
         "force {force} is a multiple of {others} in the band (independent part {own_share:.1e}): their \
-         responses cannot be separated; record a test in which it differs, or leave it out of `force`"
+         responses cannot be separated; record a test in which this force varies independently, or leave it out of \
+         `force`"
     )]
     DependentForces {
         /// The force.
         force: String,
         /// The forces before it.
         others: String,
-        /// Ratio of the RMS of its independent part to its RMS.
+        /// Ratio of the RMS of the independent part of this force to the RMS of the force.
         own_share: f64,
     },
     /// A file has no modes that can be compared.
     #[error(
-        "{file} has no modes to compare: each needs a frequency, and shapes of the same length"
+        "{file} has no modes to compare: each mode needs a frequency, and all shapes need the same length"
     )]
     NothingToCompare {
         /// The file.
         file: String,
     },
     /// The modes in a JSON file are not modes of a result.
-    #[error("{file}: its `modes` are not those of a result: {why}")]
+    #[error("{file}: its `modes` cannot be used: {why}")]
     SavedModes {
         /// The file.
         file: String,
@@ -222,7 +223,7 @@ pub enum AnalysisError {
     /// Two sets of modes have no point in common.
     #[error(
         "{first} has shapes at {points}, {second} at {other_points}: no point in common; name the places \
-         of the responses (`response_at`) as the other set does, such as 3 or 12+Z"
+         of the responses (`response_at`) with the names of the other set, such as 3 or 12+Z"
     )]
     NoCommonPoint {
         /// The first set.
@@ -250,13 +251,13 @@ pub enum AnalysisError {
     NoMotion,
     /// The columns do not pair up with the degrees of freedom.
     #[error(
-        "`{response}` names {} and `force` {forces}: every degree of freedom needs one of each \
+        "`{response}` names {} and `force` {forces}: every degree of freedom needs one response and one force \
          (`force` 0 where no force acts)", message::count(*got, "column")
     )]
     ColumnCount {
         /// Kind of response with the wrong number of columns.
         response: ResponseQuantity,
-        /// Number of columns that it names.
+        /// Number of columns given.
         got: usize,
         /// Number of force columns.
         forces: usize,
@@ -295,20 +296,20 @@ pub enum AnalysisError {
     },
     /// The number of response columns differs from the number of degrees of freedom of the system.
     #[error(
-        "`{response}` names {}, the system has {}: name one for each, 0 where it was not measured",
+        "`{response}` names {}, but the system has {}: name one column for each, or 0 if there is no measurement",
         message::count(*got, "column"), message::count(*dofs, "degree of freedom")
     )]
     MotionCount {
         /// Kind of response with the wrong number of columns.
         response: ResponseQuantity,
-        /// Number of columns that it names.
+        /// Number of columns given.
         got: usize,
         /// Degrees of freedom of the system.
         dofs: usize,
     },
     /// A force is to be identified on a degree of freedom that the system does not have.
     #[error(
-        "`forced` names degree of freedom {dof} (counted from 1), the system has {}",
+        "`forced` names degree of freedom {dof} (counted from 1), but the system has {}",
         message::count(*dofs, "degree of freedom")
     )]
     Forced {
@@ -319,7 +320,7 @@ pub enum AnalysisError {
     },
     /// The number of noise levels differs from the number of measured columns.
     #[error(
-        "`noise` gives {}, the response has {}: give one for each",
+        "`noise` gives {}, but the response has {}: give one level for each column",
         message::count(*levels, "level"), message::count(*columns, "column")
     )]
     NoiseCount {
@@ -346,7 +347,7 @@ pub enum AnalysisError {
     KalmanIsOpen,
     /// The method cannot keep the force within a frequency band.
     #[error(
-        "the force from sample to sample (`discretised`) cannot be kept within the band from {low_hz} \
+        "the force from sample to sample (`discretised`) cannot be restricted to the band from {low_hz} \
          to {high_hz} Hz: leave `band_hz` out, or choose another `method`"
     )]
     BandMethod {
@@ -417,7 +418,7 @@ pub enum AnalysisError {
     IdleInputs,
     /// The force has no spectral line in the band.
     #[error(
-        "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \
+        "no excited line between {low_hz} and {high_hz} Hz: the excited lines are between \
          {first_hz} and {last_hz} Hz",
         low_hz = message::number(*low_hz), high_hz = message::number(*high_hz),
         first_hz = message::number_to(*first_hz, 6), last_hz = message::number_to(*last_hz, 6)
@@ -433,7 +434,7 @@ pub enum AnalysisError {
         last_hz: f64,
     },
     /// None of the chosen lines carries force.
-    #[error("no excited line among {lines}: the force has its lines between {first} and {last}")]
+    #[error("no excited line among {lines}: the excited lines are between {first} and {last}")]
     NoExcitedLine {
         /// The choice.
         lines: String,
@@ -446,7 +447,7 @@ pub enum AnalysisError {
     #[error(
         "in the time domain `displacement` and `velocity` are both needed (in the frequency domain \
          one kind of response is enough); with displacement or acceleration alone, `derivatives` sets \
-         how the others are computed: spectral for whole periods, savitzky-golay:WINDOW:ORDER for any record"
+         how the other motions are computed: spectral for whole periods, savitzky-golay:WINDOW:ORDER for any record"
     )]
     TimeDomainMotions,
     /// Derivatives are computed from one measured kind of response only.
@@ -464,7 +465,7 @@ pub enum AnalysisError {
     /// Instrumental variables need two halves of the periods, which averaged frequency responses do
     /// not have.
     #[error(
-        "instrumental variables need periods, not their averages: leave `from_frf` or `method` \
+        "instrumental variables need single periods, not averages: leave `from_frf` or `method` \
          instrumental out"
     )]
     InstrumentalResponses,
@@ -483,7 +484,7 @@ pub enum AnalysisError {
         file: String,
         /// Degrees of freedom of the system.
         got: usize,
-        /// Degrees of freedom of the system it is compared with.
+        /// Degrees of freedom of the system that the record or system is compared with.
         dofs: usize,
     },
     /// A covariance names a parameter that the system does not have.
@@ -553,7 +554,7 @@ pub enum AnalysisError {
     NoSetting,
     /// No setting of a sweep gave an estimate.
     #[error(
-        "no setting gave an estimate; at the first one, {setting}: {reason}",
+        "no setting gave an estimate; the reason at the first setting, {setting}, is: {reason}",
         setting = message::number(*setting)
     )]
     EmptySweep {
@@ -567,11 +568,12 @@ pub enum AnalysisError {
     Simulation(String),
     /// No record shows a receptance.
     #[error(
-        "nothing to plot: several forces act on every line, so the record shows no single receptance"
+        "the record shows no receptance: several forces act on every line, so the response to one force \
+         alone was not measured"
     )]
     NoReceptance,
     /// A record of a hammer test has no good hit.
-    #[error("no hit to use in {file}: {reasons}")]
+    #[error("no usable hit in {file}: {reasons}")]
     NoHit {
         /// The record.
         file: String,
@@ -613,7 +615,7 @@ pub enum AnalysisError {
     /// The process for a record of a fleet has ended.
     #[error("the process that worked on the record has ended: {how}")]
     RecordProcess {
-        /// Manner in which it ended, and its message.
+        /// End of the process, and its message.
         how: String,
     },
     /// A setting cannot be understood.

@@ -20,8 +20,8 @@ const RARE: f64 = 0.05;
 /// Maximum ratio of pull to push of a hammer; ringing filters cause some pull.
 const ONE_SIDED: f64 = 0.2;
 
-/// Maximum excess of the power of a channel during the hits over the power between them, in
-/// standard deviations of this ratio for noise; with more, a force acts.
+/// Maximum excess of the power of a channel during the hits over its power between them, in
+/// standard deviations of the power of noise; with a larger excess, a force acts.
 const MOVES: f64 = 6.0;
 
 /// One hit of a record, used or excluded.
@@ -177,8 +177,8 @@ impl Struck {
     }
 }
 
-/// Returns whether the force on a degree of freedom during the hits on another one does not exceed
-/// the force between the hits.
+/// Returns whether the force on a degree of freedom during the hits on another degree of freedom
+/// does not exceed the force between the hits.
 fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
     let force = held.force.channel(dof);
     let mut is_pulse = vec![false; force.len()];

@@ -23,7 +23,8 @@ pub const WHOLE_BYTES: usize = 640;
 pub const PREDICT_BYTES: usize = 800;
 
 /// Bytes of memory per line and pair of channels for the covariances of the noise: eight copies of
-/// a complex number, the largest measured (periods of 500 forces and 500 responses).
+/// a complex number. This is the largest use that was measured (periods of 500 forces and 500
+/// responses).
 pub const PAIR_BYTES: usize = 128;
 
 /// Largest number of channels whose noise covariances need at most [`STRETCH_BYTES`] per sample and
@@ -31,14 +32,16 @@ pub const PAIR_BYTES: usize = 128;
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
 /// Decay of the slowest mode, as a natural logarithm, during the zeros that are appended to the
-/// forces of a prediction: the response that wraps around from the end is below 0.1 %.
+/// forces of a prediction: the response that wraps around from the end is below 0.1 % of its value
+/// at the end.
 pub const REST_DECAY: f64 = 7.0;
 
 /// Largest number of zeros that are appended to the forces of a prediction by modes, in lengths of
 /// the record; it limits the memory.
 pub const REST_RECORDS: usize = 8;
 
-/// Minimum relative uncertainty of the standard errors for a remark: that of 12 degrees of freedom.
+/// Minimum relative uncertainty of the standard errors for a remark: 12 degrees of freedom have
+/// this uncertainty.
 pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
 /// Minimum share of the variance of a response that the modes of a test must explain, and predict
 /// where it was not fitted. With less, most of the response has another cause, and the entries of
@@ -46,8 +49,8 @@ pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
 pub const LEAST_EXPLAINED: f64 = 0.5;
 
 /// Minimum share of the samples in the smaller half of a test that is divided between two records.
-/// With a smaller one, the half determines the modes so badly that its test has little power; the
-/// longest record is divided instead.
+/// With a smaller share, the half determines the modes so badly that the comparison of the halves
+/// has little power; the longest record is divided instead.
 pub const SMALLER_HALF: f64 = 0.25;
 
 /// Minimum number of modes of an ambient record within one half-width for a suspected peak of the
@@ -75,7 +78,7 @@ pub const NOTED_UNMEASURED: f64 = 0.01;
 
 /// Maximum correlation of the errors of two lines of averaged responses in the same fit: neighbours
 /// under a Hann window have 0.44, second neighbours 0.03. A smaller limit would discard lines; with
-/// a larger one, smooth noise would appear as modes.
+/// a larger limit, smooth noise would appear as modes.
 pub const LINE_CORRELATION: f64 = 0.1;
 
 /// Minimum half-power bandwidth, in lines of a segment, of a mode for a correction of its window
@@ -137,8 +140,8 @@ pub(crate) const PRIOR_SHARE: f64 = 0.5;
 /// Maximum relative difference of two equal frequencies in tables, which have few digits.
 pub(crate) const SAME_FREQUENCY: f64 = 1e-6;
 
-/// Largest 1 − coherence (median over the lines) of a table that states no noise: it is rounding of
-/// the file, or the coherence was not computed.
+/// Largest 1 − coherence (median over the lines) of a table that states no noise: a smaller value
+/// is rounding of the file, or the coherence was not computed.
 pub const COHERENCE_OF_ONE: f64 = 1e-6;
 
 /// Number of lines per unknown of the fits that decide whether a force is held or linear between

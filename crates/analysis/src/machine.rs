@@ -26,7 +26,7 @@ pub struct Machine {
     pub uncertain: UncertainSystem,
     /// Degrees of freedom of the variance behind the covariance.
     pub degrees_of_freedom: usize,
-    /// The system with its nonlinear terms; `None` for a linear one.
+    /// The system with its nonlinear terms; `None` for a linear system.
     pub nonlinear: Option<NonlinearPart>,
     /// Names of the channels that the system was identified from, one per degree of freedom; empty
     /// if they are not known.
@@ -36,7 +36,8 @@ pub struct Machine {
 /// A system with nonlinear terms, as its channels record it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearPart {
-    /// M, C and K with the terms and their coefficients, and the covariance of the uncertain ones.
+    /// M, C and K with the terms and their coefficients, and the covariance of the uncertain
+    /// values.
     pub uncertain: UncertainNonlinearSystem,
     /// Delay and phase of the channels.
     pub channels: ChannelPhase,
@@ -78,7 +79,7 @@ impl Machine {
         })
     }
 
-    /// Reads the `system` of a JSON file (`-`: of standard input) and, if it is there, its
+    /// Reads the `system` of a JSON file (`-`: of standard input) and, if present, its
     /// `covariance`, its `nonlinear` terms and the names of its `channels` or `points`: the
     /// description of an experiment, or the result of an identification.
     ///
@@ -140,8 +141,8 @@ impl Machine {
         AnalysisError::NonlinearMachine { file: self.name.clone(), terms: terms.to_string() }
     }
 
-    /// Returns the system with its nonlinear terms (none for a linear one), and the properties of
-    /// its channels.
+    /// Returns the system with its nonlinear terms (none for a linear system), and the properties
+    /// of its channels.
     pub(crate) fn with_terms(&self) -> Result<NonlinearPart, AnalysisError> {
         match &self.nonlinear {
             Some(part) => Ok(part.clone()),

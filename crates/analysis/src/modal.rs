@@ -143,7 +143,7 @@ impl Machine {
 }
 
 impl ShapedMode {
-    /// Returns the modes of an identified system, or of an exactly `known` one.
+    /// Returns the modes of an identified system, or of an exactly `known` system.
     pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
         let rows = ModeRow::all(modes, known)?.into_iter().zip(modes);
         Ok(rows.map(|(row, mode)| Self::new(row, mode, known)).collect())

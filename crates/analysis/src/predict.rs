@@ -25,7 +25,7 @@ pub struct Predict {
     pub settle: Option<usize>,
 }
 
-/// A predicted response, and its difference from the measured one.
+/// A predicted response, and its difference from the measured response.
 #[derive(Debug)]
 pub struct Predicted {
     summary: PredictionSummary,
@@ -87,9 +87,10 @@ pub struct PredictionError {
 
 /// Predicts the response of a machine to the force of a record.
 ///
-/// With a period, it is the steady state under the mean period; otherwise the response over the
-/// whole window. Between the samples the force is band-limited. Measured responses are compared, if
-/// there are any; for a steady state without their means.
+/// With a period, the prediction is the steady state under the mean period; otherwise it is the
+/// response over the whole window. Between the samples the force is band-limited. Measured
+/// responses, if there are any, are compared with the prediction; for a steady state, their means
+/// are subtracted.
 ///
 /// # Errors
 /// [`AnalysisError::NoForce`], [`AnalysisError::DegreesOfFreedom`], [`AnalysisError::Setting`] if
@@ -155,11 +156,11 @@ pub fn predict(
 const PARTS: usize = 8;
 /// Minimum ratio of the errors in the first and the last part that indicates a wrong initial state.
 const DIES_AWAY: f64 = 3.0;
-/// Minimum number of samples in such a part, and number of initial samples that must show the
-/// error.
+/// Minimum number of samples in a part of a record, and number of initial samples that must show
+/// the error.
 const SHORTEST: usize = 16;
-/// Minimum ratio of the initial error to the largest one; the error of an inaccurate machine grows
-/// with the response instead.
+/// Minimum ratio of the initial error to the largest error; the error of an inaccurate machine
+/// grows with the response instead.
 const AT_ONCE: f64 = 0.5;
 
 /// Returns whether the error of a channel decays from the beginning of a record, as a free response
@@ -219,7 +220,7 @@ pub(crate) fn settled_samples(
         Ok(samples)
     } else {
         wrong(format!(
-            "the initial state can be fitted to 2 to {} of the {len} samples of this record",
+            "the fit of the initial state needs 2 to {} of the {len} samples of this record",
             len - 1
         ))
     }
@@ -248,7 +249,8 @@ fn open(
     shown(&nonlinear::predict(system, &force, Extent::Open, &start)?, phase, 1)
 }
 
-/// Returns the steady state of periods without measured responses.
+/// Returns the steady state that the search from rest finds, for periods without measured
+/// responses.
 fn steady_from_rest(
     system: &NonlinearSystem,
     phase: ChannelPhase,

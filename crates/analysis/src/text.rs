@@ -23,9 +23,9 @@ pub fn text_table(rows: &[Vec<String>]) -> String {
 /// Maximum width of a table on a page, in characters.
 const PAGE: usize = 100;
 
-/// Formats a table like [`text_table`]; a table that is too wide is divided into several ones below
-/// each other. Each begins with the first column, and omits rows without further content. The first
-/// table contains at least the first `together` columns.
+/// Formats a table like [`text_table`]; a table that is too wide is divided into several tables,
+/// one below the other. Each of them begins with the first column, and omits rows without further
+/// content. The first table contains at least the first `together` columns.
 pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let part = |chosen: &[usize]| {
@@ -74,8 +74,8 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// Formats a number like [`significant`], without trailing zeros: for given numbers, not measured
-/// ones, in any unit.
+/// Formats a number like [`significant`], without trailing zeros: for numbers that were given and
+/// not measured, in any unit.
 pub fn compact(value: f64, digits: usize) -> String {
     if value.fract() == 0.0 && value.abs() < 10f64.powi(digits as i32) {
         return format!("{value}");

@@ -33,7 +33,8 @@ pub enum BearingError {
         message::number(position[1])
     )]
     SingularFilm {
-        /// Position of the journal along the load and across over the clearance, a ratio each.
+        /// Position of the journal along and across the load, divided by the clearance (a ratio
+        /// each).
         position: [f64; 2],
     },
     /// The ends of the film did not settle within the iterations allowed.
@@ -49,7 +50,8 @@ pub enum BearingError {
         iterations: usize,
         /// Last change of an end of the film, in rad.
         change: f64,
-        /// Position of the journal along the load and across over the clearance, a ratio each.
+        /// Position of the journal along and across the load, divided by the clearance (a ratio
+        /// each).
         position: [f64; 2],
     },
     /// No equilibrium was found within the iterations allowed.

@@ -31,8 +31,8 @@
 //!
 //! x is along the static load and y across it, such that the journal rotates from x to y.
 //! Eccentricities and coefficients are scaled by the clearance of a pad. For an elliptical bearing
-//! this is the difference between the radii of a lobe and of the journal, not the assembled
-//! clearance.
+//! this clearance is the difference between the radii of a lobe and of the journal, not the
+//! assembled clearance.
 
 mod conditions;
 mod equilibrium;

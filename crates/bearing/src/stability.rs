@@ -15,7 +15,7 @@ use crate::error::{BearingError, require};
 ///   ω_w² = [(k_eq − kxx) (k_eq − kyy) − kxy kyx] / (cxx cyy − cxy cyx)
 /// ```
 ///
-/// The whirl frequency ratio ω_w / Ω does not depend on the rotor. A heavier rotor than the
+/// The whirl frequency ratio ω_w / Ω does not depend on the rotor. A rotor that is heavier than the
 /// critical mass k_eq / ω_w² is unstable.
 ///
 /// ```
@@ -46,7 +46,8 @@ struct Gradient {
     whirl_squared: SVector<f64, 8>,
 }
 
-/// Standard errors of the values of a [`Threshold`], to first order in those of the coefficients.
+/// Standard errors of the values of a [`Threshold`], to first order in the standard errors of the
+/// coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThresholdErrors {
     /// Standard error of the equivalent stiffness, in N/m.

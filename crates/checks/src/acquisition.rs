@@ -175,7 +175,8 @@ fn local_variance(deviations: &DVector<f64>, dof: usize) -> DVector<f64> {
     variance
 }
 
-/// Subtracts the part of the directions that the parameters and the columns of each record explain.
+/// Subtracts from the directions of each record the part that the parameters and the additional
+/// columns of this record explain.
 fn without_explained(
     mut directions: Vec<DVector<f64>>,
     after: &[SpectralResidual],
@@ -244,7 +245,8 @@ pub fn fault_of_acquisition(
             continue;
         }
         let residuals_without = after_spectral_fit(&without, estimate, extent)?.records;
-        // Correlation from line to line is allowed: the transients were estimated with the fault.
+        // Correlation from line to line is allowed: the transients were estimated from data with
+        // the fault.
         if remaining <= DELAY_REMAINING || is_noise(after) || is_uncorrelated(&residuals_without) {
             let cause = fault.cause(first, &driven, corner);
             best = Some((remaining, Finding::Alternative(Alternative { cause, remaining })));
@@ -288,7 +290,8 @@ pub fn forces_between_samples(
 /// ([`Finding::Alternative`]). `records` are the data of the fit, sampled every `dt` (s), `closed`
 /// are the data without the transients, and `after` are the residuals. `None` unless the tests of
 /// the residual warn, and without the AC coupling they pass or at most a quarter of the power
-/// remains. A short force hardly shows whether the residual is correlated with it.
+/// remains. It is not sufficient that the residual is uncorrelated with the force, because a short
+/// force hardly shows a correlation.
 ///
 /// # Source
 /// Rao's score test; maximum likelihood with new transients for the corner frequency.

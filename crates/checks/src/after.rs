@@ -93,8 +93,8 @@ fn colour(
         let estimate = autocorrelation(&e, lags + span);
         estimate.iter().enumerate().map(|(lag, c)| c * taper(lag)).collect()
     };
-    // The added term covers the error of these coefficients, which would exceed the variance if the
-    // spectra of residual and force hardly overlap.
+    // The added term covers the error of these coefficients. Without it, this error would exceed
+    // the variance if the spectra of residual and force hardly overlap.
     coefficients[0] += 2.0 / (e.len() as f64).sqrt();
     Ok(coefficients)
 }

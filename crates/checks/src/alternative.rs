@@ -22,7 +22,7 @@ pub struct Alternative {
     pub remaining: f64,
 }
 
-/// Difference of an alternative model from the fitted one.
+/// Difference of an alternative model from the fitted model.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -140,8 +140,8 @@ pub struct ModelledResponses {
     pub measured: DMatrix<Complex<f64>>,
     /// Modelled responses, rows × channels (unit of the channel).
     pub modelled: DMatrix<Complex<f64>>,
-    /// Logarithm of the Jacobian of a conversion: the area in the complex plane of the converted
-    /// responses per area of the original ones (pure number); 0 without a conversion.
+    /// Logarithm of the Jacobian of a conversion: area of the converted responses in the complex
+    /// plane per area of the original responses (pure number); 0 without a conversion.
     pub log_area: f64,
 }
 
@@ -156,8 +156,8 @@ impl ModelledResponses {
         self.power(deviation) / weighted(&self.measured, deviation).norm_squared()
     }
 
-    /// Returns whether the residual of no channel is correlated from line to line within rising
-    /// `omega` (rad/s).
+    /// Returns whether the residual of no channel is correlated from line to line within a stretch
+    /// of rising `omega` (rad/s).
     fn is_white(&self, omega: &[f64], deviation: Option<&DMatrix<f64>>) -> bool {
         let residual = weighted(&(&self.measured - &self.modelled), deviation);
         let first = |row: &usize| *row == 0 || omega[*row] < omega[row - 1];

@@ -9,11 +9,12 @@ use super::finding::{Check, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Difference of an estimate from an estimate without bias by noise on the response.
+/// Difference between an estimate and another estimate that noise on the response does not bias.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Bias {
-    /// Probability of a difference as large by noise alone if neither is biased.
+    /// Probability that noise alone gives a difference at least as large if neither estimate is
+    /// biased.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Parameter with the largest change, in standard errors.

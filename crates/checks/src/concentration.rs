@@ -28,10 +28,11 @@ struct Line {
     rows: Vec<(usize, usize)>,
 }
 
-/// Finds the few lines that cause the misfit. `None` unless at most [`MOST_DISTURBED`] lines, and
-/// at most an eighth of all, have the share [`CONCENTRATED`] of the residual power beyond the
-/// noise, and the other lines at most [`DISTURBED_ALONE`] times the noise power: a wrong model,
-/// too, has its largest errors on few lines, near a resonance.
+/// Finds the few lines that cause the misfit: at most [`MOST_DISTURBED`] lines, and at most an
+/// eighth of all, with at least the share [`CONCENTRATED`] of the residual power beyond the noise.
+/// `None` if there are no such lines, or if the other lines have more than [`DISTURBED_ALONE`]
+/// times the noise power: a wrong model, too, has its largest errors on few lines, near a
+/// resonance.
 ///
 /// The line with the largest residual is removed from the linearised fit, then the next one: this
 /// also removes its effect on the residuals of the other lines.

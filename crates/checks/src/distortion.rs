@@ -57,7 +57,7 @@ pub struct Distortion {
     /// Level of the response on odd lines without force relative to the driven lines, in dB, if
     /// only odd lines are driven; `None` otherwise, or if there is only noise.
     pub odd_db: Option<f64>,
-    /// Probability that one of the terms explains as much by noise alone.
+    /// Probability that noise alone makes one of the terms explain at least as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }
@@ -88,7 +88,7 @@ impl Check for Distortion {
         )?;
         for (name, level) in [("even", even_db), ("odd", odd_db)] {
             if let Some(level) = level {
-                write!(f, "; {name} distortion {level:.0} dB against the response")?;
+                write!(f, "; {name} distortion {level:.0} dB relative to the response")?;
             }
         }
         f.write_str(

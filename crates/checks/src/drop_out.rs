@@ -36,9 +36,9 @@ pub struct DropOut {
 /// converter; therefore the channel must move by many steps on both sides of the run.
 ///
 /// A force may also be zero by intention: between the hits of a hammer, or between bursts. A run in
-/// a force is therefore a drop-out only if it has some samples, is a small part of the record, and
-/// the force acts at nearly all other samples. The run must also begin or end with a jump; a run
-/// near the mean of the force needs a larger jump.
+/// a force is therefore a drop-out only if it is long enough, if it is a small part of the record,
+/// and if the force acts at nearly all other samples. The run must also begin or end with a jump; a
+/// run near the mean of the force needs a larger jump.
 ///
 /// # Source
 /// Ours: runs of a Markov chain are distributed geometrically.
@@ -89,9 +89,9 @@ fn smallest_change(x: &[f64]) -> f64 {
     changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min)
 }
 
-/// Returns whether a run of equal samples of a force may be part of the excitation. It may if the
-/// run is short, as at a smooth peak, or long; if the force rests at other times, too; or if the
-/// force comes to rest and begins again without a jump.
+/// Returns whether a run of equal samples of a force may be part of the excitation. This is
+/// possible if the run is short, as at a smooth peak, or long; if the force rests at other times,
+/// too; or if the force comes to rest and begins again without a jump.
 fn may_be_intended(x: &[f64], sample: usize, samples: usize) -> bool {
     let (before, after) = (&x[..sample], &x[sample + samples..]);
     let (level, rest) = (x[sample], DROP_OUT_MOTION * smallest_change(x));
@@ -142,7 +142,7 @@ impl Check for DropOut {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} is {} from sample {} on, {} in a row, but changes before and after: {}; \
+            "{} is {} from sample {} on for {}, but changes before and after them: {}; \
              choose a window without these samples",
             names.channel(self.channel),
             message::number(self.level),

@@ -98,7 +98,7 @@ findings! {
     Clipping in clipping,
     /// A channel has the same value in all samples.
     ConstantChannel in constant_channel,
-    /// A channel has the value of another one in every sample.
+    /// A channel has the value of another channel in every sample.
     RepeatedChannel in repeated_channel,
     /// Every value of a frequency response is real and positive.
     ConstantPhase in constant_phase,
@@ -116,7 +116,8 @@ findings! {
     Delay in delay,
     /// Alternative model that explains the residual of the fit.
     Alternative in alternative,
-    /// Difference of an estimate from an estimate without bias by noise on the response.
+    /// Difference between an estimate and another estimate that noise on the response does not
+    /// bias.
     Bias in bias,
     /// A free response of the identified system grows.
     Instability in instability,

@@ -13,13 +13,13 @@ use super::{Subject, Verdict};
 pub struct FluidInertia {
     /// Twice the logarithm of the likelihood ratio of twelve coefficients and eight (pure number).
     pub statistic: f64,
-    /// Probability of a statistic as large for a fluid without inertia.
+    /// Probability of a statistic at least as large for a fluid without inertia.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }
 
 /// Reports a test of twelve coefficients of a bearing against eight ([`Finding::FluidInertia`]);
-/// `p_value` is the probability of a `statistic` as large by noise alone.
+/// `p_value` is the probability that noise alone gives a `statistic` at least as large.
 ///
 /// # Source
 /// Wilks (1938), Annals of Mathematical Statistics 9, 60–62.

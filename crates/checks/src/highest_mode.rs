@@ -48,7 +48,7 @@ pub enum ModeLimit {
     BetweenSamples,
     /// Transition by Euler's rule.
     Euler {
-        /// Relative error of the state matrix by that rule (pure number).
+        /// Relative error that Euler's rule causes in the state matrix (pure number).
         bias: f64,
     },
     /// Lines of the spectrum.
@@ -59,8 +59,8 @@ pub enum ModeLimit {
 }
 
 /// Returns the natural frequency (Hz) of the highest oscillating mode and its samples per period.
-/// If no mode oscillates, it is the geometric mean of all natural frequencies, because fast decays
-/// need not be resolved.
+/// If no mode oscillates, the frequency is the geometric mean of all natural frequencies, because
+/// fast decays need not be resolved.
 pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 2], EstimateError> {
     let modes = system.modes()?;
     let oscillating = modes.iter().filter(|mode| mode.oscillates());
@@ -193,7 +193,7 @@ impl ModeLimit {
             (ModeLimit::BetweenSamples, Verdict::Good) => String::new(),
             (ModeLimit::BetweenSamples, Verdict::Doubtful) => {
                 ", so few that the change of the force between samples matters: sample faster, or \
-                 state this change (`between_samples`)"
+                 state how it changes (`between_samples`)"
                     .into()
             }
             (ModeLimit::AtSamples | ModeLimit::BetweenSamples, _) => {

@@ -8,10 +8,9 @@ use super::p_value::PValue;
 /// with maximum likelihood, and the test for growth, form groups separate from the tests of data
 /// and residual.
 ///
-/// If the model is right and only noise disturbs the fit, the probability that any finding of a
-/// group becomes a warning is at most [`SIGNIFICANCE`](super::limits::SIGNIFICANCE). For all groups
-/// together it is at most three times as large. Both limits hold for any dependence between the
-/// tests.
+/// If the model is right and only noise disturbs the fit, the probability of at least one warning
+/// in a group is at most [`SIGNIFICANCE`](super::limits::SIGNIFICANCE). For all groups together it
+/// is at most three times as large. Both limits hold for any dependence between the tests.
 ///
 /// # Source
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.

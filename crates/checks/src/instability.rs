@@ -14,10 +14,10 @@ use super::{Subject, Verdict};
 /// Tests whether a mode of the estimate grows; `None` if all modes decay, apart from rounding and
 /// rigid-body modes.
 ///
-/// The p-value is the probability that the estimate of a neutrally stable system grows by as many
-/// standard errors in any mode: the one-sided probability of Student's t distribution, times the
-/// number of modes. If one eigenvalue of a real pair is positive, the test uses the product of the
-/// pair, which is the ratio of stiffness to mass.
+/// The p-value is the probability that the estimate of a neutrally stable system grows by at least
+/// as many standard errors in any mode: the one-sided probability of Student's t distribution,
+/// times the number of modes. If one eigenvalue of a real pair is positive, the test uses the
+/// product of the pair, which is the ratio of stiffness to mass.
 pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
     let grows = |mode: &&IdentifiedMode| {
@@ -66,7 +66,7 @@ pub struct Instability {
     pub growth_rate: f64,
     /// Standard error of the growth rate, in 1/s.
     pub standard_error: f64,
-    /// Probability of a growth as large by noise alone.
+    /// Probability that noise alone gives a growth at least as large.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

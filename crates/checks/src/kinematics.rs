@@ -13,7 +13,7 @@ use super::limits::KINEMATIC_GAIN;
 use super::limits::STANDARD_ERRORS;
 use super::{Subject, Verdict};
 
-/// Finds the channels with one response quantity that does not change as another predicts
+/// Finds the channels in which one response quantity does not change as another predicts
 /// ([`Finding::Kinematics`]): a wrong unit (mm/s for m/s), interchanged columns or a wrong sign.
 /// Checks each pair of displacement (m), velocity (m/s) and acceleration (m/s²) that is measured,
 /// in that order.

@@ -23,20 +23,20 @@ pub const EXCITED_LINE: f64 = 1e-4;
 /// Condition number above which relative noise of 1 % may hide a combination of parameters.
 pub const CONDITION_NUMBER: f64 = 1e4;
 
-/// Ratio of the curvature from the last sample of a period to its first to the RMS curvature
-/// inside, above which the record is hardly one period of a steady state.
+/// Curvature from the last sample of a period to its first, relative to the RMS curvature inside
+/// the period, above which the record is hardly one period of a steady state.
 pub const SEAM_DOUBTFUL: f64 = 5.0;
 
-/// Ratio of the curvature from the last sample of a period to its first to the RMS curvature
-/// inside, above which the record is not a period of a steady state.
+/// Curvature from the last sample of a period to its first, relative to the RMS curvature inside
+/// the period, above which the record is not a period of a steady state.
 pub const SEAM_BAD: f64 = 20.0;
 
-/// RMS deviation of a period from the mean of all, relative to the RMS of the response, above which
-/// the response is hardly steady.
+/// RMS deviation of a period from the mean of all periods, relative to the RMS of the response,
+/// above which the response is hardly steady.
 pub const PERIOD_SCATTER_DOUBTFUL: f64 = 0.1;
 
-/// RMS deviation of a period from the mean of all, relative to the RMS of the response, above which
-/// the response does not repeat.
+/// RMS deviation of a period from the mean of all periods, relative to the RMS of the response,
+/// above which the response does not repeat.
 pub const PERIOD_SCATTER_BAD: f64 = 0.5;
 
 /// Fraction of the power of a response that the forces do not explain (1 − coherence, median over
@@ -72,12 +72,12 @@ pub const EULER_BIAS_DOUBTFUL: f64 = 0.01;
 /// Relative error of the state matrix by Euler's rule, above which the estimate is bad.
 pub const EULER_BIAS_BAD: f64 = 0.1;
 
-/// Maximum fraction of the residual power with a delayed model, for the delay to be reported.
+/// Maximum fraction of the residual power that remains with a delay, for the delay to be reported.
 pub const DELAY_REMAINING: f64 = 0.25;
 
-/// Factor between a measured derivative and the one computed from another channel, above which
-/// units, columns or signs are wrong. Sensor errors are smaller, and so is the error of the rule
-/// between two samples below four tenths of the sampling rate.
+/// Factor between a measured derivative and the derivative computed from another channel, above
+/// which units, columns or signs are wrong. Sensor errors are smaller, and so is the error of the
+/// rule between two samples below four tenths of the sampling rate.
 pub const KINEMATIC_GAIN: f64 = 3.0;
 
 /// Power that forces extract from a machine, relative to the apparent power, above which it is
@@ -87,8 +87,9 @@ pub const POWER_TAKEN_OUT: f64 = 0.05;
 /// Maximum number of distinct values of a coarsely quantised response.
 pub const QUANTISATION_LEVELS: usize = 16;
 
-/// Ratio of the second difference of a sample to the largest of the others, above which it is a
-/// spike: a motion below the Nyquist frequency cannot have such a curvature at a single sample.
+/// Ratio of the second difference at a sample to the largest second difference at other samples,
+/// above which the sample is a spike: a motion below the Nyquist frequency cannot have such a
+/// curvature at a single sample.
 pub const SPIKE: f64 = 20.0;
 
 /// Maximum residual, relative to the fitted signal (RMS), that counts as rounding.
@@ -105,20 +106,21 @@ pub const SAMPLES_PER_LAG: usize = 4;
 pub const ASYMMETRY: f64 = 1e-6;
 
 /// Share of the response attributed to unmeasured forces, at or above which this explanation is
-/// doubtful: few tests are as disturbed, and nonlinear systems have a larger share.
+/// doubtful: few tests have a disturbance of this size, and nonlinear systems have a larger share.
 pub const UNMEASURED_FORCE: f64 = 0.1;
 
-/// Minimum deviation from 1 of the ratio of two mirrored entries, in standard errors, in damping
-/// and in stiffness, for a gain to be reported; below it the ratio may be due to noise.
+/// Minimum deviation of the ratio of two mirrored entries from 1, in standard errors, for a gain to
+/// be reported. The ratios in damping and in stiffness must both have it; a smaller deviation may
+/// be due to noise.
 pub const GAIN_SHOWS: f64 = 5.0;
 
-/// Maximum number of standard errors between the ratios of mirrored entries, in damping and in
-/// stiffness, that count as the same gain.
+/// Maximum difference, in standard errors, between the ratios of mirrored entries in damping and in
+/// stiffness that count as the same gain.
 pub const GAIN_AGREES: f64 = 2.5;
 
-/// Maximum difference between the logarithms of the ratios of mirrored entries, in damping and in
-/// stiffness, relative to the logarithm in stiffness, that counts as the same gain even if it
-/// exceeds [`GAIN_AGREES`].
+/// Maximum difference between the logarithms of the ratios of mirrored entries in damping and in
+/// stiffness, relative to the logarithm in stiffness. Up to this difference, the ratios count as
+/// the same gain even if they differ by more than [`GAIN_AGREES`].
 pub const GAIN_NEAR: f64 = 0.05;
 
 /// Minimum fraction of samples of a coarsely quantised channel that equal the sample before.
@@ -202,7 +204,7 @@ pub(crate) const PERIOD_REPEATS: f64 = 0.5;
 /// be better.
 pub(crate) const PERIOD_CLEARLY: f64 = 4.0;
 
-/// Minimum factor between the squared mismatch across an interruption and elsewhere.
+/// Minimum ratio of the squared mismatch across an interruption to that at the other samples.
 pub(crate) const PERIOD_INTERRUPTED: f64 = 10.0;
 
 /// Number of strongest lines in the test of the power flow: the share [`STRONGEST_FRACTION`] of
@@ -229,7 +231,7 @@ pub(crate) const WINDOW_REACH: usize = 2;
 pub(crate) const MAX_DISTANCES: usize = 12;
 
 /// Minimum ratio of the number of lines to the largest distance at which residuals are correlated:
-/// fewer pairs of lines have products that are not normally distributed.
+/// with fewer pairs of lines, the sum of their products is not normally distributed.
 pub(crate) const LINES_PER_DISTANCE: usize = 8;
 
 /// Minimum number of pairs of lines with a given distance.
@@ -243,15 +245,15 @@ pub(crate) const LINES_PER_CORRELATION: usize = 8;
 pub(crate) const FREE_RESIDUALS: f64 = 8.0;
 
 /// Minimum residual power relative to the stated power of the response to an unmeasured force: the
-/// mean of the periods may contain as little as this.
+/// mean of the periods may contain only this part.
 pub(crate) const SPECTRAL_LEAKED: f64 = 0.5;
 
 /// Minimum singular value of the sensitivity (columns of unit length), relative to the largest; a
 /// combination of parameters below it has no effect.
 pub(crate) const FIT_RANK: f64 = 1e-12;
 
-/// Ratio of the response variance by force noise to the response's own noise variance, above which
-/// the force noise dominates.
+/// Ratio of the variance that force noise causes in the response to the variance of the noise of
+/// the response, above which the force noise dominates.
 pub(crate) const FIT_DECIDES: f64 = 10.0;
 
 /// Number of transient terms of each channel of a record.

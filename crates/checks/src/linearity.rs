@@ -151,7 +151,7 @@ impl Tested {
     }
 
     /// Returns the finding for the power of the motion whose response has the strongest correlation
-    /// with the residual. `correlation` is that of neighbouring lines.
+    /// with the residual. `correlation` is the correlation of neighbouring lines.
     fn finding(
         &self,
         estimate: &Estimate,
@@ -271,8 +271,8 @@ fn without_linear_part(
 }
 
 /// Returns the probability that noise with the spectra of the residual (channels × lines, `sizes`
-/// averaged over neighbouring lines) is correlated as much with the responses; `correlation` is
-/// that between neighbouring lines.
+/// averaged over neighbouring lines) is correlated at least as much with the responses;
+/// `correlation` is the correlation of neighbouring lines.
 ///
 /// For given magnitudes the phases of the noise are random from line to line. The sum over the
 /// channels of a line has one phase, because noise on a force, or an unmeasured force, affects all
@@ -296,8 +296,8 @@ fn p_value(
         sum += product(at, at).re;
         for (apart, c) in correlation.iter().enumerate().take(residual.ncols() - at) {
             let (other, times) = (at + apart, if apart == 0 { 0.5 } else { 1.0 });
-            // The residuals of both lines themselves give the variance: at a narrow resonance they
-            // exceed the average of the neighbours.
+            // The variance is computed from the residuals of these two lines, because at a narrow
+            // resonance they are larger than the average of neighbouring lines.
             let common = product(at, at).conj() * product(at, other)
                 + product(other, at).conj() * product(other, other);
             variance += times * c * 0.5 * common.re;
@@ -330,7 +330,7 @@ pub struct Linearity {
     /// Degree of freedom of the motion.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub dof: usize,
-    /// Probability of a correlation as strong for a linear system.
+    /// Probability of a correlation at least as strong for a linear system.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

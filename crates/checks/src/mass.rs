@@ -12,8 +12,9 @@ use super::p_value::PValue;
 use super::{Subject, Verdict};
 
 /// Finds the most significant negative mass on the diagonal of M ([`Finding::NegativeMass`]);
-/// `None` if there is none. The p-value is the probability that noise alone makes any mass of zero
-/// as negative: the one-sided probability of Student's t distribution, times the number of masses.
+/// `None` if there is none. The p-value is the probability that noise alone makes the estimate of
+/// any mass of zero at least as negative: the one-sided probability of Student's t distribution,
+/// times the number of masses.
 ///
 /// A machine may have negative damping or stiffness, but no negative mass: a force or a response of
 /// the wrong sign changes the sign of all matrices and leaves the modes unchanged.
@@ -58,7 +59,7 @@ pub struct NegativeMass {
     pub mass: f64,
     /// Standard error of the mass, in kg.
     pub standard_error: f64,
-    /// Probability that noise alone makes any mass of zero as negative.
+    /// Probability that noise alone makes the estimate of any mass of zero at least as negative.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

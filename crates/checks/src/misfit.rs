@@ -13,8 +13,9 @@ use super::{Subject, Verdict};
 pub struct Misfit {
     /// Ratio of the residual power to its expectation for noise alone (pure number).
     pub ratio: f64,
-    /// Probability that noise alone deviates as much. The deviation is upwards for coherence,
-    /// downwards for the noise of the force, and to either side for periods.
+    /// Probability that noise alone gives a ratio that deviates at least as much from 1. The
+    /// deviation is upwards for coherence, downwards for the noise of the force, and to either side
+    /// for periods.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Source of the noise power.
@@ -48,8 +49,8 @@ pub enum NoiseSource {
     Coherence,
     /// Standard errors that the data state.
     Stated,
-    /// Noise of the force on the lines where it dominates, stated or estimated above the excited
-    /// band.
+    /// Noise of the force, stated or estimated above the excited band, on the lines where this
+    /// noise dominates.
     Force,
 }
 

@@ -21,7 +21,7 @@ pub struct TermLeftOut {
     pub term: OmittedTerm,
     /// Fraction of the residual power that the term explains.
     pub explained: f64,
-    /// Probability that noise alone makes one of the terms explain as much.
+    /// Probability that noise alone makes one of the terms explain at least as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Changes by the term, parameter by parameter (unit of the parameter).
@@ -44,7 +44,7 @@ pub struct ChangeByTerm {
 }
 
 /// Tests for terms that the model of a fit leaves out ([`Finding::TermLeftOut`]); `None` if noise
-/// explains the residual as well. `records` are those of [`PartsOfFit::omitted`].
+/// alone is sufficient to explain the residual. `records` are those of [`PartsOfFit::omitted`].
 ///
 /// # Source
 /// The source of [`PartsOfFit::omitted`].
@@ -82,7 +82,8 @@ pub struct NonlinearTermsLeftOut {
     pub laws: Vec<String>,
     /// Fraction of the power of the unexplained force that the terms explain.
     pub explained: f64,
-    /// Probability that noise alone makes one of the candidates differ as much from zero.
+    /// Probability that noise alone makes the coefficient of one of the candidates differ from zero
+    /// at least as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Changes by the terms, parameter by parameter (unit of the parameter).

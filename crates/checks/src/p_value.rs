@@ -63,7 +63,7 @@ pub struct CorrelationTest {
     pub outside: usize,
     /// Bound that contains 95 % of the coefficients of noise.
     pub bound: f64,
-    /// Probability of a correlation as strong by noise alone.
+    /// Probability that noise alone gives a correlation at least as strong.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// `true` if the residual is only rounding, whose correlations have no meaning.

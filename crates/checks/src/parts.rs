@@ -16,7 +16,7 @@ use crate::Finding;
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PartsAgreement {
-    /// Probability that noise alone makes the parts of any split differ as much.
+    /// Probability that noise alone makes the parts of any split differ at least as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// The part that differs most from the others.

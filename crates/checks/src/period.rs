@@ -12,8 +12,8 @@ use super::limits::{
 };
 use super::{Subject, Verdict};
 
-/// Checks a claimed period (in samples) with a force (N) of one or several such periods; `None` if
-/// the force does not contradict it.
+/// Checks a claimed period (in samples) with a force (N) that covers one or several claimed
+/// periods; `None` if the force does not contradict it.
 ///
 /// Three faults are detected ([`PeriodFault`]): the force repeats better after one or two samples
 /// more or less; it repeats after the claimed period except at one sample, where samples are
@@ -40,9 +40,9 @@ fn unit(force: &Record, channel: usize) -> Option<Vec<f64>> {
     (rms > PERIOD_ROUNDING * size).then(|| x.iter().map(|x| (x - mean) / rms).collect())
 }
 
-/// Returns a neighbouring period after which the force repeats clearly better. Mismatches are RMS
-/// differences relative to √2 times the RMS of the force. The next longer and shorter periods must
-/// be worse; otherwise the true period is not a neighbour.
+/// Returns a neighbouring period after which the force repeats significantly better than after the
+/// claimed period. Mismatches are RMS differences relative to √2 times the RMS of the force. The
+/// next longer and shorter periods must be worse; otherwise the true period is not a neighbour.
 fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let longest = period + PERIOD_NEIGHBOURS + 1;
     let pairs = channels[0].len().checked_sub(longest)?;
@@ -106,14 +106,15 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     {
         return None;
     }
-    // A single sample may agree with the one a period before by chance, or differ from it by noise.
+    // A single sample may by chance agree with the sample one period before, or differ from it by
+    // noise.
     let off = outside.max(within(worst) / PERIOD_INTERRUPTED);
     let first = (worst..worst + period).find(|k| squares[*k] > off)?;
     Some(PeriodFault::Interruption { sample: first + period, mismatch: outside.sqrt() })
 }
 
-/// Returns the shortest number of samples after which all channels repeat, if the claimed period is
-/// not a multiple of it and repeats less well.
+/// Returns the shortest number of samples after which all channels repeat. `None` if they repeat
+/// equally well after the claimed period, or if the claimed period is a multiple of this number.
 fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let squares = squared_mismatches(channels);
     // The search excludes the first lags, at which a slow force resembles itself.
@@ -189,7 +190,7 @@ pub struct WrongPeriod {
 pub enum PeriodFault {
     /// The force repeats better after one or two samples more or less.
     Neighbour {
-        /// Number of samples after which it repeats best.
+        /// Number of samples after which the force repeats best.
         period: usize,
         /// Ratio of the RMS difference from one of these periods to the next to √2 times the RMS of
         /// the force (pure number).
@@ -204,13 +205,14 @@ pub enum PeriodFault {
         /// First sample that does not repeat, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         sample: usize,
-        /// RMS difference elsewhere, relative to √2 times the RMS of the force (pure number).
+        /// RMS difference at the other samples, relative to √2 times the RMS of the force (pure
+        /// number).
         mismatch: f64,
     },
     /// The force repeats after a different number of samples, and the claimed period is not a
     /// multiple of it.
     Other {
-        /// Number of samples after which it repeats.
+        /// Number of samples after which the force repeats.
         period: usize,
         /// Ratio of the RMS difference from one of these periods to the next to √2 times the RMS of
         /// the force (pure number).

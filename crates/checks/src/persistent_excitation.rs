@@ -23,8 +23,8 @@ pub struct PersistentExcitation {
     pub needed: usize,
 }
 
-/// Returns the order of persistent excitation of each force, in the record with the highest,
-/// compared with the number of states and inputs, or of unknowns.
+/// Returns the order of persistent excitation of each force, in the record in which it is highest,
+/// compared with the number of states and inputs, or with the number of unknowns.
 pub(super) fn excitation<'a>(
     records: impl Iterator<Item = &'a Record>,
     needed: usize,

@@ -13,8 +13,8 @@ use super::limits::{FORCE_FLOOR, STRONGEST_FRACTION, STRONGEST_LINES};
 use super::{Subject, Verdict};
 
 /// Finds forces (N) that extract power from the system, line by line and in the mean
-/// ([`Finding::PowerFlow`]): such forces do not drive it. Force and response have one channel per
-/// degree of freedom. `None` if the forces supply power.
+/// ([`Finding::PowerFlow`]): such forces do not drive the system. Force and response have one
+/// channel per degree of freedom. `None` if the forces supply power.
 ///
 /// The power is Σ ½ Re(F V̄), the apparent power Σ ½ |F| |V|.
 ///

@@ -22,7 +22,7 @@ pub struct PriorAgreement {
     pub standard_deviation: f64,
     /// Estimate, in the unit of the parameter.
     pub estimate: f64,
-    /// Probability of an estimate as far from the mean.
+    /// Probability of an estimate at least as far from the mean.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

@@ -20,8 +20,8 @@ use super::p_value::PValue;
 /// motion, fitted sample by sample to displacement, velocity, acceleration and force (N)
 /// ([`Finding::Bias`]): white noise on the response has this effect, noise on the force does not.
 /// `None` if the neighbours do not explain the residual, if no parameter changes by more than its
-/// standard error with the neighbours as instruments, if the residual is not white (this is another
-/// finding), or if there is no noise. Only the first 32,768 samples of a long record are used.
+/// standard error with the neighbours as instruments, if the residual is not white (another check
+/// reports this), or if there is no noise. Only the first 32,768 samples of a long record are used.
 ///
 /// The finding names the parameter with the largest change, in standard errors of `estimate`.
 ///
@@ -59,7 +59,8 @@ pub fn noise_on_response(
     // Bonferroni's bound: the smallest p-value times the number of equations.
     let p_value = |change: &Change| (change.p_value * equations as f64).min(1.0);
     let significant = least.filter(|change| p_value(change) < SIGNIFICANCE);
-    // A smaller bias is significant, too, in a long record, but hardly affects the interval.
+    // In a long record a bias of less than one standard error may be significant, too, but it
+    // hardly affects the interval.
     let relevant = significant.filter(|change| change.standard_errors() > 1.0);
     Ok(relevant.map(|change| {
         Finding::Bias(Bias {

@@ -7,7 +7,7 @@ use mechid_signal::Record;
 use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::{Subject, Verdict};
 
-/// Channel that has the value of another one in every sample.
+/// Channel that has the value of another channel in every sample.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RepeatedChannel {

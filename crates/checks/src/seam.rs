@@ -12,7 +12,8 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Seam {
-    /// Ratio of the curvature there to the RMS curvature inside, largest channel (pure number).
+    /// Ratio of the curvature at the seam to the RMS curvature inside the period; of several
+    /// channels, the largest ratio (pure number).
     pub ratio: f64,
 }
 
@@ -65,7 +66,8 @@ impl Check for Seam {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the curvature of the response from the last sample to the first is {:.1} times that elsewhere: ",
+            "where the last sample of the response meets the first, the curvature is {:.1} times the RMS \
+             curvature of the record: ",
             self.ratio
         )?;
         f.write_str(match self.verdict() {

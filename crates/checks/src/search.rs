@@ -37,7 +37,7 @@ impl Check for SearchAgreement {
         f.write_str(match self.verdict() {
             Verdict::Good => "",
             _ => {
-                ": there may be a higher one; give better first values, bounds, or more \
+                ": there may be a higher likelihood; give better initial values, bounds, or more \
                  searches (`starts`)"
             }
         })

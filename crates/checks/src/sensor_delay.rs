@@ -20,13 +20,13 @@ pub struct SensorDelay {
     /// Standard error of the delay by the noise, in s; a large delay also has an error of second
     /// order.
     pub standard_error: f64,
-    /// Probability of a delay as large by noise alone.
+    /// Probability that noise alone gives a delay at least as large.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }
 
 /// Tests the residual of a machine for a delay between its inputs and its sensors
-/// ([`Finding::SensorDelay`]); `None` if the data do not determine any.
+/// ([`Finding::SensorDelay`]); `None` if the data do not determine any delay.
 ///
 /// # Source
 /// The score test of [`DelayScore`](mechid_estimate::likelihood::DelayScore).

@@ -34,14 +34,14 @@ pub struct SpectralResidual {
     with_ends: Option<(DVector<f64>, DMatrix<f64>)>,
     /// Standard deviation of every residual before the fit of the parameters, from its own size.
     deviations: DVector<f64>,
-    /// QᵀΣQ with the squares Σ of those deviations.
+    /// QᵀΣQ with the diagonal matrix Σ of the squared `deviations`.
     explained_spread: DMatrix<f64>,
-    /// Forces, rows × n, without the part of their noise that the residual shows: the residual of a
-    /// correct model is also correlated with this part.
+    /// Forces, rows × n, without the part of their noise that follows from the residual: even the
+    /// residual of a correct model is correlated with this part.
     force: DMatrix<Complex<f64>>,
     rounding: bool,
     /// Ratio of residual power to noise power on the lines where force noise dominates, and the
-    /// probability of a ratio as small.
+    /// probability of a ratio at most as large.
     force_decides: Option<(f64, f64)>,
     /// Few lines with most of the misfit of all records.
     concentration: Option<Concentration>,
@@ -106,7 +106,7 @@ impl SpectralResidual {
         Self { rounding, ..self }
     }
 
-    /// Replaces the measured forces by the most likely ones.
+    /// Replaces the measured forces by the most likely forces.
     pub(super) fn with_likely_force(self, force: Option<DMatrix<Complex<f64>>>) -> Self {
         Self { force: force.unwrap_or(self.force), ..self }
     }
@@ -246,7 +246,8 @@ impl SpectralResidual {
         // A power far below the noise is also significant: then the periods differ by more than
         // noise.
         let below = match &self.with_ends {
-            // The noise from few periods also contains the transients of an unmeasured force.
+            // The noise estimate from few periods also contains the transients of an unmeasured
+            // force.
             Some(_) if power > SPECTRAL_LEAKED * mean => 1.0,
             _ => 1.0 - above,
         };
@@ -276,9 +277,9 @@ impl SpectralResidual {
         2 * (self.data.dof() * line + channel)
     }
 
-    /// Returns the correlation of the residual of a channel from line to line, at a distance of
-    /// `first` lines (at least 1) or more. `None` if there are too few lines or the residual is
-    /// zero.
+    /// Returns the correlation of the residual of a channel from line to line, at the distances
+    /// `first` (at least 1), `first` + 1 … in lines. `None` if there are too few lines or the
+    /// residual is zero.
     ///
     /// # Panics
     /// If there is no such channel.

@@ -19,12 +19,13 @@ pub struct Spike {
     /// Sample of the spike, counted from 0 in the window.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub sample: usize,
-    /// Ratio of the second difference at the sample to the largest of the others (pure number).
+    /// Ratio of the second difference at the spike to the largest second difference at other
+    /// samples (pure number).
     pub ratio: f64,
 }
 
 /// Finds the channels of a response (any unit) with one sample far outside its neighbours
-/// ([`Finding::Spike`]) at a sample without a spike of a force (N): an error of the transmission,
+/// ([`Finding::Spike`]), if no force (N) has a spike at this sample: an error of the transmission,
 /// not a motion.
 ///
 /// # Source
@@ -41,8 +42,8 @@ pub fn spiked_channels(quantity: Quantity, response: &Record, force: &Record) ->
     (0..response.channels()).filter_map(one).collect()
 }
 
-/// Returns the sample of a spike, and the ratio of its second difference to the largest of the
-/// others.
+/// Returns the sample of a spike, and the ratio of its second difference to the largest second
+/// difference at other samples.
 fn spike(x: &[f64]) -> Option<(usize, f64)> {
     let bend: Vec<f64> = x.windows(3).map(|x| (x[1] - 0.5 * (x[0] + x[2])).abs()).collect();
     let largest = (0..bend.len()).max_by(|a, b| bend[*a].total_cmp(&bend[*b]))?;

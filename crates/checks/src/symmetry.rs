@@ -18,8 +18,8 @@ use super::{Subject, Verdict};
 /// which make C and K non-symmetric. An M that is not symmetric shows that forces and displacements
 /// do not belong to the same points and directions.
 ///
-/// The p-value is the probability that one pair m_ij, m_ji of a symmetric M differs by as many
-/// standard errors: the two-sided probability of Student's t distribution, times the number of
+/// The p-value is the probability that one pair m_ij, m_ji of a symmetric M differs by at least as
+/// many standard errors: the two-sided probability of Student's t distribution, times the number of
 /// pairs.
 ///
 /// # Source
@@ -95,7 +95,7 @@ pub struct MassSymmetry {
     pub below: f64,
     /// Standard error of the difference, in kg.
     pub standard_error: f64,
-    /// Probability that noise alone makes any two such entries differ as much.
+    /// Probability that noise alone makes any two mirrored entries differ at least as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

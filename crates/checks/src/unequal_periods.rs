@@ -89,7 +89,7 @@ impl Check for UnequalPeriods {
         write!(
             f,
             "single periods of the force differ from their mean by up to {:.2} %, and the response \
-             follows them: the test is not periodic, and the differences are not noise. Average frequency \
+             follows these differences: the test is not periodic, and the differences are not noise. Average frequency \
              responses over the periods (`from_frf`), or fit the strokes of a hammer as `hits`",
             100.0 * self.fraction
         )

@@ -78,13 +78,13 @@ impl Check for Unit {
 pub struct TimeUnit {
     /// Description of the column.
     pub column: String,
-    /// Sampling rate of instants in seconds, in Hz.
+    /// Sampling rate if the instants are in seconds, in Hz.
     pub rate_hz: f64,
-    /// Duration of the record in seconds, in s.
+    /// Duration of the record if the instants are in seconds, in s.
     pub duration_s: f64,
     /// Unit that may be meant.
     pub unit: &'static str,
-    /// Size of that unit, in s.
+    /// Size of `unit`, in s.
     pub factor: f64,
 }
 

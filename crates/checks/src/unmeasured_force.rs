@@ -34,7 +34,8 @@ impl Check for UnmeasuredForce {
         f.write_str(match self.verdict() {
             Verdict::Good => "",
             _ => {
-                ": a nonlinearity under a random force or a missing degree of freedom has the same effect; repeat the test at another level of the force, or with a periodic force"
+                ": a missing degree of freedom has the same effect, and so has a nonlinearity if the force is random; \
+                 repeat the test at another level of the force, or with a periodic force"
             }
         })
     }

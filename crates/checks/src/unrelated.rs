@@ -15,8 +15,8 @@ use super::{Subject, Verdict};
 pub struct Unrelated {
     /// Share of the power of the response that the fit explains.
     pub explained: f64,
-    /// Upper bound of the probability that a fit explains as much of a response unrelated to the
-    /// force.
+    /// Upper bound of the probability that a fit explains at least as much of a response that is
+    /// unrelated to the force.
     pub p_value: f64,
 }
 
@@ -60,8 +60,8 @@ impl Check for Unrelated {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the response does not follow the force: the fit explains {} % of its power, no more than it \
-             would explain of noise; the parameters are meaningless. Check columns, cables and units",
+            "the response does not follow the force: the fit explains {} % of the power of the response, \
+             no more than if it were pure noise; the parameters are meaningless. Check columns, cables and units",
             three_digits(100.0 * self.explained)
         )
     }

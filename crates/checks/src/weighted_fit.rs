@@ -81,7 +81,7 @@ struct WeightedFit {
     records: Vec<SpectralResidual>,
     /// True if every record states its noise.
     noise_stated: bool,
-    /// Change of the parameters from the estimate to the most likely ones.
+    /// Change of the parameters from the estimate to the most likely values.
     step: Option<DVector<f64>>,
 }
 
@@ -92,7 +92,7 @@ struct Linearised {
     basis: DMatrix<f64>,
     /// Orthonormal columns that span the effect of the parameters.
     explained: Vec<DMatrix<f64>>,
-    /// Scalar products of the residuals with those columns.
+    /// Scalar products of the residuals with the columns of `explained`.
     coefficients: DVector<f64>,
 }
 
@@ -232,7 +232,8 @@ impl<'a> Weighing<'a> {
         Some(linear.power() - linear.coefficients.norm_squared())
     }
 
-    /// Returns the parameters after some Gauss–Newton steps, and the residuals there.
+    /// Returns the parameters after some Gauss–Newton steps, and the residuals with these
+    /// parameters.
     fn settled(&self) -> Option<(DVector<f64>, Linearised)> {
         let mut values = self.start();
         let mut linear = self.linearised(&values)?;
@@ -331,7 +332,7 @@ impl WeightedFit {
         let step = change.component_div(&scale);
         let count = scale.len() as f64;
         let together = if estimate.unknowns().is_related() {
-            // Related entries have a singular covariance.
+            // The covariance of related entries is singular, so there is no joint test.
             1.0
         } else {
             let statistic = estimate.squared_length(change)?;
@@ -415,9 +416,9 @@ fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(
 }
 
 /// Returns two values for the channel with the smallest probability: the ratio of residual power to
-/// noise power on the lines where force noise dominates, and the probability of a ratio as small,
-/// times the number of channels. `None` if no force noise is stated, or if it dominates on too few
-/// lines.
+/// noise power on the lines where force noise dominates, and the probability of a ratio at most as
+/// large, times the number of channels. `None` if no force noise is stated, or if it dominates on
+/// too few lines.
 fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
     if data.force_variance().iter().all(|variance| *variance == 0.0) {
         return None;

@@ -16,7 +16,8 @@ pub struct Whiteness {
     /// Result of the test.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub test: CorrelationTest,
-    /// Lags over which noise on the response correlates the residual, if it is uncorrelated beyond.
+    /// Lags over which noise on the response correlates the residual, if the residual is
+    /// uncorrelated beyond these lags.
     pub span: Option<NoiseSpan>,
 }
 
@@ -61,7 +62,7 @@ pub struct NoiseSpan {
     pub lags: usize,
     /// Autocorrelation at lag 1 (pure number).
     pub first_coefficient: f64,
-    /// Result of the test beyond those lags.
+    /// Result of the test beyond the lags of the span.
     pub beyond: CorrelationTest,
 }
 
@@ -92,7 +93,7 @@ impl Check for Whiteness {
         if let Some(NoiseSpan { lags, first_coefficient, beyond }) = significant {
             return write!(
                 f,
-                "correlated up to lag {lags} ({first_coefficient:.2} at lag 1) and no further ({beyond}), \
+                "correlated up to lag {lags} ({first_coefficient:.2} at lag 1), but not at longer lags ({beyond}), \
                  as with noise on the response, which least squares ignores: the parameters are \
                  biased by more than their standard errors"
             );
@@ -110,7 +111,7 @@ impl Residual {
                 let (response, force) = (response + 1, names.force(*force));
                 write!(
                     f,
-                    "residual of response {response} to {force}, lines {distance} or more apart: "
+                    "residual of response {response} to {force}, on lines at least {distance} apart: "
                 )
             }
         }

@@ -45,7 +45,7 @@ pub enum CliError {
     MisplacedOption {
         /// The option.
         option: &'static str,
-        /// Reason why the option is not allowed there.
+        /// Reason why the option is not allowed in this context.
         why: &'static str,
     },
     /// A time-stepping scheme fails.
@@ -74,7 +74,7 @@ pub enum CliError {
     SharedOutput {
         /// Number of files for standard output.
         files: usize,
-        /// `true` if the report as JSON goes there, too.
+        /// `true` if the report as JSON goes to standard output, too.
         json: bool,
     },
     /// The report cannot be printed.

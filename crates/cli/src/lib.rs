@@ -66,7 +66,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         // The reader has closed the pipe (`mechid … | head`).
         Err(error) if error.is_closed_output() => ExitCode::from(BROKEN_PIPE),
         Err(error) => {
-            // The exit code is the same even if the message cannot be printed.
+            // The exit code does not depend on whether the message can be printed.
             let command = arguments.get(1).and_then(|word| word.to_str()).unwrap_or_default();
             let raises = options::has(command, "raise-limits");
             let message = error.message(raises, options::spelled);

@@ -21,7 +21,7 @@ pub fn spelled(message: &str) -> String {
     spelled
 }
 
-/// Returns the option of any subcommand with the name of a setting.
+/// Returns the option for the name of a setting; `None` if no subcommand has this option.
 fn option(setting: &str) -> Option<String> {
     let name = setting.replace('_', "-");
     Cli::command().get_subcommands().any(|command| takes(command, &name)).then_some(name)

@@ -62,7 +62,7 @@ fn spinner() -> ProgressBar {
 }
 
 /// Does some work and shows its progress if it takes long. At a terminal, the progress is one line
-/// that changes; elsewhere it is a new line every [`LINE`].
+/// that changes; otherwise a new line is written every [`LINE`].
 pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     // An existing logger is kept: a caller of the library may have set one.
     if log::set_logger(&PROGRESS).is_ok() {

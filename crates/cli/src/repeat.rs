@@ -12,7 +12,9 @@ fn command(arguments: &[OsString]) -> String {
     for argument in arguments {
         let argument = argument.to_string_lossy();
         command.push(' ');
-        command += &quoter.quote(&argument).expect("only a NUL is refused, and NULs are allowed");
+        command += &quoter
+            .quote(&argument)
+            .expect("NUL is the only character that can be refused, and it is allowed");
     }
     command
 }

@@ -83,7 +83,7 @@ fn tables_of_frequency_responses() {
     let table = "f,real,imag,coherence\n1,1e-3,-2e-3,0.9\n2,1e-3,-3e-3,0.9\n";
     refused(table, "identify a.csv --frf-table", &["--quantity", "does not say what was measured"]);
     let told = "identify a.csv --frf-table --quantity velocity";
-    refused(table, told, &["from how many independent averages?"]);
+    refused(table, told, &["state their number of independent averages"]);
     refused(table, &format!("{told} --averages 8 --band-hz 5:9"), &["5 and 9 Hz"]);
     refused(table, &format!("{told} --averages 8 --force 1"), &["cannot be used with"]);
 }
@@ -109,7 +109,11 @@ fn noise_of_the_force_belongs_to_open_records() {
 #[test]
 fn bearing_tests_need_two_directions() {
     let common = "bearing a.csv --force force --stator-mass";
-    refused(&good(), &format!("{common} 2 --displacement x"), &["needs two columns, in x and y"]);
+    refused(
+        &good(),
+        &format!("{common} 2 --displacement x"),
+        &["needs two columns, x and y, of each quantity"],
+    );
     refused(
         &good(),
         &format!("{common} 0 --displacement x"),
@@ -204,7 +208,7 @@ fn no_time_axis() {
 
 #[test]
 fn window_past_the_end() {
-    let part = "the window needs samples 9 to 40 (counted from 1), a.csv has 32";
+    let part = "the window needs samples 9 to 40 (counted from 1), but a.csv has 32";
     identify(&good(), "--start 9 --period 32", &[part]);
     identify(&good(), "--period 16 --periods 3", &["samples 1 to 48"]);
     identify(&good(), "--start 33", &["a.csv has 32"]);
@@ -348,7 +352,7 @@ fn descriptions_that_describe_nothing() {
 fn a_free_decay_that_is_none() {
     let common = "modes a.csv --displacement x --plot out.svg";
     let fit = |more: &str, parts: &[&str]| refused(&good(), &format!("{common} {more}"), parts);
-    fit("--from 1", &["--from: 1 s is not in the window of 0.128 s"]);
+    fit("--from 1", &["--from: 1 s is not in the window, which is 0.128 s long"]);
     fit("--from 0.1 --to 0.05", &["--to: it must be after --from"]);
     fit("--from -1", &["--from: -1 s is not in the window"]);
     fit("--to inf", &["--to: inf s is not in the window"]);
@@ -364,6 +368,6 @@ fn a_free_decay_that_is_none() {
         let t = f64::from(k);
         (0.004 * t, 0.0, (0.1 * t).exp() * (0.7 * t).sin() + 0.01 * (3.0 * t * t).sin())
     });
-    let grows = ["grows, at", "an unstable system"];
+    let grows = ["grows, at", "the system is unstable"];
     refused(&growing, "modes a.csv --displacement x --from 0", &grows);
 }

@@ -111,7 +111,10 @@ fn the_method_follows_the_record_and_says_why() {
     }
     let told = mechid(folder, &format!("force run.csv --system machine.json {period}")).unwrap();
     let told = String::from_utf8(told).unwrap();
-    for words in ["because: whole periods, the lines with force not given", "standard error (N)"] {
+    for words in [
+        "because: the record has whole periods, but the lines with force are not given",
+        "standard error (N)",
+    ] {
         assert!(told.contains(words), "{told}");
     }
 }
@@ -145,7 +148,7 @@ fn one_sensor_finds_the_force_in_the_other_direction() {
     assert_eq!(&picture[1..4], b"PNG");
     // One sensor cannot distinguish two forces.
     let both = arguments.replace("--forced 2", "");
-    assert!(mechid(folder, &both).unwrap_err().contains("name fewer forced ones"));
+    assert!(mechid(folder, &both).unwrap_err().contains("name fewer forced degrees of freedom"));
 }
 
 #[test]

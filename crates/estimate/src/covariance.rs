@@ -5,20 +5,20 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// Covariance of parameters θ.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Covariance {
-    /// Full matrix, parameters × parameters, in products of SI units.
+    /// Full matrix, parameters × parameters; each entry is in the product of the SI units of its
+    /// two parameters.
     Full(DMatrix<f64>),
-    /// Factors, for equations that were solved one by one: n equations of 3n unknowns each have
-    /// (3n²)² covariances, but these depend on not many more than (3n)² numbers.
+    /// Factors, for equations that were solved one by one: n equations with 3n unknowns each have
+    /// (3n²)² covariances, but about (3n)² numbers determine them all.
     Product(Product),
 }
 
-/// Factors of Cov(θ_p, θ_q) = S_ij h_p·h_q, with the residual covariance S between the equations i
-/// and j of the two parameters and the rows h of the pseudo-inverses, which equations with the same
-/// regressors share.
+/// Factors of Cov(θ_p, θ_q) = S_ij h_p·h_q: S is the residual covariance of the equations, i and j
+/// are the equations of the two parameters, and h are rows of the pseudo-inverses. Equations with
+/// the same regressors share the rows h.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Product {
-    /// S, equations × equations.
-    /// In products of SI units.
+    /// S, equations × equations; each entry is in the product of the SI units of its two equations.
     pub residual: DMatrix<f64>,
     /// Distinct rows h, one below the other, in inverse SI units of the regressors.
     pub rows: DMatrix<f64>,
@@ -35,8 +35,7 @@ impl From<DMatrix<f64>> for Covariance {
 }
 
 impl Covariance {
-    /// Returns the variance of one parameter.
-    /// In the square of the SI unit.
+    /// Returns the variance of one parameter, in the square of its SI unit.
     pub fn variance_of(&self, at: usize) -> f64 {
         match self {
             Self::Product(product) if product.open[at] => f64::INFINITY,
@@ -44,8 +43,8 @@ impl Covariance {
         }
     }
 
-    /// Returns the covariance of two parameters; NaN if the data do not determine one of them.
-    /// In the product of both SI units.
+    /// Returns the covariance of two parameters, in the product of their SI units; NaN if the data
+    /// do not determine one of them.
     pub fn between(&self, p: usize, q: usize) -> f64 {
         match self {
             Self::Full(all) => all[(p, q)],
@@ -81,8 +80,8 @@ impl Covariance {
         }
     }
 
-    /// Returns all entries, parameters × parameters.
-    /// In products of SI units.
+    /// Returns all entries, parameters × parameters; each is in the product of the SI units of its
+    /// two parameters.
     pub fn full(&self) -> DMatrix<f64> {
         match self {
             Self::Full(all) => all.clone(),
@@ -104,7 +103,7 @@ impl Covariance {
     }
 
     /// Returns the covariance of the sums f_i = Σ w_p θ_p over the parameters p of equation i:
-    /// 2n×2n, real parts first. One weight for each parameter, in any unit.
+    /// 2n×2n, real parts first. `weights` has one complex weight for each parameter, in any unit.
     ///
     /// # Source
     /// The law of propagation of uncertainty.

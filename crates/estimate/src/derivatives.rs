@@ -35,8 +35,8 @@ pub fn spectral_from_displacement(displacement: &Record) -> Result<Response, Est
 
 /// Returns x, ẋ and ẍ of an acceleration (m/s²) recorded over whole periods.
 ///
-/// The mean of a periodic acceleration is zero, so the mean of the displacement is lost: subtract
-/// the mean of the force too before a fit ([`Record::without_mean`]).
+/// The mean of a periodic acceleration is zero, so the mean of the displacement is lost. Before a
+/// fit, subtract the mean of the force, too ([`Record::without_mean`]).
 ///
 /// # Errors
 /// [`EstimateError::Signal`] if an integral is too large for a record.
@@ -66,8 +66,8 @@ fn times(
 
 /// Fit of a sliding polynomial to windows of 2·half_width + 1 samples.
 ///
-/// It is exact for polynomials of its order. Near the ends of the record the first and the last
-/// window are evaluated off their centres, with more noise.
+/// The fit is exact for polynomials up to its order. Near the ends of the record, the first and the
+/// last window are evaluated off their centres; these samples have more noise.
 ///
 /// # Source
 /// Savitzky & Golay (1964), Analytical Chemistry 36, 1627–1639.
@@ -83,7 +83,7 @@ impl SavitzkyGolay {
     /// Largest half-width, in samples; a polynomial over more samples cannot follow a vibration.
     pub const MOST_HALF_WIDTH: usize = 10_000;
 
-    /// Highest order; higher powers of time differ by rounding only.
+    /// Highest order; the columns of higher powers of time differ by rounding only.
     pub const MOST_ORDER: usize = 20;
 
     /// Number of samples of a window, 2·half_width + 1.
@@ -115,8 +115,8 @@ impl SavitzkyGolay {
         Ok(Self { half_width, order, inverse })
     }
 
-    /// Returns the `times`-th derivative of every channel (0 smooths), samples × channels like the
-    /// record, in its unit per s^`times`.
+    /// Returns the `times`-th derivative of every channel (0 smooths): samples × channels like the
+    /// record, in the unit of the channel per s^`times`.
     ///
     /// # Errors
     /// [`SignalError::TooShort`] if the record is shorter than the window,
@@ -156,7 +156,7 @@ impl SavitzkyGolay {
     }
 
     /// Differentiates acceleration and force twice: M ẍ″ + C ẍ′ + K ẍ = F″ has the same matrices as
-    /// the equation of motion and needs no integration, which would drift.
+    /// the equation of motion. It needs no integration, so there is no drift.
     ///
     /// Returns (ẍ, ẍ′, ẍ″) as displacement, velocity and acceleration, and F″ as force, for
     /// [`crate::time_domain::equation_of_motion`].

@@ -5,8 +5,8 @@ use nalgebra::{Complex, DMatrix};
 /// Replaces B by A⁻¹B by elimination with row exchanges and overwrites A; returns `false` for a
 /// singular A.
 ///
-/// The operations are those of an LU decomposition in a library, but without allocation: this runs
-/// once per line and step, and the matrices are tiny.
+/// The operations are those of an LU decomposition in a library, but without allocation: the
+/// function runs once per line and step, and the matrices are tiny.
 pub(crate) fn solve_in_place(a: &mut DMatrix<Complex<f64>>, b: &mut DMatrix<Complex<f64>>) -> bool {
     let n = a.nrows();
     for j in 0..n {

@@ -14,7 +14,7 @@ use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
 /// Rows of M ẍ + C ẋ + K x = F, gathered block by block from any number of records.
 ///
-/// A row is one instant, or the real or imaginary part of one spectral line (then the
+/// A row is one instant, or the real or imaginary part of one spectral line (in a spectral row the
 /// "acceleration" is −ω²X and the "velocity" iωX). All motions and forces are reduced to one small
 /// triangular factor: memory does not grow with the data, and the same rows can be solved for
 /// several sets of [`Unknowns`].
@@ -39,7 +39,7 @@ pub struct EquationOfMotion {
     factor: TriangularFactor,
 }
 
-/// The unknown columns of an equation of motion, each by its matrix and its degree of freedom.
+/// Unknown columns of an equation of motion; each is given by its matrix and its degree of freedom.
 pub(crate) type Columns = Vec<(Matrix, usize)>;
 
 /// Equations of motion (rows of M, C, K) that have the same unknown columns.
@@ -64,8 +64,8 @@ impl EquationOfMotion {
     /// each rows × degrees of freedom.
     ///
     /// # Errors
-    /// [`NumericsError::Size`], [`NumericsError::NotFinite`] and [`NumericsError::Overflow`]; then
-    /// no row is added.
+    /// [`NumericsError::Size`], [`NumericsError::NotFinite`] and [`NumericsError::Overflow`]; if
+    /// there is an error, no row is added.
     pub fn push_rows(
         &mut self,
         acceleration: DMatrixView<'_, f64>,
@@ -103,8 +103,8 @@ impl EquationOfMotion {
     /// Solves for the free entries of M, C and K by least squares: one equation of motion after
     /// another, or all of them together if entries are related.
     ///
-    /// Parameters that the data do not determine are listed in [`Estimate::undetermined`]; the
-    /// other estimates are not affected by them.
+    /// Parameters that the data do not determine are listed in [`Estimate::undetermined`]; they do
+    /// not affect the other estimates.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if `unknowns` has another number of degrees of freedom,
@@ -125,8 +125,9 @@ impl EquationOfMotion {
         RelatedEquations { motions, targets, rows: self.rows(), unknowns }.solve()
     }
 
-    /// Returns the parts of the estimate and the factors of its covariance: the rows that give each
-    /// parameter from the right-hand side of its equation, and the residual covariance.
+    /// Returns the parts of the estimate and the factors of its covariance. The factors are the
+    /// residual covariance and one row for each parameter, which gives the parameter from the
+    /// right-hand side of its equation.
     pub(crate) fn findings(
         &self,
         unknowns: &Unknowns,
@@ -171,8 +172,8 @@ impl EquationOfMotion {
         Ok(())
     }
 
-    /// Creates equations from compressed rows \[ẍ | ẋ | x | F\], which have the Gram matrix of
-    /// `rows` original ones.
+    /// Creates equations from compressed rows \[ẍ | ẋ | x | F\], which have the same Gram matrix as
+    /// the `rows` original rows.
     pub(crate) fn from_compressed(
         dof: usize,
         [acceleration, velocity, displacement, force]: [DMatrixView<'_, f64>; 4],
@@ -238,8 +239,8 @@ impl EquationOfMotion {
     }
 }
 
-/// Groups the equations of motion (counted from 0) by their unknown columns: each entry has the
-/// columns and the equations that share them.
+/// Groups the equations of motion (counted from 0) by their unknown columns; each entry has the
+/// columns and the equations that share these columns.
 pub(crate) fn equations_by_columns(
     unknowns: &Unknowns,
     free: &[Parameter],

@@ -13,7 +13,7 @@ pub const NAMED_DIRECTIONS: usize = 3;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EstimateError {
-    /// A known matrix is not of the size of the problem.
+    /// The size of a known matrix differs from that of the problem.
     #[error("the known {matrix} matrix is {rows}×{columns}, expected {dof}×{dof}")]
     Shape {
         /// Name of the matrix.
@@ -44,7 +44,8 @@ pub enum EstimateError {
         /// Names of the unknown parameters.
         known: String,
     },
-    /// An equation of motion has neither a force nor a known entry: it fixes only ratios.
+    /// An equation of motion has neither a force nor a known entry: it determines only ratios of
+    /// its entries.
     #[error(
         "no force acts on degree of freedom {dof} and none of its parameters ({parameters}) is known: \
          its equation of motion fixes their ratios only; give one of the masses, or apply a force there"
@@ -55,7 +56,7 @@ pub enum EstimateError {
         /// Names of the parameters of that equation.
         parameters: String,
     },
-    /// Two entries of a symmetric matrix are known, and differ.
+    /// The two entries of a symmetric pair are known, but they differ.
     #[error(
         "{lower} is given as {} and {upper} as {}: a symmetric matrix needs equal values",
         message::number(*lower_value), message::number(*upper_value)
@@ -143,7 +144,7 @@ pub enum EstimateError {
         /// The period, in seconds.
         period: f64,
     },
-    /// A mode is too fast for a step from sample to sample.
+    /// A mode is too fast for a step of one sample.
     #[error(
         "the fastest mode has {rate:.3e} rad/s, too fast for a sampling interval of {dt:.3e} s: leave \
          out degrees of freedom without a mass, or sample faster"
@@ -195,7 +196,7 @@ pub enum EstimateError {
     /// The identified matrices do not make a system.
     #[error(transparent)]
     Model(#[from] mechid_model::ModelError),
-    /// A record is not usable.
+    /// A record cannot be used.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
 }

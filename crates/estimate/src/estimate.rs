@@ -53,19 +53,20 @@ pub struct Estimated {
     pub parameter: Parameter,
     /// Value in kg, N·s/m or N/m; NaN if the data do not determine it.
     pub value: f64,
-    /// Standard error, in the same unit; infinite if the data do not determine it.
+    /// Standard error, in the unit of the value; infinite if the data do not determine the
+    /// parameter.
     pub standard_error: f64,
-    /// Degrees of freedom of the residual variance behind the standard error.
+    /// Degrees of freedom of the residual variance that the standard error comes from.
     pub degrees_of_freedom: usize,
 }
 
 /// A combination of parameters that the data do not determine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undetermined {
-    /// Ratio of its singular value to that of the best determined combination.
+    /// Ratio of the singular value of this combination to that of the best determined combination.
     pub relative_singular_value: f64,
-    /// Parameters and the weight of each, in its unit. If all weights times any common factor are
-    /// added to the parameters, the data fit equally well.
+    /// Parameters, each with its weight in the unit of the parameter. If a multiple of all weights
+    /// is added to the parameters, the fit to the data does not change.
     pub terms: Vec<(Parameter, f64)>,
 }
 
@@ -106,10 +107,11 @@ impl Estimate {
         })
     }
 
-    /// Squared Mahalanobis distance dᵀ Cov⁻¹ d of the parameters of another estimate from those of
-    /// this one, with the covariance of this one: a pure number. If the estimates differ by noise
-    /// alone, its mean is about the number of parameters. `None` if the covariance has no inverse,
-    /// as with related entries, or if the other estimate has other parameters.
+    /// Returns the squared Mahalanobis distance dᵀ Cov⁻¹ d, a pure number: d is the difference of
+    /// the parameters of another estimate from those of this one, and Cov is the covariance of this
+    /// one. If the estimates differ by noise alone, the mean of the distance is about the number of
+    /// parameters. `None` if the covariance has no inverse, as with related entries, or if the
+    /// other estimate has other parameters.
     ///
     /// # Source
     /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
@@ -121,9 +123,9 @@ impl Estimate {
         self.squared_length(&DVector::from_iterator(self.values.len(), change))
     }
 
-    /// Squared Mahalanobis length of a change of the parameters, as in
-    /// [`Estimate::squared_distance`]. A change has one entry per parameter, in its SI unit; the
-    /// length is a pure number.
+    /// Returns the squared Mahalanobis length of a change of the parameters, a pure number, as in
+    /// [`Estimate::squared_distance`]. A change has one entry per parameter, in the SI unit of the
+    /// parameter.
     ///
     /// # Source
     /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
@@ -141,9 +143,8 @@ impl Estimate {
         Some(change.dot(&correlation.cholesky()?.solve(&change)))
     }
 
-    /// Returns the same fit with other values, in the order of [`Unknowns::free`], and another
-    /// covariance.
-    /// Values have one entry per parameter, in its SI unit.
+    /// Returns the same fit with other values and another covariance. There is one value per
+    /// parameter, in the order of [`Unknowns::free`] and in the SI unit of the parameter.
     ///
     /// # Errors
     /// As [`Estimate::new`].
@@ -167,8 +168,8 @@ impl Estimate {
     /// Returns the estimate without the damping that an exponential window exp(−σt) on force and
     /// response adds: windowed responses belong to M, C + 2σM and K + σC + σ²M.
     ///
-    /// `rate` is σ, in 1/s; `unknowns` has the known entries without that damping, and the same
-    /// free entries.
+    /// `rate` is σ, in 1/s. `unknowns` has the known entries without the damping that the window
+    /// adds; its free entries are those of the estimate.
     ///
     /// # Errors
     /// [`EstimateError::Undetermined`] if the data do not determine an entry,
@@ -245,9 +246,9 @@ impl Estimate {
         })
     }
 
-    /// Returns the same estimate with standard errors multiplied by `scale` (a pure number), the
-    /// Birge ratio of data that disagree by more than their noise. The degrees of freedom are those
-    /// of `scale`, if `scale` has fewer.
+    /// Returns the same estimate with standard errors multiplied by `scale` (a pure number): the
+    /// Birge ratio of data that differ by more than their noise. The degrees of freedom become
+    /// those of `scale`, if these are fewer.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -258,8 +259,8 @@ impl Estimate {
         self
     }
 
-    /// Returns the same estimate with a mean square error of the model added to its covariance, in
-    /// the products of the units of two parameters.
+    /// Returns the same estimate with a mean square error of the model added to its covariance.
+    /// Each entry of `beside` is in the product of the units of its two parameters.
     ///
     /// # Errors
     /// [`NumericsError::Size`] for another number of parameters.
@@ -286,8 +287,8 @@ impl Estimate {
     /// of the two parameters' units (kg, N·s/m, N/m).
     ///
     /// An undetermined parameter has an infinite variance and NaN covariances. After least squares
-    /// on the equations of motion only the factors are stored: each call multiplies them to (3n²)²
-    /// entries for n degrees of freedom.
+    /// on the equations of motion only the factors are stored: each call multiplies the factors and
+    /// returns (3n²)² entries for n degrees of freedom.
     pub fn covariance(&self) -> DMatrix<f64> {
         self.covariance.full()
     }
@@ -346,13 +347,13 @@ impl Estimate {
     ///
     /// # Errors
     /// As [`Estimate::system`]; [`EstimateError::Model`] if the covariance is not finite, for
-    /// example with as many unknowns as equations.
+    /// example if there are as many unknowns as equations.
     pub fn uncertain_system(&self) -> Result<UncertainSystem, EstimateError> {
         let covariance = self.covariance();
         Ok(UncertainSystem::new(self.system()?, self.parameters.clone(), covariance)?)
     }
 
-    /// Checks that the data determine every parameter; the error names the others.
+    /// Checks that the data determine every parameter; the error names the undetermined ones.
     ///
     /// # Errors
     /// [`EstimateError::Undetermined`].
@@ -367,7 +368,7 @@ impl Estimate {
         Ok(())
     }
 
-    /// Number of equations minus unknowns, the smallest of all equations of motion.
+    /// Number of rows minus number of unknowns: the smallest value of all equations of motion.
     pub fn degrees_of_freedom(&self) -> usize {
         self.degrees_of_freedom
     }

@@ -26,7 +26,7 @@ pub struct IdentifiedMode {
     /// −Re λ / |λ| or, for an overdamped pair, −(λ₁ + λ₂) / (2 √(λ₁ λ₂)).
     pub damping_ratio: Uncertain,
     /// Square of the natural frequency, |λ|² or, for a pair of real eigenvalues, λ₁ λ₂, in rad²/s².
-    /// Unlike the frequency it is a smooth function of the matrices where it is zero.
+    /// At zero the square is a smooth function of the matrices, but the frequency is not.
     pub squared_frequency: Uncertain,
     /// Index of the other mode of a pair of real eigenvalues; `None` for a mode that oscillates,
     /// and if the shapes do not show which real eigenvalues form a pair.
@@ -133,8 +133,9 @@ fn modes(
     Ok(partners.iter().enumerate().map(identify).collect())
 }
 
-/// Pairs the real eigenvalues of overdamped modes: the only two, or those whose shapes agree best;
-/// with proportional damping the two shapes of a pair are equal.
+/// Pairs the real eigenvalues of overdamped modes. If there are only two, they form a pair; of
+/// more, those whose shapes agree best form pairs, if their MAC is at least [`SAME_SHAPE`]. With
+/// proportional damping the two shapes of a pair are equal.
 fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
     let mut partners = vec![None; modes.len()];
     let real: Vec<usize> = (0..modes.len()).filter(|at| !modes[*at].oscillates()).collect();
@@ -163,8 +164,8 @@ struct Spread<'a> {
 }
 
 impl Spread<'_> {
-    /// Returns a mode with standard errors; an eigenvalue of modulus up to `rounding` (rad/s) is
-    /// zero.
+    /// Returns a mode with standard errors; an eigenvalue whose modulus is at most `rounding`
+    /// (rad/s) counts as zero.
     fn propagate(
         &self,
         mode: &Mode,
@@ -233,7 +234,7 @@ impl Spread<'_> {
     }
 
     /// Returns the standard errors of the real and imaginary parts of dφ = −U f, where f is the
-    /// change of the equations of motion by the parameters.
+    /// change of the equations of motion due to the parameters.
     fn shape_error(&self, sensitivity: &Sensitivity) -> DVector<Complex<f64>> {
         let answers = &sensitivity.answers;
         let n = answers.ncols();
@@ -268,8 +269,8 @@ struct Value {
 }
 
 /// Returns the modulus (rad/s) and the damping ratio of a mode from the `sum` and the product
-/// (`square`) of two eigenvalues, of the mode and of its partner; `gradient` belongs to the
-/// eigenvalue of the mode.
+/// (`square`) of two eigenvalues: that of the mode and that of its partner; `gradient` belongs to
+/// the eigenvalue of the mode.
 fn modulus_and_damping(
     mode: &Mode,
     gradient: &DVector<Complex<f64>>,
@@ -313,7 +314,8 @@ impl Sensitivity {
     /// └     e_rᵀ             0     ┘ └ dλ ┘ = − └         0         ┘
     /// ```
     ///
-    /// The bordered matrix is regular for every simple eigenvalue, with M, C and K of any symmetry.
+    /// The bordered matrix is regular for every simple eigenvalue; M, C and K need not be
+    /// symmetric.
     fn new(mode: &Mode, system: &SecondOrderSystem, parameters: &[Parameter]) -> Self {
         let (m, c, k) = (system.mass(), system.damping(), system.stiffness());
         let (n, lambda, shape) = (mode.shape().len(), mode.eigenvalue(), mode.shape());

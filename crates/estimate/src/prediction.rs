@@ -15,8 +15,9 @@ pub use self::initial_state::{StartFit, fitted_start};
 pub use self::periodic::predict_periodic;
 use crate::EstimateError;
 
-/// Returns the fit of a prediction to each channel, in per cent: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖). 100
-/// is perfect, 0 is no better than the mean, a negative fit is worse than the mean.
+/// Returns the fit of a prediction to each channel, in per cent: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖). A fit
+/// of 100 is perfect; with 0 the prediction is as good as the mean ȳ, and with a negative fit it is
+/// worse.
 ///
 /// # Errors
 /// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if
@@ -33,11 +34,11 @@ pub fn fit_percent(measured: &Record, predicted: &Record) -> Result<Vec<f64>, Es
     Ok(norms.map(|(gap, motion)| 100.0 * (1.0 - gap.norm() / motion.norm())).collect())
 }
 
-/// Predicts the response of a machine to a sampled force (N): from the initial state `start` for an
-/// open record, in the steady state for a whole period (without `start`).
+/// Predicts the response of a machine to a sampled force (N). An open record begins at the initial
+/// state `start`; for a whole period `start` is ignored, and the response is the steady state.
 ///
-/// The discretisation defines the force between samples; for Euler it is held. The acceleration
-/// follows from the equation of motion.
+/// The discretisation defines the force between samples; for Euler's rule the force is held. The
+/// acceleration follows from the equation of motion.
 ///
 /// # Errors
 /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels,
@@ -75,7 +76,7 @@ pub fn predict(
 struct Step {
     dt: f64,
     transition: DMatrix<f64>,
-    /// Rows of \[Φ Γ₀ Γ₁\], which multiplies (z, F, F⁺).
+    /// Rows of the matrix \[Φ Γ₀ Γ₁\], which is multiplied by (z, F, F⁺).
     rows: Vec<f64>,
 }
 
@@ -146,8 +147,8 @@ impl Step {
         DVector::from_column_slice(at.state())
     }
 
-    /// Advances the state by one step from a sample of the force; the first sample follows the
-    /// last.
+    /// Advances the state by one step from a sample of the force; after the last sample, the force
+    /// continues with the first one.
     fn advance(&self, force: &Record, sample: usize, at: &mut At) {
         let (loads, next) = (force.data(), (sample + 1) % force.len());
         let size = at.next.len();
@@ -161,7 +162,8 @@ impl Step {
         at.now[..size].copy_from_slice(&at.next);
     }
 
-    /// Returns the periodic state: (I − Φᴺ) z equals the state after one period that began at rest.
+    /// Returns the initial state z of the periodic response: (I − Φᴺ) z equals the state after one
+    /// period that began at rest.
     fn steady_state(&self, force: &Record) -> Result<DVector<f64>, EstimateError> {
         let size = self.transition.nrows();
         let from_rest = self.run(force, &DVector::zeros(size));

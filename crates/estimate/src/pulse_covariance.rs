@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::limits::PULSE_SUMS;
 
 /// Covariance I + P Pᵀ of the weighted errors of a record. The columns of P are the weighted
-/// effects of the amplitudes of its pulse errors; P is stored in blocks of rows.
+/// effects of the amplitudes of the pulse errors of this record; P is stored in blocks of rows.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 2.1.4 (formula of Sherman,
@@ -37,8 +37,8 @@ impl PulseCovariance {
     }
 
     /// Replaces the columns v of a matrix, in blocks of rows, by v − P b with (I + PᵀP) b = Pᵀv,
-    /// and returns b. If b is appended to each column as further rows, the product of two new
-    /// columns is v₁ᵀ(I + P Pᵀ)⁻¹v₂ for the original columns v₁ and v₂.
+    /// and returns b. If the rows of b are appended to the new columns, the product of two of these
+    /// columns is v₁ᵀ(I + P Pᵀ)⁻¹v₂ with the original columns v₁ and v₂.
     pub(crate) fn whiten(&self, parts: &mut [&mut DMatrix<f64>]) -> DMatrix<f64> {
         let columns = parts.first().map_or(0, |part| part.ncols());
         let pairs = self.effects.par_iter().zip(parts.par_iter());
@@ -69,8 +69,8 @@ impl PulseCovariance {
         self.effects.par_iter().map(columns).collect()
     }
 
-    /// Returns the number of amplitudes that the lines determine. Each amplitude counts with the
-    /// share of its information that comes from the lines.
+    /// Returns the number of amplitudes that the lines determine. Each amplitude counts as the
+    /// fraction of its information that comes from the lines.
     pub(crate) fn determined(&self) -> f64 {
         self.factor.l_dirty().nrows() as f64 - self.factor.inverse().trace()
     }

@@ -90,7 +90,7 @@ impl RelatedEquations<'_> {
             });
             match lower {
                 Some((next, lower)) => (unknowns, before) = (next, lower),
-                // No part of the step lowers the cost: the minimum is reached to rounding.
+                // Even a shorter step does not reduce the cost: this is a minimum up to rounding.
                 None => return Ok(Fit { unknowns, solution }),
             }
             if settled {

@@ -103,8 +103,7 @@ impl Relations {
         }
     }
 
-    /// Returns the free entries θ(p).
-    /// In SI units.
+    /// Returns the free entries θ(p), in SI units.
     ///
     /// # Source
     /// Rayleigh, *The Theory of Sound*, vol. 1 (1877), article 97 (proportional damping).
@@ -119,8 +118,7 @@ impl Relations {
         DVector::from_iterator(self.entries.len(), self.entries.iter().map(value))
     }
 
-    /// Returns the derivative ∂θ/∂p, entries × unknowns.
-    /// In SI units.
+    /// Returns the derivative ∂θ/∂p, entries × unknowns, in SI units.
     ///
     /// # Source
     /// As [`Relations::entries`].
@@ -142,9 +140,9 @@ impl Relations {
         tangent
     }
 
-    /// Returns the unknowns p of entries that obey the relations. For other entries it returns the
-    /// mean of the entries that share an unknown, and the α and β of a least-squares fit. In SI
-    /// units.
+    /// Returns the unknowns p of entries that obey the relations, in SI units. If the entries do
+    /// not obey them, an unknown is the mean of the entries that share it, and α and β come from a
+    /// least-squares fit.
     ///
     /// # Source
     /// As [`Relations::entries`].
@@ -167,9 +165,8 @@ impl Relations {
         unknowns
     }
 
-    /// Returns α and β with their gradients over entries that obey the relations; `None` without
-    /// proportional damping.
-    /// In SI units.
+    /// Returns α and β, in SI units, and their gradients with respect to entries that obey the
+    /// relations; `None` without proportional damping.
     ///
     /// # Source
     /// As [`Relations::entries`].
@@ -183,8 +180,8 @@ impl Relations {
         let lengths = [0, 1].map(|part| columns.column(part).norm());
         let factors = [unknowns[self.shared], unknowns[self.shared + 1]];
         let gradient = |of: usize| {
-            // The gradient follows from the part of this matrix that is orthogonal to the matrix of
-            // the other factor.
+            // The gradient of the factor of M (or K) follows from the part of this matrix that is
+            // orthogonal to the other matrix.
             let (column, other) = (columns.column(of), columns.column(1 - of));
             let unit = if lengths[1 - of] > 0.0 { other / lengths[1 - of] } else { other.into() };
             let orthogonal = column - &unit * unit.dot(&column);
@@ -205,7 +202,8 @@ impl Relations {
         Some([(factors[0], gradient(0)), (factors[1], gradient(1))])
     }
 
-    /// Returns the index of every free entry of proportional damping, with its mass and stiffness.
+    /// Returns, for every free entry of proportional damping, its index and the mass and stiffness
+    /// entries at the same position.
     fn damping(&self, unknowns: &[f64]) -> Vec<(usize, [f64; 2])> {
         let row = |(at, source): (usize, &Source)| match source {
             Source::Shared(_) => None,

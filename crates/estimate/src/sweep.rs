@@ -14,9 +14,9 @@ pub struct SweepPoint<S, E> {
     pub outcome: Result<Estimate, E>,
     /// Relative error of the outcome, a pure number; `None` if there is no complete estimate.
     ///
-    /// With a reference it is the largest error of an entry of M, C or K relative to the largest
-    /// entry of that matrix. Without a reference the standard errors replace the errors; they do
-    /// not include bias.
+    /// With a reference it is the largest error of an entry of M, C or K, relative to the largest
+    /// entry of the matrix that has this entry. Without a reference, standard errors replace the
+    /// errors; standard errors do not include bias.
     pub error: Option<f64>,
 }
 
@@ -79,8 +79,8 @@ impl<S, E> Sweep<S, E> {
         &self.points
     }
 
-    /// Returns the point with the smallest error, the first one if several are equal; `None` if no
-    /// setting has a complete estimate.
+    /// Returns the point with the smallest error; if several points have this error, the first of
+    /// them. `None` if no setting has a complete estimate.
     pub fn best(&self) -> Option<&SweepPoint<S, E>> {
         let rated = self.points.iter().filter_map(|point| Some((point, point.error?)));
         rated.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(point, _)| point)

@@ -8,7 +8,7 @@ use crate::EstimateError;
 use crate::error::NAMED_PARAMETERS;
 use crate::relations::Relations;
 
-/// Free entries of M, C and K, and the values of the others.
+/// Free entries of M, C and K, and the values of the known entries.
 ///
 /// ```
 /// use mechid_estimate::Unknowns;
@@ -24,9 +24,9 @@ use crate::relations::Relations;
 /// # Ok::<(), mechid_estimate::EstimateError>(())
 /// ```
 ///
-/// Entries may be related: [`Unknowns::symmetric`] makes two of them one unknown, and
-/// [`Unknowns::proportional_damping`] replaces the whole damping matrix by two unknowns. Machines
-/// of many masses need such relations, because otherwise the test must excite every entry
+/// Entries may be related: [`Unknowns::symmetric`] makes the entries (i, j) and (j, i) one unknown,
+/// and [`Unknowns::proportional_damping`] replaces the whole damping matrix by two unknowns.
+/// Machines with many masses need such relations: without them the test must excite every entry
 /// separately.
 ///
 /// The feature `serde` writes three matrices, with `null` for a free entry, and the relations.
@@ -122,7 +122,7 @@ impl Unknowns {
     }
 
     /// Returns the same unknowns with a symmetric matrix: its entries (i, j) and (j, i) are one
-    /// unknown, and if one of them is known, both are.
+    /// unknown; if one of the two is known, the other one is known, too.
     ///
     /// # Errors
     /// [`EstimateError::Asymmetric`] if two such entries are known and differ.
@@ -227,8 +227,8 @@ impl Unknowns {
         Parameter::all(self.dof).filter(is_free).collect()
     }
 
-    /// Returns M (kg), C (N·s/m) and K (N/m), n×n each, with the known values and with `values` (in
-    /// the order of [`Unknowns::free`]) as free entries.
+    /// Returns M (kg), C (N·s/m) and K (N/m), n×n each. The known entries have their values; the
+    /// free entries have `values`, in the order of [`Unknowns::free`].
     ///
     /// # Panics
     /// If there are not as many values as free entries.

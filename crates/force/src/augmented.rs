@@ -137,8 +137,8 @@ impl Augmented {
     }
 
     /// Returns a model, with its likelihood, for the logarithms of the signal-to-noise ratio of
-    /// each force and of the corner frequency in radians per sample. If the noise is unknown, the
-    /// innovations determine it, and all variances scale with it.
+    /// each force and of the corner frequency in radians per sample. If the noise is unknown, it is
+    /// estimated from the innovations, and all variances scale with the noise.
     fn trial(&self, process: &LowPass, noise: Option<f64>, free: &[f64]) -> Option<Tuned> {
         let (corner, ratios) = free.split_last()?;
         let (lowest, forces) = (self.lowest(), ratios.len());
@@ -325,8 +325,8 @@ impl Augmented {
     /// this state are at most a hundred times those of the converged filter.
     ///
     /// With the wide initial covariance of the first pass, the variances of the first samples lose
-    /// digits. The narrower covariance avoids this; it changes the estimates by a ten-thousandth of
-    /// their standard error.
+    /// digits. The narrower covariance avoids this loss and changes the estimates by only a
+    /// ten-thousandth of their standard error.
     pub fn started(&self, mut space: StateSpace) -> StateSpace {
         let (m, machine) = (space.states, self.rate.nrows());
         let first = space.filter(&self.data);

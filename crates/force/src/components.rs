@@ -63,8 +63,8 @@ impl Components {
         self.weight.iter().sum::<f64>() + self.outside_weight
     }
 
-    /// Returns the number of components that can carry a force: those whose s_i exceeds rounding of
-    /// the largest.
+    /// Returns the number of components that can carry a force: the components whose s_i exceeds
+    /// the rounding error of the largest s_i.
     pub fn transmitted(&self) -> usize {
         let floor = 1e-14 * self.singular[0];
         self.singular.partition_point(|s| *s > floor)

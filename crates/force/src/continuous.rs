@@ -10,8 +10,8 @@ use crate::identified::IdentifiedForce;
 ///
 /// The force is exact if the response satisfies equilibrium at the sampled instants. Newmark,
 /// Houbolt, central difference and Runge-Kutta responses do; Wilson's θ method does not: it
-/// enforces equilibrium at t + θΔt, so that its response gives another force even with the exact
-/// matrices.
+/// enforces equilibrium at t + θΔt, so that its response gives a different force even with the
+/// exact matrices.
 ///
 /// Cost: three products of samples × n by n × n.
 ///

@@ -21,8 +21,8 @@ use crate::state_space::exact_transition;
 /// error grows along it.
 ///
 /// The result amplifies noise in the velocity by M/Δt (held), and in the displacement by 6M/Δt²
-/// (linear). Euler's rule is exact for no motion: at a line ω it returns the force times the ratio
-/// of M(e^{iωΔt} − 1)/Δt + C + K/(iω) to M iω + C + K/(iω); see the book, `theory/force.md`.
+/// (linear). Euler's rule is not exact for any motion: at a line ω it returns the force times the
+/// ratio of M(e^{iωΔt} − 1)/Δt + C + K/(iω) to M iω + C + K/(iω); see the book, `theory/force.md`.
 ///
 /// Cost: one exponential of order 4n, then one product of samples × 2n by 2n × n.
 ///
@@ -166,8 +166,8 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
     change
 }
 
-/// Returns the factors of the input matrix, or an error if it is nearly singular: the step then
-/// does not show some force.
+/// Returns the factors of the input matrix, or an error if it is nearly singular: some force then
+/// has almost no effect on the end of the step.
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;

@@ -27,7 +27,10 @@ pub enum ForceError {
         needed: usize,
     },
     /// A record and its list of channels differ in size.
-    #[error("the record has {}, but {described} are described: describe each", message::count(*record, "channel"))]
+    #[error(
+        "the record has {}, but {described} are described: describe each channel",
+        message::count(*record, "channel")
+    )]
     ChannelCount {
         /// Channels of the record.
         record: usize,
@@ -60,7 +63,8 @@ pub enum ForceError {
     /// More unknown forces than measured channels.
     #[error(
         "{forces} unknown forces cannot be separated with {}: \
-         measure more degrees of freedom, or name fewer forced ones", message::count(*measurements, "measured channel")
+         measure more degrees of freedom, or name fewer forced degrees of freedom",
+        message::count(*measurements, "measured channel")
     )]
     MoreForcesThanMeasurements {
         /// Unknown forces.
@@ -142,7 +146,7 @@ pub enum ForceError {
         /// Angular frequency, in rad/s.
         omega: f64,
     },
-    /// Too few lines remain outside the chosen ones to estimate the noise.
+    /// Too few lines remain outside the chosen lines to estimate the noise.
     #[error(
         "the noise level is estimated from the lines that are not chosen, but only {outside} of them remain \
          and {needed} are needed: choose fewer lines, give a longer period, or state the level (`noise`)"
@@ -192,7 +196,10 @@ pub enum ForceError {
         dof: usize,
     },
     /// A force model has RMS values for another number of forces.
-    #[error("the model of the forces has {models} RMS values for {}: give one for each", message::count(*forces, "force"))]
+    #[error(
+        "the model of the forces has {models} RMS values for {}: give one value for each force",
+        message::count(*forces, "force")
+    )]
     ModelCount {
         /// RMS values given.
         models: usize,
@@ -201,7 +208,7 @@ pub enum ForceError {
     },
     /// A force model has an impossible order.
     #[error(
-        "a force model of order {order} is not possible: choose 1 (first-order low-pass) to {most} (a sharp band)"
+        "a force model of order {order} is not possible: choose 1 (first-order low-pass) to {most} (steep edge)"
     )]
     ModelOrder {
         /// The order given.
@@ -254,16 +261,16 @@ pub enum ForceError {
     Compared {
         /// Channels of the estimate.
         estimate: usize,
-        /// Channels of the force it is compared with.
+        /// Number of channels of the reference force.
         truth: usize,
     },
-    /// A ratio to a force that is zero at the line.
+    /// The reference force of a ratio is zero at the line.
     #[error("the reference force is zero at line {line}: leave the line out")]
     NoForceAtLine {
         /// The line.
         line: usize,
     },
-    /// A ratio to a force that is zero.
+    /// The reference force of a ratio is zero.
     #[error("the reference force is zero on every channel")]
     NoForce,
     /// The model is not usable.

@@ -34,7 +34,7 @@ pub(crate) struct Posterior {
 
 impl Posterior {
     /// Averages over the likely values of reach and colour and, for each of these, over share and
-    /// variances. If the noise is known, its variance is 1.
+    /// variances. If the noise is known, the noise variance is 1.
     pub fn from_components(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
         let white = Evidence::most_likely(components, limits::COLOURS[0], noise);
@@ -113,7 +113,8 @@ impl Evidence {
         let most = components.transmitted();
         let mut reach = most;
         let mut best = Self::at_reach(components, most, colour, noise);
-        // A falling spectrum has no upper end, so that a coloured force reaches all components.
+        // Only a white force has an upper end; the falling spectrum of a coloured force has none,
+        // so this force reaches all components.
         while colour == 0 && reach > 2 {
             reach = ((reach as f64 * limits::REACH_RATIO) as usize).max(2);
             best = best.better(Self::at_reach(components, reach, colour, noise));
@@ -134,7 +135,7 @@ impl Evidence {
         if other.likelihood > self.likelihood { other } else { self }
     }
 
-    /// Adds this reach and the neighbouring reaches that are likely enough. Each has as a weight
+    /// Adds this reach and the neighbouring reaches that are likely enough. The weight of each is
     /// the number of reaches that it represents.
     fn beside(
         self,
@@ -301,7 +302,8 @@ impl Evidence {
             log += (data - within) * ratio.ln();
             force /= data;
             let cost = match noise {
-                // With a known noise, the variance of the force follows from the ratio.
+                // If the noise variance is known, this variance and the ratio give the variance of
+                // the force.
                 Some(noise) => {
                     let given = noise / ratio;
                     data * given.ln() + log + data * force / given

@@ -17,8 +17,8 @@ use crate::limits;
 /// ```
 ///
 /// Order 1 reverts to zero as an Ornstein–Uhlenbeck process does, and is a random walk over times
-/// short against 1/ω_c; higher orders are bands with a sharper end at the corner. None of them
-/// drifts: without information in the measurement, the force is 0 ± τ.
+/// that are short compared with 1/ω_c; higher orders are bands with a sharper end at the corner.
+/// None of them drifts: without information in the measurement, the force is 0 ± τ.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceModel {

@@ -16,12 +16,12 @@ use crate::unexplained::Residual;
 ///
 /// Velocity and acceleration lines are divided by iω and −ω². With fewer forces than channels, or
 /// if only some degrees of freedom are measured, each line is a weighted least-squares problem X_n
-/// = H_n F_n. If only the excited lines are chosen, the noise of all others has no effect. The
+/// = H_n F_n. If only the excited lines are chosen, the noise of all other lines has no effect. The
 /// Nyquist line of an even record has no phase: leave it out.
 ///
 /// The standard error covers measurement noise, if its level is known, and the uncertainty of a
 /// system that states it ([`FrequencyResponse::response_covariance`]); it is the same at every
-/// instant. No unbiased method does better at these lines (Cramér-Rao).
+/// instant. No unbiased method has a smaller standard error at these lines (Cramér-Rao).
 ///
 /// Cost: one transform per channel, one n×n solve and one small SVD per line.
 ///
@@ -96,7 +96,8 @@ struct Variance {
     noise: Vec<f64>,
     /// Part in each force from the uncertainty of the system.
     system: Vec<f64>,
-    /// Part in the residual of each channel from the uncertainty of the system, `1 × channels`.
+    /// Contribution of the uncertainty of the system to the residual of each channel,
+    /// `1 × channels`.
     residual: DMatrix<f64>,
     /// `true` if the system states its uncertainty.
     is_known: bool,
@@ -109,8 +110,8 @@ impl Variance {
         Self { noise: zeros(), system: zeros(), residual, is_known: false }
     }
 
-    /// Adds the effect of the uncertainty of the system on a line: to first order δF = −G δH F, and
-    /// the residual changes by −(I − H G) δH F, with the inverse G of H.
+    /// Adds the effect of the uncertainty of the system on a line. To first order, the force
+    /// changes by δF = −G δH F and the residual by −(I − H G) δH F, where G is the inverse of H.
     fn add_system(
         &mut self,
         transfer: &Transfer<'_>,

@@ -45,7 +45,7 @@ pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Ra
             .map(|blocks| (blocks * block * channels) as f64);
         let ratio = ((total - inside) / of_outside) / (inside / of_inside);
         let p_value = FisherSnedecor::new(of_outside, of_inside).ok()?.sf(ratio);
-        // The longest of equally certain ranges determines the noise best.
+        // If ranges have the same p-value, the longest one determines the noise best.
         if best.as_ref().is_none_or(|(least, longest)| {
             p_value < *least || (p_value == *least && range.len() > longest.len())
         }) {

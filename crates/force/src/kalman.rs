@@ -71,7 +71,8 @@ pub struct KalmanForce {
 /// error are therefore restricted to frequencies above [`KalmanForce::seen_from_hz`]
 /// ([`IdentifiedForce::band_hz`]), unless the measurement has its own band
 /// ([`Measurement::in_band`]). The standard error in a band is its value far from the ends of the
-/// record, plus the increase of the whole force's error at each instant.
+/// record, plus the excess of the error of the whole force at the instant over its median
+/// over the record.
 ///
 /// Cost: linear in the record. With c channels and m = 2n + (order × forces) states, a pass takes
 /// about 2m³ + 2cm² operations per sample until the variances converge, then m² + 2cm; tuning takes
@@ -168,8 +169,8 @@ fn quiet_part_noise(
 }
 
 /// Returns the part of the force in a band. Its variance has three parts: the variance far from the
-/// ends of the record, the increase of the variance of the whole force from the middle to each
-/// instant, and the slower errors that leak into the band at the ends of the record.
+/// ends of the record, the excess of the variance of the whole force at each instant over its
+/// median, and the slower errors that leak into the band at the ends of the record.
 fn in_band(
     force: IdentifiedForce,
     forced: &[usize],
@@ -178,8 +179,8 @@ fn in_band(
 ) -> Result<IdentifiedForce, ForceError> {
     let record = within_band(force.record(), band_hz, Extent::Open)?;
     let (sampling, len) = (record.sampling(), record.len());
-    // This function has the slope 1 at the first sample and the slope 0 at the last one, so that
-    // its mirror image has a corner.
+    // This function has the slope 1 at the first sample and the slope 0 at the last one: only at
+    // the first sample does it form a corner with its mirror image.
     let corner: Vec<f64> =
         (0..len).map(|k| sampling.time(k) * (1.0 - 0.5 * k as f64 / len as f64)).collect();
     let corner = BandFilter { sampling, band_hz, extent: Extent::Open }.apply(&corner)?;
@@ -206,8 +207,8 @@ fn known(measured: &Measurement, noise: &[f64]) -> Result<Vec<f64>, ForceError> 
     Ok(level.unwrap_or_default())
 }
 
-/// Checks at an arbitrary frequency that the forces can be separated. If they cannot be separated
-/// there, they cannot be separated at any frequency.
+/// Checks at one arbitrary frequency that the forces can be separated. Forces that cannot be
+/// separated at this frequency cannot be separated at any other.
 pub(crate) fn check_seen(
     system: &SecondOrderSystem,
     measured: &Measurement,

@@ -3,7 +3,7 @@
 //! | Function | Needs | Use it when |
 //! |---|---|---|
 //! | [`continuous`] | x, ẋ, ẍ of every degree of freedom | all three are measured or simulated |
-//! | [`continuous_nonlinear`] | the same, of a system with nonlinear terms | it is nonlinear |
+//! | [`continuous_nonlinear`] | the same, of a system with nonlinear terms | the system is nonlinear |
 //! | [`discretised`] | x, ẋ of every degree of freedom | no accelerations and little noise |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
 //! | [`regularised`] | any channels, a period or few samples | the lines are unknown |

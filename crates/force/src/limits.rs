@@ -13,7 +13,7 @@ pub(crate) const UNDETERMINED_LOGARITHM: f64 = 1.5;
 /// best point alone is then enough.
 pub(crate) const NARROW_POSTERIOR: f64 = 0.02;
 
-/// Largest logarithm of the ratio of the likelihood of a posterior point to its approximation.
+/// Largest logarithm of a ratio: the likelihood of a posterior point divided by its approximation.
 pub(crate) const POINT_WEIGHT: f64 = 1.0;
 
 // Kalman filter
@@ -22,8 +22,8 @@ pub(crate) const POINT_WEIGHT: f64 = 1.0;
 /// previous order; the first two start from a grid.
 pub(crate) const FORCE_ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
 
-/// Smallest gain in the log-likelihood by a higher order of the force model for which the next
-/// order is tried.
+/// Smallest gain in the log-likelihood by an order of the force model above 4 over the best lower
+/// order. If the gain is smaller, no higher order is tried.
 pub(crate) const ORDER_GAIN: f64 = 1.0;
 
 /// Maximum number of states of all forces; with more, long records take too long.
@@ -74,12 +74,13 @@ pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
 /// Colours tried: white, random walk, integrated random walk.
 pub(crate) const COLOURS: [i32; 3] = [0, 1, 2];
 
-/// Minimum number of driven components of a white force for which a colour is tried; the amplitudes
-/// of fewer may follow some slope by chance.
+/// Minimum number of components that can carry a force for which a colour is tried. If a white
+/// force drives fewer than this number, a colour needs the gain [`COLOUR_GAIN`]: the amplitudes of
+/// few components may follow a slope by chance.
 pub(crate) const COLOUR_COMPONENTS: f64 = 16.0;
 
-/// Minimum gain in the log-likelihood by a colour if there are fewer components; a smaller gain may
-/// be chance.
+/// Minimum gain in the log-likelihood by a colour if fewer than [`COLOUR_COMPONENTS`] components
+/// are driven; a smaller gain may be chance.
 pub(crate) const COLOUR_GAIN: f64 = 6.0;
 
 /// Ratio of successive reaches of the first search, which starts at all components.
@@ -97,7 +98,7 @@ pub(crate) const NEGLIGIBLE_LIKELIHOOD: f64 = 6.0;
 /// Prior probability that the reach of a white force is all components, relative to all reaches.
 pub(crate) const ENDLESS_PRIOR: f64 = 0.25;
 
-/// Number of reaches, on either side of the best one, that are averaged.
+/// Number of reaches on either side of the best reach that are averaged.
 pub(crate) const NEIGHBOURING_REACHES: usize = 16;
 
 /// Minimum share of driven components of a band; with less the force consists of single lines. The
@@ -116,8 +117,8 @@ pub(crate) const LAMBDAS_PER_DECADE: usize = 25;
 /// Number of decades of λ below the largest singular value.
 pub(crate) const LAMBDA_DECADES: usize = 8;
 
-/// Largest ratio of the residual variance to the noise at which the corner of the L-curve is
-/// searched for.
+/// Largest ratio of the residual variance to the noise variance at which the corner of the L-curve
+/// is searched for.
 pub(crate) const CORNER_NOISE_RATIO: f64 = 2.0;
 
 /// Smallest relative change of residual and force for which a step of λ counts as effective.
@@ -128,13 +129,14 @@ pub(crate) const LAMBDA_EFFECT: f64 = 1e-3;
 pub(crate) const TRUNCATION_RESIDUAL: f64 = 0.1;
 
 /// Smallest fraction of the data that Tikhonov's factors must leave as a residual: with a smaller
-/// one, the residual of data without noise would be only rounding, which would decide.
+/// one, the residual of data without noise would be only rounding, and rounding would determine λ.
 pub(crate) const TIKHONOV_RESIDUAL: f64 = 1e-4;
 
 /// Largest relative difference of costs that count as equal.
 pub(crate) const EQUAL_COSTS: f64 = 1e-6;
 
-/// Maximum number of Newton steps to the half width of an interval; they converge in far fewer.
+/// Maximum number of Newton steps to the half width of an interval; the iteration converges in far
+/// fewer steps.
 pub(crate) const HALF_WIDTH_STEPS: usize = 50;
 
 /// Change of a half width, in standard deviations, that ends the search.
@@ -159,15 +161,16 @@ pub(crate) const PARAMETER_STEP: f64 = 0.1;
 
 // Forces that act for a part of a record
 
-/// Number of parts into which a record is divided in the search for quiet ones.
+/// Number of parts into which a record is divided in the search for quiet parts.
 pub(crate) const INTERMITTENT_BLOCKS: usize = 16;
 
 /// Minimum number of consecutive quiet parts that determine the noise: a quarter of the record.
 pub(crate) const QUIET_BLOCKS: usize = 4;
 
-/// Probability that parts differ as much by chance; below it a force is not stationary.
+/// Probability that parts with a stationary force differ at least as much by chance; below it the
+/// force counts as not stationary.
 pub(crate) const INTERMITTENT_LEVEL: f64 = 0.01;
 
 /// Number of samples, from the first on, that decide whether a record begins at rest. More samples
-/// do not determine the first state better once its free response has decayed, and take longer.
+/// take more time, and do not determine the first state better once its free response has decayed.
 pub(crate) const REST_SAMPLES: usize = 1024;

@@ -11,7 +11,7 @@ pub fn inner_lines(measured: &Measurement) -> Vec<usize> {
 }
 
 /// Returns the variance of the real part of a line's amplitude under white noise of unit variance;
-/// the imaginary part has the same.
+/// the variance of the imaginary part is the same.
 pub(crate) fn noise_weight(len: usize, line: usize) -> f64 {
     if line == 0 || 2 * line == len { 1.0 / len as f64 } else { 2.0 / len as f64 }
 }

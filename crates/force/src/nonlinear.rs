@@ -59,7 +59,7 @@ pub fn continuous_nonlinear(
 /// [tangents](NonlinearSystem::tangents) of each sample instead of C and K.
 ///
 /// The standard error is of first order in the noise: if the force is curved within one standard
-/// deviation, its mean changes, too.
+/// deviation of the noise, the noise also changes the mean of the force.
 ///
 /// # Errors
 /// The errors of [`continuous_nonlinear`]; [`ForceError::ChannelCount`] if a noise level is

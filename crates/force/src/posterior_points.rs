@@ -8,7 +8,7 @@ use crate::limits;
 
 /// Returns points around the parameters of maximum likelihood, with weights that sum to 1. They
 /// have the mean and covariance of the posterior. Only the best point is returned if the
-/// measurement determines the parameters so well that the others have no effect.
+/// measurement determines the parameters so well that the other points have no effect.
 ///
 /// `log_likelihood` is `None` for impossible parameters.
 ///

@@ -1,4 +1,4 @@
-//! Force from few or noisy channels: its weakly transmitted part is damped.
+//! Force from few or noisy channels: the weakly transmitted part of the force is damped.
 
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
@@ -43,8 +43,8 @@ pub struct RegularisedForce {
     /// Standard deviation of the noise in each channel, in the channel's unit: stated, or estimated
     /// by maximum likelihood.
     pub noise_std: Vec<f64>,
-    /// Frequency, in Hz, below which the noise of the channels exceeds a force as strong as this
-    /// one; `None` if they show it at no frequency.
+    /// Frequency, in Hz, below which the noise of the channels exceeds a force as strong as the
+    /// identified one; `None` if the channels show such a force at no frequency.
     pub seen_from_hz: Option<f64>,
 }
 

@@ -17,9 +17,10 @@ pub enum Rule {
     /// The λ whose force is nearest to the posterior mean of the force.
     ///
     /// This mean needs the variances of force and noise, the colour of the force, the share of
-    /// driven components and the number of singular values they cover; all are those of maximum
-    /// likelihood. It is the recommended rule, and the only one here that minimises the error of
-    /// the force, not of the response. The book (`studies/force.md`) compares the others.
+    /// driven components among the strongest ones, and the number of these strongest ones; all are
+    /// those of maximum likelihood. It is the recommended rule, and the only one here that
+    /// minimises the error of the force, not of the response. The book (`studies/force.md`)
+    /// compares the others.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
     ///
@@ -33,9 +34,9 @@ pub enum Rule {
     /// logarithm of ‖force‖. It is searched for only where this residual is at most twice the noise
     /// (in variance).
     ///
-    /// The textbook curve has ‖residual‖, which vanishes when there are as many unknowns as data:
-    /// its corner is then at no damping. Far above the noise it has other corners, where only the
-    /// resonance is fitted.
+    /// The curve of the textbooks has ‖residual‖, which vanishes when there are as many unknowns as
+    /// data; the corner of this curve is then at zero damping. If the residual is far above the
+    /// noise, the curve has other corners, at which only the resonance is fitted.
     ///
     /// # Source
     /// Hansen & O'Leary (1993) for the curve and its curvature; both changes are ours.
@@ -55,7 +56,8 @@ pub enum Filter {
     /// Truncation: components with s ≥ λ are unchanged, the others are zero.
     TruncatedSvd(Rule),
     /// The posterior mean of the force, with a factor for each component, as in
-    /// [`Rule::Likelihood`]: driven lines are kept, silent ones suppressed.
+    /// [`Rule::Likelihood`]: lines that the force drives are kept almost unchanged, all other lines
+    /// are suppressed.
     Shrinkage,
 }
 
@@ -182,8 +184,8 @@ fn corner(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
 }
 
 /// Returns the curvature through three points, from the circle through them (4·area over the
-/// product of the three sides). It is positive where the L bends as λ falls: first left, then up.
-/// If λ has no effect there is no corner, only rounding.
+/// product of the three sides). It is positive where the curve bends like an L: as λ falls, the
+/// curve goes first to the left, then up. If λ has no effect, there is no corner, only rounding.
 fn curvature(p: [(f64, f64); 3]) -> f64 {
     let side = |a: usize, b: usize| (p[b].0 - p[a].0).hypot(p[b].1 - p[a].1);
     if side(0, 1).min(side(1, 2)) < limits::LAMBDA_EFFECT {

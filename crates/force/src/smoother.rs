@@ -51,7 +51,7 @@ impl Passage {
     }
 }
 
-/// Prediction errors of a model: each sample is predicted from those before it.
+/// Prediction errors of a model: each sample is predicted from the earlier samples.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Innovations {
     /// Sum of the logarithms of the variances of the innovations.
@@ -125,8 +125,8 @@ impl StateSpace {
         passage
     }
 
-    /// Returns mean and variance of every state at every sample given the whole record, sample
-    /// after sample, in place of the results of the filter.
+    /// Returns mean and variance of every state at every sample, given the whole record. The values
+    /// are stored sample after sample and replace the results of the filter.
     pub fn smooth(&self, mut passage: Passage) -> (Vec<f64>, Vec<f64>) {
         let (m, channels) = (self.states, self.channels);
         let len = passage.mean.len() / m;

@@ -15,7 +15,8 @@ pub trait FrequencyResponse {
     /// Returns the number of places where a force can act.
     fn places(&self) -> usize;
 
-    /// Returns the number of places where a channel can measure; [`Channel::dof`] counts them.
+    /// Returns the number of places where a channel can measure; [`Channel::dof`] is an index of
+    /// these places.
     fn sensors(&self) -> usize {
         self.places()
     }
@@ -36,8 +37,8 @@ pub trait FrequencyResponse {
 
     /// Returns the covariance E[δy δyᴴ] of the responses of the channels to given forces (one for
     /// each entry of `forced`, in N) due to the uncertainty of the system: channels × channels in
-    /// the products of their units. `None` if the system is exact or its uncertainty is taken into
-    /// account elsewhere.
+    /// the products of their units. `None` if the system is exact or if the caller takes its
+    /// uncertainty into account in another way.
     fn response_covariance(
         &self,
         _channels: &[Channel],

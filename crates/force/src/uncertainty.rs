@@ -16,7 +16,7 @@ use crate::limits;
 /// The derivatives are central differences over a tenth of a standard error: exact for
 /// [`continuous`](crate::continuous()), for which the force is linear in the entries. If `find`
 /// chooses a parameter, fix it at the value of the first call ([`Rule::Given`], [`Tuning::Given`]):
-/// the derivative should be the effect of the system, not of another choice.
+/// the derivative should be the effect of the system, not of a different choice of the parameter.
 ///
 /// The result covers the covariance only, not the bias of an identification.
 ///

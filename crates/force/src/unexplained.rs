@@ -1,7 +1,7 @@
 //! Part of the measured response that a force does not explain.
 //!
-//! With fewer forces than channels there is a residual: it shows another force, a dead sensor, two
-//! exchanged sensors, or a wrong system.
+//! With fewer forces than channels there is a residual. A large residual indicates a further force,
+//! a sensor without signal, two interchanged sensors, or a wrong system.
 
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
@@ -23,8 +23,9 @@ pub struct Unexplained {
     /// The larger of the measured response and the response to the identified force, in the unit of
     /// the channel.
     pub motion: f64,
-    /// Residual expected from noise alone, from its level on the lines used, in the unit of the
-    /// channel. `None` if the level was neither stated nor measured separately from the fit.
+    /// Residual expected from noise alone, computed from the noise level on the lines used, in the
+    /// unit of the channel. `None` if the level was neither stated nor measured separately from the
+    /// fit.
     pub noise: Option<f64>,
     /// Residual expected from the uncertainty of the system, in the unit of the channel, from
     /// [`with_uncertain_system`](crate::with_uncertain_system); otherwise `None`.
@@ -32,8 +33,8 @@ pub struct Unexplained {
 }
 
 impl Unexplained {
-    /// Ratio of residual to response, a pure number: 0 if all is explained, 1 if none is (2 if the
-    /// predicted response has the opposite sign).
+    /// Ratio of residual to response, a pure number: 0 if the force explains the whole response, 1
+    /// if it explains no part of it (2 if the predicted response has the opposite sign).
     ///
     /// The larger of the two responses is the reference, since the response of a dead sensor is
     /// zero.
@@ -73,7 +74,7 @@ impl Residual {
     /// force, line by line.
     ///
     /// White noise of standard deviation σ has the RMS value σ √(Σ w) on these lines, with w the
-    /// variance of each part of a line under noise of unit variance.
+    /// variance of the real or the imaginary part of a line under noise of unit variance.
     pub fn from_lines(
         system: &dyn FrequencyResponse,
         measured: &Measurement,
@@ -105,9 +106,9 @@ impl Residual {
         Ok(Self::new(in_time(seen)?.data(), in_time(residual)?.into_data(), noise))
     }
 
-    /// Computes the residual in an open record: the part that neither a force of these samples,
-    /// linear between them, nor an initial state explains. The initial state comes from least
-    /// squares of channels divided by `scale`.
+    /// Computes the residual in an open record: the measured response minus the response to a force
+    /// with these samples, linear between them, and to an initial state. The initial state is
+    /// estimated by least squares; the channels are divided by `scale`.
     pub fn from_open_record(
         system: &SecondOrderSystem,
         measured: &Measurement,

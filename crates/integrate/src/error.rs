@@ -31,7 +31,10 @@ pub enum IntegrateError {
         value: f64,
     },
     /// A force, or an initial or starting vector, does not have one entry per degree of freedom.
-    #[error("{what} has {}, the system has {}", message::count(*got, "component"), message::count(*dof, "degree of freedom"))]
+    #[error(
+        "{what} has {}, but the system has {}",
+        message::count(*got, "component"), message::count(*dof, "degree of freedom")
+    )]
     Components {
         /// Name of the input.
         what: &'static str,
@@ -42,7 +45,7 @@ pub enum IntegrateError {
     },
     /// A degree of freedom was selected that the system does not have.
     #[error(
-        "degree of freedom {index} (counted from 0) was selected, the system has {}",
+        "degree of freedom {index} (counted from 0) was selected, but the system has {}",
         message::count(*dof, "degree of freedom")
     )]
     DofOutside {
@@ -66,7 +69,7 @@ pub enum IntegrateError {
     MidStepSampling {
         /// Samples of the forces within the steps.
         got: usize,
-        /// Step of the mid-step forces, in seconds.
+        /// Time step of the forces within the steps, in seconds.
         got_dt: f64,
         /// Samples of the force.
         expected: usize,
@@ -127,8 +130,8 @@ pub enum IntegrateError {
     /// The factors of a matrix need more memory than the limit.
     #[error(
         "the LU factors of the {} need at least {:.2} GB, more than the limit of {:.2} GB: the factors \
-         of a three-dimensional body have many additional entries. Use a coarser model, a scheme or \
-         search with a diagonal matrix (central-difference with lumped masses), or raise the limit \
+         of a three-dimensional body have many additional entries. Use a coarser model, a scheme \
+         whose matrix is diagonal (central-difference with lumped masses), or raise the limit \
          (`factor_memory_gb` of the system, `SparseSystem::with_factor_limit`); the time then \
          grows faster than the memory",
         message::count(*dof, "degree of freedom"), 1e-9 * *bytes as f64, 1e-9 * *limit as f64
@@ -261,7 +264,7 @@ pub enum IntegrateError {
         /// acceleration.
         missed: f64,
     },
-    /// The nonlinear equation of a step has no solution that Newton's method finds.
+    /// Newton's method found no solution of the nonlinear equation of a step.
     #[error(
         "the nonlinear equation of motion was not solved at t = {time} s: Newton's method leaves an error of \
          {residual:.1e} m/s² in the accelerations; choose smaller steps",
@@ -297,7 +300,7 @@ pub enum IntegrateError {
         /// Degree of freedom, counted from 1.
         component: usize,
     },
-    /// The damping ratio of an accuracy analysis is not at least 0 and less than 1.
+    /// The damping ratio ζ of an accuracy analysis is outside the range 0 ≤ ζ < 1.
     #[error(
         "the damping ratio must be at least 0 and less than 1, got {damping_ratio}",
         damping_ratio = message::number(*damping_ratio)

@@ -3,7 +3,8 @@
 
 // Matrices.
 
-/// Maximum number of degrees of freedom of dense matrices that are never converted to sparse.
+/// Maximum number of degrees of freedom for which dense matrices are never converted to sparse
+/// ones.
 pub(crate) const DENSE_DOF: usize = 64;
 
 /// Fraction of non-zero entries below which larger dense matrices are converted to sparse.
@@ -17,8 +18,9 @@ pub(crate) const BAND_DIAGONALS: usize = 256;
 /// Maximum number of diagonals of a band that is always factored by band: no other form is faster.
 pub(crate) const NARROW_BAND_DIAGONALS: usize = 32;
 
-/// Smallest ratio of a diagonal entry to the largest entry of its column for which it is the
-/// pivot. Below it rows are exchanged, which keeps rounding small but widens the band.
+/// Smallest ratio of a diagonal entry to the largest entry of its column for which the diagonal
+/// entry is the pivot. Below this ratio rows are exchanged, which keeps rounding small but widens
+/// the band.
 pub(crate) const PIVOT_FRACTION: f64 = 0.1;
 
 /// Maximum number of operations of an LU factorisation that works column by column; above it, the
@@ -53,11 +55,12 @@ pub(crate) const NUMBERS_PER_MESSAGE: usize = 1 << 20;
 
 // Nonlinear equation of a step.
 
-/// Residual of the accelerations, relative to the largest, at which Newton's method ends.
+/// Residual of the accelerations, relative to the largest acceleration, at which Newton's method
+/// ends.
 pub(crate) const STEP_RESIDUAL: f64 = 1e-12;
 
-/// Residual that is accepted if no Newton step reduces it: a small extension between large
-/// displacements has a rounding error.
+/// Residual, relative to the largest acceleration, that is accepted if no Newton step reduces it: a
+/// small extension between large displacements has a rounding error.
 pub(crate) const STEP_RESIDUAL_ROUNDING: f64 = 1e-9;
 
 /// Maximum number of Newton steps.
@@ -86,7 +89,8 @@ pub(crate) const PERIODIC_GMRES_RESIDUAL: f64 = 1e-9;
 pub(crate) const PERIODIC_SEARCHES: usize = 8;
 
 /// Maximum number of passes over the period after a linear periodic state is computed from the
-/// matrix of the period map. The first pass gives the response; the others follow a correction.
+/// matrix of the period map. The first pass gives the response; each further pass follows a
+/// correction of the state.
 pub(crate) const PERIODIC_PASSES: usize = 4;
 
 /// Ratio of successive corrections above which the remaining gap is rounding.
@@ -106,15 +110,16 @@ pub(crate) const SEARCH_VECTORS: usize = 1000;
 /// matrix; above it Newton steps are found in a Krylov space.
 pub(crate) const MONODROMY_DOF: usize = 64;
 
-/// Relative residual of a Newton step in a Krylov space: each step then reduces the gap by about
-/// this factor.
+/// Relative residual of a Newton step in a Krylov space: each step then reduces the change of the
+/// state over a period by about this factor.
 pub(crate) const ORBIT_GMRES_RESIDUAL: f64 = 1e-4;
 
 /// Change of the state over a period, relative to the largest displacement, velocity or
 /// acceleration, at which Newton's method ends.
 pub(crate) const ORBIT_GAP: f64 = 1e-11;
 
-/// Change of the state over a period that is accepted if no Newton step reduces it.
+/// Change of the state over a period, relative as for [`ORBIT_GAP`], that is accepted if no Newton
+/// step reduces it.
 pub(crate) const ORBIT_GAP_ROUNDING: f64 = 1e-8;
 
 /// Maximum number of Newton steps to a periodic orbit.
@@ -126,8 +131,8 @@ pub(crate) const ORBIT_NEWTON_FRACTION: f64 = 1.0 / 64.0;
 /// Error of the Floquet multipliers of a derivative formed as a matrix, relative to the largest.
 pub(crate) const MONODROMY_ERROR: f64 = 1e-9;
 
-/// Residual of the largest Floquet multiplier, relative to it or, if it is below 1, absolute, at
-/// which Arnoldi's iteration ends.
+/// Residual of the largest Floquet multiplier at which Arnoldi's iteration ends: relative to the
+/// multiplier, or absolute if its modulus is below 1.
 pub(crate) const MULTIPLIER_RESIDUAL: f64 = 1e-6;
 
 /// Maximum number of vectors of the search for the largest Floquet multiplier.
@@ -146,8 +151,8 @@ pub(crate) const AMPLIFICATION_DOF: usize = 20;
 /// above it Krylov spaces give the largest.
 pub(crate) const DENSE_EIGENVALUE_DOF: usize = 200;
 
-/// Growth per step that is not refused. Rounding turns the double eigenvalue 1 of a free body into
-/// 1 ± √ε, times a condition number, which is no instability; at this rate a motion needs a
+/// Largest growth per step that is accepted. Rounding turns the double eigenvalue 1 of a free body
+/// into 1 ± √ε, times a condition number, which is no instability; at this rate a motion needs a
 /// million steps to grow by a factor e.
 pub(crate) const TOLERATED_GROWTH: f64 = 1e-6;
 
@@ -157,7 +162,8 @@ pub(crate) const TOLERATED_GROWTH: f64 = 1e-6;
 pub(crate) const CRITICAL_GROWTH: f64 = 1e-9;
 
 /// Factor on the limit of a scheme. An eigenvalue that is not proved to be below the limit is
-/// assumed to be at the limit times this factor; its motion then grows by more than is tolerated.
+/// assumed to be at the limit times this factor. The motion of this eigenvalue then grows by more
+/// than [`TOLERATED_GROWTH`].
 pub(crate) const EXCEEDED_LIMIT: f64 = 1.0 + 1e-8;
 
 /// Largest relative difference of two mirrored entries of a matrix that counts as symmetric.
@@ -193,8 +199,8 @@ pub(crate) const GROWTH_CHECK_INTERVAL: usize = 5;
 /// free body.
 pub(crate) const GROWTH_ROUNDING: f64 = 1e-4;
 
-/// Norm of a motion after one period below which it has vanished; its square is still
-/// representable.
+/// Norm after one period below which a motion has vanished; the square of this norm is still a
+/// normal number.
 pub(crate) const VANISHED_MOTION: f64 = 1e-150;
 
 /// Number of periods over which a motion is followed if the search leaves its growth undecided.
@@ -254,12 +260,12 @@ pub(crate) const NEGLIGIBLE_EIGENVALUE: f64 = 1e-14;
 pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-9;
 
 /// Smallest norm of a unit eigenvector, after its parts along other eigenvectors of the same
-/// eigenvalue are subtracted, for which it is independent of them.
+/// eigenvalue are subtracted, for which it is independent of these other eigenvectors.
 pub(crate) const INDEPENDENT_EIGENVECTOR: f64 = 1e-6;
 
-/// Number of eigenvalues examined in addition to the modes wanted, because the order of the
-/// eigenvalues of the operator differs slightly from the order of the search.
+/// Number of eigenvalues that are examined in addition to the requested modes, because the order of
+/// the eigenvalues of the operator differs slightly from the order of the search.
 pub(crate) const SPARE_MODES: usize = 8;
 
-/// Largest residual of a mode that is returned.
+/// Largest relative residual of a mode that is returned.
 pub(crate) const MODE_RESIDUAL: f64 = 1e-12;

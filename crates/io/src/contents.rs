@@ -87,7 +87,8 @@ pub(crate) struct ComplexArray {
     /// Distance between neighbouring elements in `values`, along each dimension.
     pub strides: Vec<usize>,
     pub values: Vec<Complex<f64>>,
-    /// Text for its unit in an attribute or a field beside it; empty if there is none.
+    /// Text that states the unit, from an attribute or a neighbouring field; empty if there is
+    /// none.
     pub unit: String,
 }
 
@@ -132,11 +133,13 @@ pub(crate) struct Column {
     pub axis: Axis,
     /// Description in the file in addition to the name.
     pub about: String,
-    /// Text for its unit in a line of units, a label or an attribute; empty if there is none.
+    /// Text that states the unit, from a line of units, a label or an attribute; empty if there is
+    /// none.
     pub unit: String,
     /// Quantity that the file states by a code; `None` if it states none.
     pub kind: Option<Quantity>,
-    /// `true` if its numbers are instants, in s, that were read from dates or clock times.
+    /// `true` if the numbers of the column are instants, in s, that were read from dates or clock
+    /// times.
     pub has_instants: bool,
     /// Unit or factor that the user states; it replaces what the file states.
     pub overriding: Option<Override>,

@@ -89,7 +89,7 @@ impl NodalModes {
         }
     }
 
-    /// Reads the text of such a file; `file` is its name in messages.
+    /// Reads the modes in the text of a universal file; `file` is its name in messages.
     ///
     /// # Errors
     /// As [`NodalModes::read`].
@@ -127,7 +127,8 @@ impl Geometry {
         }
     }
 
-    /// Reads the text of such a file; `file` is its name in messages.
+    /// Reads the geometry in the text of a file, as [`Geometry::read`] does; `file` is its name in
+    /// messages.
     ///
     /// # Errors
     /// [`IoError::Malformed`] with the wrong line.
@@ -236,7 +237,7 @@ impl Geometry {
 
     /// Returns the displacement along x, y, z of each point of a shape (real and imaginary parts,
     /// pure numbers) whose entries have these names, such as `1+Z`; an entry whose name has no axis
-    /// moves its point along z. `None` if an entry has no point.
+    /// is a displacement of its point along z. `None` if an entry has no point.
     ///
     /// # Source
     /// Ours.

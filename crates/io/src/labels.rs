@@ -22,7 +22,7 @@ pub(crate) fn states_unit(name: &str) -> bool {
     let letters: String = name.chars().filter(|c| c.is_alphabetic()).collect();
     let letters = letters.to_lowercase();
     let is_device = letters.starts_with("id") || letters.ends_with("id");
-    // `community` is a word with `unity`, whereas `unit_y` and `unitY` state a unit.
+    // In `community`, `unity` is a part of a word, whereas `unit_y` and `unitY` state a unit.
     let mut words = name.split(|c: char| !c.is_alphabetic());
     let is_word = words.any(|word| word.contains("unity") || word.contains("UNITY"));
     UNITS.contains(&letters.as_str())
@@ -32,8 +32,8 @@ pub(crate) fn states_unit(name: &str) -> bool {
             && !OTHER_UNITS.iter().any(|other| letters.contains(other)))
 }
 
-/// Assigns the units of a list to the channels of an array beside it, if it has as many channels as
-/// the list has units. A list without such an array becomes a remark.
+/// Assigns the units of a list to the channels of a neighbouring array, if the array has as many
+/// channels as the list has units. A list without such an array becomes a remark.
 fn with_listed_units(mut contents: Contents) -> Contents {
     let mut lists: Vec<(String, Vec<String>)> = Vec::new();
     for (path, text) in &contents.texts {
@@ -74,7 +74,8 @@ fn with_listed_units(mut contents: Contents) -> Contents {
         }
         if !is_used {
             contents.remarks.push(format!(
-                "{list} lists {} units ({}), but no array beside it has as many channels: they were not used (state them with `unit`)",
+                "{list} lists {} units ({}), but no array of the same struct has this number of channels: the \
+                 units were not used (state them with `unit`)",
                 units.len(),
                 units.join(", ")
             ));

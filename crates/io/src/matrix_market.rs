@@ -20,7 +20,7 @@ use crate::{IoError, Limit, Limits};
 /// default a matrix has at most 2²² rows.
 pub(crate) const NUMBERS_PER_ROW: usize = 64;
 
-/// Relation between the stored triangle of a matrix and the other one.
+/// Relation between the stored triangle of a matrix and the triangle that is not stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Symmetry {
     General,
@@ -99,7 +99,7 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
         let (row, column, value) = if header.is_coordinate {
             lines.entry(size)?
         } else {
-            let (row, column) = next_entry.expect("a place is left for each entry");
+            let (row, column) = next_entry.expect("each stored entry has a row and a column");
             next_entry = header.symmetry.after(row, column, size);
             (row, column, lines.value()?)
         };
@@ -123,7 +123,7 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
     if lines.next_of_data(&mut source)? {
         Err(lines.malformed(format!("there are more than the {stored} entries stated")))
     } else {
-        Ok(triplets(size, entries).expect("every entry was checked to be inside"))
+        Ok(triplets(size, entries).expect("every entry was checked to be in the matrix"))
     }
 }
 
@@ -142,7 +142,7 @@ impl Header {
                 Err(lines.malformed("the matrix of a machine has as many rows as columns"))
             }
             (true, _) => Err(lines.malformed("rows, columns and number of entries are needed")),
-            (false, _) => Err(lines.malformed("number of rows and columns are needed")),
+            (false, _) => Err(lines.malformed("the numbers of rows and columns are needed")),
         }
     }
 
@@ -251,7 +251,7 @@ impl Lines {
         let (Some(row), Some(column), Some(value), None) =
             (row.and_then(whole), column.and_then(whole), value, words.next())
         else {
-            return Err(self.malformed("an entry is its row, its column and its value"));
+            return Err(self.malformed("an entry consists of its row, its column and its value"));
         };
         if row.min(column) < 1 || row.max(column) > size {
             return Err(self.malformed(format!(
@@ -266,7 +266,7 @@ impl Lines {
         let mut words = self.words();
         match (words.next(), words.next()) {
             (Some(value), None) => self.number(value),
-            _ => Err(self.malformed("an array has one number in a line")),
+            _ => Err(self.malformed("in the format array, a line has one number")),
         }
     }
 
@@ -352,14 +352,17 @@ mod tests {
             (format!("{banner}2 2 -1\n"), "line 2: rows, columns and number"),
             (format!("{banner}2 2 1\n3 1 1.0\n"), "line 3: row 3, column 1"),
             (format!("{banner}2 2 1\n0 1 1.0\n"), "line 3: row 0, column 1"),
-            (format!("{banner}2 2 1\n1 1\n"), "line 3: an entry is"),
+            (format!("{banner}2 2 1\n1 1\n"), "line 3: an entry consists of"),
             (format!("{banner}2 2 1\n1 1 nan\n"), "line 3: \"nan\" is not a finite number"),
             (format!("{banner}2 2 1\n1 1 1e999\n"), "is not a finite number"),
             (format!("{banner}2 2 2\n1 1 1.0\n"), "line 4: the file ends after 1 entry of 2"),
             (format!("{banner}2 2 1\n1 1 1.0\n2 2 1.0\n"), "line 4: there are more than the 1"),
             (format!("{banner}2 2 99999999999999\n"), "there are more than 268435456 numbers"),
             (format!("{banner}99999999999 99999999999 1\n1 1 1\n"), "more than 268435456 numbers"),
-            ("%%MatrixMarket matrix array real general\n2 2\n1 2\n".into(), "one number in a line"),
+            (
+                "%%MatrixMarket matrix array real general\n2 2\n1 2\n".into(),
+                "a line has one number",
+            ),
             (
                 "%%MatrixMarket matrix coordinate real skew-symmetric\n1 1 1\n1 1 1\n".into(),
                 "no diagonal",

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 /// Appends a number with the fewest digits that identify it, in the form of `{:?}`; of two equally
-/// near texts, this takes the one with an even last digit, and `{:?}` the larger one.
+/// near texts, this function takes the text with an even last digit, and `{:?}` takes the larger
+/// number.
 pub(crate) fn push_number(text: &mut String, value: f64) {
     if !value.is_finite() {
         let _ = write!(text, "{value:?}");

@@ -22,8 +22,8 @@ pub struct OutputFile {
 /// its name in [`write_all`]; if it is dropped before that, it is removed.
 ///
 /// On Linux the file has no name until then, so that it disappears however the program ends. On
-/// other systems, and on file systems without such files, it has a hidden name in the folder of the
-/// destination; [`remove_unfinished_files`] removes it when a signal ends the program. If the
+/// other systems, and on file systems without unnamed files, it has a hidden name in the folder of
+/// the destination; [`remove_unfinished_files`] removes it when a signal ends the program. If the
 /// program is killed, the file is removed when the same destination is next written to.
 ///
 /// A file that is replaced keeps its permissions; a read-only file is not replaced.
@@ -75,8 +75,8 @@ static TEMPORARIES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 ///
 /// A destination that is not a regular file (a pipe, `/dev/null`) is written into; so is standard
 /// output, given as `-` or by a name of the system such as `/dev/stdout`, even if it is redirected
-/// to a file. It is written last, so that a reader that has closed it does not prevent the other
-/// files.
+/// to a file. Standard output is written last, so that a reader that has closed it does not prevent
+/// the other files.
 ///
 /// # Errors
 /// [`IoError::Write`] naming the file, also for two files with one destination; the files at the
@@ -105,7 +105,7 @@ pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoEr
 }
 
 /// Refuses outputs that would replace an input: the same file by any path or link, including
-/// redirected standard input. Pipes and devices may be both.
+/// redirected standard input. Pipes and devices may be input and output at the same time.
 ///
 /// # Errors
 /// [`IoError::OutputIsInput`].
@@ -171,7 +171,8 @@ impl BegunFile {
                 return Ok((tempfile::tempfile()?, Stage::Elsewhere { destination }));
             }
             Ok(metadata) => {
-                // Renaming does not need write permission on the file, so it is checked here.
+                // Renaming does not need write permission on the replaced file, so this permission
+                // is checked here.
                 if metadata.permissions().readonly() {
                     let why = "the existing file is read-only";
                     return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
@@ -245,8 +246,8 @@ fn resolved(path: &Path) -> io::Result<PathBuf> {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
         };
-        // The target of this link does not exist yet. A link to a pipe has no path and is opened
-        // unchanged.
+        // The target of this link does not exist yet. A link to a pipe is not changed here:
+        // `metadata` finds the pipe, although the text of the link is not a path.
         if fs::metadata(&path).is_err()
             && let Ok(target) = fs::read_link(&path)
         {
@@ -323,7 +324,7 @@ mod beside {
     pub fn create(destination: &Path) -> io::Result<(File, Temporary)> {
         let open = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
         let (file, path) = named(destination, open)?;
-        // Abandoned files stay on systems without file locks.
+        // On systems without file locks, abandoned files are not removed.
         let _ = file.try_lock();
         Ok((file, Temporary::new(path)))
     }
@@ -377,7 +378,7 @@ mod unnamed {
         format!("/proc/self/fd/{}", file.as_raw_fd())
     }
 
-    /// Gives a file its name, which replaces the file that had it.
+    /// Gives a file its name; a file that already has this name is replaced.
     pub fn link(file: &File, destination: &Path) -> io::Result<()> {
         let link = |path: &Path| {
             rustix::fs::linkat(CWD, link_to(file), CWD, path, AtFlags::SYMLINK_FOLLOW)
@@ -386,7 +387,8 @@ mod unnamed {
             Err(rustix::io::Errno::EXIST) => {}
             other => return Ok(other?),
         }
-        // Only renaming replaces a file; a lock marks the intermediate name as in use.
+        // Only a rename can replace a file, so the link first gets another name; a lock marks this
+        // name as in use.
         let _ = file.try_lock();
         let ((), path) = beside::named(destination, |path| Ok(link(path)?))?;
         fs::rename(&path, destination).inspect_err(|_| drop(fs::remove_file(&path)))

@@ -141,7 +141,7 @@ impl Header {
                 of_name.is_some_and(|name| name != parsed.quantity || parsed.is_inverse);
             if is_other_quantity || unit.as_ref().is_some_and(|(known, _)| *known != parsed) {
                 return Err(format!(
-                    "the unit {} of {name} contradicts its name or another unit: state one unit",
+                    "the unit {} of {name} contradicts this name or another stated unit: state one unit",
                     escaped(&text)
                 ));
             }
@@ -180,9 +180,9 @@ impl Header {
                 format!("in {}, multiplied by {} to get SI units", escaped(text), unit.in_si)
             }
             (None, Some(text)) => {
-                format!("in SI units, because their unit {} is not understood", escaped(text))
+                format!("read in SI units, because the unit {} is not understood", escaped(text))
             }
-            (None, None) => "in SI units, because no units are stated".into(),
+            (None, None) => "read in SI units, because no units are stated".into(),
         }
     }
 }
@@ -197,8 +197,8 @@ fn leaf(name: &str) -> &str {
 }
 
 /// Removes a unit at the end of the words of a name and returns it: `g`, `N` as `g/N`, `mm`, `s2`,
-/// `N` as `mm/s2/N`. If the name states a quantity, this may also be a unit of something other than
-/// a frequency response.
+/// `N` as `mm/s2/N`. If the name states a quantity, the unit may also be one that is not a unit of
+/// frequency responses.
 fn take_unit_words(words: &mut Vec<String>, has_quantity: bool) -> Option<String> {
     let joined = |count: usize| {
         let first = words.len().checked_sub(count).filter(|first| *first > 0)?;
@@ -245,7 +245,8 @@ impl Shape {
             [points, references] => [points, references],
             _ => {
                 return Err(format!(
-                    "{} has more than three dimensions; only three are known: frequency, response point and reference point",
+                    "{} has more than three dimensions; the possible ones are frequency, response point and \
+                     reference point",
                     sizes(array)
                 ));
             }

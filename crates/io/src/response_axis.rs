@@ -4,8 +4,8 @@ use crate::escape::escaped;
 use crate::responses::FrequencyResponses;
 use crate::{Evidence, IoError, Quantity, StatedUnit, Table};
 
-/// Names, in lower case, of a column of frequencies; those before [`IN_RADIANS`] are in Hz unless a
-/// unit states otherwise.
+/// Names, in lower case, of a column of frequencies; the names that are not in [`IN_RADIANS`] mean
+/// Hz if there is no unit.
 const FREQUENCY: [&str; 10] =
     ["frequency_hz", "frequency", "freq", "f", "frequenz", "hz", "khz", "rpm", "omega", "w"];
 
@@ -80,8 +80,8 @@ pub(crate) fn frequencies(
     Ok(values.iter().map(|value| value * factor).collect())
 }
 
-/// Returns the frequencies, in Hz, of orders: multiples of the speed of rotation, which a column
-/// beside them must state.
+/// Returns the frequencies, in Hz, of orders: multiples of the speed of rotation, which a second
+/// column must state.
 fn frequencies_of_orders(table: &Table, orders: usize) -> Result<Vec<f64>, IoError> {
     let is_speed = |at: &usize| {
         let name = table.names()[*at].to_lowercase();

@@ -384,7 +384,7 @@ fn polar<'a>(
     if let (Part::Phase(None), Some(doubt)) = (second.part, &second.doubt) {
         let (column, text) = (table.label(second.column), escaped(&doubt.text));
         let what = format!(
-            "column {column} is a phase in {text}, which is no known unit of angle: deg, rad, mrad, gon"
+            "column {column} is a phase in {text}, which is not a unit of angle: state deg, rad, mrad or gon"
         );
         return Err(IoError::Description { file: table.file().into(), what });
     }
@@ -410,7 +410,7 @@ fn polar<'a>(
     Ok(pairs.map(|(value, phase)| Complex::from_polar(size(*value), phase * unit)).collect())
 }
 
-/// Returns the error of a column without the other part of its response.
+/// Returns the error for a column whose response has no column for the other part.
 fn missing(table: &Table, heading: &Heading, what: &str) -> IoError {
     IoError::Description {
         file: table.file().into(),

@@ -147,7 +147,7 @@ impl AveragedSegments {
 /// Maximum number of samples; a larger number in a file is an error.
 const MOST_SAMPLES: f64 = (1_u64 << 26) as f64;
 
-/// Response at one point per unit force at another, frequency by frequency.
+/// Response at one point per unit force at another point, frequency by frequency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseFunction {
     /// Point and direction of the response.
@@ -187,8 +187,8 @@ impl FrequencyResponses {
     ///
     /// # Errors
     /// [`IoError::Responses`] if the columns of a text are not those of frequency responses,
-    /// [`IoError::Empty`] for a universal file without any, and the errors of [`Table::parse`] and
-    /// [`Table::column`].
+    /// [`IoError::Empty`] for a universal file without frequency responses, and the errors of
+    /// [`Table::parse`] and [`Table::column`].
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
         Self::from_source(Source::new(file.into(), bytes)?)
     }
@@ -246,7 +246,8 @@ impl FrequencyResponses {
         let any = AveragedSegments::COLUMNS[..4].iter().any(|name| table.find(name).is_ok());
         if any && responses.segments.is_none() {
             responses.remarks.push(format!(
-                "the columns {} do not state possible segments that are the same in every row: the bias of the window was not corrected",
+                "the columns {} do not state the same possible segments in every row: the \
+                 bias of the window was not corrected",
                 AveragedSegments::COLUMNS.join(", ")
             ));
         }

@@ -71,7 +71,8 @@ pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
 }
 
 /// Assigns to each column the instants of the time column in the same struct or group, or at the
-/// same top level; only for files in which a struct or a group has a time column.
+/// top level for columns there. It does so only for files in which a struct or a group has a time
+/// column.
 pub(crate) fn with_own_times(mut contents: Contents) -> Contents {
     let group = |at: usize| enclosing(&contents.columns[at].name);
     let times: Vec<usize> = (0..contents.columns.len())

@@ -80,7 +80,7 @@ pub fn read_sparse_system(path: impl AsRef<Path>) -> Result<SparseSystem, IoErro
     described.sparse(&file, json::folder(path.as_ref()))
 }
 
-/// Reads the system in the text of such a file, as [`read_sparse_system`] does; `file` is its name
+/// Reads the system in the text of a JSON file, as [`read_sparse_system`] does; `file` is its name
 /// in messages.
 ///
 /// # Errors
@@ -327,8 +327,8 @@ impl SystemDescription {
         matrices.iter().all(|entries| matches!(entries, Some(Entries::Rows(_))))
     }
 
-    /// Returns whether full matrices of a large machine have so few entries that are not zero that
-    /// the steps of sparse ones take less time.
+    /// Returns whether only a few entries of the full matrices of a large machine are not zero, so
+    /// that steps with sparse matrices take less time.
     fn is_mostly_zero(&self) -> bool {
         let few = |entries: &Entries| match entries {
             Entries::Rows(rows) => {
@@ -432,7 +432,9 @@ impl ListedEntries {
             ));
         }
         if size > MOST_ROWS {
-            return Err(format!("a sparse matrix of {size} rows is larger than {MOST_ROWS}"));
+            return Err(format!(
+                "a sparse matrix has {size} rows, but at most {MOST_ROWS} are possible"
+            ));
         }
         let outside = rows.iter().zip(&columns).find(|(row, column)| {
             let inside = 1..=size;
@@ -494,7 +496,7 @@ impl<'de> Deserialize<'de> for Entries {
                 while let Some(row) = seq.next_element::<Vec<f64>>()? {
                     if let Some(first) = rows.first().filter(|first| first.len() != row.len()) {
                         return Err(de::Error::custom(format_args!(
-                            "row {} of a matrix has {}, the first has {}",
+                            "row {} of a matrix has {}, but the first row has {}",
                             rows.len() + 1,
                             message::count(row.len(), "entry"),
                             first.len()

@@ -60,7 +60,7 @@ pub struct ExcitationDesign {
 pub enum Separation {
     /// Interleaved lines: each input has separate lines, assigned in turn, in one experiment.
     Interleaved,
-    /// All inputs have the same lines: as many experiments as inputs.
+    /// All inputs have the same lines; the number of experiments is equal to the number of inputs.
     Orthogonal(Mixing),
 }
 

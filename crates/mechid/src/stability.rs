@@ -93,7 +93,7 @@ pub struct MachineStability {
 }
 
 /// Compares schemes for an oscillation with a damping ratio, at any number of steps, each a
-/// fraction of its undamped period, and for a machine if there is one.
+/// fraction of the undamped period, and for a machine if one is given.
 ///
 /// ```
 /// use mechid::integrate::Houbolt;

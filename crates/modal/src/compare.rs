@@ -7,25 +7,27 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::indicators::{Indicator, IndicatorError, ShapeWithCovariance, mac, mac_with_error};
 
-/// Largest ratio of the frequencies of two modes that can be one mode: finite-element models miss
-/// measured frequencies by up to a fifth before they are updated.
+/// Largest ratio of the frequencies of two modes that can be one mode. Before an update, the
+/// frequencies of a finite-element model may differ from the measured ones by up to a fifth.
 const MAX_FREQUENCY_RATIO: f64 = 1.25;
 
-/// Smallest MAC of two modes that can be one mode; below it their shapes have little in common.
+/// Smallest MAC of two modes that can be one mode; below it the shapes have little in common.
 const MIN_MAC: f64 = 0.3;
 
-/// Singular values of the covariance of a shape difference below this part of the largest count as
-/// no error.
+/// Ratio of an eigenvalue of the covariance of a shape difference to the largest one, at or below
+/// which the test omits this direction.
 const COVARIANCE_RANK: f64 = 1e-12;
 
-/// Value with its standard error; 0 for an exact value, such as one of a finite-element model.
+/// Value with its standard error. The standard error is 0 for an exact value, such as that of a
+/// finite-element model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// Value.
     pub value: f64,
     /// Standard error, in the unit of the value.
     pub standard_error: f64,
-    /// Degrees of freedom of the variance behind the standard error; infinite if it is exact.
+    /// Degrees of freedom of the variance that the standard error comes from; infinite if the
+    /// standard error is exact.
     pub degrees_of_freedom: f64,
 }
 
@@ -43,7 +45,7 @@ pub struct ComparedMode {
     pub natural_frequency_hz: Measured,
     /// Damping ratio; `None` for a model without damping.
     pub damping_ratio: Option<Measured>,
-    /// Shape; entries of both sets belong to the same points and directions.
+    /// Shape. Entries with the same index in both sets must belong to the same point and direction.
     pub shape: ShapeWithCovariance,
 }
 
@@ -67,7 +69,7 @@ impl Default for PairingRule {
 pub struct Difference {
     /// Difference, in the unit of the values.
     pub value: f64,
-    /// Standard error of the difference, in the same unit.
+    /// Standard error of the difference, in the unit of the values.
     pub standard_error: f64,
     /// Probability that the errors alone cause a difference at least as large; `None` without
     /// errors.
@@ -89,7 +91,7 @@ pub struct ShapeTest {
     pub adjusted_p_value: f64,
 }
 
-/// Pair of modes, one of each set, that are the same mode of the structure.
+/// Pair of modes, one from each set, that represent the same mode of the structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModePair {
     /// Index in the first set.
@@ -120,8 +122,9 @@ pub struct Comparison {
 /// Pairs modes by frequency and shape. Returns the pairs (index in the first set, index in the
 /// second set), sorted by the first index.
 ///
-/// The pair with the largest MAC, reduced by its distance in frequency, is accepted first; then the
-/// next pair of modes without a partner, and so on.
+/// The MAC of each pair is reduced according to the distance in frequency. The pair with the
+/// largest reduced MAC is accepted first; the next pair of modes without a partner follows, and so
+/// on.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if shapes differ in length.
@@ -217,8 +220,8 @@ fn difference(first: Measured, second: Measured) -> Difference {
     Difference { value, standard_error, p_value, adjusted_p_value: p_value }
 }
 
-/// Tests the difference of two shapes with χ², both normalised to the same entry, one that is large
-/// in both.
+/// Tests the difference of two shapes by χ². Both shapes are normalised to the same entry, which is
+/// large in each of them.
 fn shape_test(first: &ShapeWithCovariance, second: &ShapeWithCovariance) -> Option<ShapeTest> {
     let outputs = first.shape().len();
     let size = |i: &usize| (first.shape()[*i] * second.shape()[*i]).norm();

@@ -1,8 +1,8 @@
 //! Constraints that a structure puts on its modes: real shapes and reciprocity.
 //!
-//! A constraint c(v) = 0 on pole, shape and participations v of a mode is imposed on the estimate
-//! v̂ with covariance Σ: the constrained estimate minimises (v̂ − v)ᵀ Σ⁻¹ (v̂ − v). To first order
-//! this is the maximum-likelihood estimate under the constraint, and the minimum is the
+//! A constraint c(v) = 0 acts on v, the pole, shape and participations of a mode. The estimate v̂
+//! has the covariance Σ; the constrained estimate v minimises (v̂ − v)ᵀ Σ⁻¹ (v̂ − v). To first
+//! order this is the maximum-likelihood estimate under the constraint, and the minimum is the
 //! likelihood-ratio statistic, χ² with one degree of freedom for each equation if the constraint is
 //! true.
 //!
@@ -52,11 +52,11 @@ pub struct ConstraintTest {
     pub mode: usize,
     /// Index of the constraint in the settings.
     pub constraint: usize,
-    /// Likelihood-ratio statistic: increase of −2 log L by the constraint.
+    /// Likelihood-ratio statistic: increase of −2 log L due to the constraint.
     pub statistic: f64,
     /// Number of equations of the constraint.
     pub degrees_of_freedom: usize,
-    /// Probability of a statistic as large if the constraint is true.
+    /// Probability of a statistic at least as large as this one if the constraint is true.
     pub p_value: f64,
 }
 
@@ -90,7 +90,7 @@ impl ModalConstraint {
                     if points[..k].iter().any(same) {
                         return refused(
                             point.output,
-                            "a driving point that shares no output or input with another",
+                            "a driving point that shares neither output nor input with another one",
                         );
                     }
                 }
@@ -193,8 +193,8 @@ pub(crate) fn test(
     constraints.iter().enumerate().filter_map(tested).collect()
 }
 
-/// Returns central differences with steps of a thousandth of the standard errors: the equations are
-/// products of two or three parameters, so that the error is negligible.
+/// Returns central differences with steps of a thousandth of the standard errors. The error of
+/// these differences is negligible, because the equations are products of two or three parameters.
 fn derivative(
     equations: &impl Fn(&ModeParameters) -> DVector<f64>,
     at: &ModeParameters,

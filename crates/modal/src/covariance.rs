@@ -1,8 +1,9 @@
-//! Covariance of poles, participations and shapes under the whole noise: sensors and unmeasured
-//! forces.
+//! Covariance of poles, participations and shapes due to the whole noise: noise of the sensors, and
+//! unmeasured forces.
 //!
-//! The fit gives all outputs the same weight over frequency; its parameters have the covariance G⁻¹
-//! M G⁻¹, where G is the curvature and M the variance of the score under the estimated noise.
+//! In the fit, the weights of all outputs depend on frequency in the same way. Its parameters have
+//! the covariance G⁻¹ M G⁻¹, where G is the curvature and M is the variance of the score under the
+//! estimated noise.
 //!
 //! # Source
 //! White, Econometrica 50 (1982) 1, with the variance of the score from the noise model.
@@ -34,7 +35,8 @@ pub(crate) struct Covariance {
     /// Degrees of freedom of the noise estimate at each mode: real and imaginary parts in the
     /// window of a line, or fewer with an unmeasured force.
     pub(crate) degrees_of_freedom: Vec<usize>,
-    /// A⁺ C, the change of the linear unknowns of the modes with the parameters, `2m × parameters`.
+    /// A⁺ C, the derivatives of the linear unknowns of the modes with respect to the parameters,
+    /// `2m × parameters`.
     unknowns_by_parameter: DMatrix<f64>,
     /// Covariance of the linear unknowns of the modes due to the sensor noise of each output,
     /// `2m × 2m`, in whitened units.
@@ -50,7 +52,8 @@ pub(crate) struct Covariance {
 }
 
 impl Covariance {
-    /// Returns the covariance of a fit under `noise`, or `None` if its curvature is singular.
+    /// Returns the covariance of a fit under `noise`; `None` if the curvature of the fit is
+    /// singular.
     pub(crate) fn new(fit: &Fit<'_>, noise: &Noise) -> Option<Self> {
         let (lines, model, projection) = (fit.lines, &fit.model, &fit.projection);
         let normal = NormalEquations::new(lines, model, projection);
@@ -59,8 +62,8 @@ impl Covariance {
         let scale = parameter_scale(&pairs, model);
         let shapes = whitened_shapes(projection, modes);
         let (unknowns_by_parameter, rows) = unknowns_by_parameter(lines, model, projection, &pairs);
-        // The weights include unmeasured forces: near a resonance the sensor noise is far below
-        // them.
+        // The weights include the responses to unmeasured forces, which are far above the sensor
+        // noise near a resonance.
         let mean = mean_sensor(fit, noise);
         let weights = mean.iter().zip(&fit.weights.shape);
         let deviation: Vec<f64> = weights.map(|(mean, shape)| mean.sqrt() / shape).collect();
@@ -224,8 +227,8 @@ impl Covariance {
         (values, covariance)
     }
 
-    /// Returns the parameters of one mode, and how they change with the parameters of the search
-    /// and with an unmeasured force on the mode.
+    /// Returns the parameters of one mode, and their derivatives with respect to the parameters of
+    /// the search and to an unmeasured force on the mode.
     fn mode_response(&self, fit: &Fit<'_>, mode: usize, shape: &[C]) -> ModeResponse {
         let (model, levels) = (&fit.model, &fit.weights.level);
         let (outputs, inputs, loads) = (shape.len(), fit.lines.inputs(), fit.lines.loads.len());
@@ -269,7 +272,7 @@ impl Covariance {
 /// Parameters of one mode, with the derivatives and covariances that describe their errors.
 struct ModeResponse {
     values: DVector<f64>,
-    /// Derivatives by the parameters of the search.
+    /// Derivatives with respect to the parameters of the search.
     response: DMatrix<f64>,
     /// Derivatives with respect to the complex factor that an unmeasured force applies to the
     /// shape.
@@ -278,7 +281,8 @@ struct ModeResponse {
     cross: DMatrix<f64>,
 }
 
-/// Returns the real 2 × 2 matrix that multiplies (real part, imaginary part) by a complex number.
+/// Returns the real 2 × 2 matrix whose product with (real part, imaginary part) is the
+/// multiplication by a complex number.
 fn rotation(z: C) -> DMatrix<f64> {
     DMatrix::from_row_slice(2, 2, &[z.re, -z.im, z.im, z.re])
 }
@@ -352,8 +356,8 @@ fn sensor_variance(
     (meat, unknowns)
 }
 
-/// Returns on every line the mean over the outputs of sensor noise variance divided by squared
-/// level.
+/// Returns, for every line, the mean over the outputs of the ratio of sensor noise variance to
+/// squared level.
 fn mean_sensor(fit: &Fit<'_>, noise: &Noise) -> Vec<f64> {
     let levels = &fit.weights.level;
     let mut mean = vec![0.0; fit.lines.len()];
@@ -364,8 +368,8 @@ fn mean_sensor(fit: &Fit<'_>, noise: &Noise) -> Vec<f64> {
     mean
 }
 
-/// Returns the ratio of each output's sensor noise variance to the mean of all, averaged over a
-/// block.
+/// Returns, for each output, the ratio of its sensor noise variance to the mean over all outputs,
+/// averaged over a block.
 fn noise_ratios(fit: &Fit<'_>, noise: &Noise, mean: &[f64], block: &Block) -> Vec<f64> {
     let ratio = |(sensor, level): (&Vec<f64>, &f64)| {
         let rows: Range<usize> = block.rows.clone();

@@ -4,12 +4,13 @@
 use mechid_model::{RealSchur, linear_algebra};
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 
-/// Distance of the shift of inverse iteration from the eigenvalue, over the norm of the matrix: far
-/// enough for a regular factorisation, near enough that one step separates the eigenvector.
+/// Distance of the shift of inverse iteration from the eigenvalue, relative to the norm of the
+/// matrix. It is large enough for a regular factorisation, and small enough that one step separates
+/// the eigenvector.
 const SHIFT: f64 = 1e-13;
 
-/// Number of steps of inverse iteration: the first reduces other eigenvectors to rounding errors,
-/// the second removes these.
+/// Number of steps of inverse iteration. The first step reduces the components of other
+/// eigenvectors to rounding errors, the second step removes these rounding errors.
 const STEPS: usize = 2;
 
 pub(crate) fn svd<T: ComplexField<RealField = f64>>(
@@ -35,7 +36,8 @@ pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     RealSchur::new(matrix.clone()).ok().map(|schur| schur.eigenvalues())
 }
 
-/// Returns the eigenvector of unit length to an eigenvalue of a real matrix, by inverse iteration.
+/// Returns the eigenvector, of unit length, of a real matrix for a given eigenvalue, by inverse
+/// iteration.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.1.
@@ -65,7 +67,7 @@ pub(crate) fn eigenvector(
     Some(vector)
 }
 
-/// Returns the unit vector v with the smallest ‖A v‖ of a square complex matrix.
+/// Returns the unit vector v with the smallest ‖A v‖ for a square complex matrix A.
 pub(crate) fn null_vector(matrix: DMatrix<Complex<f64>>) -> Option<DVector<Complex<f64>>> {
     let last = matrix.ncols().checked_sub(1)?;
     let rows = svd(matrix)?.v_t?;

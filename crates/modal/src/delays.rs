@@ -1,4 +1,4 @@
-//! Delays of the outputs behind the forces, as filters or scanning converters cause them.
+//! Delays of the outputs relative to the forces, for example due to filters or scanning converters.
 //!
 //! A delay changes the phase of an output in proportion to the frequency. Modes and a few residual
 //! terms cannot describe this change, so that a fit without the delay has false modes.
@@ -19,7 +19,7 @@ use crate::search::Fit;
 
 type C = Complex<f64>;
 
-/// Delay of an output behind the forces.
+/// Delay of an output relative to the forces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutputDelay {
     /// Delay, in s; negative if the forces are late.
@@ -35,11 +35,11 @@ impl OutputDelay {
     }
 }
 
-/// Returns the delay of each output (s) with which modes at `poles` (rad/s) and the first residual
-/// terms explain the outputs best; `None` if that improves the fit by less than the penalty of one
-/// unknown per output by Schwarz's criterion.
+/// Returns the delays (s), one for each output, with which modes at `poles` (rad/s) and the first
+/// residual terms explain the outputs best. `None` if the delays improve the fit by less than the
+/// penalty of one unknown per output in Schwarz's criterion.
 ///
-/// The first residual terms have even powers of jω: those of undamped modes outside the band. A
+/// The first residual terms have even powers of jω, as undamped modes outside the band have. A
 /// delay needs odd powers. The residues are free. A grid of delays common to some outputs gives the
 /// initial estimate; Gauss–Newton steps of each output follow.
 pub(crate) fn apparent_delays(lines: &Lines, poles: &[C]) -> Option<Vec<f64>> {
@@ -67,13 +67,14 @@ pub(crate) fn apparent_delays(lines: &Lines, poles: &[C]) -> Option<Vec<f64>> {
     (gain > outputs as f64 * lines.schwarz()).then_some(delays)
 }
 
-/// Returns the delays of the outputs with the modes, residual terms and weights of a fit, from
-/// `initial` delays (s); zero for outputs whose delay the data do not determine. `None` if the
-/// delays improve the fit by less than the penalty of one unknown for each delay.
+/// Returns the delays of the outputs. The search starts from `initial` delays (s); modes, residual
+/// terms and weights are those of a fit. The delay is zero for outputs whose delay the data do not
+/// determine. `None` if the delays improve the fit by less than the penalty of one unknown for each
+/// delay.
 ///
-/// For displacements, complex shapes can represent a small delay up to second order: the derivative
-/// of the residual with respect to the delay then contains only noise. For accelerations, residual
-/// terms of odd powers of jω remain.
+/// For displacements, complex shapes can represent a small delay up to second order, so that the
+/// derivative of the residual with respect to the delay contains only noise. For accelerations,
+/// residual terms with odd powers of jω remain in this derivative.
 pub(crate) fn determined_delays(
     lines: &Lines,
     fit: &Fit<'_>,
@@ -145,8 +146,8 @@ impl<D: Design> Trial<'_, D> {
         self.residuals(self.advanced(delays)).iter().map(|residual| square(residual)).collect()
     }
 
-    /// Returns the best common delay on a grid, in s, of the outputs with the largest explained
-    /// shares.
+    /// Returns the best common delay (s), on a grid, of the outputs whose power the model explains
+    /// best.
     fn common_delay(&self) -> f64 {
         let costs = self.costs(&vec![0.0; self.lines.outputs.len()]);
         let unexplained = |output: &usize| {
@@ -171,7 +172,7 @@ impl<D: Design> Trial<'_, D> {
         best.map_or(0.0, |(delay, _)| *delay)
     }
 
-    /// Returns the residuals of the outputs and their derivatives by the delays.
+    /// Returns the residuals of the outputs and their derivatives with respect to the delays.
     fn residuals_and_slopes(&self, delays: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let mut columns = self.advanced(delays);
         let slope = |(output, column): &(usize, Vec<C>)| {
@@ -185,9 +186,9 @@ impl<D: Design> Trial<'_, D> {
         (residuals, slopes)
     }
 
-    /// Returns the delays after Gauss–Newton steps, which end when each step is less than a small
-    /// part of the standard error of its delay; `None` if a delay is not finite or exceeds the
-    /// largest.
+    /// Returns the delays after Gauss–Newton steps. The steps end when each step is a small
+    /// fraction of the standard error of its delay. `None` if a delay is not finite or exceeds the
+    /// maximum.
     fn refined(&self, mut delays: Vec<f64>, most: usize) -> Option<Vec<f64>> {
         let largest = MAX_DELAY_TURNS * TAU / self.lines.band().1;
         for _ in 0..most {
@@ -211,8 +212,9 @@ impl<D: Design> Trial<'_, D> {
     }
 }
 
-/// Returns an effective number of residuals r, 3(Σr²)²/Σr⁴. It is their number if they are normal,
-/// and smaller if errors of the initial poles make the residuals near resonances large.
+/// Returns the effective number 3(Σr²)²/Σr⁴ of residuals r. For normal residuals it is equal to
+/// their number. It is smaller if errors of the initial poles make the residuals near resonances
+/// large.
 fn effective_count(values: &[f64]) -> f64 {
     let fourth: f64 = values.iter().map(|value| value.powi(4)).sum();
     3.0 * square(values).powi(2) / fourth

@@ -10,8 +10,8 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::limits::DEPENDENT_COLUMN;
 
-/// Replaces the first `factored` columns of a matrix by their triangular factor R and the other
-/// columns by Qᵀ times them; the reflectors stay below the triangle.
+/// Replaces the first `factored` columns of a matrix by their triangular factor R, and multiplies
+/// the other columns by Qᵀ; the reflectors remain below the triangle.
 pub(crate) fn triangularise(columns: &mut [f64], rows: usize, factored: usize) {
     let size = rows.min(factored);
     if size == 0 {
@@ -120,8 +120,8 @@ pub(crate) fn add_product(
     );
 }
 
-/// Upper triangular factor R of a least-squares problem; a dependent column has an infinite
-/// diagonal.
+/// Upper triangular factor R of a least-squares problem; a linearly dependent column has an
+/// infinite diagonal entry.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Triangle {
     pub(crate) size: usize,

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::DroppedCandidate;
 
-/// Reason for which no modes can be identified.
+/// Reason why no modes can be identified.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModalError {
@@ -16,7 +16,7 @@ pub enum ModalError {
         "the data have no excitation of the modes: neither an input nor an open record was given"
     )]
     NoExcitation,
-    /// The lines are fewer than the unknowns of one mode.
+    /// The number of lines is smaller than the number of unknowns of one mode.
     #[error("the band has {lines} lines; one mode of these data needs at least {required}")]
     TooFewLines {
         /// Number of lines.
@@ -46,8 +46,8 @@ pub enum ModalError {
     DependentInputs {
         /// Index of the input.
         input: usize,
-        /// Root-mean-square of the part that the other inputs do not explain, relative to that of
-        /// the input.
+        /// RMS value of the part of the input that the preceding inputs do not explain, relative to
+        /// the RMS value of the input.
         own_share: f64,
     },
     /// No mode is significant.
@@ -90,8 +90,8 @@ pub enum ModalError {
     },
     /// The numbers of channels of line data and estimate differ.
     #[error(
-        "the data have {inputs} inputs and {outputs} outputs, but the modes have {model_inputs} and \
-         {model_outputs}"
+        "the data have {inputs} inputs and {outputs} outputs, but the modes have {model_inputs} inputs \
+         and {model_outputs} outputs"
     )]
     Size {
         /// Inputs of the data.

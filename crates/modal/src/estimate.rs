@@ -1,4 +1,4 @@
-//! The identified modes of a record, and what they predict.
+//! Identified modes of a record, and predictions with them.
 
 use std::ops::Range;
 
@@ -27,7 +27,8 @@ use crate::synthesis::add_transients;
 
 type C = Complex<f64>;
 
-/// Identified modes with the residual terms and the noise that were estimated with them.
+/// Identified modes, and the residual terms and the noise that were estimated together with the
+/// modes.
 #[derive(Debug, Clone)]
 pub struct ModalEstimate {
     modes: Vec<IdentifiedMode>,
@@ -45,7 +46,7 @@ pub struct ModalEstimate {
     noise_spectrum: Vec<Vec<f64>>,
     log_likelihood: f64,
     required_gain: f64,
-    /// Variance of the unmeasured force on each mode, for its shape as reported.
+    /// Variance of the unmeasured force on each mode, for the mode shape as reported.
     unmeasured_variance: Vec<f64>,
     iterations: usize,
 }
@@ -117,19 +118,19 @@ impl ModalEstimate {
         &self.modes
     }
 
-    /// Returns the poles of all modes of the model, also of those that were not requested.
+    /// Returns the poles of all modes of the model, including the modes that were not requested.
     pub(crate) fn poles(&self) -> Vec<C> {
         self.modes.iter().chain(&self.others).map(|mode| mode.pole).collect()
     }
 
-    /// Returns the modal mass of a mode for the shape with a largest entry of 1, if the output of
-    /// `point` measures the `derivative`-th time derivative of the displacement at which its input
-    /// acts as a force; `None` without such a mode, output or input, and if the mode does not move
-    /// at the point.
+    /// Returns the modal mass of a mode for the shape with a largest entry of 1. The input of
+    /// `point` must be a force, and its output must be the `derivative`-th time derivative of the
+    /// displacement where the force acts. `None` if there is no such mode, output or input, or if
+    /// the mode does not move at the point.
     ///
     /// The mass is valid for light, proportional damping, and is in kg if the input is in N and the
-    /// output in m, m/s or m/s². It is negative if the response has the wrong sign. A delay between
-    /// the channels of less than a quarter of a period does not change the mass.
+    /// output in m, m/s or m/s². The mass is negative if the response has the wrong sign. A delay
+    /// of less than a quarter of a period between the channels does not change the mass.
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), sections 2.4 and 3.5; the standard error is to first
@@ -164,7 +165,7 @@ impl ModalEstimate {
     }
 
     /// Compares these modes with the modes of another record, or of another part of the same
-    /// record, and tests which of them have changed (by damage, temperature or loosening).
+    /// record, and tests which modes have changed (due to damage, temperature or loosening).
     ///
     /// # Errors
     /// [`IndicatorError::Size`] if the numbers of outputs differ.
@@ -173,7 +174,7 @@ impl ModalEstimate {
     }
 
     /// Returns the same estimate; the standard errors of each mode are multiplied by the entry of
-    /// `scales` for this mode (a pure number). Use it for data that disagree by more than their
+    /// `scales` for this mode (a pure number). Use it if parts of the data differ by more than the
     /// noise.
     ///
     /// # Errors
@@ -205,28 +206,29 @@ impl ModalEstimate {
         &self.constraint_tests
     }
 
-    /// Returns the rejected candidates with the reason.
+    /// Returns the rejected candidates, each with the reason of its rejection.
     pub fn dropped(&self) -> &[DroppedCandidate] {
         &self.dropped
     }
 
-    /// Returns the share of each output's power in the band that the model explains.
+    /// Returns, for each output, the fraction of its power in the band that the model explains.
     pub fn variance_explained(&self) -> Vec<f64> {
         self.explained.clone()
     }
 
-    /// Returns the root-mean-square of each sensor's own noise on a line, in the unit of the
-    /// output.
+    /// Returns, for each sensor, the RMS value of its noise on a line, in the unit of the output;
+    /// unmeasured forces are not part of it.
     pub fn noise_levels(&self) -> &[f64] {
         &self.noise_level
     }
 
-    /// Returns the variance of each sensor's own noise on every line: `[output][line]`.
+    /// Returns the variance of the noise of each sensor on every line: `[output][line]`; unmeasured
+    /// forces are not part of it.
     pub fn noise_spectra(&self) -> &[Vec<f64>] {
         &self.noise_spectrum
     }
 
-    /// Returns the variance of the unmeasured force on each mode, for its shape as reported.
+    /// Returns the variance of the unmeasured force on each mode, for the mode shape as reported.
     pub(crate) fn unmeasured_variance(&self) -> &[f64] {
         &self.unmeasured_variance
     }
@@ -260,8 +262,8 @@ impl ModalEstimate {
         &self.model
     }
 
-    /// Returns the delay of each output behind the forces, which the shapes do not contain; empty
-    /// if the data determine none.
+    /// Returns the delay of each output relative to the forces; the shapes do not contain these
+    /// delays. Empty if the data do not determine any delay.
     pub fn delays(&self) -> &[OutputDelay] {
         &self.delays
     }
@@ -271,9 +273,9 @@ impl ModalEstimate {
         self.model.response(omega)
     }
 
-    /// Predicts the outputs of line data (lines × outputs) from its inputs. The transients of its
-    /// open records are estimated from its outputs: modal loads per record, and residual terms per
-    /// output.
+    /// Predicts the outputs of line data (lines × outputs) from its inputs. The transients of open
+    /// records are estimated from the outputs: modal loads for each record, and residual terms for
+    /// each output.
     ///
     /// # Errors
     /// [`ModalError::Size`] if the numbers of inputs or outputs differ.
@@ -311,8 +313,8 @@ fn imposed(
     (imposed.unwrap_or(free), tests)
 }
 
-/// Returns one group for each mode: a constrained estimate has only the covariance of each single
-/// mode.
+/// Returns one group for each mode: a constrained estimate has no covariance between different
+/// modes.
 fn groups_of_one(modes: &[ModeParameters]) -> Vec<ModalGroup> {
     let alone =
         |(index, mode): (usize, &ModeParameters)| ModalGroup::new(vec![index], &mode.covariance);

@@ -29,8 +29,8 @@ use crate::search::Fit;
 pub struct ModalSettings {
     /// Number of modes; `None` chooses it by the likelihood.
     pub modes: Option<usize>,
-    /// Frequencies (Hz) of modes to report (within 2 %), even if they are weak; other modes are
-    /// part of the model, but not reported. Empty: all modes are reported.
+    /// Frequencies (Hz) of modes to report (within 2 %), even if they are weak. Other modes are
+    /// part of the model, but are not reported. If the list is empty, all modes are reported.
     pub near_hz: Vec<f64>,
     /// Largest number of modes that is tried.
     pub max_modes: usize,
@@ -59,10 +59,10 @@ impl Default for ModalSettings {
 
 /// Identifies the modes in the band of the data by maximum likelihood, without a window.
 ///
-/// The search varies the poles and participation factors; the shapes and residual terms then follow
-/// from linear least squares. The transient of each open record (one that is not whole periods) is
-/// estimated as one more force, common to all outputs. Delays of the outputs behind the forces are
-/// part of the model if the data determine them ([`ModalEstimate::delays`]).
+/// The search varies the poles and participation factors; the shapes and residual terms follow from
+/// linear least squares at each step. The transient of each open record (one that is not whole
+/// periods) is estimated as one more force, common to all outputs. Delays of the outputs relative
+/// to the forces are part of the model if the data determine them ([`ModalEstimate::delays`]).
 ///
 /// # Errors
 /// [`ModalError`] if the data do not suffice for a mode, or if no mode is significant.
@@ -100,7 +100,7 @@ pub fn identify_modes(
 /// record of another day.
 ///
 /// The search starts from the poles of the estimate and uses its residual powers and delays. The
-/// result has no modes that the data do not determine.
+/// result has only modes that the data determine.
 ///
 /// # Errors
 /// [`ModalError`] as for [`identify_modes`].
@@ -161,7 +161,8 @@ struct Identification<'a> {
     fit: Fit<'a>,
     noise: Noise,
     dropped: Vec<DroppedCandidate>,
-    /// `true` after the first choice of the residual powers: the noise is known well enough then.
+    /// `true` after the first choice of the residual powers; from this point on the noise is known
+    /// well enough.
     has_chosen_powers: bool,
 }
 
@@ -252,8 +253,8 @@ impl<'a> Identification<'a> {
         );
     }
 
-    /// Removes modes that gain less than the penalty of their parameters, and adds candidates that
-    /// gain more.
+    /// Removes modes whose gain is less than the penalty of their parameters, and adds candidates
+    /// whose gain is larger.
     fn choose_modes(&mut self) {
         let required = required_gain(self.lines);
         self.remove_impossible();
@@ -290,8 +291,9 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Adds modes whose response is attributed to the unmeasured force of a mode nearby, if the
-    /// likelihood of fit and noise together rises by the penalty of their parameters.
+    /// Adds modes whose response the fit attributes to the unmeasured force of a mode nearby. A
+    /// mode is added if the likelihood of fit and noise together rises by at least the penalty of
+    /// its parameters.
     fn add_hidden(&mut self, required: f64, most: usize) {
         while self.settings.unmeasured_forces && self.modes_in_band() < most {
             let mut trial = self.fit.clone();
@@ -325,11 +327,11 @@ impl<'a> Identification<'a> {
         self.fit.model.poles.iter().filter(|pole| self.lines.contains(**pole)).count()
     }
 
-    /// Removes roots that are damped too much for a resonance, and roots outside the band that gain
-    /// less than the penalty of their parameters; returns whether there were any.
+    /// Removes roots that are damped too much for a resonance, and roots outside the band whose
+    /// gain is less than the penalty of their parameters; returns whether it removed any.
     ///
-    /// A strong mode outside the band is kept: with residual terms alone, modes near the edge would
-    /// be biased.
+    /// A strong mode outside the band remains in the model: with residual terms alone, modes near
+    /// the edge would be biased.
     fn remove_impossible(&mut self) -> bool {
         let required = required_gain(self.lines);
         let losses = removal_losses(&self.fit);
@@ -349,8 +351,8 @@ impl<'a> Identification<'a> {
         reasons.iter().any(Option::is_some)
     }
 
-    /// Removes modes whose loss is below the penalty of their parameters, until all others are
-    /// significant; returns whether there were any.
+    /// Removes modes whose removal costs less likelihood than the penalty of their parameters,
+    /// until all remaining modes are significant; returns whether it removed any.
     fn remove_insignificant(&mut self, required: f64) -> bool {
         let mut removed = false;
         while self.settings.modes.is_none() {
@@ -374,10 +376,10 @@ impl<'a> Identification<'a> {
     }
 
     /// Removes the weakest modes if the likelihood, maximised again without them, falls by less
-    /// than the penalty of their parameters; returns whether there were any.
+    /// than the penalty of their parameters; returns whether it removed any.
     ///
-    /// If other modes can represent the response of a mode, its loss at fixed poles and
-    /// participations is larger than this fall.
+    /// If other modes can represent the response of a mode, the fall at fixed poles and
+    /// participations is larger than the fall after the new search.
     fn remove_replaceable(&mut self) -> bool {
         let required = required_gain(self.lines);
         let mut removed = false;
@@ -397,8 +399,8 @@ impl<'a> Identification<'a> {
             trial.model.select(&retained);
             trial.refresh();
             trial.search_roughly_to(self.fit.cost() + required);
-            // A mode that replaces another one may leave the band or the range of damping: it would
-            // be lost, too.
+            // Another mode may take the place of the removed one and leave the band or the
+            // permitted range of damping: it would be lost, too.
             let is_lost = |(before, after): (&usize, &Complex<f64>)| -> bool {
                 self.is_possible(self.fit.model.poles[*before]) && !self.is_possible(*after)
             };
@@ -424,7 +426,7 @@ impl<'a> Identification<'a> {
         removed
     }
 
-    /// Returns whether a pole may be that of a resonance within reach of the band.
+    /// Returns whether a pole may belong to a resonance in the band or near it.
     fn is_possible(&self, pole: Complex<f64>) -> bool {
         -pole.re / pole.norm() <= MAX_DAMPING && self.lines.reaches(pole)
     }
@@ -437,7 +439,7 @@ impl<'a> Identification<'a> {
         stated_modes(&self.fit.model.poles, &self.settings.near_hz)
     }
 
-    /// Keeps the modes with the largest gains, up to a stated number.
+    /// Removes modes beyond a stated number; the modes with the largest gains remain.
     fn remove_beyond(&mut self, most: usize) {
         while self.modes_in_band() > most {
             let losses = removal_losses(&self.fit);
@@ -451,7 +453,7 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Removes the modes with a reason and searches again.
+    /// Removes the modes for which there is a reason in `reasons`, and searches again.
     ///
     /// A removed mode may have taken the place of residual terms. Their powers are therefore chosen
     /// again, with the weights of the fit that contained the mode.
@@ -468,7 +470,8 @@ impl<'a> Identification<'a> {
         self.fit.search_roughly();
     }
 
-    /// Lists the modes with a reason as rejected, and returns the indices of the others.
+    /// Lists the modes for which there is a reason as rejected, and returns the indices of the
+    /// other modes.
     fn reject(&mut self, reasons: &[Option<DropReason>]) -> Vec<usize> {
         for (pole, reason) in self.fit.model.poles.iter().zip(reasons) {
             if let Some(reason) = reason {
@@ -486,7 +489,8 @@ impl<'a> Identification<'a> {
     }
 
     /// Chooses the residual powers by Akaike's criterion: too few terms bias the poles, too many
-    /// only add variance. Each unknown beyond the current number has the given `penalty` instead.
+    /// only add variance. Each unknown beyond the current number has the given `penalty` instead of
+    /// Akaike's.
     fn choose_powers(&mut self, penalty: f64) {
         if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
             return;
@@ -516,7 +520,7 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Removes modes that are significant but no resonances of the structure.
+    /// Removes modes that are significant but are not resonances of the structure.
     fn apply_rules(&mut self) {
         while self.settings.modes.is_none() && self.fit.model.modes() > 0 {
             let Some(covariance) = self.covariance_of_all() else { return };
@@ -593,8 +597,9 @@ impl<'a> Identification<'a> {
     }
 }
 
-/// Returns the reasons, except for modes near a weaker mode that is removed. Neighbours may explain
-/// the same response, so that the reason against a mode may disappear with the weaker mode.
+/// Returns the reasons, without those of modes near a weaker mode that is removed, too.
+/// Neighbouring modes may explain the same response, so that the reason against the stronger mode
+/// may disappear when the weaker one is removed.
 fn weakest_of_neighbours(
     poles: &[Complex<f64>],
     losses: &[f64],
@@ -637,10 +642,11 @@ fn power_sets() -> Vec<ResidualPowers> {
     forces.into_iter().map(|forces| ResidualPowers { forces, transients: vec![0, 1, 2] }).collect()
 }
 
-/// Maximum relative distance of a pole from a requested frequency that it matches.
+/// Maximum distance of a pole from a requested frequency, relative to this frequency, at which the
+/// pole matches it.
 const STATED_DISTANCE: f64 = 0.02;
 
-/// Returns lightly damped poles at the requested frequencies without a pole nearby.
+/// Returns lightly damped poles at those requested frequencies that have no pole nearby.
 fn missing_poles(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<Complex<f64>> {
     const DAMPING: f64 = 5e-3;
     let omegas = near_hz.iter().map(|hz| TAU * hz);
@@ -650,7 +656,8 @@ fn missing_poles(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<Complex<f64>> {
     omegas.filter(is_missing).map(|omega| Complex::new(-DAMPING, 1.0) * omega).collect()
 }
 
-/// Returns which modes are nearest to the requested frequencies; all if none is requested.
+/// Returns which modes are nearest to the requested frequencies; if none is requested, these are
+/// all modes.
 fn stated_modes(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<bool> {
     let mut stated = vec![near_hz.is_empty(); poles.len()];
     for omega in near_hz.iter().map(|hz| TAU * hz) {

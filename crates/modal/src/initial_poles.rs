@@ -1,10 +1,10 @@
-//! Initial poles: roots of a subspace method on the lines for many orders, and clusters of these
-//! roots.
+//! Initial poles: clusters of the roots that a subspace method finds from the lines, for many
+//! orders.
 //!
 //! The band is mapped to most of the unit circle, z = e^{j(ω − ω_a)Δ}; block rows are the lines
-//! times powers of z. The products of two block rows depend only on the difference of their powers:
-//! one correlation per lag gives all of them. Past inputs and outputs are the instruments; future
-//! inputs and the transient of each record are projected out.
+//! times powers of z. The products of two block rows depend only on the difference of the powers,
+//! so one correlation per lag gives all products. Past inputs and outputs are the instruments;
+//! future inputs and the transient of each record are projected out.
 //!
 //! # Source
 //! McKelvey, Akçay & Ljung, IEEE Trans. Automatic Control 41 (1996) 960 (subspace on spectral
@@ -63,8 +63,8 @@ pub(crate) fn initial_poles(lines: &Lines) -> Result<Vec<C>, ModalError> {
 }
 
 /// Returns the poles of the subspace models of rising order, the initial poles of the
-/// identification. The vectors have a single entry of 1: these models are compared by their poles
-/// only.
+/// identification. The vector of each pole has a single entry of 1, because these models are
+/// compared by their poles only.
 ///
 /// # Errors
 /// As [`identify_modes`](crate::identify_modes).
@@ -79,8 +79,8 @@ pub fn stabilisation_of(data: &LineData) -> Result<Stabilisation, ModalError> {
     Ok(Stabilisation::new(models.collect()))
 }
 
-/// Returns the number of initial modes, before any is tested: the poles on which the orders of the
-/// subspace method agree.
+/// Returns the number of initial modes, before the modes are tested. It is the number of poles on
+/// which the orders of the subspace method agree.
 ///
 /// # Errors
 /// As [`identify_modes`](crate::identify_modes).
@@ -123,7 +123,7 @@ pub(crate) fn subspace_roots(lines: &Lines) -> Result<(Vec<Root>, usize), ModalE
     Ok((retained, orders.len()))
 }
 
-/// Returns the number of block rows, or `None` if the lines are too few for two.
+/// Returns the number of block rows; `None` if fewer than three are possible.
 fn shifts(lines: &Lines, components: usize) -> Option<usize> {
     let channels = lines.inputs() + components;
     let wanted = (2 * MAX_ORDER / components).max(SUBSPACE_SHIFTS);
@@ -217,7 +217,7 @@ impl Products {
             .collect()
     }
 
-    /// Adds the products of one record after projecting out its transient.
+    /// Adds the products of one record after its transient has been projected out.
     fn add(&mut self, lags: &Lags, open: bool) -> Result<(), ModalError> {
         let rows = self.rows();
         let size = rows.len();
@@ -262,7 +262,7 @@ impl Products {
     }
 }
 
-/// Solves with a Hermitian matrix of products after adding [`RIDGE`] to its diagonal.
+/// Solves a system of equations with a Hermitian matrix of products and [`RIDGE`] on its diagonal.
 fn solve_ridged(mut matrix: Mat<C>, right: &Mat<C>) -> Result<Mat<C>, ModalError> {
     let size = matrix.nrows();
     let trace = (0..size).map(|k| matrix[(k, k)].re).sum::<f64>();
@@ -324,8 +324,8 @@ fn shift_roots(basis: &Mat<C>, outputs: usize, order: usize) -> Result<Vec<C>, M
 
 /// Returns the medians of the clusters that the roots of all orders form, sorted by frequency.
 ///
-/// The cluster with the most orders is taken first; roots within 0.3 half-widths of its median
-/// belong to it and are removed.
+/// The cluster with the most orders is taken first; roots within 0.3 half-widths of the median of
+/// this cluster belong to it and are removed.
 pub(crate) fn clusters(roots: Vec<Root>, orders: usize) -> Vec<C> {
     let mut remaining = roots;
     let mut poles = Vec::new();

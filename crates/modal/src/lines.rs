@@ -42,12 +42,13 @@ pub(crate) struct Lines {
     pub(crate) omega: Vec<f64>,
     pub(crate) outputs: Vec<Vec<Complex<f64>>>,
     pub(crate) loads: Vec<Load>,
-    /// Amplitude of each load on every line; empty for a transient, which is 1 on its record.
+    /// Amplitude of each load on every line; empty for a transient, whose amplitude is 1 on all
+    /// lines of its record.
     pub(crate) amplitude: Vec<Vec<Complex<f64>>>,
     pub(crate) blocks: Vec<Block>,
-    /// Delays that were removed from the outputs; empty: none.
+    /// Delays that were removed from the outputs; empty if no delay was removed.
     pub(crate) delays: Vec<OutputDelay>,
-    /// Stated variance of each output's noise on every line, positive; empty: unknown.
+    /// Stated variance (positive) of each output's noise on every line; empty if it is unknown.
     pub(crate) stated_noise: Vec<Vec<f64>>,
 }
 
@@ -93,7 +94,7 @@ impl Lines {
         Self { omega, outputs, loads, amplitude, blocks, delays, stated_noise }
     }
 
-    /// Returns an output without its delay, in s.
+    /// Returns an output without its delay; `delay` is in s.
     pub(crate) fn advanced_output(&self, output: usize, delay: f64) -> Vec<Complex<f64>> {
         let values = self.outputs[output].iter().zip(&self.omega);
         values.map(|(value, omega)| value * Complex::cis(omega * delay)).collect()
@@ -131,14 +132,14 @@ impl Lines {
         self.omega.iter().fold((f64::INFINITY, 0.0), fold)
     }
 
-    /// Returns whether a pole lies in the band.
+    /// Returns whether the frequency of a pole is in the band.
     pub(crate) fn contains(&self, pole: Complex<f64>) -> bool {
         let (low, high) = self.band();
         pole.im >= low && pole.im <= high
     }
 
-    /// Returns whether a pole lies in the band or so near to it that residual terms may not
-    /// describe its resonance.
+    /// Returns whether a pole is in the band or near it. Residual terms cannot always describe the
+    /// resonance of such a pole.
     pub(crate) fn reaches(&self, pole: Complex<f64>) -> bool {
         let (low, high) = self.band();
         let margin = OUTSIDE_DISTANCE * (high - low);
@@ -184,7 +185,8 @@ impl Lines {
         self.check_independence()
     }
 
-    /// Checks by Gram–Schmidt, column by column, that no input is a combination of those before it.
+    /// Checks by Gram–Schmidt, column by column, that no input is a combination of the preceding
+    /// inputs.
     fn check_independence(&self) -> Result<(), ModalError> {
         let mut basis: Vec<Vec<Complex<f64>>> = Vec::new();
         for input in 0..self.inputs() {

@@ -25,10 +25,10 @@ pub struct ModalModel {
     pub reference: f64,
     /// Powers n of the residual terms.
     pub powers: Vec<i32>,
-    /// Coefficients c of the residual terms, in the unit of the output per N: one list for each
-    /// output, in it one for each input, in it one for each power.
+    /// Coefficients c of the residual terms, in the unit of the output per N:
+    /// `[output][input][power]`.
     pub residuals: Vec<Vec<Vec<f64>>>,
-    /// Delay of each output behind the forces, in s; empty: none.
+    /// Delay of each output relative to the forces, in s; empty if there are no delays.
     #[cfg_attr(feature = "serde", serde(default))]
     pub delays: Vec<f64>,
     /// Groups of modes with dependent errors, with their covariance.
@@ -56,8 +56,9 @@ pub struct ModalTerm {
 pub struct ModalGroup {
     /// Indices of the modes.
     pub modes: Vec<usize>,
-    /// Lower triangle of the covariance, row by row. The parameters are ln(−Re λ), ln Im λ, real
-    /// and imaginary part of each entry of the shape, then of each participation, mode after mode.
+    /// Lower triangle of the covariance, row by row. The parameters of a mode are ln(−Re λ), ln Im
+    /// λ, the real and imaginary part of each entry of the shape, and those of each participation;
+    /// the modes follow one another.
     pub covariance: Vec<Vec<f64>>,
 }
 
@@ -68,7 +69,7 @@ impl ModalGroup {
         Self { modes, covariance: (0..covariance.nrows()).map(row).collect() }
     }
 
-    /// Multiplies the standard errors of each mode by its entry of `scales`.
+    /// Multiplies the standard errors of each mode by the entry of `scales` for this mode.
     fn scale_errors(&mut self, terms: &[ModalTerm], scales: &[f64]) {
         let of_mode = |mode: &usize| std::iter::repeat_n(scales[*mode], terms[*mode].parameters());
         let scale: Vec<f64> = self.modes.iter().flat_map(of_mode).collect();
@@ -98,8 +99,8 @@ impl ModalTerm {
         2 + 2 * self.shape.len() + 2 * self.participation.len()
     }
 
-    /// Returns the derivatives of the response of an output to forces by the parameters of the mode
-    /// that change it, with their indices.
+    /// Returns the derivatives of the response of an output to forces with respect to those
+    /// parameters of the mode that change it, each with the index of the parameter.
     fn derivatives(&self, output: usize, omega: f64, forces: &[C]) -> Vec<(usize, C)> {
         let pole = self.pole();
         let Kernel { value, mirror, slope, mirror_slope } = Kernel::from_force(pole, omega);
@@ -165,7 +166,8 @@ impl ModalModel {
             && self.groups.iter().all(grouped)
     }
 
-    /// Multiplies the standard errors of each mode of the groups by its entry of `scales`.
+    /// Multiplies the standard errors of each mode of the groups by the entry of `scales` for this
+    /// mode.
     pub(crate) fn scale_errors(&mut self, scales: &[f64]) {
         self.groups.iter_mut().for_each(|group| group.scale_errors(&self.terms, scales));
     }
@@ -203,8 +205,8 @@ impl ModalModel {
         response
     }
 
-    /// Returns the covariance E[δy δyᴴ] of the response to given forces at ω (rad/s) that the
-    /// errors of the modes cause, outputs × outputs.
+    /// Returns the covariance E[δy δyᴴ], due to the errors of the modes, of the response to given
+    /// forces at ω (rad/s): outputs × outputs.
     pub fn response_covariance(&self, omega: f64, forces: &[C]) -> DMatrix<C> {
         let outputs = self.outputs();
         let mut covariance = DMatrix::zeros(outputs, outputs);
@@ -236,7 +238,7 @@ impl ModalModel {
         (0..self.outputs()).map(variance).collect()
     }
 
-    /// Returns the derivatives of an output by the parameters of a group.
+    /// Returns the derivatives of an output with respect to the parameters of a group.
     fn gradient(
         &self,
         group: &ModalGroup,

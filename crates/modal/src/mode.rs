@@ -16,22 +16,23 @@ pub struct IdentifiedMode {
     pub frequency_damping_covariance: f64,
     /// Shape at the outputs; its largest entry is 1.
     pub shape: Vec<Complex<f64>>,
-    /// Standard errors of the real and imaginary part of each entry of `shape`, as real and
-    /// imaginary part.
+    /// Standard errors of each entry of `shape`: the real part is the error of the real part, the
+    /// imaginary part the error of the imaginary part.
     pub shape_standard_error: Vec<Complex<f64>>,
     /// Participation of each input: the residue of output i and input j is the product of shape
     /// entry i and participation j.
     pub participation: Vec<Complex<f64>>,
     /// Standard errors of the real and imaginary part of each participation.
     pub participation_standard_error: Vec<Complex<f64>>,
-    /// Share of this mode's motion that the measured forces drive; `None` without measured forces.
+    /// Fraction of the power of this mode that the measured forces cause; `None` without measured
+    /// forces.
     pub driven_share: Option<f64>,
     /// Ratio of unmeasured to measured force of this mode (root-mean-square, modal); `None` without
     /// measured forces.
     pub unmeasured_ratio: Option<f64>,
-    /// Decrease of −2 log L that this mode brings.
+    /// Decrease of −2 log L due to this mode.
     pub gain: f64,
-    /// `true` if the mode lies within a few half-widths of an edge of the band.
+    /// `true` if the mode is within a few half-widths of an edge of the band.
     pub near_edge: bool,
 }
 
@@ -47,8 +48,8 @@ impl IdentifiedMode {
         self
     }
 
-    /// Returns the residue of an output and an input: the numerator of 1/(jω − λ) in their
-    /// response, without a delay of the output ([`ModalEstimate::delays`]).
+    /// Returns the residue of an output and an input: the numerator over (jω − λ) in the frequency
+    /// response between them, without the delay of the output ([`ModalEstimate::delays`]).
     ///
     /// [`ModalEstimate::delays`]: crate::ModalEstimate::delays
     pub fn residue(&self, output: usize, input: usize) -> Complex<f64> {
@@ -56,8 +57,8 @@ impl IdentifiedMode {
     }
 
     /// Returns the shape at the inputs, with a largest entry of 1. If the inputs are forces at
-    /// points of one structure (roving hammer), the participations are the shape at these points,
-    /// by reciprocity.
+    /// points of one structure (roving hammer), the participations are, by reciprocity, the shape
+    /// at these points.
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), section 3.5 (a row of a response matrix is as good
@@ -70,42 +71,43 @@ impl IdentifiedMode {
     }
 }
 
-/// Reason for which a candidate was rejected.
+/// Reason why a candidate was rejected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// The likelihood gains less than the penalty of the parameters of a mode.
+    /// The decrease of −2 log L is less than the penalty of the parameters of a mode.
     Insignificant {
         /// Decrease of −2 log L.
         gain: f64,
         /// Required decrease.
         required: f64,
     },
-    /// The damping ratio does not exceed zero significantly.
+    /// The damping ratio is not significantly larger than zero.
     UndeterminedDamping {
         /// Standard error of the damping ratio.
         standard_error: f64,
     },
-    /// The damping is too high for a resonance: the root represents modes outside the band.
+    /// The damping is too large for a resonance: the root represents modes outside the band.
     TooDamped,
-    /// The root left the band.
+    /// The root is outside the band: too far from it, insignificant, or not determined.
     OutsideBand,
     /// Another mode within a half-width has the same shape and participations.
     Twin {
         /// Natural frequency of the other mode, in Hz.
         other_hz: f64,
     },
-    /// Unmeasured forces drive the mode more than the measured ones.
+    /// The unmeasured force on the mode is too large relative to the measured force.
     Undriven {
         /// Ratio of unmeasured to measured force.
         ratio: f64,
     },
-    /// The number of modes was stated, and other modes gain more.
+    /// The number of modes was stated, and other modes have larger gains.
     BeyondNumber {
         /// Decrease of −2 log L.
         gain: f64,
     },
-    /// The mode is part of the model, but frequencies were stated, and it is near none of them.
+    /// The mode is part of the model, but it is not near any of the stated frequencies, or another
+    /// mode is nearer.
     NotStated,
 }
 
@@ -121,7 +123,7 @@ pub struct DroppedCandidate {
 }
 
 impl DroppedCandidate {
-    /// Creates the record of a rejected pole (rad/s).
+    /// Creates the entry for a rejected pole (rad/s).
     pub(crate) fn new(pole: Complex<f64>, reason: DropReason) -> Self {
         let size = pole.norm();
         Self { frequency_hz: size / std::f64::consts::TAU, damping_ratio: -pole.re / size, reason }

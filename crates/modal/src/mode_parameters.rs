@@ -12,13 +12,14 @@ use crate::mode::IdentifiedMode;
 
 type C = Complex<f64>;
 
-/// Parameters of one mode: ln(−Re λ), ln Im λ, real and imaginary part of each entry of the shape
-/// (in the units of the outputs), then of the participation of each input.
+/// Parameters of one mode: ln(−Re λ), ln Im λ, the real and imaginary part of each entry of the
+/// shape (in the units of the outputs), and those of the participation of each input.
 #[derive(Debug, Clone)]
 pub(crate) struct ModeParameters {
     pub(crate) outputs: usize,
     pub(crate) inputs: usize,
-    /// Index of the load whose participation is 1; an index beyond the inputs is a transient.
+    /// Index of the load whose participation is 1; an index above those of the inputs is that of a
+    /// transient.
     pub(crate) gauge: usize,
     pub(crate) values: DVector<f64>,
     pub(crate) covariance: DMatrix<f64>,
@@ -108,14 +109,15 @@ impl ModeParameters {
         (0..self.outputs).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0)
     }
 
-    /// Returns the modal mass of the shape with a largest entry of 1, if the output of `point`
-    /// measures the `derivative`-th time derivative of the displacement at which its input acts.
+    /// Returns the modal mass of the shape with a largest entry of 1. The output of `point` must be
+    /// the `derivative`-th time derivative of the displacement where its input acts.
     ///
     /// `None` if the shape or the participation is zero at the point.
     ///
     /// The residue of the displacement is ψ²/(2jω_d) with the mass-normalised ψ at the point, so
-    /// that the mass is φ²/ψ² with the entry φ of the shape: the modulus of this complex quotient,
-    /// with the sign of its real part, because a delay between the channels changes only the phase.
+    /// that the mass is φ²/ψ² with the entry φ of the shape. The function returns the modulus of
+    /// this complex quotient with the sign of its real part: a delay between the channels changes
+    /// only the phase.
     pub(crate) fn modal_mass(&self, point: DrivingPoint, derivative: i32) -> Option<Uncertain> {
         let (pole, largest) = (self.pole(), self.largest_output());
         let [entry, scale] = [point.output, largest].map(|output| self.shape(output));
@@ -146,8 +148,8 @@ impl ModeParameters {
         })
     }
 
-    /// Returns the mode with these parameters: its shape divided by the largest entry, and its
-    /// participations multiplied by this entry.
+    /// Returns the mode with these parameters. Its shape is divided by the largest entry, and its
+    /// participations are multiplied by this entry.
     pub(crate) fn mode(&self) -> IdentifiedMode {
         let pole = self.pole();
         let (frequency, damping, frequency_damping_covariance) =
@@ -184,7 +186,8 @@ impl ModeParameters {
     }
 }
 
-/// Returns the real 2 × 2 matrix that multiplies (real part, imaginary part) by a complex number.
+/// Returns the real 2 × 2 matrix whose product with (real part, imaginary part) is the
+/// multiplication by a complex number.
 fn rotation(z: C) -> Matrix2<f64> {
     Matrix2::new(z.re, -z.im, z.im, z.re)
 }

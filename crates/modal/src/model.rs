@@ -35,14 +35,14 @@ impl ResidualPowers {
     }
 }
 
-/// Poles and participations, which the search changes, and residual powers, which define the linear
-/// unknowns.
+/// Poles, participations and residual powers. The search changes the poles and participations; the
+/// residual powers define the linear unknowns.
 #[derive(Debug, Clone)]
 pub(crate) struct Model {
     pub(crate) poles: Vec<Complex<f64>>,
     /// Participation of each load in each mode: `[mode][load]`.
     pub(crate) participation: Vec<Vec<Complex<f64>>>,
-    /// Load of each mode whose participation is 1.
+    /// For each mode, the load whose participation is 1.
     pub(crate) gauge: Vec<usize>,
     pub(crate) powers: ResidualPowers,
     /// Angular frequency that scales the residual powers.
@@ -136,14 +136,15 @@ impl Model {
         (0..2 * self.modes()).chain(active).collect()
     }
 
-    /// Returns the index of the pair of parameters of a participation that is not the gauge of its
-    /// mode.
+    /// Returns the index of the pair of parameters of a participation; the participation must not
+    /// be the gauge of the mode.
     pub(crate) fn pair_of(&self, mode: usize, load: usize, loads: usize) -> usize {
         let before = load - usize::from(load > self.gauge[mode]);
         self.modes() + mode * (loads - 1) + before
     }
 
-    /// Returns mode and load of every pair of parameters of the search: poles (no load) first.
+    /// Returns mode and load of every pair of parameters of the search; the poles (without a load)
+    /// come first.
     pub(crate) fn pairs(&self, loads: usize) -> Vec<(usize, Option<usize>)> {
         let poles = (0..self.modes()).map(|mode| (mode, None));
         let free = (0..self.modes()).flat_map(|mode| {

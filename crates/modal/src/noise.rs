@@ -2,7 +2,7 @@
 //!
 //! The noise is e(ω) = Σ_r φ_r w_r(ω)/(jω − λ_r) + n(ω), with the unmeasured force w_r on mode r
 //! and the noise n_i of sensor i; E|w_r|² = S_r, and E|n_i|² = D_i(ω) is smooth. A resonance is
-//! only a few lines wide; a smooth spectrum cannot follow the first term.
+//! only a few lines wide, so a smooth spectrum cannot describe the first term.
 //!
 //! # Source
 //! Au, *Operational Modal Analysis* (2017), chapter 10 (likelihood of the lines of modal
@@ -92,10 +92,10 @@ impl Noise {
     }
 
     /// Takes one scoring step of the logarithms of the variances of the unmeasured forces, and
-    /// returns the largest step.
+    /// returns the largest change of a logarithm.
     ///
-    /// The information of a force includes the part that it shares with others, so that the forces
-    /// of close modes do not overshoot together.
+    /// The information about a force includes the part that it shares with other forces, so that
+    /// the estimates of the forces on close modes do not overshoot together.
     fn improve_process(&mut self, sums: &[ForceSums]) -> f64 {
         let mut largest: f64 = 0.0;
         for (process, sum) in self.process.iter_mut().zip(sums) {
@@ -160,8 +160,8 @@ impl Noise {
         (total, powers)
     }
 
-    /// Returns initial variances of the unmeasured forces: the power of the residuals along each
-    /// shape near its resonance.
+    /// Returns initial variances of the unmeasured forces: the power of the residuals along the
+    /// shape of each mode near its resonance.
     fn initial_process(
         &self,
         lines: &Lines,
@@ -195,7 +195,7 @@ impl Noise {
     }
 }
 
-/// Residuals in the units of the outputs, corrected for the share of the noise that the fit
+/// Residuals in the units of the outputs, corrected for the fraction of the noise that the fit
 /// absorbs.
 pub(crate) struct Residuals {
     pub(crate) error: Vec<Vec<C>>,
@@ -278,8 +278,8 @@ fn half_window(lines: usize) -> usize {
     ((lines as f64 * NOISE_WINDOW_SHARE) as usize).max(MIN_NOISE_WINDOW)
 }
 
-/// Returns the moving mean within each record, at least `floor`; the window is cut at the ends of
-/// the record.
+/// Returns the moving mean within each record. Values below `floor` are raised to `floor`; the
+/// window is cut at the ends of the record.
 fn smooth(power: &[f64], records: &[Range<usize>], floor: f64) -> Vec<f64> {
     let mut mean = vec![0.0; power.len()];
     for rows in records {
@@ -339,11 +339,11 @@ pub(crate) fn modal_gain(pole: C, omega: f64) -> C {
     1.0 / (C::new(0.0, omega) - pole)
 }
 
-/// Step of the log variances of unmeasured forces that ends their iteration.
+/// Step of the log variances of unmeasured forces below which their iteration ends.
 const SETTLED: f64 = 0.05;
-/// Maximum step of the log variance of an unmeasured force: a force that does not exist shrinks by
-/// this factor in each step.
+/// Maximum step of the log variance of an unmeasured force. The variance of a force that does not
+/// exist shrinks by the factor e in each step.
 const MAX_SCORING_STEP: f64 = 1.0;
-/// Minimum initial variance of an unmeasured force, relative to its initial estimate from the
-/// residuals.
+/// Minimum initial variance of an unmeasured force, relative to the estimate of this variance from
+/// the residuals.
 const LEAST_FIRST_PROCESS: f64 = 0.01;

@@ -14,11 +14,11 @@ use crate::lines::{Block, Lines};
 use crate::model::Model;
 use crate::projection::{BlockArrays, Projection};
 
-/// Number of partial sums, each over neighbouring blocks: a fixed number makes results independent
-/// of the number of processors.
+/// Number of partial sums, each over neighbouring blocks. This number is fixed, so that results do
+/// not depend on the number of processors.
 const LANES: usize = 8;
 
-/// Curvature G and gradient of half the cost in the parameters of the search.
+/// Curvature G and gradient of half the cost with respect to the parameters of the search.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct NormalEquations {
     /// Number of parameters.
@@ -56,8 +56,8 @@ pub(crate) fn whitened_shapes(projection: &Projection, modes: usize) -> Vec<f64>
     shapes
 }
 
-/// Returns indices and pairs of the parameters that affect a block: all poles, and participations
-/// of its loads.
+/// Returns indices and pairs of the parameters that affect a block: all poles, and the
+/// participations of the loads of the block.
 pub(crate) fn block_pairs(
     pairs: &[(usize, Option<usize>)],
     block: &Block,
@@ -97,7 +97,7 @@ impl NormalEquations {
         Self::assemble(&sum.gram, sum.descent, &pairs, model, &products)
     }
 
-    /// Multiplies CᵀP⊥C by the shapes and scales it to the parameters.
+    /// Multiplies CᵀP⊥C by the shapes, and scales the product to the parameters.
     fn assemble(
         projected: &[f64],
         mut descent: Vec<f64>,

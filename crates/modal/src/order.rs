@@ -17,7 +17,8 @@ type C = Complex<f64>;
 const DAMPING_GRID: [f64; 6] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 3e-2];
 /// Step of the grid's frequencies, in half-widths.
 const GRID_STEP: f64 = 0.5;
-/// Share of the required gain that the scan must show before a candidate is tried.
+/// Minimum gain of a candidate in the scan, as a fraction of the required gain; candidates below it
+/// are not tried.
 const TRIAL_GAIN: f64 = 0.5;
 
 /// Candidate of a further mode in the residual.
@@ -27,12 +28,12 @@ pub(crate) struct Candidate {
     pub(crate) participation: Vec<C>,
     /// Decrease of −2 log L by this mode alone.
     pub(crate) gain: f64,
-    /// Share of the power of the residual around the candidate that it explains.
+    /// Fraction of the power of the residual around the candidate that the candidate explains.
     pub(crate) explained: f64,
 }
 
-/// Returns the decrease of −2 log L that one more mode must bring: its parameters times the
-/// logarithm of the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
+/// Returns the required decrease of −2 log L by one more mode: the number of its parameters times
+/// the logarithm of the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
 pub(crate) fn required_gain(lines: &Lines) -> f64 {
     let parameters = 2 * (lines.outputs.len() + lines.loads.len() - 1) + 2;
     parameters as f64 * lines.schwarz()
@@ -63,8 +64,8 @@ pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
     (0..modes).map(loss).collect()
 }
 
-/// Returns whether a pole lies within the resonance of a mode of the fit and is about as wide: only
-/// such a pole can be hidden by the unmeasured force of the mode.
+/// Returns whether a pole is within the resonance of a mode of the fit and has about the same width
+/// as the mode. The unmeasured force on the mode can hide only such a pole.
 pub(crate) fn is_within_resonance(pole: C, modes: &[C]) -> bool {
     let width = |mode: &C| pole.re / mode.re;
     let inside = |mode: &&C| (pole.im - mode.im).abs() < HIDDEN_HALF_WIDTHS * -mode.re;
@@ -74,12 +75,12 @@ pub(crate) fn is_within_resonance(pole: C, modes: &[C]) -> bool {
         .any(|mode| (HIDDEN_WIDTHS.recip()..=HIDDEN_WIDTHS).contains(&width(mode)))
 }
 
-/// Returns the best candidate within the resonance of a mode of the fit whose response to the
-/// measured forces explains most of the residual around it.
+/// Returns the best candidate within the resonance of a mode of the fit. The response of the
+/// candidate to the measured forces must explain most of the residual around it.
 ///
-/// If two close modes are fitted as one, the unmeasured force of this mode represents the remaining
-/// response, and the weights hide the other mode. Noise and unmeasured forces are independent of
-/// the measured forces: they explain little of such a residual.
+/// If two close modes are fitted as one mode, the unmeasured force on this mode represents the
+/// remaining response, and the weights hide the second mode. Such a residual depends on the
+/// measured forces; noise and the response to unmeasured forces do not.
 pub(crate) fn hidden(fit: &Fit<'_>, required: f64) -> Option<Candidate> {
     let mut candidates = candidates(fit, &|pole| is_within_resonance(pole, &fit.model.poles));
     candidates.retain(|one| one.gain > required && one.explained > LEAST_HIDDEN_SHARE);
@@ -148,7 +149,7 @@ impl Residual {
         Self { values, weight }
     }
 
-    /// Fits one more mode at a given pole to the residual around it.
+    /// Fits one more mode, at a given pole, to the residual near this pole.
     fn candidate(
         &self,
         lines: &Lines,

@@ -10,22 +10,22 @@ use crate::estimate::ModalEstimate;
 use crate::identify::{ModalSettings, refit_modes};
 use crate::limits::DIFFERENCE_PROBABILITY;
 
-/// Modes of an estimate that were fitted to two parts of its data.
+/// Modes of an estimate, fitted again to two parts of its data.
 #[derive(Debug, Clone)]
 pub struct PartsComparison {
     /// Modes of both parts.
     pub parts: [Vec<ComparedMode>; 2],
     /// Pairs of modes of both parts with the tests of their differences.
     pub pairs: Vec<ModePair>,
-    /// Factor on the standard errors of each mode of the whole: 1 if the parts agree, otherwise the
-    /// largest significant difference in units of its standard error; `None` for a mode that one of
-    /// the parts alone does not determine.
+    /// Factor for the standard errors of each mode of the whole data. It is 1 if the parts agree;
+    /// otherwise it is the largest significant difference, in units of its standard error. `None`
+    /// for a mode that one of the parts alone does not determine.
     pub error_scales: Vec<Option<f64>>,
 }
 
 impl PartsComparison {
-    /// Fits the modes of an estimate to two parts of its data and tests the differences of their
-    /// natural frequencies and damping ratios.
+    /// Fits the modes of an estimate to two parts of its data, and tests the differences in natural
+    /// frequency and damping ratio between the parts.
     ///
     /// A linear structure that does not change has the same modes in both parts.
     ///
@@ -41,16 +41,17 @@ impl PartsComparison {
         parts: [&LineData; 2],
         settings: &ModalSettings,
     ) -> Result<Self, ModalError> {
-        // A part of a test may lack one of the forces that a constraint names.
+        // A force that a constraint names may be missing in a part of a test, so parts are fitted
+        // without constraints.
         let settings = ModalSettings { constraints: Vec::new(), ..settings.clone() };
         let [first, second] = parts.map(|data| refit_modes(data, whole, &settings));
         let parts = [first?.compared_modes(), second?.compared_modes()];
         Ok(Self::from_modes(&whole.compared_modes(), parts))
     }
 
-    /// Fits the modes of an ambient record to two parts of it and tests the differences of their
-    /// natural frequencies and damping ratios. Modes without an interval in one of the parts are
-    /// not compared.
+    /// Fits the modes of an ambient record to two parts of the record, and tests the differences in
+    /// natural frequency and damping ratio between the parts. Modes without an interval in one of
+    /// the parts are not compared.
     ///
     /// # Errors
     /// [`AmbientError`] if a part is too short for the spectrum of the whole.
@@ -67,8 +68,8 @@ impl PartsComparison {
         Ok(Self::from_modes(&whole, [known(first?), known(second?)]))
     }
 
-    /// Compares the modes of two parts with each other and with those of the whole. All have the
-    /// same outputs.
+    /// Compares the modes of two parts with each other and with the modes of the whole data. All
+    /// modes have the same outputs.
     fn from_modes(whole: &[ComparedMode], parts: [Vec<ComparedMode>; 2]) -> Self {
         let [first, second] = &parts;
         let rule = PairingRule::default();
@@ -81,8 +82,8 @@ impl PartsComparison {
         Self { parts, pairs, error_scales }
     }
 
-    /// Returns the mode that differs most, in both parts, with its pair; `None` if the parts have
-    /// no common mode.
+    /// Returns the mode that differs most between the parts: the mode in both parts, and their
+    /// pair. `None` if the parts have no common mode.
     pub fn largest_difference(&self) -> Option<([&ComparedMode; 2], &ModePair)> {
         let pair = self.pairs.iter().min_by(|a, b| p_value(a).total_cmp(&p_value(b)))?;
         let [first, second] = &self.parts;
@@ -110,8 +111,8 @@ fn p_value(pair: &ModePair) -> f64 {
     differences(pair).filter_map(|difference| difference.adjusted_p_value).fold(1.0, f64::min)
 }
 
-/// Returns the largest significant difference of a mode in units of its standard error, or 1
-/// without any.
+/// Returns the largest significant difference of a mode, in units of the standard error of the
+/// difference; 1 if no difference is significant.
 fn excess(pair: &ModePair) -> f64 {
     let is_significant = |p_value: f64| p_value < DIFFERENCE_PROBABILITY;
     differences(pair)

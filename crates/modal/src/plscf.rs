@@ -2,9 +2,9 @@
 //! frequency responses.
 //!
 //! The responses of a table are fitted by a right matrix fraction H = B(z) A(z)⁻¹ with real
-//! coefficients in z = exp(−j(ω − ω₁)Δ), where Δ maps the band to half the unit circle. Only sums
-//! over the lines are needed, and the sums of the highest order contain the sums of every lower
-//! order.
+//! coefficients in z = exp(−j(ω − ω₁)Δ), where Δ maps the band to half the unit circle. The fit
+//! needs only sums over the lines. The sums for the highest order contain the sums for all lower
+//! orders.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,8 +15,8 @@ use thiserror::Error;
 use crate::decomposition;
 use crate::stabilisation::{Pole, PoleCluster, Stabilisation};
 
-/// Share of the half circle to which the band is mapped: below 1, the edges of the band do not meet
-/// their mirror images.
+/// Fraction of the half circle to which the band is mapped. The fraction is below 1, so that the
+/// edges of the band do not meet their mirror images.
 const CIRCLE: f64 = 0.995;
 
 /// Largest damping ratio of a pole that counts as a mode of the band.
@@ -25,8 +25,8 @@ const MAX_DAMPING: f64 = 0.1;
 /// Minimum share of the orders in which a mode must have a pole.
 const MIN_SHARE: f64 = 0.4;
 
-/// Maximum number of rows of a companion matrix: the time of its eigenvalues rises with the third
-/// power.
+/// Maximum number of rows of a companion matrix: the time for the eigenvalues rises with the third
+/// power of this number.
 const MAX_COMPANION: usize = 400;
 
 /// Error of the estimator of frequency responses.
@@ -62,7 +62,7 @@ pub enum PlscfError {
         lines: usize,
         /// Highest order asked for.
         order: usize,
-        /// Number of lines that it needs.
+        /// Number of lines that the highest order needs.
         needed: usize,
     },
     /// The orders do not rise, are zero, or are too high.
@@ -119,8 +119,8 @@ impl ResponseTable {
     /// Weights every line of every output (lines × outputs) by the inverse of its standard
     /// deviation.
     ///
-    /// Do not use the scatter about a response that was smoothed over frequency: it mistakes a
-    /// narrow resonance for noise.
+    /// The standard deviation must not come from the scatter about a response that was smoothed
+    /// over frequency: at a narrow resonance this scatter is not noise.
     ///
     /// # Errors
     /// [`PlscfError::Size`], [`PlscfError::Value`].
@@ -157,10 +157,11 @@ impl ResponseTable {
     }
 }
 
-/// Returns the poles and participations of models of all `orders` (of the denominator, rising).
+/// Returns the poles and participations of models of all `orders` (orders of the denominator,
+/// rising).
 ///
-/// A model of order n with q inputs has n q poles; those in the band that decay are returned, with
-/// the participations of the inputs.
+/// A model of order n with q inputs has n q poles. The function returns the decaying poles in the
+/// band, with the participations of the inputs.
 ///
 /// # Errors
 /// [`PlscfError::Orders`], [`PlscfError::TooFewLines`], [`PlscfError::Singular`].
@@ -188,8 +189,8 @@ pub fn plscf(table: &ResponseTable, orders: &[usize]) -> Result<Stabilisation, P
     Ok(Stabilisation::new(models?))
 }
 
-/// Returns the modes of a table as the clusters of its poles over `orders`, by rising frequency:
-/// initial values of a maximum-likelihood fit.
+/// Returns the clusters of the poles of a table over `orders`, by rising frequency. They are the
+/// initial values of the modes in a maximum-likelihood fit.
 ///
 /// # Errors
 /// As [`plscf`].
@@ -349,8 +350,8 @@ fn accumulate(sums: &mut [f64], powers: &[Complex<f64>], value: Complex<f64>) {
     }
 }
 
-/// Solves A X = B of a positive definite A, each unknown scaled by its diagonal; by LU where
-/// rounding makes A indefinite.
+/// Solves A X = B for a positive definite A, after scaling so that the diagonal of A is 1. If
+/// rounding makes A indefinite, LU factorisation replaces the Cholesky factorisation.
 fn scaled_solve(mut matrix: DMatrix<f64>, mut right: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale: Vec<f64> = matrix.diagonal().iter().map(|d| d.max(0.0).sqrt()).collect();
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {

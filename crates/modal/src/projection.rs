@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use crate::dense::{Triangle, add_product, triangularise};
 use crate::lines::{Block, Lines};
 
-/// Approximate standard deviation of the noise for the search: a shape over the lines that all
-/// outputs share, times a level of each output. E|n_i(ω)|² is (shape(ω) level_i)².
+/// Approximate standard deviation of the noise for the search. It is the product of a shape over
+/// the lines, which all outputs share, and a level of each output. E|n_i(ω)|² is (shape(ω)
+/// level_i)².
 #[derive(Debug, Clone)]
 pub(crate) struct Weights {
     pub(crate) shape: Vec<f64>,
@@ -52,7 +53,7 @@ pub(crate) struct BlockArrays {
     pub(crate) weight: Vec<f64>,
     /// Whitened outputs, 2n rows each.
     pub(crate) outputs: Vec<f64>,
-    /// Columns of the whole problem that act on the block.
+    /// Indices of the columns of the whole problem that act on the block.
     pub(crate) columns: Vec<usize>,
     /// Whitened columns, 2n rows each.
     pub(crate) design: Vec<f64>,
@@ -64,7 +65,7 @@ pub(crate) struct BlockArrays {
     local: Vec<f64>,
 }
 
-/// Linear unknowns of all outputs for given columns, and the residuals of the outputs.
+/// Linear unknowns of all outputs for a given design, and the residuals of the outputs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Projection {
     pub(crate) blocks: Vec<BlockArrays>,
@@ -97,7 +98,8 @@ impl Projection {
 
     /// Solves for the linear unknowns and returns the cost.
     ///
-    /// Each block is reduced to its triangular factor, and these factors to one; Q is never formed.
+    /// Each block is reduced to a triangular factor, and these factors are combined into one
+    /// factor; Q is never computed.
     pub(crate) fn solve(&mut self, lines: &Lines, design: &impl Design) -> f64 {
         let (columns, outputs) = (design.columns(lines), lines.outputs.len());
         self.blocks.par_iter_mut().zip(&lines.blocks).for_each(|(arrays, block)| {

@@ -6,8 +6,8 @@ use crate::lines::{Block, Lines};
 use crate::model::{Model, ResidualPowers, growth, kernels, level_near, select_kernel, write_pair};
 use crate::projection::{Design, Projection, Weights};
 
-/// Linear model with an unconstrained residue for every mode and load, and with the residual terms
-/// of the modes outside the band.
+/// Linear model with an unconstrained residue for every mode and load, and with residual terms for
+/// the modes outside the band.
 pub(crate) struct FreeResidues<'a> {
     /// Poles and powers of jω in the residual terms; the participations are not used.
     pub(crate) model: &'a Model,

@@ -10,7 +10,7 @@ use crate::model::Model;
 use crate::noise::{Noise, modal_gain};
 use crate::search::Fit;
 
-/// Returns the power of a mode from the measured forces and from the unmeasured one.
+/// Returns the power of a mode from the measured forces, and its power from the unmeasured force.
 fn powers(lines: &Lines, model: &Model, noise: &Noise, mode: usize) -> (f64, f64) {
     let (mut measured, mut unmeasured) = (0.0, 0.0);
     for block in &lines.blocks {
@@ -43,8 +43,8 @@ pub(crate) fn unmeasured_ratio(
     Some((unmeasured / measured).sqrt())
 }
 
-/// Returns one mode of a fit with the values of `parameters`; `gain` is the decrease of −2 log L by
-/// the mode.
+/// Returns one mode of a fit with the values of `parameters`; `gain` is the decrease of −2 log L
+/// due to the mode.
 pub(crate) fn identified_mode(
     fit: &Fit<'_>,
     noise: &Noise,

@@ -1,4 +1,5 @@
-//! Scatter of the residual along the shapes of the modes, beside that of independent sensors.
+//! Scatter of the residual along the shapes of the modes, relative to the scatter from independent
+//! sensor noise.
 
 use mechid_spectra::LineData;
 use nalgebra::Complex;
@@ -7,14 +8,14 @@ use crate::limits::LEAST_SCATTER_LINES;
 use crate::{IdentifiedMode, ModalError, ModalEstimate};
 
 impl ModalEstimate {
-    /// Returns for each mode the ratio of the residual power along its shape, near its resonance,
-    /// to the power expected from independent noise of the outputs and from the unmeasured force on
-    /// the mode. The ratio is corrected for the unknowns that the fit absorbs; it is `None` with
-    /// too few lines at the resonance.
+    /// Returns, for each mode, a ratio of powers near its resonance: the residual power along its
+    /// shape, divided by the mean power from independent noise of the outputs and from the
+    /// unmeasured force on the mode. The ratio is corrected for the residual power that the
+    /// unknowns of the fit absorb. It is `None` with too few lines at the resonance.
     ///
-    /// Leakage of averaged responses moves all outputs together, along the shape of the mode. The
-    /// variance of frequency and damping ratio is then larger by this ratio than with independent
-    /// outputs.
+    /// Leakage of averaged responses has the same relative effect on all outputs, along the shape
+    /// of the mode. In this case the variance of frequency and damping ratio is this ratio times
+    /// the variance for independent outputs.
     ///
     /// # Errors
     /// As [`ModalEstimate::synthesis`].
@@ -44,7 +45,8 @@ impl ModalEstimate {
                 squares += weight * weight;
             }
             let lines = weights * weights / squares;
-            // The pole and the entry of the shape along itself absorb two complex numbers.
+            // The fit of the pole and of the scale of the shape uses two complex degrees of
+            // freedom.
             (lines > LEAST_SCATTER_LINES).then(|| sum / weights / (1.0 - 2.0 / lines))
         };
         Ok(self.modes().iter().zip(self.unmeasured_variance()).map(ratio).collect())

@@ -1,5 +1,5 @@
 //! Scores of the search: projected derivatives of each block, and the effect of an unmeasured force
-//! on them.
+//! on these scores.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -26,7 +26,8 @@ pub(crate) struct BlockProducts {
     derivatives: Vec<f64>,
 }
 
-/// Effect of a mode's unmeasured force on the two unknowns of its shape, for a whitened shape of 1.
+/// Effect of the unmeasured force on a mode on the two unknowns of its shape, for a whitened shape
+/// of 1.
 #[derive(Debug, Clone)]
 pub(crate) struct ProcessEffect {
     /// Covariance of the two unknowns.
@@ -41,7 +42,8 @@ fn local_rows(columns_of_all: &[f64], columns: usize, indices: &[usize]) -> Vec<
     chunks.flat_map(|column| indices.iter().map(|index| column[*index])).collect()
 }
 
-/// Returns columns with the real and the imaginary part of each line times a factor of the line.
+/// Returns columns in which the real and the imaginary part of each line are multiplied by the
+/// factor of the line.
 fn scaled(columns: &[f64], factors: &[f64]) -> Vec<f64> {
     columns.iter().zip(factors.iter().cycle()).map(|(value, factor)| value * factor).collect()
 }
@@ -49,7 +51,7 @@ fn scaled(columns: &[f64], factors: &[f64]) -> Vec<f64> {
 impl BlockProducts {
     /// Computes the products of a block; `deviation` is the standard deviation of the sensor noise
     /// on each line relative to the weights.
-    #[allow(clippy::too_many_arguments, reason = "one call, all of it the same fit")]
+    #[allow(clippy::too_many_arguments, reason = "all arguments belong to one fit")]
     pub(crate) fn new(
         lines: &Lines,
         model: &Model,

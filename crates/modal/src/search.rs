@@ -35,30 +35,33 @@ impl<'a> Fit<'a> {
         self.projection.cost
     }
 
-    /// Whitens again and solves for the linear unknowns, after a change of weights or model.
+    /// Whitens the data again and solves for the linear unknowns, after a change of weights or
+    /// model.
     pub(crate) fn refresh(&mut self) {
         self.model.fix_gauge(self.lines);
         self.projection.whiten(self.lines, &self.weights);
         self.projection.solve(self.lines, &self.model);
     }
 
-    /// Takes steps until the cost no longer falls, at most `MAX_STEPS`.
+    /// Takes at most `MAX_STEPS` steps, until the cost no longer falls.
     pub(crate) fn search(&mut self) {
         self.search_until(MAX_STEPS, COST_TOLERANCE, f64::INFINITY);
     }
 
-    /// Takes a few steps: accurate enough to estimate the noise and the number of modes.
+    /// Takes a few steps; the result is accurate enough to estimate the noise and the number of
+    /// modes.
     pub(crate) fn search_roughly(&mut self) {
         self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE, f64::INFINITY);
     }
 
-    /// Takes a few steps, and ends if the cost will hardly fall to `goal`.
+    /// Takes a few steps, and ends early if the cost is unlikely to fall to `goal`.
     pub(crate) fn search_roughly_to(&mut self, goal: f64) {
         self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE, goal);
     }
 
-    /// Takes steps until the cost falls by less than `tolerance`, at most `limit`; also ends if the
-    /// cost would stay above `goal` even if every further step lowered it as much as the last one.
+    /// Takes at most `limit` steps, until a step lowers the cost by less than `tolerance`. It also
+    /// ends if the cost would remain above `goal` with all further steps as effective as the last
+    /// one.
     fn search_until(&mut self, limit: usize, tolerance: f64, goal: f64) {
         if self.model.modes() == 0 {
             return;
@@ -79,7 +82,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Takes one step that does not raise the cost, and returns the cost there.
+    /// Takes one step that does not raise the cost, and returns the cost after the step.
     fn step(&mut self, cost: f64, damping: &mut f64) -> Option<f64> {
         let normal = NormalEquations::new(self.lines, &self.model, &self.projection);
         let before = self.model.clone();

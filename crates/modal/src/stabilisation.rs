@@ -1,31 +1,33 @@
-//! Poles of models of rising order: which of them are stable, and the clusters that they form.
+//! Poles of models of rising order: their stability from order to order, and their clusters.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::decomposition;
 use crate::indicators::mac;
 
-/// Largest relative change of the frequency from one order to the next of a stable pole.
+/// Largest relative change of the frequency of a stable pole from one order to the next.
 pub const STABLE_FREQUENCY: f64 = 0.01;
 
-/// Largest relative change of the damping ratio from one order to the next of a stable pole.
+/// Largest relative change of the damping ratio of a stable pole from one order to the next.
 pub const STABLE_DAMPING: f64 = 0.05;
 
-/// Largest decrease below 1 of the MAC of participations or shapes from one order to the next of a
-/// stable pole.
+/// Largest value of 1 − MAC for a stable pole, where the MAC compares its participations or shapes
+/// of one order and the next.
 pub const STABLE_VECTOR: f64 = 0.02;
 
-/// Minimum radius of a cluster, in relative frequency: allows for rounding and noise of very
-/// lightly damped poles, whose half-power width is smaller.
+/// Minimum radius of a cluster, in relative frequency: the half-power width of very lightly damped
+/// poles is smaller than their scatter due to rounding and noise.
 const CLUSTER_FREQUENCY: f64 = 4e-4;
 
 /// Maximum radius of a cluster, in relative frequency, even for strong damping.
 const CLUSTER_REACH: f64 = 0.005;
 
-/// Maximum relative distance in damping of a member from the centre of a cluster.
+/// Maximum distance in damping of a member from the centre of its cluster, relative to the damping
+/// of the centre.
 const CLUSTER_DAMPING: f64 = 0.3;
 
-/// Distance from the median of a cluster, in decay rates, within which further poles belong to it.
+/// Distance from the median of a cluster, in decay rates, within which further poles belong to this
+/// cluster.
 const CLUSTER_CLAIM: f64 = 0.3;
 
 /// Pole of a model of one order.
@@ -57,13 +59,14 @@ pub struct StabilisationPole {
     pub order: usize,
     /// The pole.
     pub pole: Pole,
-    /// `true` if a pole of the previous order is within [`STABLE_FREQUENCY`].
+    /// `true` if the frequency of the nearest pole of the previous order differs by at most
+    /// [`STABLE_FREQUENCY`].
     pub stable_frequency: bool,
-    /// `true` if a pole of the previous order has a stable frequency and agrees within
-    /// [`STABLE_DAMPING`].
+    /// `true` if the frequency is stable and the damping ratio of the nearest pole of the previous
+    /// order differs by at most [`STABLE_DAMPING`].
     pub stable_damping: bool,
-    /// `true` if participation or shape of the nearest pole of the previous order agrees within
-    /// [`STABLE_VECTOR`].
+    /// `true` if the frequency is stable and participation or shape of the nearest pole of the
+    /// previous order agrees within [`STABLE_VECTOR`].
     pub stable_vector: bool,
 }
 
@@ -79,11 +82,12 @@ impl StabilisationPole {
 pub struct PoleCluster {
     /// Medians of real and imaginary part, in rad/s, and the common direction of the vectors.
     pub pole: Pole,
-    /// Share of the orders with a member.
+    /// Fraction of the orders that have a member in the cluster.
     pub share: f64,
 }
 
-/// Poles of all orders, rising, each marked as stable or not relative to the order before.
+/// Poles of all orders, in rising order. Each pole is marked as stable or not stable, compared with
+/// the preceding order.
 ///
 /// # Source
 /// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal
@@ -95,7 +99,7 @@ pub struct Stabilisation {
 }
 
 impl Stabilisation {
-    /// Takes the poles of each order, orders rising.
+    /// Creates the diagram from the poles of each order; the orders must rise.
     pub fn new(models: Vec<(usize, Vec<Pole>)>) -> Self {
         let orders = models.iter().map(|(order, _)| *order).collect();
         let mut poles = Vec::new();
@@ -117,8 +121,8 @@ impl Stabilisation {
         &self.poles
     }
 
-    /// Returns the clusters of poles damped less than `max_damping` that have members in at least
-    /// `min_share` of the orders, by rising frequency.
+    /// Returns the clusters of poles whose damping ratio is below `max_damping`, by rising
+    /// frequency. A cluster has members in at least the fraction `min_share` of the orders.
     pub fn clusters(&self, max_damping: f64, min_share: f64) -> Vec<PoleCluster> {
         let candidates = self.poles.iter().filter(|p| p.pole.damping_ratio() < max_damping);
         let mut free: Vec<&StabilisationPole> = candidates.collect();
@@ -163,7 +167,8 @@ fn with_stability(order: usize, pole: &Pole, before: &[Pole]) -> StabilisationPo
     StabilisationPole { order, pole, stable_frequency, stable_damping, stable_vector }
 }
 
-/// Returns the members of the neighbourhood with the most orders, and the number of orders.
+/// Returns the members of the neighbourhood that contains poles of the most orders, and the number
+/// of these orders.
 fn densest(sorted: &[&StabilisationPole]) -> Option<(Vec<usize>, usize)> {
     let frequency = |i: usize| sorted[i].pole.pole.norm();
     let mut best: Option<(Vec<usize>, usize)> = None;

@@ -1,4 +1,4 @@
-//! Transients of the records that the modes predict.
+//! Transients of records whose response is predicted from the modes.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -9,8 +9,8 @@ use crate::model::{growth, kernels};
 
 type C = Complex<f64>;
 
-/// Adds to `predicted` the transients of open records, fitted to what remains of the outputs: one
-/// complex load of each mode per record, and real residual terms of each output.
+/// Adds to `predicted` the transients of open records, fitted to the outputs minus the prediction
+/// so far: one complex load of each mode for each record, and real residual terms of each output.
 pub(crate) fn add_transients(
     lines: &Lines,
     modes: &[&IdentifiedMode],
@@ -85,8 +85,9 @@ impl Record<'_> {
         C::i().powi(power) * (omega / self.reference).powi(power)
     }
 
-    /// Returns the triangular factor of an output's columns and its number of rows. The residual
-    /// terms come first, so that they can be projected out of the loads that all outputs share.
+    /// Returns the triangular factor of an output's columns and its number of rows. The columns of
+    /// the residual terms come first, so that these terms can be projected out; the loads, which
+    /// all outputs share, remain.
     fn reduced(
         &self,
         lines: &Lines,

@@ -1,5 +1,5 @@
-//! Score and information that the residuals of one line give on the unmeasured forces of the modes
-//! near it.
+//! Score and information from the residuals of one line about the unmeasured forces on the modes
+//! near this line.
 
 use nalgebra::Complex;
 
@@ -16,11 +16,11 @@ pub(crate) struct ForceSums {
     /// Derivative of the log-likelihood with respect to ln S_r: Σ S_r (|b_rᴴV⁻¹e|² − b_rᴴV⁻¹b_r),
     /// with the response b_r to a unit force on mode r, the residual e and its covariance V.
     pub(crate) score: f64,
-    /// Information on ln S_r, including the part shared with other forces: Σ_s Σ S_r S_s
+    /// Information about ln S_r, including the part shared with other forces: Σ_s Σ S_r S_s
     /// |b_rᴴV⁻¹b_s|².
     pub(crate) information: f64,
-    /// Largest share of the force in the noise of a line in the direction of its response, from 0
-    /// to 1.
+    /// Largest fraction, over the lines, that the force contributes to the noise in the direction
+    /// of its response, from 0 to 1.
     pub(crate) largest_share: f64,
 }
 
@@ -35,7 +35,8 @@ impl ForceSums {
     /// Returns the degrees of freedom of the noise estimate at the resonance.
     ///
     /// The variance of ln S_r is 1/information. The logarithm of an estimate with ν degrees of
-    /// freedom has the variance 2/ν. Only the share of the force in the noise has this uncertainty.
+    /// freedom has the variance 2/ν. Only the part of the noise that the force causes has this
+    /// uncertainty.
     ///
     /// # Source
     /// Satterthwaite (1946), Biometrics Bulletin 2, 110–114.
@@ -61,8 +62,8 @@ pub(crate) struct ForceModel<'a> {
     pub(crate) directions: &'a [f64],
 }
 
-/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for the columns φ_r h_r of B and the covariance V of
-/// the line; its memory is reused from line to line.
+/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e, where φ_r h_r are the columns of B and V is the
+/// covariance of the line. The memory is reused from line to line.
 #[derive(Default)]
 pub(crate) struct Posterior {
     active: Vec<usize>,
@@ -76,7 +77,7 @@ pub(crate) struct Posterior {
 }
 
 impl Posterior {
-    /// Moves to a line and returns whether a mode is near it.
+    /// Moves to a line and returns whether a mode is near this line.
     pub(crate) fn move_to(&mut self, forces: &ForceModel<'_>, line: usize) -> bool {
         let ForceModel { noise, lines, model, .. } = *forces;
         let omega = lines.omega[line];
@@ -169,8 +170,8 @@ impl Posterior {
         }
     }
 
-    /// Returns the expected power of an error after subtraction of the response to unmeasured
-    /// forces.
+    /// Returns the expected power of the sensor noise of an output: |`error` − r|² plus the
+    /// variance of r, where r is the most likely response to unmeasured forces.
     pub(crate) fn remaining_power(&mut self, shapes: &[Vec<C>], output: usize, error: C) -> f64 {
         let size = self.active.len();
         let parts = &mut self.parts;

@@ -70,7 +70,7 @@ pub enum ModelError {
     Parameter {
         /// Name of the parameter.
         name: &'static str,
-        /// Requirement that it does not meet.
+        /// Requirement that the value does not meet.
         requirement: &'static str,
         /// Value given, in the unit of the quantity.
         value: f64,
@@ -137,7 +137,7 @@ pub enum ModelError {
         what: &'static str,
         /// The word given.
         name: String,
-        /// Known words, separated by commas.
+        /// Accepted words, separated by commas.
         known: &'static str,
     },
     /// An index is outside M, C and K.
@@ -179,7 +179,7 @@ pub enum ModelError {
     },
     /// A variance is negative, or a covariance is not finite.
     #[error(
-        "{parameter} has the variance {variance} or a covariance that is not finite: \
+        "{parameter} has the variance {variance}, or one of its covariances is not finite: \
          leave out the parameters that the data do not determine",
         variance = message::number(*variance)
     )]

@@ -108,7 +108,8 @@ impl JournalBearing {
     /// Returns the same shaft with support springs `sx`, `sy` (N/m) added to Kxx and Kyy.
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] if one of them, or its sum with the film's, is not finite.
+    /// [`ModelError::Parameter`] if a spring, or its sum with the stiffness of the film, is not
+    /// finite.
     pub fn with_support(self, sx: f64, sy: f64) -> Result<Self, ModelError> {
         require("support stiffness in x", sx, "finite", (self.film.kxx + sx).is_finite())?;
         require("support stiffness in y", sy, "finite", (self.film.kyy + sy).is_finite())?;

@@ -8,16 +8,17 @@
 pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-7;
 
 /// Distance between the shift of inverse iteration and the eigenvalue, in units of the rounding of
-/// the eigenvalue. It is larger than the coupling that rounding causes between equal eigenvalues,
-/// so that each start vector gives another direction.
+/// the eigenvalue. The distance is larger than the coupling that rounding causes between equal
+/// eigenvalues, so that each start vector gives a different direction.
 pub(crate) const INVERSE_ITERATION_SHIFT: f64 = 100.0;
 
 /// Number of steps of inverse iteration: the first step reduces the other modes to the size of
-/// rounding, the second below it.
+/// rounding, the second step to less.
 pub(crate) const INVERSE_ITERATION_STEPS: usize = 2;
 
-/// Smallest part of a shape that is independent of the other shapes of the same eigenvalue,
-/// relative to the shape; below it there is no further independent shape.
+/// Smallest independent part of a shape: the part that is not a combination of the other shapes of
+/// the same eigenvalue, relative to the whole shape. If the part is smaller, there is no further
+/// independent shape.
 pub(crate) const INDEPENDENT_SHAPE: f64 = 1e-3;
 
 /// Maximum number of degrees of freedom for which all singular values of M are computed; above it

@@ -23,9 +23,9 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// Creates a mode from λ, in rad/s, and any multiple of its shape, one entry per degree of
-    /// freedom; for a conjugate pair, either of the two. `None` unless all are finite and the shape
-    /// is not zero.
+    /// Creates a mode from λ (rad/s) and any multiple of its shape, one entry per degree of
+    /// freedom; of a conjugate pair, either eigenvalue can be given. `None` if a number is not
+    /// finite or the shape is zero.
     pub fn new(eigenvalue: Complex<f64>, shape: &DVector<Complex<f64>>) -> Option<Self> {
         let largest = largest_entry(shape);
         let finite = |z: &Complex<f64>| z.re.is_finite() && z.im.is_finite();
@@ -39,7 +39,8 @@ impl Mode {
         (sound && shape.iter().all(finite)).then_some(Self { eigenvalue, shape })
     }
 
-    /// Eigenvalue λ, in rad/s, with Im λ ≥ 0; its conjugate belongs to the conjugate shape.
+    /// Eigenvalue λ, in rad/s, with Im λ ≥ 0; the conjugate eigenvalue belongs to the conjugate
+    /// shape.
     pub fn eigenvalue(&self) -> Complex<f64> {
         self.eigenvalue
     }
@@ -205,10 +206,10 @@ impl SecondOrderSystem {
     /// for each real eigenvalue.
     ///
     /// A system of n degrees of freedom has n modes if all of them oscillate, otherwise up to 2n.
-    /// If a repeated eigenvalue has enough independent shapes, they are orthogonal; each is then
-    /// scaled. If it has fewer (it is defective, as in critical damping), a shape is repeated.
-    /// Rounding splits a defective pair by about √ε: a rigid-body mode has |λ| of about 1e-7 rad/s
-    /// instead of 0.
+    /// If a repeated eigenvalue has enough independent shapes, the shapes are made orthogonal and
+    /// then scaled. If it has fewer shapes (a defective eigenvalue, as in critical damping), a
+    /// shape is repeated. Rounding splits a defective pair by about √ε: a rigid-body mode has |λ|
+    /// of about 1e-7 rad/s instead of 0.
     ///
     /// The shapes come from the same Schur form as the eigenvalues, at a cost of O(n²) each; if
     /// only frequencies and damping are needed, [`eigenvalues`](Self::eigenvalues) is a little

@@ -39,8 +39,8 @@ impl Sdof {
     /// Returns the response from `x0` (m), `v0` (m/s) to a force (N, one channel) that is constant
     /// between samples.
     ///
-    /// The force jumps at the samples, and the acceleration with it: ẍ is the limit from the right,
-    /// under the force that begins there.
+    /// The force and the acceleration jump at the samples: ẍ is the limit from the right, with the
+    /// force after the jump.
     ///
     /// ```
     /// use mechid_model::Sdof;

@@ -39,8 +39,7 @@ pub struct StateTransition {
     /// Γ₀, 2n × inputs, in m per unit of the input: effect of an input that keeps its initial value
     /// over the step.
     pub held: DMatrix<f64>,
-    /// Γ₁, 2n × inputs, in the same unit: effect of the rise of the input over the step, from 0
-    /// to 1.
+    /// Γ₁, 2n × inputs, in the unit of Γ₀: effect of an input that rises from 0 to 1 over the step.
     pub ramp: DMatrix<f64>,
 }
 

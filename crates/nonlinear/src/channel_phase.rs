@@ -7,11 +7,11 @@ use nalgebra::Complex;
 
 /// Delay between force and response, and the phase common to both channels.
 ///
-/// A common phase, for example of equal anti-alias filters, does not affect a linear system. It
-/// affects a nonlinear one, because the powers of the response are formed before the filter. The
-/// measured lines at frequency f are the true lines times e^(−iφ), φ = p₃ z³ + p₅ z⁵ with z =
-/// f/(f_s/2); a common delay, the term in z, has no effect. The force acts `delay` later than its
-/// channel shows.
+/// A common phase, for example of equal anti-alias filters, does not affect the fit of a linear
+/// system. It affects the fit of a nonlinear system, because the nonlinear forces depend on the
+/// response before the filter. The measured lines at frequency f are the true lines times e^(−iφ),
+/// with φ = p₃ z³ + p₅ z⁵ and z = f/(f_s/2). A common delay, the term in z, has no effect. The
+/// force acts later by `delay` than the channel of the force shows.
 ///
 /// # Source
 /// Ours. The odd polynomial is the series of any filter's phase about zero frequency.
@@ -31,15 +31,15 @@ pub struct ChannelPhase {
 }
 
 impl ChannelPhase {
-    /// Returns the factors from the measured to the true lines of force and response at `omega`
-    /// (rad/s), which is the fraction `z` of half the sampling rate.
+    /// Returns the factors that convert measured lines of force and response to true lines at
+    /// `omega` (rad/s); `z` is this frequency divided by half the sampling rate.
     pub(super) fn corrections(&self, omega: f64, z: f64) -> [Complex<f64>; 2] {
         let common = z * z * z * (self.cubic + self.quintic * z * z);
         [Complex::cis(common - omega * self.delay), Complex::cis(common)]
     }
 
-    /// Returns force and response as they are before the measuring channels, for records that are
-    /// one period (N, and m, m/s or m/s²; samples × channels).
+    /// Returns force and response before the measuring channels, for records of one period (samples
+    /// × channels; N, and m, m/s or m/s²).
     ///
     /// # Errors
     /// [`EstimateError::Signal`] if the time axes of the records differ, or values overflow.
@@ -52,8 +52,8 @@ impl ChannelPhase {
         Ok((self.turn(force, 0, false)?, self.turn(response, 1, false)?))
     }
 
-    /// Returns a response predicted from a corrected force as the channel would measure it (samples
-    /// × channels, in its unit).
+    /// Returns the response that the channel would measure (samples × channels, in the unit of the
+    /// response), given a `response` that was predicted from a corrected force.
     ///
     /// # Errors
     /// [`EstimateError::Signal`] if values overflow.

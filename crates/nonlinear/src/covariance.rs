@@ -1,5 +1,5 @@
-//! Standard errors that hold for a residual of any spectrum, also if its variance changes with the
-//! response.
+//! Standard errors that are valid for a residual of any spectrum, also if the variance of the
+//! residual changes with the response.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -14,8 +14,8 @@ pub(super) struct Uncertainty {
     pub(super) standard_errors: StandardErrors,
     pub(super) freedom: usize,
     pub(super) misfit: Option<Misfit>,
-    /// Bias of the parameters by noise in their regressors, estimated from several periods; zero
-    /// without them.
+    /// Bias of the parameters due to noise in their regressors, estimated from several periods;
+    /// zero for a single period.
     pub(super) bias: DVector<f64>,
 }
 
@@ -23,15 +23,15 @@ pub(super) struct Uncertainty {
 pub(super) struct ByPeriods {
     pub(super) scatter: PeriodScatter,
     pub(super) misfit: Misfit,
-    /// Bias of the parameters by noise in their regressors.
+    /// Bias of the parameters due to noise in the regressors.
     pub(super) bias: DVector<f64>,
 }
 
 impl Uncertainty {
-    /// Uses the scatter of the periods if the residual does not exceed their noise. Otherwise uses
-    /// the blocks of the residual or, for a record too short for blocks, the scatter times the
-    /// ratio of residual to noise. The degrees of freedom are the least of the first `wanted`
-    /// parameters.
+    /// Uses the scatter of the periods if the residual does not exceed the noise of the periods.
+    /// Otherwise it uses the blocks of the residual or, for a record too short for blocks, the
+    /// scatter times the ratio of residual to noise. The number of degrees of freedom is the
+    /// smallest one of the first `wanted` parameters.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227, for standard errors scaled by the residual.
@@ -67,12 +67,12 @@ pub(super) fn block_count(duration: f64, rate: f64) -> usize {
     }
 }
 
-/// Scores (regressor times residual) and Gram matrices of the regressors, summed over blocks of
-/// time.
+/// Scores (regressor times residual) and Gram matrices of the regressors, each summed over blocks
+/// of time.
 ///
 /// The formula s²(AᵀA)⁻¹ assumes a residual that is white and independent of the response. The
-/// residual of a nonlinear model is neither. Estimates that omit one block at a time show the
-/// variance without this assumption.
+/// residual of a nonlinear model is neither white nor independent. Estimates that omit one block at
+/// a time show the variance without this assumption.
 ///
 /// # Source
 /// Künsch (1989), Annals of Statistics 17, 1217–1241 (the jackknife by blocks of a series); Bell &
@@ -85,7 +85,7 @@ pub(super) struct BlockScores {
 
 /// Regressors and residual of one equation or channel of one experiment, as time signals.
 pub(super) struct InTime {
-    /// Indices of parameters and their regressors.
+    /// Indices of the parameters, each with its regressor.
     pub(super) regressors: Vec<(usize, Vec<f64>)>,
     pub(super) residual: Vec<f64>,
 }
@@ -124,9 +124,10 @@ impl BlockScores {
     }
 
     /// Returns the covariance (B − 1)/B Σ d dᵀ over B blocks. Here d = (AᵀA − A_bᵀA_b)⁻¹ s_b is the
-    /// change of the estimate without block b, with the regressors A, their rows A_b and the scores
-    /// s_b in this block, and `inverse` = (AᵀA)⁻¹. Also returns the least degrees of freedom of the
-    /// first `wanted` parameters. `None` if a parameter depends on one block only.
+    /// change of the estimate if block b is omitted. A are the regressors, A_b and s_b are the rows
+    /// of A and the scores in this block, and `inverse` is (AᵀA)⁻¹. Also returns the smallest
+    /// number of degrees of freedom of the first `wanted` parameters. `None` if a parameter depends
+    /// on one block only.
     pub(super) fn covariance(
         &self,
         inverse: &DMatrix<f64>,
@@ -146,10 +147,10 @@ impl BlockScores {
         Some((sum * ((blocks - 1.0) / blocks), self.degrees_of_freedom(inverse, wanted)))
     }
 
-    /// Returns the least of Satterthwaite's degrees of freedom of the first `wanted` parameters k:
-    /// (Σ w)²/Σ w² − 1 with the information w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk of each block.
-    /// Initial states, which follow these parameters, depend on the first block only and are
-    /// ignored.
+    /// Returns the smallest number of Satterthwaite's degrees of freedom of the first `wanted`
+    /// parameters. Parameter k has (Σ w)²/Σ w² − 1, where w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk is the
+    /// information of each block. Initial states, which follow these parameters, depend on the
+    /// first block only and are ignored.
     fn degrees_of_freedom(&self, inverse: &DMatrix<f64>, wanted: usize) -> usize {
         let mut sums = DVector::<f64>::zeros(self.parameters);
         let mut squares = DVector::<f64>::zeros(self.parameters);
@@ -166,8 +167,8 @@ impl BlockScores {
     }
 }
 
-/// Returns a weighted column of lines as a time signal with the same sum of squares as its real and
-/// imaginary parts.
+/// Returns a weighted column of lines as a time signal. Its sum of squares equals that of the real
+/// and imaginary parts of the lines.
 pub(super) fn in_time(
     grid: &Grid,
     lines: usize,

@@ -1,5 +1,5 @@
-//! Nonlinear distortion: evidence against a linear system at the level of the force, before a model
-//! is fitted.
+//! Nonlinear distortion: evidence that, at this level of the force, the system is not linear. No
+//! nonlinear model is fitted.
 
 use std::fmt;
 
@@ -22,27 +22,28 @@ use crate::limits::{DISTORTION_DRIVEN, DISTORTION_SIGNIFICANT};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Level {
-    /// Ratio of the RMS on these lines, without the noise power, to the RMS on the driven lines, in
-    /// dB; −∞ if there is only noise.
+    /// Ratio of the RMS value on the lines without force, after subtraction of the noise power, to
+    /// the RMS value on the driven lines, in dB; −∞ if there is only noise.
     pub db: f64,
     /// Number of lines.
     pub lines: usize,
-    /// Ratio of the power on these lines to the noise power; `None` for a single period.
+    /// Ratio of the power on the lines without force to the noise power; `None` for a single
+    /// period.
     pub over_noise: Option<f64>,
 }
 
-/// Share of the residual of a linear model that a term of one kind explains.
+/// Kind of term, with the fraction of the residual of a linear model that such a term explains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kind {
     /// The term.
     pub term: Term,
     /// Name in words, such as `cubic stiffness of x1`.
     pub name: String,
-    /// Coefficient if the term is the only one, in the unit of the term.
+    /// Coefficient, in the unit of the coefficient of the term, if it is the only nonlinear term.
     pub coefficient: f64,
-    /// Share of the squared equation error of a linear model that the term explains.
+    /// Fraction of the squared equation error of a linear model that the term explains.
     pub explained: f64,
-    /// Probability that noise alone makes one of the kinds explain as much.
+    /// Probability that noise alone makes at least one of the kinds explain this fraction or more.
     pub p_value: f64,
 }
 
@@ -53,18 +54,18 @@ pub struct Distortion {
     pub even: Option<Level>,
     /// Level on odd lines that are not driven: odd nonlinearities, such as x³.
     pub odd: Option<Level>,
-    /// Share of the force (RMS) on the lines of the band that a linear model does not explain; the
-    /// lines are weighted by the response of the linear model to this force.
+    /// Fraction (RMS) of the force on the lines of the band that a linear model does not explain;
+    /// the lines are weighted by the response of the linear model to this force.
     pub linear_leaves: f64,
-    /// Kinds of terms, by decreasing explained share.
+    /// Kinds of terms, by decreasing explained fraction.
     pub kinds: Vec<Kind>,
 }
 
 /// Detects even and odd distortion, and finds the single term that explains most of the residual of
-/// a linear model, in whole periods of force (N) and response of one or several experiments at the
-/// lines of a band.
+/// a linear model. The data are whole periods of force (N) and response of one or several
+/// experiments, on the lines of a band.
 ///
-/// All experiments share one linear model; a single experiment need not determine this model. The
+/// All experiments have the same linear model; they must determine it together, not one by one. The
 /// levels are those of the experiment with the largest level.
 ///
 /// A nonlinear system responds at sums and differences of the driven lines: if odd lines are
@@ -166,11 +167,12 @@ fn level(
     }))
 }
 
-/// Returns the share of the force that a linear model does not explain, and the kinds of terms by
-/// decreasing explained share.
+/// Returns the fraction of the force that a linear model does not explain, and the kinds of terms
+/// by decreasing explained fraction.
 fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind>), EstimateError> {
     let (terms, names) = tested_kinds(data.dof())?;
-    // The explained share uses weights as responses; its p-value uses the most likely weights.
+    // The explained share is computed with the weighting `Response`, its p-value with the most
+    // likely weights.
     let size = OneByOne::new(data, unknowns, &terms, Weighting::Response)?;
     let chance = OneByOne::new(data, unknowns, &terms, Weighting::Automatic)?;
     let residual_freedom = chance.residual_freedom as f64;
@@ -232,7 +234,8 @@ impl OneByOne {
         Ok(sizes)
     }
 
-    /// Returns the sum of squares of the residual with one of the terms, and its coefficient.
+    /// Returns the sum of squares of the residual of a fit with one of the terms, and the
+    /// coefficient of this term.
     fn with(&self, term: usize) -> Result<(f64, f64), EstimateError> {
         self.solve(&[&self.linear[..], &[self.linear.len() + term]].concat())
     }
@@ -249,8 +252,8 @@ impl OneByOne {
 }
 
 impl Distortion {
-    /// Returns the kind of term that explains most of the residual of a linear model; `None` if
-    /// this is consistent with noise.
+    /// Returns the kind of term that explains most of the residual of a linear model; `None` if the
+    /// explained fraction is consistent with noise.
     pub fn kind(&self) -> Option<&Kind> {
         self.kinds.first().filter(|kind| kind.p_value < DISTORTION_SIGNIFICANT)
     }

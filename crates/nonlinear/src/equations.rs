@@ -28,8 +28,8 @@ pub(super) struct Equations<'a> {
     pub(super) rows: Vec<usize>,
     /// Coefficients of each equation and their indices among the parameters.
     coefficients: Vec<Vec<(usize, Coefficient)>>,
-    /// Factor of each row and equation that gives all of them the same variance under white noise;
-    /// 0 if the row is not used in the equation: rows × degrees of freedom.
+    /// Factors, rows × degrees of freedom, that give all rows and equations the same variance under
+    /// white noise; 0 if the row is not used in the equation.
     pub(super) unit: DMatrix<f64>,
 }
 
@@ -68,7 +68,7 @@ impl<'a> Equations<'a> {
         Ok(Self { data, unknowns, free, terms: terms.len(), rows, coefficients, unit })
     }
 
-    /// Returns the number of coefficients: free entries, then terms.
+    /// Returns the number of coefficients: of free entries and of terms.
     pub(super) fn count(&self) -> usize {
         self.free.len() + self.terms
     }
@@ -134,8 +134,8 @@ impl<'a> Equations<'a> {
         columns.iter().map(residual).collect()
     }
 
-    /// Solves for the coefficients, with the force and then `extra` as right-hand sides (for each
-    /// experiment some matrices of rows × degrees of freedom).
+    /// Solves for the coefficients. The right-hand sides are the force and the columns of `extra`,
+    /// which has a number of matrices (rows × degrees of freedom) for each experiment.
     pub(super) fn solve(
         &self,
         columns: &[Columns],
@@ -205,7 +205,7 @@ impl<'a> Equations<'a> {
         })
     }
 
-    /// Returns the regressors of one equation in a row, each with the index of its coefficient.
+    /// Returns the regressors of one equation for one row, each with the index of its coefficient.
     pub(super) fn regressors<'b>(
         &'b self,
         columns: &'b Columns,
@@ -218,7 +218,7 @@ impl<'a> Equations<'a> {
         self.coefficients[dof].iter().map(entry)
     }
 
-    /// Returns whether the equation of this degree of freedom has a coefficient.
+    /// Returns whether the equation of this degree of freedom has a free coefficient.
     pub(super) fn concerns(&self, dof: usize) -> bool {
         !self.coefficients[dof].is_empty()
     }

@@ -12,8 +12,8 @@ use super::{ChannelPhase, Misfit, Weighting};
 /// Parameter with its name and unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedParameter {
-    /// `m`, `k12`, the name of a term, `c3.b` for the constant b inside a term, `delay`, `p3` or
-    /// `p5`.
+    /// Name: `m`, `k12`, the name of a term, `c3.b` for the constant b of the term `c3`, `delay`,
+    /// `p3` or `p5`.
     pub name: String,
     /// SI unit.
     pub unit: String,
@@ -24,16 +24,17 @@ pub struct NamedParameter {
 /// Origin of the standard errors of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StandardErrors {
-    /// Noise of force and response from this number of periods of all records: the errors hold for
-    /// noise of any spectrum, if the residual does not exceed that noise.
+    /// Noise of force and response, from this number of periods of all records. The standard errors
+    /// are valid for noise of any spectrum, if the residual does not exceed this noise.
     Periods(usize),
-    /// Scatter of the scores over this number of blocks of time: the errors hold for a residual of
-    /// any spectrum, also if the model does not explain part of the response.
+    /// Scatter of the scores over this number of blocks of time. The standard errors are valid for
+    /// a residual of any spectrum, also if the model does not explain a part of the response.
     Blocks(usize),
-    /// White noise on the samples of force and response, whose sizes the residual shows: the errors
-    /// hold if the residual is consistent with it.
+    /// White noise on the samples of force and response; its variances are estimated from the
+    /// residual. The standard errors are valid if the residual is consistent with this noise.
     Noise,
-    /// Size of the weighted residual, assumed white: the record is too short for blocks.
+    /// Size of the weighted residual, which is assumed to be white, because the record is too short
+    /// for blocks.
     White,
 }
 
@@ -49,7 +50,7 @@ pub struct NonlinearEstimate {
     pub(super) weighting: Weighting,
     pub(super) standard_errors: StandardErrors,
     pub(super) misfit: Option<Misfit>,
-    /// Bias of the parameters by noise in their regressors, estimated from several periods.
+    /// Bias of the parameters due to noise in their regressors, estimated from several periods.
     pub(super) bias: DVector<f64>,
     pub(super) unexplained: Vec<f64>,
     pub(super) ranges: Vec<[f64; 2]>,
@@ -109,7 +110,7 @@ impl NonlinearEstimate {
         Ok(UncertainNonlinearSystem::new(system, parameters, covariance)?)
     }
 
-    /// Returns the terms with the estimated constants inside them.
+    /// Returns the terms, with the estimated constants in their laws.
     pub fn terms(&self) -> &Terms {
         &self.terms
     }
@@ -151,21 +152,21 @@ impl NonlinearEstimate {
         self.standard_errors
     }
 
-    /// Returns the comparison of the residual of the mean periods with the noise of the periods;
+    /// Returns the comparison of the residual of the mean period with the noise of the periods;
     /// `None` for open records and single periods.
     pub fn misfit(&self) -> Option<Misfit> {
         self.misfit
     }
 
-    /// Returns the share (RMS) of the response of each degree of freedom that the model does not
-    /// explain. For a fit of lines this is the response of the linear part to the equation error;
-    /// for a fit in time, the residual.
+    /// Returns, for each degree of freedom, the fraction (RMS) of the response that the model does
+    /// not explain. For a fit of lines, the unexplained part is the response of the linear part to
+    /// the equation error; for a fit in time, it is the residual.
     pub fn unexplained(&self) -> &[f64] {
         &self.unexplained
     }
 
-    /// Returns for each term the largest displacement (m) and velocity (m/s) of its coordinate in
-    /// the data. Beyond them the term is extrapolated.
+    /// Returns, for each term, the largest displacement (m) and velocity (m/s) of its coordinate in
+    /// the data. For larger motions the term is an extrapolation.
     pub fn ranges(&self) -> &[[f64; 2]] {
         &self.ranges
     }
@@ -174,8 +175,8 @@ impl NonlinearEstimate {
     /// displacement (m) and velocity (m/s), with the standard error from the covariance of the
     /// parameters (constants inside the laws count as known).
     ///
-    /// The data determine a polynomial only within [`NonlinearEstimate::ranges`]: the growth of the
-    /// standard error outside shows how far it can be extrapolated.
+    /// The data determine a polynomial only within [`NonlinearEstimate::ranges`]. Outside these
+    /// ranges the standard error grows; it shows how far the force can be extrapolated.
     ///
     /// # Errors
     /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is one
@@ -220,8 +221,8 @@ impl NonlinearEstimate {
         Ok((0..n).map(force_of).collect())
     }
 
-    /// Returns the estimate with a mean square error added to its covariance, both in the products
-    /// of the units of [`NonlinearEstimate::parameters`] (parameters × parameters).
+    /// Returns the estimate with a mean square error added to its covariance. Both are parameters ×
+    /// parameters, in the products of the units of [`NonlinearEstimate::parameters`].
     ///
     /// # Errors
     /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of
@@ -245,7 +246,7 @@ impl NonlinearEstimate {
 }
 
 impl fmt::Display for NamedParameter {
-    /// Writes `k3 = 3.951e0 ± 1.7e-3 N/m³`, with one standard error after ±.
+    /// Writes `k3 = 3.951e0 ± 1.7e-3 N/m³`; the number after ± is one standard error.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, unit, Uncertain { value, standard_error, .. }) =
             (&self.name, &self.unit, self.estimate);

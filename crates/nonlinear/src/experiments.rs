@@ -16,8 +16,9 @@ use crate::limits::EXPERIMENT_FINER;
 /// Steady-state forces and responses under periodic excitation, one mean period per experiment.
 ///
 /// Unlike [`FrequencyData`](mechid_spectra::FrequencyData) it contains all lines of the period: a
-/// nonlinear system responds at all lines even if the force has few, and a power of the response
-/// needs all of them. The equation of motion is fitted on `lines`, including lines without force.
+/// nonlinear system responds on all lines even if the force has few lines, and the computation of a
+/// power of the response needs all lines. The equation of motion is fitted on `lines`, including
+/// lines without force.
 pub struct SteadyExperiments {
     lines: Vec<usize>,
     period: Sampling,
@@ -31,7 +32,7 @@ pub struct SteadyExperiments {
 struct Experiment {
     /// Mean of its periods.
     mean: Steady,
-    /// Single periods; empty if there is only one.
+    /// Single periods; empty if there is only one period.
     periods: Vec<Steady>,
 }
 
@@ -188,8 +189,8 @@ impl SteadyExperiments {
         }
     }
 
-    /// Returns displacement (m) and velocity (m/s) on the finer grid for the degrees of freedom on
-    /// which terms depend.
+    /// Returns displacement (m) and velocity (m/s), on the finer time grid, for those degrees of
+    /// freedom that terms depend on.
     fn signals(
         &self,
         steady: &Steady,

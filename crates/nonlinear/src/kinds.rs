@@ -1,5 +1,5 @@
-//! Usual kinds of nonlinear terms, for the test of distortion and for the search for terms that a
-//! fit lacks.
+//! Usual kinds of nonlinear terms, for the test of distortion and for the search for missing terms
+//! of a fit.
 
 use mechid_estimate::EstimateError;
 use mechid_model::{Coordinate, Friction, Law, ModelError, Power, QuadraticDamping, Term, Terms};
@@ -7,8 +7,8 @@ use mechid_model::{Coordinate, Friction, Law, ModelError, Power, QuadraticDampin
 use super::{NonlinearEstimate, SteadyExperiments};
 use crate::limits::{DISTORTION_PAIRS, FRICTION_WIDTH};
 
-/// Kinds of terms whose distortion is tested: exponents of displacement and velocity (none for
-/// quadratic damping), and name.
+/// Kinds of terms in the test of distortion. Each has the exponents of displacement and velocity
+/// (`None` for quadratic damping) and a name.
 const TESTED: [(Option<[u32; 2]>, &str); 4] = [
     (Some([2, 0]), "quadratic stiffness"),
     (Some([3, 0]), "cubic stiffness"),
@@ -20,7 +20,8 @@ const TESTED: [(Option<[u32; 2]>, &str); 4] = [
 /// depends on the displacement.
 const FURTHER: [[u32; 2]; 3] = [[5, 0], [1, 1], [2, 1]];
 
-/// Friction whose velocity b is known: records of fast motion do not determine it.
+/// Friction with a known constant b (a velocity), because records of fast motion do not determine
+/// b.
 #[derive(Debug)]
 struct KnownFriction(Friction);
 
@@ -57,9 +58,10 @@ pub(super) fn tested_kinds(dof: usize) -> Result<(Terms, Vec<String>), EstimateE
     Ok((Terms::new(terms)?, names))
 }
 
-/// Returns the terms of the usual kinds that a fit lacks: springs of the second, third and fifth
-/// power, quadratic and cubic damping, damping that depends on the displacement, and friction, for
-/// each degree of freedom and, with up to four, between any two of them.
+/// Returns the terms of the usual kinds that are missing in a fit: springs of the second, third and
+/// fifth power, quadratic and cubic damping, damping that depends on the displacement, and
+/// friction. Each kind has a term for each degree of freedom and, with up to four degrees of
+/// freedom, between any two of them.
 ///
 /// # Errors
 /// [`EstimateError::Model`] if a term is not valid.
@@ -78,7 +80,7 @@ pub fn further_terms(
 }
 
 /// Returns the terms of [`further_terms`]; `fastest` returns the largest velocity (m/s) of the
-/// coordinate of a term, which scales the friction.
+/// coordinate of a term; this velocity scales the friction.
 pub(super) fn further_terms_up_to(
     fit: &NonlinearEstimate,
     fastest: impl Fn(&Term) -> f64,
@@ -106,7 +108,7 @@ pub(super) fn further_terms_up_to(
     Ok(Terms::new(terms)?)
 }
 
-/// Returns every degree of freedom and, if there are few, every pair.
+/// Returns every degree of freedom and, if there are few degrees of freedom, every pair of them.
 fn coordinates(dof: usize) -> impl Iterator<Item = Coordinate> {
     let pairs = (0..dof).flat_map(move |i| (i + 1..dof).map(move |j| Coordinate::Difference(i, j)));
     (0..dof).map(Coordinate::Dof).chain(pairs.filter(move |_| dof <= DISTORTION_PAIRS))
@@ -128,7 +130,7 @@ fn term(
     }
 }
 
-/// Returns whether two terms have the same law of the same coordinate, in either direction.
+/// Returns whether two terms have the same law and the same coordinate, in either direction.
 fn is_same_force(one: &Term, other: &Term) -> bool {
     let expression = |term: &Term| term.law().expression("q", "v");
     is_same_coordinate(one.coordinate(), other.coordinate()) && expression(one) == expression(other)
@@ -143,7 +145,8 @@ fn is_same_coordinate(one: Coordinate, other: Coordinate) -> bool {
     dofs(one) == dofs(other)
 }
 
-/// Returns whether the force of a law is a pure number, as that of friction is.
+/// Returns whether the value of a law is a pure number that changes with the motion, as for
+/// friction.
 fn is_bounded(law: &dyn Law) -> bool {
     law.dimension() == [0, 0] && !law.is_constant()
 }

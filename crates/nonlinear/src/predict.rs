@@ -12,8 +12,8 @@ use super::simulate::{Course, Direction, FineForce, Tangent};
 use crate::limits::{PREDICTION_CLOSED, PREDICTION_SHOTS};
 
 /// Computes displacement, velocity and acceleration of a nonlinear system under a sampled force
-/// (N). For an open record they begin at `start`; for a whole period they are the steady state,
-/// whose search begins at `start`.
+/// (N). For an open record the motion begins at `start`. For a whole period the motion is the
+/// steady state; the search for it begins at `start`.
 ///
 /// Between the samples the force is band-limited, not held or linear: for a hardening spring with a
 /// third harmonic near resonance, the difference is several times the noise of a good sensor. The
@@ -55,7 +55,8 @@ pub fn predict(
     Ok(Response::new(record(0)?, record(1)?, record(2)?)?)
 }
 
-/// Returns the state that recurs after one period of the force, by Newton's method (shooting).
+/// Returns the initial state of the steady state: the state that is reached again after one period
+/// of the force. The method is Newton's (shooting).
 fn steady_start(
     system: &NonlinearSystem,
     force: &Record,
@@ -95,10 +96,10 @@ pub(super) fn initial(state: &DVector<f64>) -> Result<InitialState, EstimateErro
 }
 
 /// Returns the initial state of an open record for which [`predict`] fits the measured responses
-/// best, each channel relative to its size.
+/// best; the error of each channel is divided by the size of the channel.
 ///
-/// Use only the first samples, some time constants of the system: later samples do not depend on
-/// the initial state.
+/// Use only the first samples, over some time constants of the system: later samples do not depend
+/// on the initial state.
 ///
 /// # Errors
 /// As [`predict`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or
@@ -136,8 +137,8 @@ struct Start<'a> {
 }
 
 impl Start<'_> {
-    /// Returns for each measured channel the column of the state, the samples and the reciprocal of
-    /// their norm.
+    /// Returns, for each measured channel, the column of the state, the samples, and the reciprocal
+    /// of the norm of the samples.
     fn channels(&self) -> impl Iterator<Item = (usize, &[f64], f64)> {
         let n = self.system.dof();
         self.measured.iter().flat_map(move |(kind, record)| {

@@ -1,4 +1,5 @@
-//! Propagation of noise on the samples of a force to the response, and its adjoint.
+//! Propagation of noise from the samples of a force to the response, and the adjoint of this
+//! propagation.
 
 use mechid_model::ResponseQuantity;
 use nalgebra::{DMatrix, DVector};
@@ -8,7 +9,7 @@ use super::simulate::Transition;
 /// Linearised response to small changes of the force, about a simulated response.
 ///
 /// Between the samples a force is band-limited. Here each sample acts as an impulse, half of it
-/// before the sample and half after: the two are equivalent below half the sampling rate.
+/// before the sample and half after it. Below half the sampling rate, both forces are equivalent.
 pub(super) struct Propagation<'a> {
     transitions: &'a [Transition],
     inverse_mass: &'a DMatrix<f64>,
@@ -49,12 +50,13 @@ impl<'a> Propagation<'a> {
         self.transitions.len()
     }
 
-    /// Returns the derivatives of the state at the next sample with respect to that at a sample.
+    /// Returns the derivatives of the state at the next sample with respect to the state at this
+    /// sample.
     pub(super) fn transition(&self, sample: usize) -> &DMatrix<f64> {
         &self.transitions[sample].state
     }
 
-    /// Returns the change of the state by half of a force sample, 2n × n.
+    /// Returns the change of the state due to half of a force sample, 2n × n.
     pub(super) fn half_push(&self) -> DMatrix<f64> {
         let n = self.dof();
         let mut push = DMatrix::zeros(2 * n, n);
@@ -62,8 +64,8 @@ impl<'a> Propagation<'a> {
         push
     }
 
-    /// Returns the change of the measured response by a force at the same instant, n × n; it is
-    /// zero except for accelerations.
+    /// Returns the change of the measured response due to a force at the same instant, n × n; the
+    /// change is zero except for accelerations.
     pub(super) fn direct(&self) -> DMatrix<f64> {
         self.inverse_mass * f64::from(u8::from(self.is_acceleration()))
     }

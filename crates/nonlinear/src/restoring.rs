@@ -12,7 +12,7 @@ use super::grid::Grid;
 use crate::limits::{HIGHEST_ORDER, RESTORING_NEGLIGIBLE, RESTORING_POOR};
 
 /// Points of the restoring-force surface: the measured force minus the inertia force, as a function
-/// of displacement and velocity. All records are samples of one period × degrees of freedom.
+/// of displacement and velocity. All records are samples × degrees of freedom, over one period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RestoringForce {
     /// Displacement, in m.
@@ -25,20 +25,20 @@ pub struct RestoringForce {
     pub residual: Record,
 }
 
-/// Restoring force at [`REACH`] times the largest displacement and velocity in the data, in the
-/// equation of motion of a term.
+/// Growth of a term, and of the restoring force in its equation of motion, up to [`REACH`] times
+/// the largest displacement and velocity in the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extrapolation {
     /// Name of the term.
     pub term: String,
-    /// Exponent with which the force of the term grows from the edge of the data to [`REACH`] times
-    /// as far; 3 for a cubic spring.
+    /// Exponent of the growth of the force of the term from the edge of the data to [`REACH`] times
+    /// the range of the data; 3 for a cubic spring.
     pub order: f64,
     /// Ratio of the standard error of the restoring force to the restoring force, at the edge of
-    /// the data and at [`REACH`] times as far.
+    /// the data and at [`REACH`] times the range of the data.
     pub relative_error: [f64; 2],
     /// Ratio of the force of the term to the restoring force, at the edge of the data and at
-    /// [`REACH`] times as far.
+    /// [`REACH`] times the range of the data.
     pub share: [f64; 2],
 }
 
@@ -47,14 +47,14 @@ pub struct Extrapolation {
 pub const REACH: f64 = 1.5;
 
 impl Extrapolation {
-    /// Returns true if the restoring force is poorly known at [`REACH`] times the range of the
-    /// data: its standard error exceeds 10 %, or a term of fourth or higher order makes more than 1
-    /// % of it.
+    /// Returns `true` if the restoring force is unreliable at [`REACH`] times the range of the
+    /// data: its standard error exceeds 10 % of the force, or the term is of fourth or higher order
+    /// and is more than 1 % of the force.
     pub fn is_poor(&self) -> bool {
         self.relative_error[1] > RESTORING_POOR || self.grows_fast()
     }
 
-    /// Returns true if the term is of fourth or higher order and makes more than 1 % of the
+    /// Returns `true` if the term is of fourth or higher order and is more than 1 % of the
     /// restoring force at [`REACH`] times the range of the data.
     pub fn grows_fast(&self) -> bool {
         self.order > HIGHEST_ORDER && self.share[1].abs() > RESTORING_NEGLIGIBLE
@@ -121,8 +121,9 @@ impl NonlinearEstimate {
             .collect()
     }
 
-    /// Returns the growth of each term and of its restoring force from the largest displacement and
-    /// velocity in the data ([`NonlinearEstimate::ranges`]) to [`REACH`] times as far.
+    /// Returns the growth of each term, and of the restoring force in its equation of motion, from
+    /// the largest displacement and velocity in the data ([`NonlinearEstimate::ranges`]) to
+    /// [`REACH`] times these values.
     ///
     /// A term of the displacement only is evaluated at zero velocity, a term of the velocity only
     /// at zero displacement. Constant forces are ignored.
@@ -165,8 +166,8 @@ impl NonlinearEstimate {
     }
 }
 
-/// Returns displacements or velocities with this value of a coordinate; a difference is shared
-/// equally between its two degrees of freedom.
+/// Returns displacements or velocities with this value of a coordinate. If the coordinate is a
+/// difference, each of its two degrees of freedom has half of the value.
 fn spread(coordinate: Coordinate, dof: usize, value: f64) -> Vec<f64> {
     let signs: Vec<f64> = (0..dof).map(|dof| coordinate.sign(dof)).collect();
     let moved: f64 = signs.iter().map(|sign| sign.abs()).sum();

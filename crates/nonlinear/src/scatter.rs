@@ -6,12 +6,13 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::estimate::StandardErrors;
 use crate::limits::{SCATTER_ROUNDING, SIGNIFICANT};
 
-/// Comparison of the residual power of the mean periods with the noise power from their scatter.
+/// Comparison of the residual power of the mean period with the noise power from the scatter of the
+/// periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
     /// Ratio of residual power to noise power: 1 if the model is correct.
     pub ratio: f64,
-    /// Probability of a ratio as large by noise alone.
+    /// Probability that noise alone gives a ratio at least as large as this one.
     pub p_value: f64,
 }
 
@@ -26,7 +27,8 @@ impl Misfit {
 pub(super) struct Line<'a> {
     /// Deviations, channels × periods.
     pub(super) deviations: &'a DMatrix<Complex<f64>>,
-    /// Weight of this line in a sum of products over lines that equals the sum over samples.
+    /// Weight of this line. With these weights, a sum of products over lines equals the sum over
+    /// samples.
     pub(super) weight: f64,
     /// `true` if the values are real: on line 0 and at half the sampling rate.
     pub(super) is_real: bool,
@@ -36,9 +38,9 @@ pub(super) struct Line<'a> {
 ///
 /// Noise e on the mean periods changes an estimate by G Σ Re(ḡ e), summed over lines and channels,
 /// with the sensitivities g of the residuals (ḡ their conjugates) and G = (AᵀA)⁻¹ for the
-/// regressors A. The deviations of the periods from their mean show this noise for any spectrum and
-/// any correlation of the channels. Lines of stationary noise are independent, so that each adds
-/// degrees of freedom.
+/// regressors A. The deviations of the periods from the mean period show this noise for any
+/// spectrum and any correlation of the channels. Lines of stationary noise are independent, so that
+/// each line adds degrees of freedom.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -67,8 +69,8 @@ impl PeriodScatter {
         self.periods += periods;
     }
 
-    /// Adds a line with the sensitivities of its residuals, channels × parameters, and the matrix
-    /// G.
+    /// Adds a line; the arguments include the sensitivities of its residuals, channels ×
+    /// parameters, and the matrix G.
     pub(super) fn push(
         &mut self,
         inverse: &DMatrix<f64>,
@@ -76,8 +78,8 @@ impl PeriodScatter {
         line: &Line<'_>,
     ) {
         let periods = line.deviations.ncols() as f64;
-        // The estimate depends on real parts: each part of a complex value has half of its
-        // variance.
+        // The estimate depends on the real and the imaginary part of a complex value separately;
+        // each part has half of the variance of the value.
         let part = if line.is_real { 1.0 } else { 0.5 };
         let scale = line.weight.powi(2) * part / (periods * (periods - 1.0));
         let freedom = (periods - 1.0) * if line.is_real { 1.0 } else { 2.0 };
@@ -93,8 +95,8 @@ impl PeriodScatter {
         self.sums += variances;
     }
 
-    /// Returns the covariance, its origin, and the least degrees of freedom of the first `wanted`
-    /// parameters.
+    /// Returns the covariance, its origin, and the smallest number of degrees of freedom of the
+    /// first `wanted` parameters.
     pub(super) fn finish(self, wanted: usize) -> (DMatrix<f64>, StandardErrors, usize) {
         let ratio = |(sum, square): (&f64, &f64)| sum * sum / square;
         let freedoms = self.sums.iter().zip(self.squares.iter()).take(wanted).map(ratio);
@@ -115,8 +117,8 @@ pub(super) struct Powers {
 }
 
 impl Powers {
-    /// Adds a line: the squared magnitude of its mean residual, the variance of the mean from its
-    /// `periods`, and the power of the signal, all weighted.
+    /// Adds a line: the squared magnitude of the residual of the mean period, the variance of the
+    /// mean from the number `periods` of periods, and the power of the signal, all weighted.
     pub(super) fn push(
         &mut self,
         [residual, noise, signal]: [f64; 3],

@@ -21,17 +21,18 @@ use crate::limits::{SELECTION_LEVEL, SIGNIFICANT};
 )]
 pub enum Criterion {
     /// The extended Bayesian information criterion: the cost must fall by more than the penalty of
-    /// a parameter chosen among this number of candidates. Because the criterion assumes a white
-    /// residual, the added terms are tested again at the end: a term whose coefficient does not
-    /// differ significantly from zero, at 1 % for all candidates together, is removed
+    /// one parameter, which depends on the number of candidates. The criterion assumes a white
+    /// residual; therefore the added terms are tested again at the end. A term is removed if its
+    /// coefficient does not differ significantly from zero, at 1 % for all candidates together
     /// ([`least_certain`]).
     ///
     /// # Source
     /// Chen & Chen (2008), Biometrika 95, 759–771.
     #[default]
     Information,
-    /// The squared residual of each experiment, predicted from the fit to all others, must fall
-    /// significantly: Student's t over the experiments, at 5 % for all candidates together.
+    /// Prediction of each experiment from the fit to all other experiments: the squared residual of
+    /// this prediction must fall significantly by Student's t over the experiments, at 5 % for all
+    /// candidates together.
     ///
     /// # Source
     /// Stone (1974), Journal of the Royal Statistical Society B 36, 111–147 (cross-validation).
@@ -43,32 +44,33 @@ pub enum Criterion {
 pub struct Selection {
     /// Given terms and added terms, in their order.
     pub terms: Terms,
-    /// Steps of the selection: without any candidate, then with each added term.
+    /// Steps of the selection: the first without any candidate, the others each with one more term.
     pub steps: Vec<SelectionStep>,
     /// Best of the candidates that the criterion refused.
     pub refused: Option<SelectionStep>,
-    /// Names of the terms that were added and removed again, least certain first.
+    /// Names of the terms that were added and later removed; the least certain term comes first.
     pub removed: Vec<String>,
 }
 
 /// Step of a selection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SelectionStep {
-    /// Name of the term added; `None` for the first step.
+    /// Name of the added term; `None` for the first step.
     pub added: Option<String>,
-    /// Criterion with the term, smaller is better: the information criterion, or the squared
-    /// residual of held-out experiments divided by the number of equations.
+    /// Value of the criterion with the term (a smaller value is better): the information criterion,
+    /// or the squared residual of experiments that are excluded from the fit, divided by the
+    /// number of equations.
     pub score: f64,
-    /// Share of the weighted force (RMS) that is unexplained with the term.
+    /// Fraction (RMS) of the weighted force that a fit with the term does not explain.
     pub unexplained: f64,
 }
 
-/// Adds to the given terms, one after the other, the candidate that lowers the equation error most,
-/// as long as the criterion accepts it, and finally removes uncertain terms
+/// Adds candidates to the given terms, one after the other: each time the candidate that lowers the
+/// equation error most, as long as the criterion accepts it. At the end it removes uncertain terms
 /// ([`Criterion::Information`]).
 ///
 /// Rows are weighted by the residual of a fit with all candidates, so that a missing term does not
-/// affect the weights. Constants inside the laws are kept as they are.
+/// affect the weights. Constants inside the laws do not change.
 ///
 /// # Errors
 /// As [`equation_error`](super::equation_error) for all terms together, and
@@ -139,9 +141,9 @@ pub fn select_terms(
 }
 
 /// Returns the name of the least certain candidate among the terms of a fit, if its coefficient
-/// does not differ from zero at 1 % for all candidates together: Student's t with the degrees of
-/// freedom of the fit, after correction of the bias by noise in the regressors if several periods
-/// show it.
+/// does not differ significantly from zero, at 1 % for all candidates together. The test is
+/// Student's t with the degrees of freedom of the fit. If there are several periods, the bias due
+/// to noise in the regressors is subtracted first.
 ///
 /// # Errors
 /// [`EstimateError::NoSuchParameter`] if the fit lacks the coefficient of one of its terms.
@@ -164,14 +166,14 @@ pub fn least_certain(
     Ok(least.map(|(_, name)| name))
 }
 
-/// Returns the terms without one.
+/// Returns the terms without the term of this name.
 fn without(terms: &Terms, name: &str) -> Result<Terms, EstimateError> {
     let mut remaining = terms.iter().filter(|term| term.name() != name).cloned();
     Ok(remaining.try_fold(Terms::none(), |remaining, term| remaining.and(term))?)
 }
 
 impl Selection {
-    /// Removes a term that turned out to be uncertain.
+    /// Removes an uncertain term by its name, and lists it as removed.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if the remaining terms are not a valid list.
@@ -188,8 +190,8 @@ struct Misfit {
     fitted: f64,
     /// Sum of squares of all experiments without a model.
     all: f64,
-    /// Sum of squares of each experiment, for the coefficients fitted to all other experiments;
-    /// empty unless the criterion is [`Criterion::HeldOut`].
+    /// Sum of squares of each experiment, with the coefficients that were fitted to all other
+    /// experiments; used only with [`Criterion::HeldOut`], otherwise empty.
     held_out: Vec<f64>,
 }
 
@@ -203,7 +205,7 @@ struct Judge {
 
 impl Judge {
     /// Returns the column among `columns` that lowers the residual of all experiments most, and the
-    /// residuals with it.
+    /// residuals with this column.
     fn best_next(
         &self,
         chosen: &[usize],

@@ -24,11 +24,11 @@ pub struct ShapeConstants {
     pub laws: bool,
     /// Delay of the force.
     pub delay: bool,
-    /// Phase common to both channels, p₃ and p₅ of [`ChannelPhase`].
+    /// Phase that is common to both channels: p₃ and p₅ of [`ChannelPhase`].
     pub phase: bool,
 }
 
-/// Terms and channels with their constants, and the choice of the free ones.
+/// Terms and channels with their constants, and the choice of the free constants.
 #[derive(Clone)]
 pub(super) struct Shape {
     terms: Terms,
@@ -53,7 +53,7 @@ impl Shape {
         self.values().count()
     }
 
-    /// Returns the values of the free constants: of the laws, then delay, p₃ and p₅.
+    /// Returns the values of the free constants: those of the laws, followed by delay, p₃ and p₅.
     pub(super) fn values(&self) -> impl Iterator<Item = f64> + '_ {
         let laws = self.terms.iter().filter(|_| self.free.laws);
         let laws = laws.flat_map(|term| term.law().constants()).map(|constant| constant.value);
@@ -77,7 +77,7 @@ impl Shape {
         laws.chain(delay).chain(phase.into_iter().flatten())
     }
 
-    /// Returns the shape with other values of the free constants; `None` if a law refuses one.
+    /// Returns the shape with other values of the free constants; `None` if a law refuses a value.
     fn with(&self, values: &[f64]) -> Option<Self> {
         let mut remaining = values;
         let mut next = || {
@@ -105,8 +105,8 @@ impl Shape {
         Some(Self { terms: Terms::new(terms).ok()?, channels, free: self.free })
     }
 
-    /// Returns the steps of the derivatives, relative to the value of a constant, to the sampling
-    /// interval for a delay, and to one radian for a phase.
+    /// Returns the steps of the derivatives. Each step is in proportion to a scale: the value of a
+    /// constant, the sampling interval for a delay, and one radian for a phase.
     fn steps(&self, dt: f64) -> Vec<f64> {
         let values: Vec<f64> = self.values().collect();
         let channels = usize::from(self.free.delay) + 2 * usize::from(self.free.phase);
@@ -119,9 +119,9 @@ impl Shape {
         values.iter().enumerate().map(step).collect()
     }
 
-    /// Returns the derivatives of the force of the model (minus those of the residual) with respect
-    /// to each free constant: for each experiment and constant one matrix of rows × degrees of
-    /// freedom.
+    /// Returns the derivatives of the force of the model with respect to each free constant: for
+    /// each experiment and constant one matrix of rows × degrees of freedom. They are the
+    /// derivatives of the residual with opposite sign.
     pub(super) fn slopes(
         &self,
         equations: &Equations<'_>,
@@ -173,9 +173,9 @@ pub(super) fn fit_shape(
     Err(EstimateError::Undetermined { parameters, directions })
 }
 
-/// Returns the names of the constants that the data do not determine: their standard error at the
-/// initial values exceeds their scale, for example the phase of the channels in a model without
-/// terms.
+/// Returns the names of the constants that the data do not determine, for example the phase of the
+/// channels in a model without terms. The standard error of such a constant at the initial values
+/// exceeds its scale.
 fn undetermined(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
     let (rows, theta) = (projected.len(), DVector::from_iterator(start.count(), start.values()));
     let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, theta.len()));

@@ -33,9 +33,9 @@ pub(super) struct FineForce {
 }
 
 impl FineForce {
-    /// Interpolates a band-limited force, by the Fourier series of a period or, for an open record,
-    /// of the record and its mirror image, which has no jump. It uses as many steps as the response
-    /// from `start` needs.
+    /// Interpolates a band-limited force by a Fourier series: that of a period or, for an open
+    /// record, that of the record followed by its mirror image, which has no jump. The number of
+    /// steps is the number that the response from `start` needs.
     pub(super) fn sufficient(
         force: &Record,
         system: &NonlinearSystem,
@@ -96,7 +96,8 @@ fn mirrored(record: &Record) -> Result<Record, EstimateError> {
 
 /// Linearised motion about a response, from one sample to the next.
 pub(super) struct Transition {
-    /// Derivatives of the state at the next sample with respect to the state at this one, 2n × 2n.
+    /// Derivatives of the state at the next sample with respect to the state at this sample, 2n ×
+    /// 2n.
     pub(super) state: DMatrix<f64>,
     /// Derivatives of the acceleration with respect to the state at this sample, n × 2n.
     pub(super) acceleration: DMatrix<f64>,
@@ -119,8 +120,8 @@ impl Stages {
 /// Integration of a nonlinear system by the classical Runge–Kutta method, together with the
 /// derivatives of the computed response by the tangent of the same method.
 ///
-/// Displacements and velocities are rows, each with its value followed by its derivatives with
-/// respect to all directions, so that a stage treats all directions of a row in one loop.
+/// Each displacement and each velocity is a row: its value, followed by its derivatives with
+/// respect to all directions. So a stage computes all directions of a row in one loop.
 ///
 /// # Source
 /// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections
@@ -134,7 +135,8 @@ pub(super) struct Tangent<'a> {
     /// Derivatives of the accelerations of the linear system with respect to displacements and
     /// velocities, 2n × n: −[K C]ᵀM⁻ᵀ.
     linear: DMatrix<f64>,
-    /// The same derivatives for the nonlinear system, at a stage.
+    /// Derivatives of the accelerations of the nonlinear system at a stage, in the layout of
+    /// `linear`.
     slopes: DMatrix<f64>,
     /// Displacement, velocity, acceleration and force of a stage.
     displacement: Vec<f64>,
@@ -322,7 +324,7 @@ impl<'a> Tangent<'a> {
         z.iter().all(|value| value.is_finite())
     }
 
-    /// Computes ż of state and derivatives (2n rows) under a force.
+    /// Computes the rates ż of state and derivatives (2n rows) under a force.
     fn rate(&mut self, z: &[f64], force: &[f64], rate: &mut [f64]) {
         let (n, width) = (self.system.dof(), self.width());
         let (displacements, velocities) = z.split_at(n * width);
@@ -377,7 +379,7 @@ impl<'a> Tangent<'a> {
         }
     }
 
-    /// Adds the accelerations that a unit of a parameter causes in a given motion.
+    /// Adds the accelerations that a unit change of a parameter causes in a given motion.
     fn drive<'b>(&self, direction: Direction, accelerations: impl Iterator<Item = &'b mut f64>) {
         let (x, v) = (&self.displacement, &self.velocity);
         let (of_unit, force) = match direction {

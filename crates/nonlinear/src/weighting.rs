@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix};
 use super::equations::Equations;
 use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
 
-/// Assumed size of the equation error over the lines.
+/// Assumed size of the equation error as a function of frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(
     feature = "serde",
@@ -13,14 +13,14 @@ use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
     serde(rename_all = "kebab-case")
 )]
 pub enum Weighting {
-    /// Whichever of the other choices gives the residual the highest likelihood (Akaike's
-    /// criterion).
+    /// The choice among the others that gives the residual the highest likelihood, by Akaike's
+    /// criterion.
     #[default]
     Automatic,
     /// Equal size on all lines of an equation of motion: white noise of the force.
     WhiteForce,
-    /// Equal size of the response of the linear part to the error, on all lines: the model error is
-    /// largest at the resonances.
+    /// Equal size, on all lines, of the response of the linear part to the equation error: lines
+    /// near a resonance have the largest weights.
     Response,
     /// Smooth spectrum: the spectrum of the residual, averaged over neighbouring lines and all
     /// experiments.
@@ -33,15 +33,15 @@ pub(super) struct Weights {
     pub(super) kind: Weighting,
 }
 
-/// Returns the number of lines on either side in the averages of a smooth spectrum; `None` if the
-/// lines are too few.
+/// Returns the half-width, in lines, of the averages of a smooth spectrum; `None` if there are too
+/// few lines.
 fn half_width(lines: usize) -> Option<usize> {
     let half = HALF_WIDTH.max(lines / (2 * WEIGHTING_GROUPS));
     (lines >= 2 * (2 * half + 1)).then_some(half)
 }
 
 impl Weights {
-    /// Returns the weights for white noise, the same in all equations.
+    /// Returns the weights for white noise that is equal in all equations.
     pub(super) fn equal(equations: &Equations<'_>) -> Self {
         Self { of_rows: equations.unit.clone(), kind: Weighting::WhiteForce }
     }
@@ -104,8 +104,8 @@ fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMat
     scaled
 }
 
-/// Returns the row weights that scale a residual force to the size of the response of the linear
-/// part to this force; `None` if the coefficients define no system.
+/// Returns row weights: a residual force times these weights has the size of the response of the
+/// linear part to this force; `None` if the coefficients define no system.
 pub(super) fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
     let variance = variance_of_response(equations, coefficients)?;
     Some(equations.unit.zip_map(&variance, |unit, v| unit / v.sqrt()))
@@ -126,7 +126,8 @@ fn variance_of_response(equations: &Equations<'_>, coefficients: &[f64]) -> Opti
     Some(variance)
 }
 
-/// Returns moving averages over the lines; line 0, if used, takes the average of the first lines.
+/// Returns moving averages over the lines; line 0, if it is used, has the average of the first
+/// lines.
 fn smooth(power: &DMatrix<f64>, first: usize, half: usize) -> DMatrix<f64> {
     let rows = power.nrows();
     let mut smooth = power.clone();

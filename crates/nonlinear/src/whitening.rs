@@ -1,7 +1,7 @@
 //! White noise on the samples of force and response, and the filter that makes a residual white.
 //!
-//! Noise u on the force changes the response through the motion linearised about the simulated
-//! response; noise e on the response is added. With the state s of that motion,
+//! Noise u on the force changes the response; the change is that of the motion linearised about the
+//! simulated response. Noise e on the response is added. With the state s of the linearised motion,
 //!
 //! ```text
 //! y = C s + H u + e,    s⁺ = Φ s + G u,    s = 0 at the first sample,
@@ -9,7 +9,8 @@
 //!
 //! because the initial state is a parameter of the fit. The innovations of a Kalman filter divided
 //! by their standard deviations are white, and their sum of squares is the likelihood of the
-//! residual. A fit that minimises it has the least variance if the noise is white.
+//! residual. If the noise is white, a fit that minimises this sum of squares has the smallest
+//! variance.
 //!
 //! # Source
 //! Ljung, *System Identification*, 2nd ed. (1999), sections 4.3 and 7.2 (innovations and
@@ -41,8 +42,8 @@ struct NoiseStep {
 pub(super) struct Filter {
     /// Gains of all samples side by side, 2n × n each.
     gains: DMatrix<f64>,
-    /// Inverses of the triangular factors of the covariances of the innovations of all samples side
-    /// by side, n × n each.
+    /// For all samples side by side, the inverse of the triangular factor of the covariance of the
+    /// innovations, n × n each.
     inverses: DMatrix<f64>,
     /// Sum of the logarithms of the determinants of the covariances.
     log_determinant: f64,
@@ -122,7 +123,7 @@ impl NoisePath {
         filter.log_determinant.is_finite().then_some(filter)
     }
 
-    /// Returns the mean square of each channel of the response under noise of unit variance on one
+    /// Returns the mean square of each channel of the response to noise of unit variance on one
     /// force.
     fn mean_square(&self, force: usize) -> DVector<f64> {
         let n = self.channels();
@@ -137,7 +138,7 @@ impl NoisePath {
         sum / self.0.len().max(1) as f64
     }
 
-    /// Replaces a residual, or derivatives of it (samples × n), by its white form.
+    /// Whitens a residual or its derivatives (samples × n) in place.
     pub(super) fn whiten(&self, filter: &Filter, values: &mut DMatrix<f64>) {
         let n = values.ncols();
         let (mut state, mut next) = (DVector::zeros(2 * n), DVector::zeros(2 * n));
@@ -175,8 +176,8 @@ fn add_product(
 /// Returns the most likely variances of white noise on response and force for the residual of a
 /// record (samples × n); `None` if no covariance is regular.
 ///
-/// The search is over the logarithms of the ratios of the variances; the common factor follows from
-/// the residual. Only the forces in `driven` have noise.
+/// The search varies the logarithms of the ratios of the variances; the common factor of the
+/// variances follows from the residual. Only the forces in `driven` have noise.
 pub(super) fn most_likely(
     path: &NoisePath,
     residual: &DMatrix<f64>,

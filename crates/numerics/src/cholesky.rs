@@ -7,8 +7,8 @@ const BLOCK: usize = 48;
 
 /// Cholesky factor L of a symmetric positive definite matrix A = L Lᵀ.
 ///
-/// The columns are processed in blocks, so that nearly all operations are matrix products: at a
-/// thousand columns this is ten times as fast as column by column.
+/// The columns are processed in blocks, so that nearly all operations are matrix products. With a
+/// thousand columns, this is ten times as fast as one column after another.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.2.6.
@@ -60,8 +60,7 @@ impl Cholesky {
         solution
     }
 
-    /// Returns L⁻¹, with as many rows and columns as A, in the inverse square root of the unit of
-    /// A.
+    /// Returns L⁻¹, which has the size of A. Its unit is the inverse square root of the unit of A.
     pub fn inverse_of_lower(&self) -> DMatrix<f64> {
         let size = self.lower.nrows();
         let mut inverse = DMatrix::zeros(size, size);

@@ -132,8 +132,8 @@ pub fn check_size(what: &'static str, expected: usize, got: usize) -> Result<(),
     if expected == got { Ok(()) } else { Err(NumericsError::Size { what, expected, got }) }
 }
 
-/// Returns an error that names the first value that is not finite, if there is one, in a matrix of
-/// rows × columns in any unit.
+/// Checks that all values of a matrix (rows × columns, any unit) are finite; the error names the
+/// first value that is not.
 ///
 /// # Errors
 /// [`NumericsError::NotFinite`].

@@ -1,11 +1,11 @@
-//! Nonlinear least squares by Gauss–Newton steps, corrected for the curvature of the residuals and
-//! damped if they do not descend.
+//! Nonlinear least squares by Gauss–Newton steps. A step is corrected for the curvature of the
+//! residuals, and damped if it does not reduce the sum of squares.
 //!
 //! A problem returns its sum of squares for given parameters, and a linearisation of its residuals
 //! at these parameters in coordinates of its choice. There are two linearisations: [`GramMatrix`]
 //! (normal equations, for many residuals and well-scaled coordinates) and [`Triangle`] (QR of the
-//! Jacobian, for badly conditioned ones). [`minimise_residuals`] is for problems that compute all
-//! residuals and their Jacobian at once.
+//! Jacobian, for badly conditioned coordinates). [`minimise_residuals`] is for problems that
+//! compute all residuals and their Jacobian at once.
 
 mod gram_matrix;
 mod residuals;
@@ -25,7 +25,7 @@ pub use triangle::{DampedTriangle, Triangle};
 /// scaled coordinates.
 ///
 /// In these coordinates the columns of J have unit length, so that damping has the same effect on
-/// all.
+/// all coordinates.
 pub trait Linearisation {
     /// Factor of the damped matrix JᵀJ + λI.
     type Factor;
@@ -71,8 +71,8 @@ pub trait SumOfSquares {
     fn linearise(&mut self) -> Option<Self::Linearisation>;
 
     /// Returns Jᵀr″ with r″ the second derivative of the residuals along `change`, a change of the
-    /// parameters; `None` if it is not known, so that steps are not corrected. The change is a
-    /// list, one entry for each parameter, in its unit.
+    /// parameters; `None` if r″ is not known; steps are then not corrected. The change is a list,
+    /// one entry for each parameter, in its unit.
     fn curvature(
         &self,
         _linearisation: &Self::Linearisation,
@@ -108,7 +108,7 @@ pub struct Minimum {
 /// and the step v + a is tried if a is small relative to v. Here r are the residuals, J is their
 /// Jacobian, r″(v) is their second derivative along v, and λ is the damping. The correction makes a
 /// step follow curved valleys, which arise when the data determine a combination of parameters
-/// badly; without it the steps would be tiny. Parameters are a list in any units.
+/// badly; without the correction the steps would be tiny. Parameters are a list in any units.
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, section 10.3; Nielsen (1999), IMM-REP-1999-05, for

@@ -46,8 +46,8 @@ pub fn gram(
     } else {
         add_wide(regressors, weights, dof, &mut sums);
     }
-    // The products of H_ij and H_ji are the sum and the difference of the sums for the real and the
-    // imaginary part of H_ij.
+    // For i < j, the product for H_ij is the sum of the sums for the real and the imaginary part of
+    // H_ij, and the product for H_ji is their difference.
     let mut products = sums.clone();
     for j in 0..dof {
         for i in 0..=j {
@@ -89,7 +89,7 @@ enum Part {
 }
 
 impl Part {
-    /// Returns the columns of the weights with this part of H: the first one and their number.
+    /// Returns where the weights have this part of H: the first column and the number of columns.
     fn columns(self, dof: usize) -> (usize, usize) {
         let real = real_part(0, dof);
         match self {
@@ -98,7 +98,7 @@ impl Part {
         }
     }
 
-    /// Returns the part for φ_a = (real, imaginary part) and φ_b.
+    /// Returns this part of 2 φ̄_a φ_b; `a` and `b` are (real, imaginary part) of φ_a and φ_b.
     #[inline(always)]
     fn product(self, a: (f64, f64), b: (f64, f64)) -> f64 {
         match self {

@@ -1,4 +1,4 @@
-//! Sums of products in an order that every width of vector registers keeps.
+//! Sums of products; the order of the additions is the same for every width of vector registers.
 
 /// Number of partial sums of a product: enough to avoid waiting for the previous addition.
 pub(crate) const LANES: usize = 16;
@@ -17,7 +17,8 @@ pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
     total(sums) + rest(x_rest, y_rest)
 }
 
-/// Returns the sum of all partial sums, by repeatedly adding one half of them to the other.
+/// Returns the sum of all partial sums: repeatedly adds the second half of the sums to the first
+/// half.
 #[inline(always)]
 pub(crate) fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
     let mut half = N / 2;

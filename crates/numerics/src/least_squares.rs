@@ -68,7 +68,8 @@ pub struct Direction {
     /// Singular value along this direction divided by the largest one, for regressors with columns
     /// scaled to unit length.
     pub relative_singular_value: f64,
-    /// One entry per unknown, in its unit; the entry that is largest in scaled columns is 1.
+    /// One entry per unknown, in its unit; the entry that is largest after scaling of the columns
+    /// is 1.
     pub combination: DVector<f64>,
     /// `true` for each unknown that is part of the combination.
     pub involved: Vec<bool>,
@@ -109,7 +110,7 @@ impl LeastSquares {
     /// Adds all rows of `other`, for example of another record.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if it has other numbers of unknowns or right-hand sides,
+    /// [`NumericsError::Size`] if `other` has a different number of unknowns or right-hand sides,
     /// [`NumericsError::Overflow`].
     pub fn merge(&mut self, other: &Self) -> Result<(), NumericsError> {
         check_size("columns of the regressors", self.unknowns, other.unknowns)?;
@@ -156,8 +157,8 @@ impl LeastSquares {
     }
 }
 
-/// Solves least squares on compressed rows, which replace `rows` original rows with the same Gram
-/// matrices. Units are as in [`Solution`].
+/// Solves least squares on compressed rows. They have the same Gram matrices as the `rows` original
+/// rows. Units are as in [`Solution`].
 ///
 /// # Errors
 /// [`NumericsError::NothingUnknown`], [`NumericsError::TooFewRows`], and errors of a decomposition.

@@ -5,7 +5,8 @@
 pub(crate) const COST_TOLERANCE: f64 = 1e-12;
 
 /// Length of a step, relative to the parameters and in scaled coordinates, that ends a search at a
-/// minimum. It is needed for data without noise, for which the predicted decrease ends no search.
+/// minimum. It is needed for data without noise: there the predicted decrease does not end the
+/// search.
 pub(crate) const STEP_TOLERANCE: f64 = 1e-12;
 
 /// Initial damping after a step that does not descend, relative to a Gram matrix of unit diagonal.
@@ -14,7 +15,7 @@ pub(crate) const FIRST_DAMPING: f64 = 1e-8;
 /// Minimum damping; a smaller one is replaced by zero.
 pub(crate) const SMALLEST_DAMPING: f64 = 1e-13;
 
-/// Maximum damping; above it rounding decides, so the search ends without descent.
+/// Maximum damping; above it rounding determines whether a step descends, so the search ends.
 pub(crate) const LARGEST_DAMPING: f64 = 1e12;
 
 /// Maximum length of the curvature correction of a step, relative to the step; if the correction is
@@ -33,8 +34,8 @@ pub(crate) const SHARE_TOLERANCE: f64 = 1e-6;
 /// digits.
 pub(crate) const SMALLEST_NORM: f64 = 1e-140;
 
-/// Largest magnitude, relative to the largest entry, of an entry that counts as 0 in a
-/// decomposition: its square would underflow.
+/// Largest magnitude of an entry that counts as 0 in a decomposition, relative to the largest
+/// entry; the squares of much smaller entries underflow.
 pub(crate) const NEGLIGIBLE: f64 = 1e-140;
 
 /// Maximum number of iterations per row or column of a decomposition; two or three are usual.
@@ -60,8 +61,8 @@ pub(crate) const PRODUCT_ROWS: usize = 1024;
 /// dot products; with more, a product of matrices is faster.
 pub(crate) const NARROW_PRODUCT: usize = 2;
 
-/// Number of rows of a tall matrix that are multiplied by their weights at a time: they stay in the
-/// fastest cache of a core.
+/// Number of rows of a tall matrix that are multiplied by their weights at a time: these rows stay
+/// in the fastest cache of a core.
 pub(crate) const WEIGHTED_ROWS: usize = 512;
 
 /// Maximum number of columns of a tall matrix whose weighted products are computed as dot products;

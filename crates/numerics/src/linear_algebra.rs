@@ -3,7 +3,7 @@
 //! The decompositions of nalgebra iterate without a bound, and panic or do not return if an entry
 //! is not finite. Here the entries are checked, the iterations counted, and failure is an error.
 
-#![allow(clippy::disallowed_methods, reason = "the one home of the iterations kept out elsewhere")]
+#![allow(clippy::disallowed_methods, reason = "the only module that may call these iterations")]
 
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 

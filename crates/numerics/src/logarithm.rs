@@ -9,8 +9,8 @@
 //! ```
 //!
 //! if the force f is constant between samples. The logarithm of the left side therefore gives A and
-//! B at once, also if A is singular (rigid-body modes), and its derivative converts the covariance
-//! of Φ and Γ to that of A and B.
+//! B at once, also if A is singular (rigid-body modes), and the derivative of the logarithm
+//! converts the covariance of Φ and Γ to that of A and B.
 
 use nalgebra::DMatrix;
 
@@ -53,9 +53,9 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
 /// ```
 ///
 /// # Errors
-/// [`NumericsError::NoLogarithm`] if an eigenvalue is real and not positive (or a pair is, up to
-/// rounding), [`NumericsError::Size`] if `a` is not square, [`NumericsError::NotFinite`],
-/// [`NumericsError::Eigenvalues`].
+/// [`NumericsError::NoLogarithm`] if an eigenvalue is real and not positive (or, up to rounding, a
+/// pair of eigenvalues is), [`NumericsError::Size`] if `a` is not square,
+/// [`NumericsError::NotFinite`], [`NumericsError::Eigenvalues`].
 ///
 /// # Source
 /// Higham, *Functions of Matrices* (2008), chapter 11 (inverse scaling and squaring, algorithm

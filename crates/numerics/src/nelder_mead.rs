@@ -2,7 +2,7 @@
 
 /// Returns the best point from a search at `start`, with an initial simplex of edge `step`. The
 /// search ends after `rounds` rounds, or earlier if the values at the corners of the simplex differ
-/// by at most `settled`. A point is a list in any unit, the same for all coordinates.
+/// by at most `settled`. A point is a list of coordinates, which all have the same unit.
 ///
 /// # Source
 /// Nelder & Mead (1965), with the usual coefficients 1, 2, ½, ½.

@@ -120,7 +120,7 @@ fn solve_block(
             }
         }
     }
-    // The eigenvalues of Y have real parts above −1, so the sum of two of them and 2 is never 0.
+    // The eigenvalues of Y have real parts above −1, so 2 plus the sum of two of them is never 0.
     let solution = equations.full_piv_lu().solve(&sides).unwrap_or_default();
     for i in 0..height {
         for j in 0..width {

@@ -12,8 +12,8 @@ use crate::limits::SMALLEST_NORM;
 /// Number of rows reduced at a time: a block of a dozen columns fits into the first-level cache.
 const BLOCK_ROWS: usize = 256;
 
-/// Number of rows that one thread reduces. It does not depend on the number of threads, so that the
-/// results do not, either.
+/// Number of rows that one thread reduces. It does not depend on the number of threads; therefore
+/// the results do not depend on it, either.
 const SEGMENT_ROWS: usize = 16_384;
 
 /// Triangular factor R of A = Q R, computed from row blocks of A; Q is never formed.
@@ -32,7 +32,7 @@ pub struct TriangularFactor {
     r: DMatrix<f64>,
     /// Entries of one block of rows, stored column by column.
     block: Vec<f64>,
-    /// `true` for columns in which the square of some value underflows and no value is larger.
+    /// `true` for columns with a value other than 0 if the squares of all their values underflow.
     vanished: Vec<bool>,
 }
 
@@ -214,8 +214,8 @@ impl Reflection {
         Self { row, tau: (beta - alpha) / beta, scale: 1.0 / (alpha - beta) }
     }
 
-    /// Changes R in `column`, whose part in the block has the product `dot` with x; returns the
-    /// multiple of x to be subtracted from that part.
+    /// Changes R in `column`; `dot` is the product of x with the part of this column in the block.
+    /// Returns the multiple of x to be subtracted from this part.
     #[inline(always)]
     fn apply(&self, r: &mut DMatrix<f64>, column: usize, dot: f64) -> f64 {
         let w = self.tau * (r[(self.row, column)] + self.scale * dot);

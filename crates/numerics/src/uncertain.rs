@@ -39,8 +39,9 @@ impl Uncertain {
     }
 }
 
-/// Returns the interval [low, high] at `level` around a value of known standard error, in its unit;
-/// it is infinite for a standard error that is not finite or has no degrees of freedom.
+/// Returns the interval [low, high] at `level` around a value with its standard error, in the unit
+/// of the value. The interval is infinite if the standard error is not finite or has no degrees of
+/// freedom.
 ///
 /// # Errors
 /// [`NumericsError::Level`] unless 0 < level < 1.

@@ -4,8 +4,8 @@
 /// times this number is the error in decibels.
 pub const NEPER: f64 = 20.0 * std::f64::consts::LOG10_E;
 
-/// Maximum rounding error, relative to the largest value of a figure: logarithmic axes end there,
-/// and responses that are never larger are not drawn.
+/// Maximum rounding error, relative to the largest value of a figure: logarithmic axes end at this
+/// level, and responses that never exceed it are not drawn.
 pub const ROUNDING: f64 = 1e-12;
 
 /// Linear or logarithmic scale of an axis.
@@ -116,8 +116,8 @@ impl Mapping {
 /// the pixels per unit would overflow.
 pub(crate) const TINY: f64 = 1e-290;
 
-/// Returns the range that shows everything from `low` to `high`, with the fraction `margin` of it
-/// added on both sides.
+/// Returns the range that shows everything from `low` to `high`, with the fraction `margin` of this
+/// range added on both sides.
 pub(crate) fn padded(scale: Scale, low: f64, high: f64, margin: f64) -> (f64, f64) {
     match scale {
         Scale::Linear => {

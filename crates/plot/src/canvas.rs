@@ -29,12 +29,12 @@ impl Stroke {
 /// Alignment of a text with its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Anchor {
-    /// The text starts there.
+    /// The text starts at its point.
     Start,
-    /// The text is centred there.
+    /// The text is centred at its point.
     #[default]
     Middle,
-    /// The text ends there.
+    /// The text ends at its point.
     End,
 }
 
@@ -135,8 +135,8 @@ impl Canvas {
         sheet
     }
 
-    /// Returns the canvas with ids that begin with `ids` (letters, digits, `-`, `_`; others become
-    /// `-`), so that several canvases can be in one document.
+    /// Returns the canvas with ids that begin with `ids` (letters, digits, `-`, `_`; other
+    /// characters become `-`), so that several canvases can be in one document.
     #[must_use]
     pub fn with_ids(mut self, ids: &str) -> Self {
         let safe = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };

@@ -75,7 +75,8 @@ impl Curve {
     }
 
     /// Creates a shaded band between `lower` and `upper`, one entry of each per abscissa, in the
-    /// units of the axes: for confidence intervals. It has the style of the curve added after it.
+    /// units of the axes: for confidence intervals. The band has the style of the curve that is
+    /// added next.
     pub fn band(label: impl Into<String>, x: &[f64], lower: &[f64], upper: &[f64]) -> Self {
         Curve { upper: upper.to_vec(), ..Curve::new(Kind::Band, label, x, lower) }
     }

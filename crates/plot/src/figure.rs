@@ -42,8 +42,8 @@ impl Figure {
         self
     }
 
-    /// Gives the panels of a column one abscissa, labelled under the lowest; a title that is equal
-    /// to the title above is written once.
+    /// Gives the panels of a column one abscissa, labelled only under the lowest panel; a title
+    /// that is equal to the title above is written once.
     #[must_use]
     pub fn share_x(mut self) -> Self {
         self.share_x = true;
@@ -51,7 +51,7 @@ impl Figure {
     }
 
     /// Draws one legend above all panels instead of one in each. It shows each label once, with the
-    /// style of its first curve.
+    /// style of the first curve that has this label.
     #[must_use]
     pub fn shared_legend(mut self) -> Self {
         self.shared_legend = true;

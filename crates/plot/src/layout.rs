@@ -82,8 +82,8 @@ impl Layout {
     pub(crate) fn new(figure: &Figure) -> Result<Self, PlotError> {
         let planner = Planner::new(figure)?;
         let first = planner.arrange(&vec![false; figure.panels.len()])?;
-        // A legend without a free place inside goes above the panel, which moves every frame of its
-        // row.
+        // A legend without a free place inside the panel goes above it; this moves every frame of
+        // the row.
         let above: Vec<bool> =
             first.panels.iter().map(|panel| panel.place == Place::Above).collect();
         if above.contains(&true) { planner.arrange(&above) } else { Ok(first) }
@@ -142,7 +142,8 @@ impl<'a> Planner<'a> {
         !self.figure.share_x || index + self.columns >= self.figure.panels.len()
     }
 
-    /// Returns whether the title of a panel is written: not if the panel above has the same title.
+    /// Returns whether the title of a panel is written; it is omitted if the panel above has the
+    /// same title.
     fn titled(&self, index: usize) -> bool {
         let title = |index: usize| &self.figure.panels[index].title;
         let repeated = self.figure.share_x

@@ -62,7 +62,7 @@ impl Entry {
     }
 }
 
-/// Label of the bands around curves with standard errors; the script has the same.
+/// Label of the bands around curves with standard errors; the script has the same label.
 const BAND: &str = "± 2 standard errors";
 
 /// Returns the entries of a panel: its labelled curves, the bands around them, then its labelled

@@ -21,7 +21,8 @@ impl Figure {
     }
 
     /// Returns the figure as an SVG element for an HTML document with several figures: its ids
-    /// begin with `ids`, different for each, and `label` is its name for screen readers.
+    /// begin with `ids`, which must be different for each figure, and `label` is its name for
+    /// screen readers.
     ///
     /// # Errors
     /// As [`Figure::to_svg`].

@@ -23,7 +23,7 @@ pub(crate) fn ticks(scale: Scale, low: f64, high: f64, wanted: f64, step: Option
 }
 
 fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
-    // A step with more than forty labels, or with one, is ignored.
+    // A step that gives more than forty labels, or only one label, is ignored.
     let step = step
         .filter(|step| *step > 0.0 && step.is_finite() && (high - low) / step <= 40.0)
         .filter(|step| multiples(low, high, *step).1 > 1)

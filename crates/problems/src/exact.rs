@@ -10,8 +10,8 @@
 //!
 //! The periodic functions return the motion that repeats with the period `len · dt` of the force,
 //! the others start from a given state. x, ẋ and ẍ belong to the same instants. A held force, and
-//! the acceleration with it, jumps at every sample: ẍ is the limit from the right, under the force
-//! that begins there.
+//! the acceleration with it, jumps at every sample: ẍ is the limit from the right, with the force
+//! after the jump.
 
 use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
 use mechid_numerics::linear_algebra::singular_values;
@@ -50,8 +50,8 @@ pub fn exact_foh(
 /// Periodic response to a force held between samples, one period (samples × dof, in N).
 ///
 /// # Errors
-/// [`ProblemError::NoPeriodicMotion`] if there is none or more than one; otherwise the errors of
-/// [`exact_zoh`].
+/// [`ProblemError::NoPeriodicMotion`] if there is no periodic response or more than one; otherwise
+/// the errors of [`exact_zoh`].
 pub fn exact_zoh_periodic(
     system: &SecondOrderSystem,
     force: &Record,
@@ -166,8 +166,7 @@ fn periodic(
     // An unstable system may overflow over the period; a matrix with infinite entries has no
     // singular values.
     if growth.is_finite() {
-        // The condition number of I − Φᴺ is no measure: without damping, the whole matrix may
-        // vanish.
+        // The condition number of I − Φᴺ is not used: without damping, the whole matrix may vanish.
         reciprocal_condition = singular_values(closing.clone())?.min() / (1.0 + growth);
     }
     // N products of matrices add rounding of about N ε to Φᴺ.

@@ -39,7 +39,7 @@ pub enum Fault {
     },
     /// The zero drifts along a straight line.
     Drift {
-        /// Drift from the first sample to the last, over the RMS value of the channel (pure
+        /// Drift from the first sample to the last, divided by the RMS value of the channel (pure
         /// number).
         end: f64,
     },
@@ -55,8 +55,8 @@ pub enum Fault {
         /// Limit as a fraction of the largest magnitude of each channel.
         part: f64,
     },
-    /// Samples are lost without a replacement: later samples come too early, and the samples from
-    /// the beginning of the record follow at its end, as in a record of whole periods.
+    /// Samples are lost without a replacement: later samples come too early, and the end of the
+    /// record is filled with samples from its beginning, as in a record of whole periods.
     Lost {
         /// Number of samples lost, all at one position drawn from the seed.
         samples: usize,
@@ -73,8 +73,7 @@ pub enum Fault {
         /// Ratio of the values to those without the fault (pure number).
         factor: f64,
     },
-    /// A converter quantises the values; its range to either side is 1.5 times the largest
-    /// magnitude.
+    /// A converter quantises the values; its range is ± 1.5 times the largest magnitude.
     Steps {
         /// Number of bits.
         bits: u8,

@@ -80,7 +80,8 @@ impl HammerTest {
     /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (orthogonality of modes).
     pub fn system(&self) -> Result<SecondOrderSystem, ProblemError> {
         let inverse = self.shapes.clone().lu().try_inverse().unwrap_or_else(|| {
-            // The constructor of the system refuses a mass that is not finite.
+            // If there is no inverse, the NaN values make the constructor of the system refuse the
+            // mass.
             DMatrix::from_element(self.shapes.nrows(), self.shapes.ncols(), f64::NAN)
         });
         let of = |modal: &dyn Fn(f64, f64) -> f64| {
@@ -153,7 +154,7 @@ impl HammerTest {
         Ok(HammerRecord { force: Record::new(self.sampling, force)?, response, hits })
     }
 
-    /// Force on one degree of freedom, and the response of all.
+    /// Force on one degree of freedom, and the response of all degrees of freedom.
     fn filtered(&self, dof: usize, pulses: &[Pulse]) -> Result<(Record, Record), ProblemError> {
         let (n, finer) = (self.shapes.nrows(), Self::FINER);
         let margin = Self::SPAN * finer;
@@ -243,7 +244,7 @@ impl Oscillator {
         let receptance =
             Complex::new(omega * omega - drive * drive, 2.0 * decay * drive).inv() * pulse.peak;
         let steady = receptance * Complex::cis(drive * t);
-        // The free motion makes displacement and velocity zero at the beginning.
+        // The free motion is added, so that displacement and velocity are zero at the beginning.
         let damped = omega * (1.0 - self.zeta * self.zeta).sqrt();
         let (x0, v0) = (-receptance.im, -drive * receptance.re);
         let sine = (v0 + decay * x0) / damped;

@@ -71,7 +71,7 @@ pub struct Test {
     pub system: SecondOrderSystem,
     /// True if M is known in the identification.
     pub mass_known: bool,
-    /// Numbers of the driven lines, and of as many lines without force above them.
+    /// Numbers of the driven lines and, above them, of an equal number of lines without force.
     pub lines: Vec<usize>,
     /// Force (N), samples × dof, one period.
     pub force: Record,

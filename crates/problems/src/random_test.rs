@@ -7,7 +7,8 @@ use nalgebra::Complex;
 use crate::error::ProblemError;
 use crate::exact::exact_harmonic_periodic;
 
-/// A window of the steady state under a Gaussian random force with a period four times as long.
+/// A window of the steady state under a Gaussian random force; the period of the force is four
+/// times the length of the window.
 ///
 /// The lines of the force reach up to [`RandomTest::BAND`] of the sampling rate, as behind an
 /// anti-aliasing filter, and the response is exact at each of them. The window begins and ends
@@ -31,7 +32,7 @@ impl RandomTest {
     const LONGER: usize = 4;
 
     /// Returns the forces (N) and the responses in one window, samples × degrees of freedom; each
-    /// seed gives others.
+    /// seed gives different records.
     ///
     /// # Errors
     /// [`ProblemError`] if the system has no receptance at a line.

@@ -56,7 +56,7 @@ pub fn displacements(
 }
 
 /// Responses D(ω)⁻¹ F (m), lines × degrees of freedom, of M, C and K (SI units) to forces (N), by
-/// dense elimination line by line, which does not use the receptance of a model.
+/// dense elimination on each line. The computation does not use the receptance of a model.
 ///
 /// # Panics
 /// If D is singular at a line.
@@ -101,8 +101,8 @@ pub fn synthesise(
     Record::new(sampling, data).unwrap()
 }
 
-/// Largest deviation relative to the largest entry.
-/// Matrices of the same rows and columns; a pure number.
+/// Returns the largest deviation of two matrices of the same shape (rows × columns), relative to
+/// the largest entry of the expected one (pure number).
 pub fn relative_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     (found - expected).abs().max() / expected.abs().max()
 }

@@ -132,7 +132,8 @@ impl Identified {
     }
 
     /// Returns the frequencies in rad/s, and the receptances of frequencies × motions · forces in
-    /// m/N: measured (NaN unless only one force acts), and of the identified system.
+    /// m/N: measured (NaN on lines where the force does not act alone), and of the identified
+    /// system.
     fn receptances<'py>(&self, py: Python<'py>) -> PyResult<Spectra<'py>> {
         let identified = Arc::clone(&self.0);
         let compare = move || -> Result<_, AnalysisError> {

@@ -10,7 +10,7 @@ use crate::machine::Answering;
 use crate::measurement::Measurement;
 use crate::{failure, work};
 
-/// Predicted response, and its error relative to the measured one.
+/// Predicted response, and its error relative to the measured response.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Predicted(mechid::Predicted);
 

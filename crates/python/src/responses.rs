@@ -87,7 +87,7 @@ impl ResponseTable {
         &self.0.file
     }
 
-    /// Returns the quantity of all responses; `None` if they do not state one.
+    /// Returns the quantity of all responses; `None` if the responses do not state their quantity.
     #[getter]
     fn quantity(&self) -> Option<String> {
         let mut stated = self.0.functions.iter().map(|function| function.quantity);

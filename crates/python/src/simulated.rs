@@ -17,8 +17,8 @@ use crate::arrays::{self, Named};
 use crate::machine::Machine;
 use crate::{failure, work};
 
-/// Record of a simulated experiment: scheme, sampling rate, machine (`None` for a sparse one), then
-/// force and responses with noise, then force and responses without noise.
+/// Record of a simulated experiment: scheme, sampling rate, machine (`None` for a sparse machine),
+/// then force and responses with noise, then force and responses without noise.
 type Simulated<'py> = (String, f64, Option<Machine>, Channels<'py>, Channels<'py>);
 
 /// Force, and each kind of response.

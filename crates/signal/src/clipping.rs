@@ -12,9 +12,9 @@ pub struct Clipping {
 }
 
 /// Returns the level at which a channel, in any unit, is clipped: its minimum or maximum, if runs
-/// of three or more samples have exactly that value and a run begins or ends with a jump. If the
-/// channel is clipped at its minimum and its maximum, the level with more samples is returned;
-/// `None` if the channel is not clipped.
+/// of three or more samples have exactly this extreme value and a run begins or ends with a jump.
+/// If the channel is clipped at its minimum and its maximum, the level with more samples is
+/// returned; `None` if the channel is not clipped.
 ///
 /// Peaks of a signal behind a coarse converter, two-level signals (binary sequences, steps), values
 /// repeated over several samples, and a constant value at rest do not count as clipping.

@@ -15,7 +15,7 @@ pub struct Correlation {
     /// Sum of the squared coefficients, each divided by its variance for noise; dimensionless.
     pub statistic: f64,
     /// Probability that noise has a larger statistic. If it is below about 0.01, the residual is
-    /// hardly noise, and the model is incomplete.
+    /// probably not noise, and the model is incomplete.
     pub p_value: f64,
 }
 
@@ -125,7 +125,7 @@ pub fn cross_correlation_of_coloured(
 impl Correlation {
     /// Tests a sum of squared coefficients. Their covariance, multiplied by the number of samples,
     /// depends only on their distance in lags: `covariance` has its values at the distances 0, 1 ….
-    /// `shared` is the excess of half the variance of the sum over its value for normal variables.
+    /// `shared` is half the variance of the sum, minus half its variance for normal variables.
     fn tested(
         sum: f64,
         covariance: &[f64],
@@ -143,8 +143,8 @@ impl Correlation {
 
 /// Returns the probability that the sum of squares of `terms` normal variables of mean zero exceeds
 /// `sum`. The covariance of two variables depends only on their distance: `covariance` has its
-/// values at the distances 0, 1 …, and it is zero at larger ones. `shared` is the excess of half
-/// the variance of the sum over its value for normal variables.
+/// values at the distances 0, 1 …, and it is zero at larger ones. `shared` is half the variance of
+/// the sum, minus half its variance for normal variables.
 ///
 /// The sum has approximately the distribution of g χ²(h) with the same mean and variance.
 fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
@@ -165,7 +165,7 @@ pub fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     let ratio = mean / unit;
     match ChiSquared::new(ratio * ratio) {
         Ok(distribution) if sum.is_finite() => distribution.sf(sum / unit * ratio),
-        // Variables without variance exceed no positive sum.
+        // The sum of variables without variance is never larger than a positive value.
         _ => f64::from(!(sum > 0.0 && mean <= 0.0)),
     }
 }

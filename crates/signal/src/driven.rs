@@ -17,10 +17,10 @@ use crate::spectrum::Spectrum;
 /// - In several periods the noise is the part that changes from one to the next. The periodic part
 ///   is compared with the median scatter of the 33 lines around it by Fisher's test, at a level of
 ///   0.1 % for all lines of the record together.
-/// - In a single period the noise is the weakest 16 lines or more, if there is a gap above them: a
-///   factor of 3 in amplitude without any line.
+/// - In a single period the noise is the weakest lines (at least 16) if there is a gap above them:
+///   no line within a factor of 3 in amplitude.
 ///
-/// If these lines have less than half of the power of each channel, because the excitation is
+/// If the driven lines have less than half of the power of each channel, because the excitation is
 /// random or the period is wrong, all lines above a thousandth of the strongest amplitude count.
 ///
 /// # Errors

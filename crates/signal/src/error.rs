@@ -131,7 +131,7 @@ pub enum SignalError {
     LineOrder {
         /// The line before.
         previous: usize,
-        /// The line given after it.
+        /// The line that follows `previous`.
         line: usize,
     },
     /// A list does not have one entry per line.
@@ -145,14 +145,14 @@ pub enum SignalError {
         got: usize,
     },
     /// A line at or above half the sampling rate cannot be sampled.
-    #[error("line {line} needs more than {} samples per period, the sampling has {len}", 2 * line)]
+    #[error("line {line} needs more than {} samples per period, but there are {len}", 2 * line)]
     Nyquist {
         /// The line.
         line: usize,
         /// Number of samples per period.
         len: usize,
     },
-    /// A quantity that must be finite and not negative is not.
+    /// A quantity that must be finite and at least zero is negative, NaN or infinite.
     #[error("{what} must be finite and not negative, got {value}", value = message::number(*value))]
     Negative {
         /// The quantity.
@@ -160,7 +160,7 @@ pub enum SignalError {
         /// The value given, in the unit of the quantity.
         value: f64,
     },
-    /// A quantity that must be finite is not.
+    /// A quantity that must be finite is NaN or infinite.
     #[error("{what} must be finite, got {value}", value = message::number(*value))]
     Infinite {
         /// The quantity.
@@ -168,7 +168,7 @@ pub enum SignalError {
         /// The value given, in the unit of the quantity.
         value: f64,
     },
-    /// A quantity that must be finite and greater than zero is not.
+    /// A quantity that must be finite and greater than zero is zero, negative, NaN or infinite.
     #[error("{what} must be finite and positive, got {value}", value = message::number(*value))]
     NotPositive {
         /// The quantity.

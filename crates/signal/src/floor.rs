@@ -1,4 +1,4 @@
-//! Noise of a random signal, from the part of its spectrum that it does not drive.
+//! Noise of a random signal, from the part of the spectrum that the signal does not drive.
 
 use std::f64::consts::TAU;
 
@@ -12,8 +12,8 @@ use crate::spectrum::Spectrum;
 const HANN: f64 = 0.375;
 
 /// Returns the standard deviation of the noise of each channel, in its unit, from the lines above
-/// the driven band. `None` if the signal drives all lines, if their spectrum falls off slowly, or
-/// if there are too few (about 500 samples).
+/// the driven band. `None` if the signal drives all lines, if the spectrum above the band falls off
+/// slowly, or if the record is too short (fewer than about 500 samples).
 ///
 /// The spectrum under Hann's window is averaged over 64 lines at a time. At least three averages,
 /// from half the sampling rate downwards, must be flat and below a hundredth of the largest
@@ -59,8 +59,9 @@ pub fn noise_above_band(record: &Record) -> Result<Vec<Option<f64>>, SignalError
         let powers: Vec<f64> =
             (1..samples.div_ceil(2)).map(|n| spectrum.line(n, channel).norm_sqr()).collect();
         let deviation = |level: f64| (level * samples as f64 / (4.0 * HANN)).sqrt();
-        // The lowest average is an upper bound of white noise. If it is negligible, it is the
-        // result even for a spectrum that is not flat: at this level leakage makes it uneven.
+        // The lowest average is an upper bound of the white noise. If this bound is negligible, it
+        // is the result even for a spectrum that is not flat: at such a low level, leakage makes
+        // the spectrum uneven.
         let rms = record.column(channel).variance().sqrt();
         let lowest = levels(&powers).into_iter().map(deviation).reduce(f64::min);
         let none = lowest.filter(|lowest| *lowest <= limits::NEGLIGIBLE_NOISE * rms);

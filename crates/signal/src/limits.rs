@@ -13,7 +13,7 @@ pub(crate) const CLIPPED_JUMP: f64 = 6.0;
 /// Fraction of all samples at an extreme value above which a channel is at rest at this value.
 pub(crate) const REST_FRACTION: f64 = 0.5;
 
-/// Fraction of all samples at the two extremes, not counting those at rest, above which a channel
+/// Fraction of all samples at the two extremes, not counting samples at rest, above which a channel
 /// is a two-level signal.
 pub(crate) const TWO_LEVEL_FRACTION: f64 = 0.9;
 
@@ -69,7 +69,7 @@ pub(crate) const NEGLIGIBLE_NOISE: f64 = 1e-5;
 
 // Hits
 
-/// Fraction of its own peak above which a force belongs to the pulse of a hit.
+/// Fraction of the peak of a hit above which the force belongs to the pulse of this hit.
 pub(crate) const PULSE_FRACTION: f64 = 0.1;
 
 /// Number of instants per sampling step at which the lobes of a ringing filter are evaluated. With
@@ -80,7 +80,7 @@ pub(crate) const RINGING_STEPS: usize = 8;
 pub(crate) const INTERPOLATION_REACH: usize = 16;
 
 /// Smallest peak of a hit, in standard deviations of the noise: the range of 10⁵ samples of
-/// Gaussian noise is 9 of them.
+/// Gaussian noise is 9 standard deviations.
 pub(crate) const HIT_OVER_NOISE: f64 = 12.0;
 
 /// Smallest peak of a hit, in steps of the converter: a force at rest flickers between two of its
@@ -99,9 +99,10 @@ pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
 /// standard deviations of the noise. Weaker ringing is lost in the noise that is set to zero.
 pub(crate) const RINGING_OVER_FLOOR: f64 = 1.0 / 3.0;
 
-/// Maximum distance, in samples, of a loud sample from the ringing of a filter before it. Near its
-/// zero crossings ringing is weaker than the noise, and half of its lobes are negative. A larger
-/// number would count slow forces of a swinging hammer as ringing.
+/// Maximum distance, in samples, between a pulse or its ringing and another sample above the noise
+/// for which this sample also counts as ringing. Near its zero crossings ringing is weaker than the
+/// noise, and half of its lobes are negative. A larger number would count slow forces of a swinging
+/// hammer as ringing.
 pub(crate) const RINGING_GAP: usize = 8;
 
 /// Default number of samples before a pulse, as a multiple of the number of samples in the pulse.
@@ -117,7 +118,8 @@ pub(crate) const PERIODIC_MISMATCH: f64 = 0.125;
 pub(crate) const EQUAL_LAGS: f64 = 2.0;
 
 /// Factor on the square of [`PERIODIC_MISMATCH`]; at a larger squared mismatch a slow signal no
-/// longer resembles itself. It is larger than the ratio of any two equally good lags.
+/// longer resembles itself. It is larger than the ratio of the squared
+/// mismatches of any two equally good lags.
 pub(crate) const SLOW_SIGNAL: f64 = 2.0 * EQUAL_LAGS;
 
 /// Squared mismatch due to rounding in the Fourier transforms.
@@ -162,8 +164,9 @@ pub(crate) const CREST_GAIN: f64 = 1e-5;
 /// Largest damping; above it the norm is stationary to rounding.
 pub(crate) const LARGEST_DAMPING: f64 = 1e6;
 
-/// Maximum number of lines for which the Hessian is formed and factored. With more lines, only its
-/// products with vectors are computed. At this number both cost the same.
+/// Maximum number of lines for which the Hessian is formed and factored. With more lines, only
+/// products of the Hessian with vectors are computed. At this number of lines, both methods take
+/// the same time.
 pub(crate) const DENSE_HESSIAN: usize = 400;
 
 /// Residual, relative to the gradient, below which conjugate gradients stop.

@@ -29,7 +29,7 @@ pub fn rms(samples: &[f64]) -> f64 {
     if peak == 0.0 {
         return 0.0;
     }
-    // Squares of very large or small samples overflow; scaling is exact.
+    // Squares of very large samples overflow, those of very small ones underflow; scaling is exact.
     let unit = power_of_two(peak);
     let sum: f64 = samples.iter().map(|x| (x / unit).powi(2)).sum();
     unit * (sum / samples.len() as f64).sqrt()
@@ -107,7 +107,7 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     if x.is_empty() {
         return Vec::new();
     }
-    // Squares of very large or small samples overflow; scaling is exact.
+    // Squares of very large samples overflow, those of very small ones underflow; scaling is exact.
     let unit = power_of_two(peak(x));
     let plan = forward(period);
     let (mut samples, mut lines) = (plan.make_input_vec(), plan.make_output_vec());

@@ -19,8 +19,8 @@ use crate::phases::Phases;
 pub enum Mixing {
     /// exp(i 2π e k / n) for experiment e and input k: any number of inputs.
     Dft,
-    /// ±1, Sylvester's matrix: a power of two inputs. Only signs change, so that every input keeps
-    /// its crest factor.
+    /// ±1, Sylvester's matrix: the number of inputs is a power of two. Only signs change, so that
+    /// every input keeps its crest factor.
     Hadamard,
 }
 

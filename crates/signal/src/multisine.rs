@@ -90,7 +90,7 @@ impl Multisine {
         Self::new(lines, amplitudes, phases)
     }
 
-    /// Creates the multisine of a measured period: its lines between DC and Nyquist, exactly.
+    /// Creates the multisine with exactly the lines of a measured period between DC and Nyquist.
     ///
     /// # Errors
     /// The errors of [`Multisine::new`], also for a period of one or two samples, which has no such
@@ -118,7 +118,7 @@ impl Multisine {
         &self.phases
     }
 
-    /// Returns the same lines and amplitudes with other phases.
+    /// Returns the multisine with the same lines and amplitudes and with other phases.
     ///
     /// # Errors
     /// [`SignalError::PerLine`] or [`SignalError::Infinite`] for bad [`Phases::Given`].
@@ -127,7 +127,7 @@ impl Multisine {
         Ok(self)
     }
 
-    /// Returns the same shape, scaled to an RMS value.
+    /// Returns the multisine scaled to an RMS value; the shape of the signal is unchanged.
     ///
     /// # Errors
     /// [`SignalError::Negative`] for an impossible `rms`, [`SignalError::Silent`] if all
@@ -138,7 +138,8 @@ impl Multisine {
         self.scaled(rms, now)
     }
 
-    /// Returns the same shape, scaled to a largest absolute value ([`peak`](Self::peak)).
+    /// Returns the multisine scaled to a largest absolute value ([`peak`](Self::peak)); the shape
+    /// of the signal is unchanged.
     ///
     /// # Errors
     /// [`SignalError::Negative`] for an impossible `peak`, [`SignalError::Silent`] if all
@@ -241,7 +242,7 @@ fn check_amplitudes(amplitudes: &[f64]) -> Result<(), SignalError> {
     for a in amplitudes {
         not_negative("amplitude", *a)?;
     }
-    // The factor of two covers the sums within a transform.
+    // The factor of 2 ensures that the sums within a transform do not overflow, either.
     not_negative("sum of all amplitudes", 2.0 * amplitudes.iter().sum::<f64>())?;
     Ok(())
 }

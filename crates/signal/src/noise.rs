@@ -1,7 +1,7 @@
 //! Seeded Gaussian noise, white or coloured, at a stated level.
 //!
-//! Each channel has its own stream of a ChaCha generator: the numbers depend only on the seed, the
-//! channel and the sample, not on other computations or the number of threads.
+//! Each channel has a separate stream of a ChaCha generator: the numbers depend only on the seed,
+//! the channel and the sample, not on other computations or the number of threads.
 
 use nalgebra::DMatrix;
 use rand::SeedableRng;
@@ -77,8 +77,8 @@ pub fn white(
 /// Returns Gaussian noise of the given colour and standard deviation (in the unit of the record),
 /// independent between channels.
 ///
-/// The standard deviation is that of the process. The RMS of one record differs from it, more so if
-/// it has fewer independent values.
+/// The standard deviation is that of the process. The RMS of one record differs from it; the
+/// difference is larger if the record has fewer independent values.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the deviation, [`SignalError::Range`] for the exponent,
@@ -141,8 +141,9 @@ pub fn add(
     Record::new(record.sampling(), data)
 }
 
-/// Returns white noise shaped in frequency. The samples are the first half of a period that is
-/// twice as long, because the two ends of a record of noise do not match.
+/// Returns white noise shaped in frequency. The samples are the first half of a period of twice the
+/// length, because the two ends of a whole period match, but the two ends of a record of noise do
+/// not.
 fn power_law(
     sampling: Sampling,
     exponent: f64,

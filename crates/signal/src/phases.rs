@@ -77,7 +77,7 @@ pub fn schroeder(lines: &[usize], amplitudes: &[f64]) -> Vec<f64> {
     let mut phases = Vec::with_capacity(lines.len());
     for (&line, a) in lines.iter().zip(amplitudes) {
         if let Some(previous) = previous {
-            // Each step adds the power so far once more to Σ (n − l) p_l.
+            // Each step to the next line adds the sum of the powers so far to Σ (n − l) p_l.
             phase += (line.abs_diff(previous) / step) as f64 * share;
         }
         phases.push(0.0 - TAU * phase.fract());

@@ -3,8 +3,8 @@
 use crate::limits;
 
 /// Returns the step between the values of a channel, in its unit, if the distance of any two values
-/// is a whole number of steps. `None` for other values, for more levels than the samples could
-/// show, and for fewer than 16 values.
+/// is a whole number of steps. `None` if the distances are not whole numbers of steps, if there are
+/// too many levels for the number of samples, and for fewer than 16 different values.
 ///
 /// Rounding to such steps adds an error of step/√12 RMS, which is the same in every period of a
 /// signal without other noise.
@@ -32,8 +32,8 @@ pub fn quantisation_step(samples: &[f64]) -> Option<f64> {
     }
     let distances = || values.windows(2).map(|pair| pair[1] - pair[0]);
     let smallest = distances().fold(f64::INFINITY, f64::min);
-    // The smallest distance contains the rounding of two printed values; the mean of all distances
-    // of one step is more precise.
+    // The smallest distance has the rounding errors of two printed values; the mean of all
+    // distances of about one step is more precise.
     let (sum, count) = distances()
         .filter(|distance| *distance < 1.5 * smallest)
         .fold((0.0, 0.0), |(sum, count), distance| (sum + distance, count + 1.0));

@@ -8,7 +8,7 @@ use crate::sampling::Sampling;
 /// Samples × channels on one uniform time axis; a channel is a contiguous column.
 ///
 /// Every value is finite, so that a record needs no further checks. Values are in any unit: each
-/// function that takes a record states it, and results of this crate have the same unit.
+/// function that takes a record states the unit, and results of this crate have the same unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     sampling: Sampling,

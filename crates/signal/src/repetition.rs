@@ -8,8 +8,8 @@ use crate::measures::aperiodic_autocorrelation;
 pub struct Repetition {
     /// Number of samples of one period.
     pub period: usize,
-    /// RMS difference of samples one period apart, over √2 times the RMS of the samples about their
-    /// mean: 0 for exact repetition, 1 for white noise, and the noise-to-signal ratio for a
+    /// RMS difference of samples one period apart, divided by √2 times the RMS of the samples about
+    /// their mean: 0 for exact repetition, 1 for white noise, and the noise-to-signal ratio for a
     /// periodic signal in little noise.
     pub mismatch: f64,
 }
@@ -28,8 +28,8 @@ pub struct Repetition {
 /// τs′ does not explain, the record does not repeat.
 ///
 /// A slow signal also resembles itself a few samples later; the search begins at the first lag at
-/// which it does not. A period of a fractional number of samples is not found, but an almost
-/// integer multiple may be.
+/// which the signal does not resemble itself. A period of a fractional number of samples is not
+/// found, but an almost integer multiple may be.
 ///
 /// ```
 /// use mechid_signal::repetition;
@@ -93,7 +93,7 @@ fn valleys(
 }
 
 /// Returns whether more than half of the difference of samples one period apart is growth or decay:
-/// the same shape, larger or smaller by a factor for each period.
+/// the shape of the signal stays the same, and its amplitude changes by a factor in each period.
 fn grows_or_decays(x: &[f64], period: usize) -> bool {
     let (early, late) = (&x[..x.len() - period], &x[period..]);
     let sum: Vec<f64> = early.iter().zip(late).map(|(a, b)| b + a).collect();

@@ -5,7 +5,7 @@ use crate::error::{SignalError, positive};
 /// A uniform time axis: `len` samples, `dt` seconds apart, the first at t = 0.
 ///
 /// If the samples are one period of a periodic signal, the period is `len · dt` (the sample at t =
-/// `len · dt` is the first one again), and the spectral lines are multiples of
+/// `len · dt` is again the first sample), and the spectral lines are multiples of
 /// [`omega0`](Self::omega0).
 ///
 /// # Source

@@ -29,10 +29,10 @@ use crate::measures::power_of_two;
 pub struct RunningStatistics {
     count: usize,
     sum: f64,
-    /// Σ x² over the square of [`power_of_two`] of the peak: squares of very large or small values
-    /// overflow, and scaling by a power of two is exact for any earlier peak.
+    /// Σ x² divided by the square of [`power_of_two`] of the peak. The division prevents overflow
+    /// and underflow; a change to the scale of another peak is exact.
     squares: f64,
-    /// Σ (x − mean)² with the same scale.
+    /// Σ (x − mean)², scaled as `squares`.
     centred_squares: f64,
     peak: f64,
     minimum: f64,

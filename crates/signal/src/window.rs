@@ -13,11 +13,11 @@ use std::fmt;
 pub enum Window {
     /// ½ − ½ cos θ, with θ = 2πk/N at sample k of N: the usual choice for a random excitation.
     Hann,
-    /// 0.54 − 0.46 cos θ, with θ = 2πk/N at sample k of N: a narrower peak, more leakage from far
-    /// away.
+    /// 0.54 − 0.46 cos θ, with θ = 2πk/N at sample k of N: a narrower main lobe than Hann's, but
+    /// more leakage from distant lines.
     Hamming,
-    /// 0.42 − 0.5 cos θ + 0.08 cos 2θ, with θ = 2πk/N at sample k of N: the least leakage, a wider
-    /// peak.
+    /// 0.42 − 0.5 cos θ + 0.08 cos 2θ, with θ = 2πk/N at sample k of N: the least leakage, but the
+    /// widest main lobe.
     Blackman,
     /// Equal weights: for segments that begin and end at rest, such as bursts.
     Rectangular,

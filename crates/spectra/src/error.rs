@@ -3,7 +3,7 @@
 use mechid_signal::{SignalError, message};
 use thiserror::Error;
 
-/// Error in spectral lines or their noise.
+/// Error of spectral lines or of their noise.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SpectraError {
@@ -50,7 +50,7 @@ pub enum SpectraError {
     /// No spectral line was chosen, or none of them has force.
     #[error("no spectral line has force: choose lines that the excitation drives")]
     NoExcitedLine,
-    /// A chosen line does not exist or carries no phase.
+    /// A chosen line does not exist or has no phase.
     #[error(
         "line {line} cannot be used: only lines 1 to {last} of this record have an amplitude and a phase"
     )]
@@ -86,7 +86,7 @@ pub enum SpectraError {
         /// Frequency in the second, in rad/s.
         right: f64,
     },
-    /// A ratio or covariance needs more averages than there are.
+    /// Too few averages for a ratio or covariance.
     #[error(
         "signal and noise cannot be separated: at least {needed} averages are needed, got {got}"
     )]
@@ -104,7 +104,7 @@ pub enum SpectraError {
     DependentForces {
         /// Frequency, in Hz.
         frequency_hz: f64,
-        /// Smallest over largest eigenvalue of the scaled force cross-spectrum.
+        /// Ratio of the smallest to the largest eigenvalue of the scaled force cross-spectrum.
         reciprocal_condition: f64,
     },
     /// A noise variance is negative or not finite.
@@ -125,7 +125,7 @@ pub enum SpectraError {
     },
     /// The response is not coherent with the force.
     #[error(
-        "the motion at {frequency_hz} Hz is not coherent with the force: H2 does not exist there"
+        "the motion at {frequency_hz} Hz is not coherent with the force: H2 does not exist at this frequency"
     )]
     IncoherentMotion {
         /// Frequency, in Hz.

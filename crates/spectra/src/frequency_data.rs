@@ -31,11 +31,11 @@ pub struct FrequencyData {
     /// known.
     force_variance: DMatrix<f64>,
     /// Basis of the transients: displacements that correspond to the terms 1 and s³ in the measured
-    /// quantity, two columns for each open record, zero on the rows of other records.
+    /// quantity. Each open record has two columns, which are zero on the rows of other records.
     transient: DMatrix<Complex<f64>>,
     /// Time axis of each open record.
     open: Vec<Sampling>,
-    /// Errors of forces that act only for a few samples, in N.
+    /// Errors, in N, of forces that act only for a few samples.
     pulses: Vec<PulseErrors>,
 }
 
@@ -43,8 +43,8 @@ impl FrequencyData {
     /// Reads the chosen lines of one record of force (N) and response, both over whole periods.
     ///
     /// Channel j of either record belongs to degree of freedom j; a degree of freedom without a
-    /// force has a channel of zeros. To read many records with one prepared transform use
-    /// [`FrequencyData::read`].
+    /// force has a channel of zeros. For many records, [`FrequencyData::read`] uses one prepared
+    /// transform.
     ///
     /// # Errors
     /// As [`Lines::new`] and [`FrequencyData::read`].
@@ -124,11 +124,11 @@ impl FrequencyData {
         })
     }
 
-    /// Creates data from frequency responses of the quantity `measured` per unit force. For each of
-    /// `omega` (rad/s) there is one matrix, responses × forces: each force is one experiment with
-    /// unit force at its degree of freedom (`force_dof`, one per column, counted from 0).
-    /// `variance`, if it is known, is E|ΔH|² of every entry, in the square of its unit; errors of
-    /// different entries are independent.
+    /// Creates data from frequency responses of the quantity `measured` per unit force. `response`
+    /// has one matrix, responses × forces, for each frequency in `omega` (rad/s). Each force
+    /// becomes one experiment with unit force at its degree of freedom (`force_dof`, one per
+    /// column, counted from 0). `variance`, if it is known, is E|ΔH|² of every entry, in the square
+    /// of its unit; errors of different entries are independent.
     /// # Errors
     /// [`NumericsError::Size`] if the shapes differ or a degree of freedom does not exist, and the
     /// errors of [`FrequencyData::from_amplitudes`] and [`NoiseSpectrum::new`].
@@ -199,10 +199,10 @@ impl FrequencyData {
     }
 
     /// Returns the same data with white noise of known standard deviation (N) on the samples of
-    /// each force channel, for a record of this many samples. It serves data that do not show the
-    /// noise of the force: the spectrum of the response noise is then estimated from the residual,
-    /// and the force is no longer taken as exact. Noise stated by [`FrequencyData::with_noise`] has
-    /// priority.
+    /// each force channel, for a record of this many samples. It is for data that do not show the
+    /// noise of the force. With it, the spectrum of the response noise is estimated from the
+    /// residual, and the force is not assumed to be exact. Noise stated by
+    /// [`FrequencyData::with_noise`] has priority.
     ///
     /// # Errors
     /// [`NumericsError::Size`] unless there is one deviation per degree of freedom,
@@ -228,8 +228,8 @@ impl FrequencyData {
         Ok(self)
     }
 
-    /// Returns the same data of one record with noise on the samples of some pulses and none on the
-    /// other samples, such as the pulses of hammer hits. Such noise is common to all lines.
+    /// Returns the same data of one record with force noise only on the samples of some pulses,
+    /// such as the pulses of hammer hits. This noise is common to all lines.
     ///
     /// # Errors
     /// As [`FrequencyData::with_force_noise`]; [`NumericsError::Size`] if there is no such channel
@@ -243,7 +243,7 @@ impl FrequencyData {
         self.force_variance.fill(0.0);
         for pulse in pulses {
             check_size("rows of a pulse", rows, pulse.rows.len())?;
-            check_size("rows up to the last of a pulse", rows, pulse.rows.end)?;
+            check_size("rows up to the last row of a pulse", rows, pulse.rows.end)?;
             let samples = pulse.sampling.len();
             for (what, expected, got) in [
                 (
@@ -289,10 +289,10 @@ impl FrequencyData {
     /// Returns the same data, read from an open record with this time axis: its initial and final
     /// states differ, so that it is not a whole period.
     ///
-    /// The difference acts on the lines like a force; this is the transient. For displacements it
-    /// is M(iω Δx + Δv) + C Δx, divided by the duration, with the differences Δx and Δv between the
-    /// two states. Sampling folds its components above half the sampling rate back into the band,
-    /// which the higher powers of s = iω describe:
+    /// The effect of this difference on the lines, which is like that of a force, is the transient.
+    /// For displacements it is M(iω Δx + Δv) + C Δx, divided by the duration, with the differences
+    /// Δx and Δv between the two states. Sampling folds the components of the transient above half
+    /// the sampling rate back into the band; the higher powers of s = iω describe these components:
     ///
     /// ```text
     /// (K + s C + s² M) X + (τ₀ + τ₁ s + … + τ₅ s⁵) Z = F
@@ -320,8 +320,8 @@ impl FrequencyData {
     }
 
     /// Returns the basis of the transients: displacements, in m, that correspond to the terms 1 and
-    /// s³ in the measured quantity; two columns for each open record, zero on the rows of other
-    /// records.
+    /// s³ in the measured quantity. Each open record has two columns, which are zero on the rows of
+    /// other records.
     pub fn transient(&self) -> &DMatrix<Complex<f64>> {
         &self.transient
     }
@@ -335,7 +335,7 @@ impl FrequencyData {
         Some(OpenRecord { sampling, rows: first..last + 1 })
     }
 
-    /// Returns the rows of this data followed by the rows of `other`: several experiments on one
+    /// Returns the rows of these data followed by the rows of `other`: several experiments on one
     /// system.
     ///
     /// The noise is kept if it is known for both.
@@ -394,7 +394,7 @@ impl FrequencyData {
         self.force.ncols()
     }
 
-    /// Returns the number of rows: frequencies, summed over the experiments.
+    /// Returns the number of rows: the number of frequencies, summed over the experiments.
     #[allow(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.omega.len()
@@ -426,8 +426,8 @@ impl FrequencyData {
     }
 
     /// Returns the covariances of the noise as [`FrequencyData::noise`] does; `None` also if the
-    /// noise is only rounding, below 10⁻¹⁰ of both the displacement and the force (RMS over lines
-    /// and channels).
+    /// noise is only rounding. Noise is rounding if it is below 10⁻¹⁰ of the displacement and of
+    /// the force (RMS over lines and channels).
     pub fn noise_above_rounding(&self) -> Option<&NoiseSpectrum> {
         let noise = self.noise()?;
         let (n, mut scatter) = (self.dof(), [0.0; 2]);

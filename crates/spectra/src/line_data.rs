@@ -25,8 +25,8 @@ pub enum Transient {
 /// Complex amplitudes of inputs and outputs, one row per spectral line; the lines of several
 /// records follow one another.
 ///
-/// Amplitudes of records are unitary: Σ |X|² over all lines of both signs is Σ x² over all samples,
-/// so that white noise of variance σ² has E|X|² = σ² on every line for any length of the record.
+/// Amplitudes of records are unitary: Σ |X|² over all lines of both signs is Σ x² over all samples.
+/// White noise of variance σ² therefore has E|X|² = σ² on every line, for any length of the record.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -118,8 +118,8 @@ impl LineData {
     /// Returns the same lines with the covariance of their noise.
     ///
     /// # Errors
-    /// [`SpectraError::Size`] unless there is one covariance per line with one row and column per
-    /// output and input.
+    /// [`SpectraError::Size`] unless there is one covariance per line, and it has one row and one
+    /// column for each output and input.
     pub fn with_noise(self, noise: LineNoise) -> Result<Self, SpectraError> {
         let channels = self.outputs.ncols() + self.inputs.ncols();
         let size = noise.covariance().first().map_or(channels, DMatrix::nrows);
@@ -136,8 +136,8 @@ impl LineData {
     }
 
     /// Returns the same lines with the variance E|n|² of each output's noise n (lines × p, in the
-    /// squares of the units of the outputs), which is uncorrelated between outputs and not part of
-    /// [`LineData::noise`].
+    /// squares of the units of the outputs). This noise is uncorrelated between outputs, and is not
+    /// part of [`LineData::noise`].
     ///
     /// # Errors
     /// [`SpectraError::Size`] for another number of lines or outputs, [`SpectraError::NotFinite`]
@@ -162,9 +162,9 @@ impl LineData {
         }
     }
 
-    /// Returns the same lines with the noise of inputs that act only for a few samples; it replaces
-    /// earlier noise of this kind. The rows of a pulse are those of its record, and its channel is
-    /// an input.
+    /// Returns the same lines with the noise of inputs that act only for a few samples; this noise
+    /// replaces earlier noise of the same kind. The rows of a pulse are the rows of its record, and
+    /// the channel of a pulse is an input.
     ///
     /// # Errors
     /// [`SpectraError::Size`] for an input that does not exist or rows that are not those of one
@@ -234,14 +234,15 @@ impl LineData {
         Ok(self)
     }
 
-    /// Returns the lines that `keep` accepts by their angular frequency (rad/s), record by record;
-    /// `None` if it accepts none.
+    /// Returns the lines whose angular frequency (rad/s) `keep` accepts, record by record; `None`
+    /// if it does not accept any line.
     pub fn retained(&self, keep: impl Fn(f64) -> bool) -> Option<Self> {
         let rows: Vec<usize> = (0..self.len()).filter(|row| keep(self.omega[*row])).collect();
         self.rows(&rows)
     }
 
-    /// Returns some of the lines, by their indices in ascending order; `None` without any.
+    /// Returns the lines with these indices, which must be in ascending order; `None` without an
+    /// index.
     pub fn rows(&self, rows: &[usize]) -> Option<Self> {
         if rows.is_empty() {
             return None;
@@ -305,7 +306,7 @@ impl LineData {
         self.output_variance.as_ref()
     }
 
-    /// Returns the errors of the inputs by the noise of pulses.
+    /// Returns the errors of the inputs due to the noise of pulses.
     pub fn pulse_errors(&self) -> &[PulseErrors] {
         &self.pulse_errors
     }

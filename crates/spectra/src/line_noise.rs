@@ -23,8 +23,8 @@ impl LineNoise {
     /// Creates the noise from known covariances.
     ///
     /// # Errors
-    /// [`SpectraError::Size`] if they differ in size, [`SpectraError::NotFinite`] for an entry that
-    /// is not finite or a variance that is negative.
+    /// [`SpectraError::Size`] if the covariances differ in size, [`SpectraError::NotFinite`] for an
+    /// entry that is not finite or a variance that is negative.
     pub fn new(covariance: Vec<DMatrix<Complex<f64>>>) -> Result<Self, SpectraError> {
         let expected = covariance.first().map_or(0, DMatrix::nrows);
         for (row, matrix) in covariance.iter().enumerate() {
@@ -42,9 +42,9 @@ impl LineNoise {
         Ok(Self { covariance, degrees_of_freedom: known, total_degrees_of_freedom: known })
     }
 
-    /// Returns the same noise as sample covariances, each averaged from `each` complex deviations.
-    /// All of them together come from `total` deviations, which is less than their sum if rows
-    /// share deviations.
+    /// Returns the same noise as sample covariances. Each covariance is averaged from `each`
+    /// complex deviations, all covariances together from `total` deviations; `total` is smaller
+    /// than the number of rows times `each` if rows share deviations.
     #[must_use]
     pub fn with_degrees_of_freedom(self, each: f64, total: f64) -> Self {
         Self { degrees_of_freedom: each, total_degrees_of_freedom: total, ..self }
@@ -55,12 +55,13 @@ impl LineNoise {
         &self.covariance
     }
 
-    /// Returns the degrees of freedom of each covariance; ∞ if they are known.
+    /// Returns the degrees of freedom of each covariance; ∞ if the covariances are known exactly.
     pub fn degrees_of_freedom(&self) -> f64 {
         self.degrees_of_freedom
     }
 
-    /// Returns the total number of complex deviations behind all covariances; ∞ if they are known.
+    /// Returns the total number of complex deviations of all covariances; ∞ if the covariances are
+    /// known exactly.
     pub fn total_degrees_of_freedom(&self) -> f64 {
         self.total_degrees_of_freedom
     }

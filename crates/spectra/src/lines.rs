@@ -34,7 +34,7 @@ impl Lines {
     /// Chooses lines of records with this time axis, in the given order.
     ///
     /// # Errors
-    /// [`SpectraError::NoExcitedLine`] if none is given, [`SpectraError::LineOutOfRange`] for a
+    /// [`SpectraError::NoExcitedLine`] if no line is given, [`SpectraError::LineOutOfRange`] for a
     /// line that does not exist or has no phase.
     pub fn new(
         sampling: Sampling,
@@ -53,9 +53,10 @@ impl Lines {
     }
 
     /// Chooses the lines on which the amplitude of at least one force channel is at least
-    /// `threshold` (a pure number) times its largest amplitude.
+    /// `threshold` (a pure number) times the largest amplitude of this channel.
     ///
-    /// The lines of a multisine are much stronger than the noise between them: 0.1 separates them.
+    /// The lines of a multisine are much stronger than the noise between the lines: a threshold of
+    /// 0.1 separates lines and noise.
     ///
     /// # Errors
     /// [`SpectraError::NoExcitedLine`] if the force is zero on all usable lines.
@@ -110,8 +111,8 @@ impl Lines {
         Ok(self.read_window(record, 0))
     }
 
-    /// Reads the lines as [`Lines::read`] does, from the samples starting at `start` of a longer
-    /// record.
+    /// Reads the lines as [`Lines::read`] does, from a window of a longer record; the window begins
+    /// at sample `start`.
     pub(crate) fn read_window(&self, record: &Record, start: usize) -> DMatrix<Complex<f64>> {
         let mut amplitudes = DMatrix::zeros(self.lines.len(), record.channels());
         let mut reader = self.reader();

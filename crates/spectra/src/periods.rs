@@ -17,8 +17,8 @@ use crate::noise::spectrum::NoiseSpectrum;
 
 /// Forces and responses at chosen lines, period by period, in a periodic steady state.
 ///
-/// The part that repeats in every period is the signal, and the rest is noise, so that no model is
-/// needed to separate them.
+/// The part that repeats in every period is the signal; the rest is noise. No model is needed to
+/// separate signal and noise.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
@@ -35,8 +35,9 @@ pub struct RepeatedPeriods {
     /// 2n, first the responses in the measured quantity, then the forces.
     sum: DMatrix<Complex<f64>>,
     half_sums: [DMatrix<Complex<f64>>; 2],
-    /// Sum Σ (z − z̄)(z − z̄)ᴴ over the periods so far, per line, 2n×2n; for periods whose spectrum
-    /// is taken together, an equivalent sum over the lines between them.
+    /// Sum Σ (z − z̄)(z − z̄)ᴴ over the periods so far, per line, 2n×2n. If the spectrum of several
+    /// periods is taken as one, it is an equivalent sum over the lines between the lines of a
+    /// period.
     scatter: Vec<DMatrix<Complex<f64>>>,
     /// Periods that are not included in the scatter yet.
     together: BetweenLines,
@@ -67,7 +68,8 @@ impl RepeatedPeriods {
     }
 
     /// Creates an empty set of periods of a system with `dof` degrees of freedom, to which
-    /// `periods` will be added a few at a time: the memory does not grow with their number.
+    /// `periods` periods will be added a few at a time: the memory does not grow with the number of
+    /// periods.
     pub fn expecting(
         lines: &Lines,
         dof: usize,
@@ -91,17 +93,17 @@ impl RepeatedPeriods {
     }
 
     /// Sets the quantisation steps of the channels, responses (in the measured quantity) before
-    /// forces (N), zero for channels without quantisation. The quantisation error of step/√12 is
-    /// equal in all periods of a channel without other noise, and then the scatter does not contain
-    /// it.
+    /// forces (N), zero for channels without quantisation. If a channel has no other noise, its
+    /// quantisation error of step/√12 is equal in all periods, and the scatter does not contain
+    /// this error.
     ///
     /// # Errors
     /// [`NumericsError::Size`] unless there is one step per channel.
     ///
     /// # Source
-    /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: with noise of standard
-    /// deviation s, the part Σ q²/(2π²k²) exp(−4π²k²s²/q²) of the variance for steps q is equal in
-    /// all periods.
+    /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: with steps q and noise of
+    /// standard deviation s, the part Σ q²/(2π²k²) exp(−4π²k²s²/q²) of the variance is equal in all
+    /// periods.
     pub fn with_quantisation(mut self, steps: Vec<f64>) -> Result<Self, SpectraError> {
         check_size("quantisation steps", 2 * self.dof, steps.len())?;
         self.steps = steps;
@@ -129,15 +131,15 @@ impl RepeatedPeriods {
         BetweenLines::new(periods_as_one(remaining, period, channels), period, channels)
     }
 
-    /// Adds the whole periods of a part of the records of force (N) and response, at least one; an
-    /// incomplete period at its end is ignored.
+    /// Adds the whole periods, at least one, of a part of the records of force (N) and response; an
+    /// incomplete period at the end of the part is ignored.
     ///
     /// # Errors
-    /// As [`RepeatedPeriods::new`]; the set is then unchanged.
+    /// As [`RepeatedPeriods::new`]; after an error the set is unchanged.
     pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), SpectraError> {
         force.check_same_sampling(motion)?;
         let period = self.lines.sampling().len();
-        // The window also refuses records shorter than a period.
+        // `window` also refuses a record that is shorter than a period.
         check_sampling(self.lines.sampling(), force.window(0, period)?.sampling())?;
         let dof = self.dof.max(1);
         for (what, got) in [
@@ -183,8 +185,8 @@ impl RepeatedPeriods {
         }
     }
 
-    /// Adds the scatter of the last `periods`: the noise between their lines, and the deviation of
-    /// their mean from the mean of all earlier periods.
+    /// Adds the scatter of the last `periods` periods: the noise between the lines, and the
+    /// deviation of the mean of these periods from the mean of all earlier periods.
     ///
     /// # Source
     /// Welford (1962), Technometrics 4, 419–420: the scatter about the mean in one pass.
@@ -215,7 +217,8 @@ impl RepeatedPeriods {
         &self.lines
     }
 
-    /// Returns the mean over all periods, without its noise.
+    /// Returns the mean over all periods, without a noise spectrum. The data only state the force
+    /// noise due to quantisation ([`RepeatedPeriods::with_quantisation`]).
     ///
     /// # Errors
     /// As [`FrequencyData::from_amplitudes`], and [`SpectraError::TooFewAverages`] if there is no
@@ -251,9 +254,9 @@ impl RepeatedPeriods {
     /// by line or pooled over lines; [`NoiseSpectrum::models`] describes the choice.
     ///
     /// The spectra of 3 to 16 consecutive periods, as far as memory allows, are taken as the
-    /// spectrum of one record, which has only noise between the lines of a period; the means of
-    /// such groups add their scatter. A force that is equal in every period up to rounding is taken
-    /// as exact.
+    /// spectrum of one record; between the lines of a period this spectrum contains only noise. The
+    /// scatter between the means of such groups is added. A force that is equal in every period up
+    /// to rounding is taken as exact.
     ///
     /// # Errors
     /// [`SpectraError::TooFewAverages`] if there is only one period, or fewer than expected.
@@ -267,7 +270,7 @@ impl RepeatedPeriods {
         self.noise_relative_to(pooling, None)
     }
 
-    /// Returns the covariance as [`RepeatedPeriods::noise`] does, where a smooth spectrum may also
+    /// Returns the covariance as [`RepeatedPeriods::noise`] does; here a smooth spectrum may also
     /// be the response of the system `machine` to unmeasured forces.
     ///
     /// # Errors
@@ -333,8 +336,8 @@ impl RepeatedPeriods {
         })
     }
 
-    /// Returns whether the force is equal in every period up to rounding: computed instead of
-    /// measured.
+    /// Returns whether the force is equal in every period up to rounding, because it was computed
+    /// and not measured.
     fn force_repeats(&self) -> bool {
         let (n, count) = (self.dof, self.count as f64);
         let scatter = self.scatter.iter().map(|s| (n..2 * n).map(|i| s[(i, i)].re).sum::<f64>());
@@ -356,12 +359,13 @@ impl RepeatedPeriods {
     }
 }
 
-/// Returns the part of the variance of rounding to steps of 1 that is equal in all periods, from
-/// the `scatter` of the quantised values between periods (variances, in squares of a step).
+/// Returns the part of the variance of the rounding error that is equal in all periods. The
+/// argument is the `scatter` of the quantised values between periods. Both are variances, in units
+/// of the squared step.
 ///
-/// For a uniformly distributed position between two steps, the error of rounding and noise together
-/// has the variance s² + 1/12; the scatter is this variance minus the part that is equal in all
-/// periods.
+/// If the position between two steps is uniformly distributed, rounding and noise of variance s²
+/// together have the variance s² + 1/12. The scatter is this variance minus the part that is equal
+/// in all periods.
 fn common_rounding(scatter: f64) -> f64 {
     let beside = |variance: f64| -> f64 {
         let term = |k: i32| {

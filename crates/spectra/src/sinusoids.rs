@@ -1,9 +1,10 @@
-//! Sinusoids of unknown frequency in the responses of open records, caused by run-out, unbalance or
-//! mains.
+//! Sinusoids of unknown frequency in the responses of open records. Their causes are run-out,
+//! unbalance or mains hum.
 //!
-//! A sinusoid between two lines leaks to all lines with a fixed phase, which neither a noise
-//! spectrum nor the exclusion of lines can describe. A conspicuous sinusoid is fitted to the lines
-//! around it under Hann's window, and subtracted from all lines.
+//! A sinusoid between two lines leaks to all lines with a fixed phase. Neither a noise spectrum nor
+//! the exclusion of lines can describe this leakage. A sinusoid that is much stronger than the
+//! noise is fitted, under Hann's window, to the lines around its frequency, and is subtracted from
+//! all lines.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -20,8 +21,8 @@ use crate::limits::{
 };
 use crate::open_record::OpenRecord;
 
-/// Sinusoid in the response that is not caused by the forces: Re(c e^{iωt}) in each channel, from
-/// the first sample on.
+/// Sinusoid in the response that is not caused by the forces: Re(c e^{iωt}) in each channel, where
+/// t is 0 at the first sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sinusoid {
     /// Nearest line.
@@ -53,7 +54,7 @@ impl Sinusoid {
     }
 }
 
-/// Returns the amplitudes of e^{iωt} and e^{−iωt} at a line, each halved as in a cosine of
+/// Returns the amplitudes of e^{iωt}/2 and e^{−iωt}/2 at a line; their sum is that of a cosine of
 /// amplitude 1.
 fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
     let samples = sampling.len() as f64;
@@ -97,12 +98,13 @@ impl FrequencyData {
     }
 }
 
-/// Returns the sinusoids that are conspicuous in a residual (rows × n, in m), for each open record
-/// of the data; the sinusoids `known` from a previous residual are fitted first.
+/// Returns, for each open record of the data, the sinusoids that are much stronger than the noise
+/// in a residual (rows × n, in m). The sinusoids `known` from a previous residual are fitted first.
 ///
-/// Lines with a peak of the force are excluded, because the residual there may come from the
-/// system. If the `system` is given, the threshold is higher at its resonances, by the ratio of the
-/// squared receptance, because a disturbance of the force has the shape of the receptance.
+/// Lines with a peak of the force are excluded, because the residual on them may come from the
+/// system. If the `system` is given, the threshold at its resonances is multiplied by the ratio of
+/// the squared receptance to that on the lines around, because a disturbance of the force has the
+/// shape of the receptance.
 ///
 /// # Source
 /// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a
@@ -221,7 +223,7 @@ impl<'a> Search<'a> {
         sinusoids
     }
 
-    /// Fits each sinusoid again, with all others subtracted.
+    /// Fits each sinusoid again after all other sinusoids have been subtracted.
     fn refine(&mut self, found: &mut [Sinusoid]) {
         for _ in 0..SINUSOID_ROUNDS {
             for sinusoid in &mut *found {
@@ -288,8 +290,8 @@ impl<'a> Search<'a> {
         rows.map(of).sum()
     }
 
-    /// Returns the sinusoid with the smallest residual around a line; its frequency is between the
-    /// two neighbouring lines.
+    /// Returns the sinusoid that leads to the smallest residual around a line. The frequency of the
+    /// sinusoid is between the two neighbours of this line.
     fn fit(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> Sinusoid {
         let rows = around(at, SINUSOID_FITTED, self.done.len()).filter(|row| self.whole[*row]);
         let rows: Vec<usize> = rows.collect();
@@ -332,8 +334,8 @@ impl<'a> Search<'a> {
         Sinusoid { line, omega, amplitude: (0..channels).map(of).collect() }
     }
 
-    /// Returns cosine and negative sine of amplitude 1 at lines under Hann's window, real and
-    /// imaginary parts alternating.
+    /// Returns the lines, under Hann's window, of a cosine and of a negative sine of amplitude 1;
+    /// real and imaginary parts alternate.
     fn waves(&self, omega: f64, rows: &[usize]) -> DMatrix<f64> {
         let mut waves = DMatrix::zeros(2 * rows.len(), 2);
         for (at, row) in rows.iter().enumerate() {
@@ -366,7 +368,7 @@ fn around(at: usize, reach: usize, count: usize) -> Range<usize> {
     at.saturating_sub(reach)..(at + reach + 1).min(count)
 }
 
-/// Returns the lines under Hann's window; the first and the last are unchanged.
+/// Returns the lines under Hann's window; the first and the last line are unchanged.
 fn hann(lines: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
     let mut windowed = lines.clone();
     for row in 1..lines.nrows().saturating_sub(1) {
@@ -376,7 +378,8 @@ fn hann(lines: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
     windowed
 }
 
-/// Returns the power around each line of each channel.
+/// Returns, for each line and channel, the mean power that follows from the median power of the
+/// lines around this line; infinite if there are too few such lines.
 fn levels(windowed: &DMatrix<Complex<f64>>, whole: &[bool]) -> DMatrix<f64> {
     let mut powers = Vec::with_capacity(2 * SINUSOID_AROUND);
     DMatrix::from_fn(windowed.nrows(), windowed.ncols(), |at, channel| {

@@ -3,8 +3,9 @@
 /// Fraction of the golden ratio, whose multiples are spread evenly and without a period.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Returns one of every `step` rows of `len`, in ascending order; none for a step of 0. The row
-/// within the step changes without a period, because forces may act on every other row.
+/// Returns one of every `step` rows of `len`, in ascending order; none for a step of 0. The
+/// position of the chosen row within its step changes without a period, because a force may act
+/// only on every second row.
 ///
 /// # Source
 /// Weyl (1916), Mathematische Annalen 77, 313–352 (multiples of an irrational number are spread

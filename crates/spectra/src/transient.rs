@@ -1,14 +1,14 @@
-//! Transient of an open record: the effect of the difference between its final and initial states
-//! on its lines, written as a load.
+//! Transient of an open record, written as a load. It is the effect on the lines of the difference
+//! between the final and initial states of the record.
 
 use mechid_model::Matrix;
 use nalgebra::{Complex, DMatrix};
 
 use crate::frequency_data::FrequencyData;
 
-/// Unknown loads τ of the transients of open records, ordered by columns of
-/// [`FrequencyData::transient`], then by powers in the order of the matrices, then by degrees of
-/// freedom.
+/// Unknown loads τ of the transients of open records, sorted by three indices: first the column of
+/// [`FrequencyData::transient`], second the power of s in the order of the matrices, third the
+/// degree of freedom.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -19,7 +19,7 @@ pub struct TransientLoad<'a> {
 }
 
 impl<'a> TransientLoad<'a> {
-    /// Creates the loads `tau` of the open records of `data`, in N times powers of s.
+    /// Creates the loads `tau` of the open records of `data`, in N times powers of seconds.
     ///
     /// # Panics
     /// If the number of loads differs from [`len`].

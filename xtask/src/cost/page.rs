@@ -7,7 +7,7 @@ use super::measure::Growth;
 
 const BEGIN: &str = "# What it costs
 
-How the computation time grows with the number of degrees of freedom and of samples.
+This page shows how the computation time grows with the number of degrees of freedom and of samples.
 `measure-cost`, a task of `cargo xtask`, writes this page and its figure; the times are those of the computer on which it ran last.
 Other computers have other times, but nearly the same slopes.
 Each point is the shortest of several runs, because other programs can only lengthen a run.
@@ -24,7 +24,7 @@ n log n of a grid with minimum-degree ordering.
 Least squares factors the rows once for all equations; maximum likelihood searches for the parameters of each equation \
 separately, and computes the common part of the equations once.
 For long records the time is proportional to the number of samples, apart from the constant cost of a run.
-A time that grows faster shows that the numbers no longer fit into the caches of the processor, or that other programs ran.
+A time that grows faster than in proportion shows that the numbers no longer fit into the caches of the processor, or that other programs ran.
 ";
 
 /// Load of the machine, if the system reports it.

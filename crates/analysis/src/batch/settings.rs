@@ -54,7 +54,7 @@ impl SavedAnalysis {
     /// Reads an analysis from a JSON file (`-`: standard input) and checks it.
     ///
     /// # Errors
-    /// [`AnalysisError::Io`] if it cannot be read or has an invalid field, and the errors of
+    /// [`AnalysisError::Io`] if the file cannot be read or has an invalid field, and the errors of
     /// [`SavedAnalysis::check`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, AnalysisError> {
         let read: Self = read_json(path)?;
@@ -62,7 +62,7 @@ impl SavedAnalysis {
         Ok(read)
     }
 
-    /// Checks for faults that would prevent the identification of every record.
+    /// Checks the settings for errors that would prevent the identification of every record.
     ///
     /// # Errors
     /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`], and
@@ -77,7 +77,7 @@ impl SavedAnalysis {
                 if self.channels == Channels::default() && self.identify == Identify::default() => {
             }
             (Some(_), _) => {
-                let why = "a machine of named elements has columns and settings of its own: leave `channels`, \
+                let why = "a machine of named elements states its columns and settings itself: leave `channels`, \
                            `identify` and `modes` out";
                 return Err(AnalysisError::Setting { setting: "elements", why: why.into() });
             }
@@ -103,7 +103,7 @@ impl SavedAnalysis {
         }
     }
 
-    /// Opens a record as the analysis reads it.
+    /// Opens a record with the columns, the reading settings and the window of the analysis.
     ///
     /// # Errors
     /// As [`Measurement::open_with`].

@@ -17,7 +17,7 @@ use crate::AnalysisError;
 use crate::identify::checks::{CheckRow, When};
 use crate::measurement::Channels;
 
-/// A finding, with its test if it concerns only one.
+/// A finding, with its test if it concerns only one test.
 type Placed<'a> = (When, Option<(&'a str, &'a Channels)>, Finding);
 
 /// Returns all findings on the tests and on the baseline tests; the p-values are adjusted for the
@@ -93,8 +93,8 @@ pub(super) fn excess(tests: &BearingData, fit: &OutputErrorFit) -> Result<f64, A
     Ok(if findings.iter().any(exceeds) { fit.misfit_ratio.max(1.0) } else { 1.0 })
 }
 
-/// Returns a finding if a free response of the housing on the identified film would grow, which the
-/// tests contradict.
+/// Returns a finding if a free response of the housing on the identified film would grow: such a
+/// rig could not be tested.
 fn instability_of_rig(film: &Film, stator_mass: f64) -> Result<Option<Finding>, AnalysisError> {
     let estimate: &Estimate = &film.fit.estimate;
     let matrix = |kind: usize| DMatrix::from_row_slice(2, 2, &film.rig.as_slice()[4 * kind..][..4]);

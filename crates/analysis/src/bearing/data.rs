@@ -81,7 +81,7 @@ impl BearingData {
 
     /// Reads tables of frequency responses, two per test: the displacement relative to the shaft
     /// and then the acceleration of the housing per shaker force, at the same frequencies. A test
-    /// has both directions of force, or one of them.
+    /// has forces in both directions, or in one direction.
     ///
     /// The errors of displacement and acceleration are assumed to be independent, because they come
     /// from different sensors.
@@ -242,7 +242,7 @@ fn mean_with_noise(
 }
 
 /// Returns the responses of the displacement and the acceleration from two tables, and the source
-/// of the noise in words; `None` unless both tables state it.
+/// of the noise in words; `None` if one of the tables does not state its noise.
 fn matching_responses(
     displacement: &FrequencyResponses,
     acceleration: &FrequencyResponses,
@@ -267,8 +267,8 @@ fn matching_responses(
     Ok((d, a, noise.zip(noise_of_a).map(|(noise, _)| noise)))
 }
 
-/// Returns the film force f − M a and the displacement at the `keep` rows of two tables of
-/// frequency responses, of the displacement `d` and of the acceleration `a`.
+/// Returns the film force f − M a and the displacement at the rows `keep` of two tables of
+/// frequency responses: `d` of the displacement and `a` of the acceleration.
 ///
 /// `mass` is the mass of the stator, in kg. With `noise`, the covariance of the result is computed
 /// from the covariances of both tables, if both have one.
@@ -283,7 +283,7 @@ fn film_data(
     let displacement = d.displacement().select_rows(keep);
     let mut force = d.force().select_rows(keep);
     for (index, row) in keep.iter().enumerate() {
-        // The table holds accelerations as displacements.
+        // `a` has the accelerations as displacements; the factor converts them back.
         let factor = ResponseQuantity::Acceleration.per_displacement(d.omega()[*row]) * mass;
         for direction in 0..2 {
             force[(index, direction)] -= a.displacement()[(*row, direction)] * factor;
@@ -319,7 +319,7 @@ fn shows_noise(data: &FrequencyData) -> bool {
     scatter > ROUNDING * ROUNDING * data.displacement().norm_squared()
 }
 
-/// Returns the different numbers in rising order.
+/// Returns the numbers in rising order, without duplicates.
 fn distinct(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
@@ -343,8 +343,8 @@ fn force_and_motion(block: &Block, mass: f64) -> Result<(Record, Record), Analys
     let missing = |setting| AnalysisError::Setting {
         setting,
         why: format!(
-            "{}: a bearing test needs two columns, in x and y: the forces of the shakers, the \
-             acceleration of the housing and its displacement relative to the shaft",
+            "{}: a bearing test needs two columns, x and y, of each quantity: force of the shakers, \
+             acceleration of the housing, and displacement of the housing relative to the shaft",
             block.file
         ),
     };

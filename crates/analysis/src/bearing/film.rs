@@ -43,7 +43,8 @@ pub(super) struct Film {
     /// Ratio of residual power to noise power if the residual is significantly larger, otherwise 1;
     /// all variances are multiplied by it.
     pub excess: f64,
-    /// Critical value of the statistic of all masses; `None` if the test did not choose the model.
+    /// Critical value of the statistic of the test of M = 0; `None` if the test did not choose the
+    /// model.
     critical: Option<f64>,
     pub degrees_of_freedom: usize,
 }
@@ -227,8 +228,8 @@ impl Fitted {
         Matrix2::from_diagonal_element(least)
     }
 
-    /// Returns the M that rig and baseline have in common if the film has no inertia, estimated
-    /// from both; zero without a baseline.
+    /// Returns the estimate of M from both rig and baseline, which have the same M if the film has
+    /// no inertia; zero without a baseline.
     fn common_mass(&self, base: Option<&Self>) -> Result<Matrix2<f64>, AnalysisError> {
         let Some(base) = base else { return Ok(Matrix2::zeros()) };
         let mass = |fitted: &Self| {
@@ -272,7 +273,8 @@ fn row_by_row(matrix: &Matrix2<f64>) -> [f64; EACH] {
 }
 
 /// Returns the coefficients of a fit as kxx, kxy, kyx, kyy, then c and m likewise, with their
-/// covariance; the given `mass` is used if it was known, without covariance.
+/// covariance. If the fit did not estimate the mass, `mass` is returned for it, with a covariance
+/// of zero.
 fn in_order(fit: &OutputErrorFit, mass: &Matrix2<f64>) -> (DVector<f64>, DMatrix<f64>) {
     let estimate = &fit.estimate;
     let free: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();

@@ -1,8 +1,9 @@
 //! Identification of a journal bearing on a test rig with a floating housing.
 //!
 //! The housing floats on the film of a shaft that rotates in fixed supports; two shakers excite it,
-//! in one test each or on interleaved lines of one. With the mass M_s of the housing, its
-//! acceleration a, the shaker forces f and the displacement d of the housing relative to the shaft,
+//! in separate tests or on interleaved lines of the same test. With the mass M_s of the housing,
+//! its acceleration a, the shaker forces f and the displacement d of the housing relative to the
+//! shaft,
 //!
 //! ```text
 //! f − M_s a = H d,   H(ω) = K − ω² M + iω C

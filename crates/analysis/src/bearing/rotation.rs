@@ -13,7 +13,7 @@ use super::BearingData;
 use super::data::rotates;
 
 /// Minimum ratio of the number of lines to the number of lines near the multiples of a speed; with
-/// a smaller ratio some speed would contain any few lines by chance.
+/// a smaller ratio, any few lines would be near the multiples of some speed by chance.
 const LINES_PER_MULTIPLE: usize = 4;
 
 /// Maximum number of trial speeds.
@@ -22,12 +22,12 @@ const MOST_SPEEDS: usize = 10_000;
 /// Maximum difference of the Bayesian information criterion from its minimum for a plausible speed.
 const PLAUSIBLE: f64 = 6.0;
 
-/// Returns the range of speeds, in Hz, for which the tests agree with a film, almost up to their
-/// noise, after the exclusion of the multiples of the speed; `None` if there is no such speed. The
-/// range has the speeds with nearly the smallest Bayesian information criterion.
+/// Returns the range of speeds, in Hz, that explain the misfit: after the exclusion of the lines at
+/// the multiples of the speed, the residual of a film is close to the noise. `None` if there is no
+/// such speed. The range has the speeds with nearly the smallest Bayesian information criterion.
 ///
-/// Each speed has a new film by least squares on the equation of motion, so that the excluded lines
-/// do not influence it.
+/// For each speed, a film is fitted to the other lines by least squares on the equation of motion,
+/// so that the excluded lines do not influence the film.
 ///
 /// # Source
 /// Cook & Weisberg, *Residuals and Influence in Regression* (1982), deletion of several cases;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Number of bisections for a limit of an interval: down to rounding.
+/// Number of bisections for a limit of an interval; they reduce its error to rounding.
 const HALVINGS: usize = 80;
 
 /// Half the search range for a limit, in standard errors: the condition on a test of four
@@ -15,7 +15,7 @@ const REACH: f64 = 60.0;
 ///
 /// The test chooses the larger model if mᵀS⁻¹m exceeds `critical`, with the `tested` estimates m
 /// and their covariance S. For a given component of m that is independent of the coefficient, this
-/// is a quadratic inequality in its estimate.
+/// is a quadratic inequality in the estimate `at`.
 ///
 /// # Source
 /// Lee, Sun, Sun & Taylor (2016), Annals of Statistics 44, 907–927 (the polyhedral lemma, here for

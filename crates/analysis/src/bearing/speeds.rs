@@ -28,7 +28,8 @@ pub struct BearingPlan {
     pub reading: Reading,
     /// Samples to use.
     pub window: Window,
-    /// Settings; each point replaces their speed and load.
+    /// Settings of all points; the speed and the load of a point, if given, replace those of the
+    /// settings.
     pub settings: IdentifyBearing,
     /// Baseline tests for every point that has no baseline tests itself.
     pub baseline: Vec<PathBuf>,
@@ -131,7 +132,7 @@ impl BearingTable {
                 let _ = write!(text, ",{:?}", coefficient(name).map_or(0.0, |c| c.estimate.value));
             }
             for name in names {
-                // The cell is empty for a withheld error, and zero for a mass that is not
+                // The error cell is empty if the estimate has no error, and 0 if the mass is not
                 // identified.
                 let error = coefficient(name).map_or(Some(0.0), |c| c.estimate.standard_error);
                 let _ = match error {

@@ -29,12 +29,12 @@ type Complex2 = Matrix2<Complex<f64>>;
 /// Minimum sine of the angle between two displacements in independent directions.
 const INDEPENDENT: f64 = 0.1;
 
-/// Maximum relative difference of equal frequencies.
+/// Maximum relative difference of two frequencies that count as equal.
 const SAME: f64 = 1e-9;
 
-/// Solves G = H D at every frequency with two tests. With one test each, it solves pairs of
-/// neighbouring lines, which the fitted film interpolates to their middle. The fitted baseline is
-/// subtracted.
+/// Solves G = H D at every frequency with two tests. At frequencies with one test, it solves for
+/// pairs of neighbouring lines; the fitted film interpolates both lines to the frequency midway
+/// between them. The fitted baseline is subtracted.
 pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLine>, AnalysisError> {
     let omega = tests.data.omega();
     let mut rows: Vec<usize> = (0..omega.len()).collect();
@@ -56,7 +56,8 @@ pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLin
     Ok(lines)
 }
 
-/// Returns H from some rows at about one frequency; `None` if they move in one direction only.
+/// Returns H from some rows at about one frequency; `None` if the displacements have one direction
+/// only.
 fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLine> {
     let data = &tests.data;
     let middle = rows.iter().map(|row| data.omega()[*row]).sum::<f64>() / rows.len() as f64;

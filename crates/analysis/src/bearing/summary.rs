@@ -29,8 +29,8 @@ pub const LARGEST_AMPLITUDE: f64 = 0.05;
 /// Half the width of an interval at 95 %, in standard errors.
 const NORMAL: f64 = 1.96;
 
-/// Minimum relative change of the width of an interval, due to the choice of the model, for a
-/// remark.
+/// Minimum relative change of the width of an interval by the choice of the model; a larger change
+/// gets a remark.
 const MOVED: f64 = 0.02;
 
 /// Units of k, c and m.
@@ -68,8 +68,9 @@ pub struct BearingSummary {
     pub amplitude: Option<Amplitude>,
     /// Ratio of residual power to noise power; 1 if the noise is not known.
     pub misfit_ratio: f64,
-    /// Factor on the standard errors from the noise (Birge ratio): 1 if the noise explains the
-    /// residual, `None` if the residual is so large that errors and intervals are withheld.
+    /// Factor that multiplies the standard errors computed from the noise (Birge ratio): 1 if the
+    /// noise explains the residual, `None` if the residual is so large that errors and intervals
+    /// are withheld.
     pub error_scale: Option<f64>,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
@@ -134,13 +135,14 @@ impl Amplitude {
         let ratio = self.over_clearance.filter(|ratio| *ratio > LARGEST_AMPLITUDE)?;
         Some(format!(
             "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} the film is \
-             not linear, and the coefficients depend on the amplitude; excite less",
+             not linear, and the coefficients depend on the amplitude; use smaller forces",
             significant(ratio, 2)
         ))
     }
 }
 
-/// Returns the coefficients of the film; `uncertain` makes an estimate of a value and its variance.
+/// Returns the coefficients of the film; `uncertain` makes an estimate from a value and its
+/// variance.
 fn coefficients(
     film: &Film,
     uncertain: &dyn Fn(f64, f64) -> Result<Uncertain, AnalysisError>,
@@ -229,7 +231,8 @@ impl BearingSummary {
                 significant(film.excess, 3)
             )),
             Some(scale) if scale > 1.0 => remarks.push(format!(
-                "the standard errors are {0} × those that the noise gives, because the residual is {0} × the noise",
+                "the standard errors that follow from the noise were multiplied by {0}, because the residual is \
+                 {0} × the noise",
                 significant(scale, 3)
             )),
             Some(_) => {}
@@ -243,8 +246,8 @@ impl BearingSummary {
         };
         if self.error_scale.is_some() && (0..film.values().len()).any(is_moved) {
             remarks.push(
-                "twelve coefficients were chosen by a significance test, which favours large masses; the \
-                 intervals allow for this. They are narrower if `coefficients` twelve is set beforehand"
+                "twelve coefficients were chosen by a significance test, which favours large mass coefficients; the \
+                 intervals include this effect. They are narrower if `coefficients` twelve is set beforehand"
                     .into(),
             );
         }

@@ -33,7 +33,7 @@ pub struct DecaySettings {
     /// record.
     pub from_s: Option<f64>,
     /// End of the part used, in s from the first sample of the window; `None`: the end of the
-    /// window, or the time at which a channel has fallen to its rounding.
+    /// window, or the time at which quantisation distorts a channel.
     pub to_s: Option<f64>,
     /// Number of modes; `None`: chosen by the Bayesian information criterion.
     pub modes: Option<usize>,
@@ -64,11 +64,13 @@ pub struct Decayed {
 /// Identifies natural frequencies, damping ratios and shapes from a record without force: after a
 /// release or an impact, or after a shaker was switched off.
 ///
-/// The record needs no force column, and a named one is not read. All channels have the same
-/// quantity. Without a given beginning, the decay begins at the last sample with a sum of squares
-/// of all channels, each divided by its power, of at least 80 % of the largest sum. Without a given
-/// end, it ends where the range of a channel has fallen to twelve quantisation steps, if its values
-/// are quantised.
+/// The record needs no force column; if a force column is named, it is not read. All channels have
+/// the same quantity. At each sample, the squares of all channels, each divided by the power of the
+/// channel, are added. Without a given beginning, the decay begins at the last sample whose sum is
+/// at least 80 % of the largest sum; at the first such sample if the amplitude decays from there;
+/// at the beginning of the record if the amplitude grows over most of it. Without a given end, it
+/// ends where the range of a channel has fallen to twelve quantisation steps, if its values are
+/// quantised.
 ///
 /// ```
 /// use mechid_analysis::{Channels, DecaySettings, Measurement, ResponseQuantity, decay};
@@ -126,8 +128,8 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     Ok(Decayed { summary, estimate, compared })
 }
 
-/// Returns the faults of the channels of a decay apart from the resolution, which has its own
-/// remark.
+/// Returns the findings on faulty channels of a decay, except coarse resolution, which has a remark
+/// of its own.
 fn faulty_channels(kind: ResponseQuantity, record: &Record) -> Vec<Finding> {
     let quantity = Quantity::Response(kind);
     let mut faults = clipped_channels(quantity, record);
@@ -207,7 +209,7 @@ impl DecaySettings {
                 return Ok(sample as usize);
             }
             let whole = len as f64 * dt;
-            let why = format!("{seconds} s is not in the window of {whole} s");
+            let why = format!("{seconds} s is not in the window, which is {whole} s long");
             Err(AnalysisError::Setting { setting, why })
         };
         let first = self.from_s.map_or(Ok(0), |seconds| at("from", seconds))?;

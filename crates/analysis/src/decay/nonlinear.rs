@@ -71,8 +71,8 @@ impl BackboneRow {
 
 impl DecaySummary {
     /// Marks the modes whose frequency is, within four standard errors, a multiple of the frequency
-    /// of the nonlinear mode at some amplitude. Without a nonlinear mode a multiple is a
-    /// coincidence.
+    /// of the nonlinear mode at some amplitude. Without a nonlinear mode, no mode is marked,
+    /// because a multiple is a coincidence.
     pub(super) fn name_harmonics(&mut self, modes: &[IdentifiedMode]) {
         let named: Vec<Option<Harmonic>> =
             (0..modes.len()).map(|at| self.harmonic(modes, at)).collect();
@@ -94,7 +94,7 @@ impl DecaySummary {
         });
         let energy = |number: usize| self.modes[number - 1].energy_share;
         let strongest = backbone.modes.iter().max_by(|a, b| energy(**a).total_cmp(&energy(**b)));
-        // The wide interval of an uncertain frequency contains a multiple by chance.
+        // The interval of an uncertain frequency is wide and may contain a multiple by chance.
         let (order, of_mode) = order.zip(strongest).filter(|_| reach < HARMONIC_REACH * low)?;
         Some(Harmonic { of_mode: *of_mode, order })
     }
@@ -121,20 +121,20 @@ impl DecaySummary {
             let at = compact(at, 4);
             remarks.push(format!(
                 "the response is excited again at about {at} s, as by a second hit: the modes are not those of one \
-                 decay. Use the part before or after (`to` {at}, `from` {at})"
+                 decay. Use only the samples before it (`to` {at}) or after it (`from` {at})"
             ));
         }
         if self.analysis.modes.is_none() && self.modes.len() == self.analysis.max_modes {
             remarks.push(format!(
-                "the maximum number of modes was found, {}: there may be more (`max_modes`)",
+                "the maximum number of modes was found ({}): there may be more modes (`max_modes`)",
                 self.modes.len()
             ));
         }
         for (number, row) in (1..).zip(&self.modes) {
             if let Some(Harmonic { of_mode, order }) = row.harmonic {
                 remarks.push(format!(
-                    "mode {number} lies at {order} × the frequency of mode {of_mode} within its error: a \
-                     harmonic of a nonlinear response, unless the structure has a mode there"
+                    "the frequency of mode {number} is {order} × that of mode {of_mode}, within four standard errors: it \
+                     may be a harmonic of a nonlinear response instead of a mode of the structure"
                 ));
             }
         }

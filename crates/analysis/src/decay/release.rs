@@ -4,7 +4,7 @@ use mechid_checks::limits::SIGNIFICANCE;
 use mechid_signal::{Record, Spectrum};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Minimum ratio of the sum of squares to its largest value at the beginning of the decay.
+/// Minimum ratio of the sum of squares at the beginning of the decay to the largest sum.
 const LEVEL: f64 = 0.8;
 /// Number of equal parts of a record; the mean of the last part is the constant of a channel.
 const REST: usize = 4;
@@ -12,17 +12,17 @@ const REST: usize = 4;
 const PARTS: usize = 8;
 /// Minimum number of intervals for a trend.
 const FEWEST: usize = 5;
-/// Minimum of twice the log-likelihood ratio for strong evidence of an amplitude that decays from
-/// the beginning; with less, the decay begins late rather than before its release.
+/// Minimum of twice the log-likelihood ratio for strong evidence that the amplitude decays from the
+/// first large sample on; with less evidence, the decay does not begin at this sample.
 const STRONG_EVIDENCE: f64 = 6.0;
 
-/// Returns the beginning of a decay, counted from 0: the last sample whose sum of squares of all
-/// channels, each divided by its power, is at least [`LEVEL`] of the largest sum. It is the first
-/// such sample if the amplitude decays from there, and the first sample of the record if the
-/// amplitude grows over most of it.
+/// Returns the beginning of a decay, counted from 0. A sample is large if its sum of squares of all
+/// channels, each divided by its power, is at least [`LEVEL`] of the largest sum. The decay begins
+/// at the last large sample. It begins at the first large sample if the amplitude decays from
+/// there, and at the first sample of the record if the amplitude grows over most of it.
 ///
-/// This sample follows a static release or the last cycles of a shaker; after an impact it is at
-/// the peak. The squares are about the mean of the last quarter.
+/// The last large sample follows a static release or the last cycles of a shaker; after an impact
+/// it is at the peak. The mean of the last quarter is subtracted before the squares are taken.
 pub(super) fn release(record: &Record) -> usize {
     let sums = sums(record);
     let largest = sums.iter().copied().fold(0.0, f64::max);
@@ -76,7 +76,7 @@ fn crests(sums: &[f64]) -> Vec<f64> {
 }
 
 /// Returns whether there is strong evidence that values fall from the beginning, by the likelihood
-/// ratio of a straight line and a constant followed by a straight line.
+/// ratio of two models: a straight line, and a constant followed by a straight line.
 ///
 /// # Source
 /// Kass & Raftery (1995), Journal of the American Statistical Association 90, 773–795, for the

@@ -22,9 +22,11 @@ const FEW_CYCLES: f64 = 2.0;
 /// Maximum ratio of the frequency of a mode to half the sampling rate; a mode above it may be an
 /// alias.
 const HIGH: f64 = 0.8;
-/// Maximum damping ratio of an oscillation; a mode with more may represent an overdamped one.
+/// Maximum damping ratio of an oscillation; a mode with a larger ratio may represent an overdamped
+/// mode.
 const HEAVY: f64 = 0.5;
-/// Minimum share of the variance of a channel that the modes explain without a remark.
+/// Minimum share of the variance of a channel that the modes explain; a smaller share gets a
+/// remark.
 const EXPLAINED: f64 = 0.9;
 
 /// Modes of a free response: numbers and remarks.
@@ -73,11 +75,11 @@ pub struct DecayModeRow {
     pub amplitude: Uncertain,
     /// Phase of this amplitude, in degrees.
     pub phase_deg: f64,
-    /// Share of the sum of squares of all modes, a ratio.
+    /// Ratio of the sum of squares of this mode to that of all modes.
     pub energy_share: f64,
     /// `false` if the interval of the growth rate is not below zero.
     pub decays: bool,
-    /// Mode with this mode as a harmonic; `None` if this mode is not a harmonic.
+    /// Mode that has this mode as a harmonic; `None` if this mode is not a harmonic.
     pub harmonic: Option<Harmonic>,
 }
 
@@ -94,10 +96,10 @@ pub struct DecayChannelRow {
     pub noise_order: usize,
     /// Constant, in the unit of the response.
     pub offset: f64,
-    /// Probability that white noise gives a residual that departs from white at least as much,
-    /// adjusted for the number of tests.
+    /// P-value, a probability, of the test that the residual is white, adjusted for the number of
+    /// tests.
     pub whiteness_p_value: f64,
-    /// Ratio of the mean square residuals of the first samples and of the others.
+    /// Ratio of the mean square residual of the first samples to that of the other samples.
     pub onset_ratio: f64,
     /// Probability of a larger ratio, adjusted for the number of tests.
     pub onset_p_value: f64,

@@ -117,8 +117,9 @@ impl ElementData {
         Ok(self)
     }
 
-    /// Returns the lines of one record of the `block` with the noise of its forces on `driven`: on
-    /// the samples of the pulses of a `hit`, otherwise on all.
+    /// Returns the lines of one record of the `block` with the noise of its forces on the degrees
+    /// of freedom `driven`. In the window of a `hit`, only the samples of its pulses have this
+    /// noise; otherwise all samples have it.
     pub(super) fn with_force_noise(
         self,
         block: &Block,

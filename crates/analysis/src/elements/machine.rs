@@ -18,7 +18,7 @@ pub(super) struct StatedMachine {
     pub notes: Vec<ElementNote>,
 }
 
-/// Returns M, C and K of an estimate from this number of real equations.
+/// Returns M, C and K of an estimate, which was fitted to `equations` real equations.
 pub(super) fn stated(
     estimate: &MachineEstimate,
     equations: usize,
@@ -49,8 +49,8 @@ pub(super) fn stated(
     Ok(StatedMachine { system, covariance, notes })
 }
 
-/// Returns the degrees of freedom of the covariance; if the noise is known, the number of equations
-/// minus the number of parameters.
+/// Returns the degrees of freedom of the covariance. If the noise is exactly known, this is the
+/// number of equations minus the number of parameters.
 pub(super) fn freedom(estimate: &MachineEstimate, equations: usize) -> usize {
     let spare = equations.saturating_sub(estimate.likelihood.parameters.len()).max(1);
     match estimate.likelihood.degrees_of_freedom {

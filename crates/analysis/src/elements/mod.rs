@@ -134,7 +134,7 @@ pub struct SensorSpectrum {
     pub name: String,
     /// Unit of the amplitudes.
     pub unit: &'static str,
-    /// Frequencies in Hz, rising, one per value below.
+    /// Rising frequencies, in Hz, one for each amplitude.
     pub frequency_hz: Vec<f64>,
     /// Measured amplitudes, one per frequency, in the unit of the sensor.
     pub measured: Vec<f64>,

@@ -23,7 +23,7 @@ pub enum ElementNote {
     ScaledErrors {
         /// Factor.
         factor: f64,
-        /// Subjects of the checks that the factor follows from.
+        /// Subjects of the checks that determine the factor.
         checks: String,
     },
     /// Most of the information on a parameter comes from its prior.
@@ -40,7 +40,7 @@ pub enum ElementNote {
     },
     /// Structural damping cannot be a part of M, C and K.
     Hysteresis,
-    /// M, C and K are those of the rotor at rest, because the speed differs from line to line.
+    /// M, C and K describe the rotor at rest, because the speed differs from line to line.
     AtRest,
     /// Too many entries of M, C and K are uncertain for their covariance.
     NoCovariance {
@@ -50,9 +50,9 @@ pub enum ElementNote {
     /// Standard errors and intervals include the change of the parameters by the delay that the
     /// residual shows.
     Delayed,
-    /// A coefficient that is stated as known may be wrong: as a further unknown it raises the
-    /// likelihood significantly. Standard errors and intervals include the changes of the
-    /// parameters that it causes.
+    /// A coefficient that is stated as known may be wrong: as a further unknown, the coefficient
+    /// raises the likelihood significantly. Standard errors and intervals include the changes that
+    /// this unknown causes in the parameters.
     DoubtfulKnown {
         /// Name of the element and its coefficient.
         parameter: String,
@@ -117,12 +117,12 @@ impl fmt::Display for ElementNote {
             ),
             Self::Delayed => f.write_str(
                 "the residual shows a delay of the sensors: the values are not corrected for it, but \
-                 standard errors and intervals include the change that it causes",
+                 standard errors and intervals include the change that the delay causes",
             ),
             Self::DoubtfulKnown { parameter, known, value, standard_error, misfit, .. } => {
                 write!(
                     f,
-                    "{parameter} is stated as {}, but the data give {} ± {} if it is unknown, too",
+                    "{parameter} is stated as {}, but the data give {} ± {} if it is estimated, too",
                     compact(*known, 6),
                     compact(*value, 6),
                     compact(*standard_error, 2)
@@ -132,7 +132,7 @@ impl fmt::Display for ElementNote {
                 }
                 f.write_str(
                     ": the stated value may be wrong; standard errors and intervals include the changes \
-                     that it causes",
+                     that such an error causes",
                 )
             }
             Self::BoundInSystem => f.write_str(

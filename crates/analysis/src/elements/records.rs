@@ -37,7 +37,7 @@ impl ElementData {
     ///
     /// # Errors
     /// [`AnalysisError::NoRecord`], [`AnalysisError::NoHit`] if no hit of a record is good,
-    /// [`AnalysisError::Setting`] for settings that do not belong together or leave no line, and if
+    /// [`AnalysisError::Setting`] for settings that exclude each other or exclude all lines, and if
     /// a file cannot be read.
     pub fn from_records(
         measurements: &[Measurement],
@@ -52,8 +52,8 @@ impl ElementData {
 }
 
 /// Reads the good hits of a record as open records that contain only the forces of their pulses.
-/// Hits without a gap are one record, unless the noise of their pulses takes more than the share of
-/// memory of one of `records` records.
+/// Hits without a gap are joined into one record. They remain separate if the noise of the joined
+/// pulses needs more memory than the limit divided by `records`, the number of records.
 fn from_hits(
     measurement: &Measurement,
     rule: &HitRule,
@@ -61,7 +61,7 @@ fn from_hits(
     records: usize,
 ) -> Result<ElementData, AnalysisError> {
     if measurement.window_settings().period.is_some() {
-        let why = "hits are not periods: leave out `period`".into();
+        let why = "a record of hits has no periods: leave `period` out".into();
         return Err(AnalysisError::Setting { setting: "hits", why });
     }
     if measurement.channels().force.is_empty() {
@@ -157,7 +157,7 @@ impl Signals {
             let columns = columns.into_iter().map(|column| column.map(DVector::from_column_slice));
             let columns: Vec<_> = columns.collect::<Option<_>>().ok_or_else(|| {
                 let why =
-                    "the columns of the record are not those of its sensors and inputs".into();
+                    "the columns of the record are not those of the sensors and inputs of the machine".into();
                 AnalysisError::Setting { setting: "machine", why }
             })?;
             Ok(Record::new(block.force.sampling(), DMatrix::from_columns(&columns))?)
@@ -184,8 +184,8 @@ impl Signals {
         let chosen = rule.lines(&self.inputs, period)?;
         let lines = Lines::new(self.inputs.sampling().with_len(period)?, chosen)?;
         let (p, q) = (self.outputs.channels(), self.inputs.channels());
-        // The data of periods have as many forces as responses; columns of zeros replace missing
-        // ones.
+        // The data of periods need the same number of forces and responses: columns of zeros are
+        // added to the record with fewer channels.
         let channels = p.max(q);
         let padded = |record: &Record| {
             let data = record.data().rows(0, period * count);

@@ -34,8 +34,8 @@ impl ElementData {
     }
 
     /// Returns the data with the measured receptances of some parts of the machine. Each table has
-    /// the receptance of one part, measured while it was not connected to the others; the points of
-    /// the tables have the names of the degrees of freedom `measured` of the machine.
+    /// the receptance of one part, measured while it was not connected to the other parts; the
+    /// points of the tables have the names of the degrees of freedom `measured` of the machine.
     ///
     /// # Errors
     /// [`AnalysisError::NoResponse`] if a response between two degrees of freedom of a part is
@@ -128,7 +128,7 @@ fn response<'a>(
     }
 }
 
-/// Returns the noise for standard errors that real and imaginary part have in common.
+/// Returns the noise from standard errors; each holds for the real and for the imaginary part.
 fn noise(errors: &[&Vec<f64>], rows: &[usize], inputs: usize) -> Result<LineNoise, AnalysisError> {
     let covariance = rows.iter().map(|row| {
         let variances = errors.iter().map(|error| Complex::from(2.0 * error[*row] * error[*row]));
@@ -190,7 +190,7 @@ fn receptance_of(
 }
 
 /// Returns the response between two points of a part, in one direction or, by reciprocity, in the
-/// other.
+/// opposite direction.
 fn between<'a>(
     part: &'a FrequencyResponses,
     response: &str,

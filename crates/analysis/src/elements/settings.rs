@@ -38,8 +38,8 @@ pub struct IdentifyElements {
     #[serde(default)]
     pub noise: Pooling,
     /// Standard deviation of the noise on the samples of the forces, in N: one value for all of
-    /// them or one for each, for open records and hits; `None`: estimated above the band that they
-    /// drive, or between the hits.
+    /// them or one for each, for open records and hits; `None`: estimated above the band that the
+    /// forces drive, or between the hits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_noise: Option<Vec<f64>>,
     /// Maximum number of searches: one from the given initial values, the others from random ones.
@@ -81,7 +81,8 @@ impl IdentifyElements {
     ///
     /// # Errors
     /// [`AnalysisError::Likelihood`] if the description of the machine does not make sense,
-    /// [`AnalysisError::Setting`] if an input is an unbalance, which no record holds.
+    /// [`AnalysisError::Setting`] if an input is an unbalance, because no record contains an
+    /// unbalance.
     pub fn channels(&self) -> Result<Channels, AnalysisError> {
         self.machine.assembly().map_err(AnalysisError::machine)?;
         let mut channels = Channels::default();
@@ -106,7 +107,7 @@ impl IdentifyElements {
         Ok(channels)
     }
 
-    /// Checks that no noise of the forces is stated for data that show it themselves.
+    /// Checks that no noise of the forces is stated for data that do not use it.
     pub(super) fn refuse_force_noise(&self, of: &str) -> Result<(), AnalysisError> {
         match self.force_noise {
             None => Ok(()),

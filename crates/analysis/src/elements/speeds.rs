@@ -35,7 +35,7 @@ impl ElementData {
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] for a machine whose speed is not `synchronous` and for a missing
-    /// column, and if a column is not of numbers.
+    /// column, and if a column contains a value that is not a number.
     pub fn from_speeds(tables: &[Table], how: &IdentifyElements) -> Result<Self, AnalysisError> {
         how.machine.assembly().map_err(AnalysisError::machine)?;
         how.refuse_force_noise("synchronous responses")?;

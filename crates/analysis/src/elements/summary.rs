@@ -46,7 +46,7 @@ pub struct ElementSummary {
     pub band_hz: [f64; 2],
     /// Number of fitted real numbers: real and imaginary parts.
     pub equations: usize,
-    /// Noise of the weights of the lines, in words.
+    /// Noise that determines the weights of the lines, in words.
     pub noise: String,
     /// Noise of the forces of open records and hits, one for each record.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -70,7 +70,7 @@ pub struct ElementSummary {
     pub misfit_ratio: Option<f64>,
     /// Probability of a larger misfit if model and noise are correct.
     pub misfit_p_value: Option<f64>,
-    /// Factor on the standard errors and intervals from the noise, a ratio.
+    /// Factor that multiplies the standard errors and intervals computed from the noise, a ratio.
     pub error_scale: f64,
     /// Condition number of the Jacobian with columns of unit length, a pure number.
     pub condition_number: f64,
@@ -128,8 +128,8 @@ pub struct CombinationRow {
 pub struct CandidateRow {
     /// Name of the sensor or the force.
     pub name: String,
-    /// Logarithm of the ratio of the volumes of the confidence region without and with the
-    /// measurement; `None` if a combination becomes determined.
+    /// Logarithm of a ratio: volume of the confidence region without the measurement, divided by
+    /// its volume with the measurement; `None` if a combination becomes determined.
     pub information_gain: Option<f64>,
     /// Number of parameters or combinations that become determined.
     pub newly_determined: usize,
@@ -270,7 +270,8 @@ fn candidates(
 /// Returns the modes of a small machine if all its entries are determined.
 fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, AnalysisError> {
     let is_small = estimate.assembly.dof() <= LISTED_MODES_DOF;
-    // The speed of a synchronous rotor differs from line to line, and its modes with the speed.
+    // The speed of a synchronous rotor differs from line to line, and the modes change with the
+    // speed.
     if !is_small || estimate.assembly.speed() == Speed::Synchronous {
         return Ok(Vec::new());
     }
@@ -279,8 +280,9 @@ fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, A
     ModeRow::all(&machine.modes()?, machine.is_exact())
 }
 
-/// Returns the estimate, and whether the sensors are late by more than the noise explains. If they
-/// are, its standard errors and intervals include the change of the parameters due to the delay.
+/// Returns the estimate, and whether the sensors are late by more than the noise explains. If the
+/// sensors are late, the standard errors and intervals of the estimate include the change of the
+/// parameters due to the delay.
 pub(super) fn allowing_for_delay(
     estimate: MachineEstimate,
     checks: &[CheckRow],
@@ -298,7 +300,7 @@ pub(super) fn allowing_for_delay(
 }
 
 /// Returns the estimate with larger standard errors and intervals, at the level `confidence`, if
-/// parts of the data disagree by more than its standard errors allow.
+/// parts of the data disagree by more than the standard errors allow.
 pub(super) fn allowing_for_parts(
     estimate: MachineEstimate,
     checks: &[CheckRow],
@@ -351,8 +353,8 @@ fn notes_of(estimate: &MachineEstimate, checks: &[CheckRow]) -> impl Iterator<It
         let mut causes: Vec<String> =
             checks.iter().filter(is_cause).map(|check| check.subject.to_string()).collect();
         causes.dedup();
-        // The misfit scales the errors at a level of its own, also if its check does not warn
-        // among many others.
+        // The misfit can scale the errors although its check does not warn, because the check is
+        // adjusted for the number of tests.
         if causes.is_empty() {
             causes.push(Subject::Misfit.to_string());
         }

@@ -108,8 +108,8 @@ impl ElementSummary {
         text_table(&rows)
     }
 
-    /// Returns the reduction of the standard errors by a candidate, averaged over the determined
-    /// parameters, in per cent.
+    /// Returns the reduction of the standard errors by a candidate measurement, averaged over the
+    /// determined parameters, in per cent.
     ///
     /// # Source
     /// Arithmetic mean of the relative reductions.

@@ -19,14 +19,14 @@ const ORDERS: usize = 9999;
 /// J. Besag and P. Clifford, "Sequential Monte Carlo p-values", Biometrika 78 (1991).
 const EXCEEDED: usize = 20;
 
-/// Maximum number of records that a test permutes one by one; for more it permutes means of
-/// neighbours.
+/// Maximum number of records that a test permutes one by one; with more records, it permutes means
+/// of neighbouring records.
 const SHUFFLED: usize = 2000;
 
 /// Maximum p-value, adjusted for the number of quantities, of a reported change.
 pub const SIGNIFICANT: f64 = 0.01;
 
-/// Maximum number of records in the pairs for a slope.
+/// Maximum number of records that form the pairs for a slope; of more records, every n-th is used.
 const SLOPES: usize = 400;
 
 /// Kind of a change.
@@ -53,10 +53,11 @@ impl ChangeKind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Change {
     pub kind: ChangeKind,
-    /// Index of the first value after a step, or of the last one before a drift.
+    /// Index of the first value after a step, or of the last value before a drift.
     pub begins: usize,
     pub p_value: f64,
-    /// `true` if no random permutation had as large a change: the p-value is an upper bound.
+    /// `true` if no random permutation had a change at least as large; then the p-value is an upper
+    /// bound.
     pub is_bound: bool,
     /// Difference of the levels of a step, or of the first and the last value of a drift.
     pub size: f64,
@@ -174,8 +175,8 @@ fn means_of_neighbours(ranks: &[f64]) -> Vec<f64> {
     means.into_iter().map(|value| value - middle).collect()
 }
 
-/// Returns the change with the largest share of the variance of values with the sum zero: kind,
-/// beginning and share.
+/// Returns the change that explains the largest share of the variance of `values`, whose sum is
+/// zero: its kind, its beginning and its share.
 fn best(values: &[f64], least: usize) -> Option<(ChangeKind, usize, f64)> {
     let len = values.len();
     let total: f64 = values.iter().map(|value| value * value).sum();

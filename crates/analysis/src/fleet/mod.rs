@@ -96,7 +96,7 @@ impl Fleet {
     ) -> Result<Self, AnalysisError> {
         analysis.check()?;
         if records_per_part == 0 {
-            let why = "a part needs at least one record".into();
+            let why = "a part is a group of records and needs at least one record".into();
             return Err(AnalysisError::Setting { setting: "part_records", why });
         }
         let folder = folder.as_ref();

@@ -51,7 +51,8 @@ pub struct Part {
     file_name: String,
 }
 
-/// Callback that adds the rows of some records of a file, or of the whole file without records.
+/// Callback that adds the rows of some records of a file or, if no records are given, of the whole
+/// file.
 type ComputeRows<'a> =
     dyn FnMut(&Path, &[RecordRows], &mut Vec<ResultRow>) -> Result<(), AnalysisError> + 'a;
 
@@ -83,7 +84,8 @@ impl Part {
             let path = &file[0].path;
             let stamp = FileStamp::read(path).map(|s| (s.bytes, s.modified_ns));
             for FleetRecord { rows, .. } in file {
-                // Quotes make the text of different paths different.
+                // The debug format quotes and escapes the paths, so that different paths give
+                // different texts.
                 state += &format!("{path:?} {stamp:?} {rows:?}\n");
             }
         }
@@ -137,11 +139,12 @@ impl Part {
     ) -> Result<PartDone, AnalysisError> {
         let path = folder.join(&self.file_name);
         if let Some(done) = self.done(&path) {
-            // The part written last counts, so a part from an earlier run gets the present time.
+            // Rows of the newest part replace the rows of older parts, so a part from an earlier
+            // run gets the present time.
             let touched = File::options().append(true).open(&path);
             let touched = touched.and_then(|file| file.set_modified(SystemTime::now()));
             match touched {
-                // A read-only folder has no later rows, so the time need not change.
+                // No later part can be written to a read-only folder, so the time need not change.
                 Err(error) if is_read_only(&error) => {}
                 touched => {
                     let file = path_text(&path).into_owned();
@@ -169,7 +172,8 @@ impl Part {
             failures: FailureCount::from_rows(&rows),
             computed: true,
         };
-        // The file stores the summary as a later run reports it: not computed in that run.
+        // A later run reads this summary from the file. It does not compute the part, so `computed`
+        // is false.
         let later = PartDone { computed: false, ..done.clone() };
         let later = serde_json::to_string(&later).unwrap_or_default();
         write_parquet(&path, &columns(&rows), &[(DONE, later)])?;

@@ -27,7 +27,7 @@ pub(super) struct Task {
     pub memory_bytes: Option<u64>,
 }
 
-/// A further message: some records of a file, or the whole file without records.
+/// A further message: some records of a file or, if no records are given, the whole file.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Order {
     /// Name of the file, in the encoding of the system.
@@ -98,8 +98,8 @@ pub fn serve(
     })
 }
 
-/// Limits the writable memory of this process, without its code and without reserved addresses: an
-/// allocation above the limit ends it.
+/// Limits the writable memory of this process; code and reserved addresses do not count. An
+/// allocation above the limit ends the process.
 fn limit_memory(bytes: Option<u64>) -> io::Result<()> {
     #[cfg(target_os = "linux")]
     if let Some(bytes) = bytes {

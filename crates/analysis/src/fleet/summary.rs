@@ -89,7 +89,7 @@ impl fmt::Display for FleetSummary {
             writeln!(f, "  left out: {path}")?;
         }
         match self.computed_parts {
-            0 => writeln!(f, "all parts had been computed before; nothing was computed")?,
+            0 => writeln!(f, "all parts had been computed before, so no record was computed")?,
             computed => {
                 let rate = self.computed_records as f64 / self.elapsed_s;
                 writeln!(
@@ -105,7 +105,8 @@ impl fmt::Display for FleetSummary {
         if self.other_parts > 0 {
             writeln!(
                 f,
-                "note: the folder contains another {}, of other records or another analysis: programs that read the whole folder include them",
+                "note: the folder also contains {} from other records or from a different analysis: a program \
+                 that reads the whole folder reads all of them",
                 message::count(self.other_parts, "part")
             )?;
         }

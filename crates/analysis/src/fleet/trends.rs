@@ -14,7 +14,8 @@ use super::results::{Results, read_results};
 use crate::text::{significant, text_table};
 use crate::{AnalysisError, ResultRow};
 
-/// Maximum distance of a value from the median, in robust standard deviations; outliers have more.
+/// Maximum distance of a value from the median, in robust standard deviations; a value farther away
+/// is an outlier.
 ///
 /// # Source
 /// Iglewicz & Hoaglin, *How to Detect and Handle Outliers* (1993): the modified z score, limit 3.5.
@@ -94,7 +95,7 @@ pub struct TrendChange {
     /// Probability of at least this change for a random order of the records, adjusted for the
     /// number of series.
     pub p_value: f64,
-    /// `true` if the p-value is an upper bound: no order that was tried has as large a change.
+    /// `true` if the p-value is an upper bound: no random order has a change at least as large.
     pub is_bound: bool,
 }
 
@@ -408,7 +409,7 @@ impl fmt::Display for Trends {
         if self.analyses > 1 {
             writeln!(
                 f,
-                "note: the rows come from {} analyses or versions, which may not be comparable",
+                "note: the results come from {} different analyses or versions, which may not be comparable",
                 self.analyses
             )?;
         }

@@ -84,8 +84,8 @@ impl Isolation {
         Ok(())
     }
 
-    /// Returns the memory that a record may take, in bytes: the limit or, if this is less, the
-    /// memory that the system allows this process (`ulimit -v`).
+    /// Returns the memory that a record may take, in bytes: the smaller of the limit and the memory
+    /// that the system allows this process (`ulimit -v`).
     fn memory_bytes(&self) -> u64 {
         // The conversion saturates, at a size above any address space.
         let bytes = (self.record_memory_gb * 1e9) as u64;
@@ -101,7 +101,8 @@ impl Isolation {
     }
 }
 
-/// Identifies records in a separate process, and starts a new process if a record has ended it.
+/// Identifies records in a separate process, and starts a new process if a record has ended the old
+/// one.
 #[derive(Debug)]
 pub struct Worker {
     isolation: Isolation,
@@ -132,8 +133,8 @@ impl Worker {
     /// Returns the rows of some records of a file, in their order, or of the whole file if no
     /// records are given.
     ///
-    /// A process that ends while it reads several records together is started again for each of
-    /// them: the row of a record is an error only where the record alone ends the process.
+    /// If the process ends while it reads several records together, it is started again for each of
+    /// these records: the row of a record is an error only if this record alone ends the process.
     ///
     /// # Errors
     /// [`AnalysisError::RecordProcess`] or [`AnalysisError::RecordMemory`] if no process can be
@@ -147,7 +148,7 @@ impl Worker {
         if records.len() > 1 {
             self.ask(path, records, &mut rows)?;
         }
-        // A whole file has one row.
+        // If `records` is empty, the whole file is one record and has one row.
         for at in rows.len()..records.len().max(1) {
             let alone = records.get(at).map(from_ref).unwrap_or_default();
             if let Some(why) = self.ask(path, alone, &mut rows)? {
@@ -175,8 +176,8 @@ impl Worker {
         };
         let patience = Duration::try_from_secs_f64(self.isolation.record_seconds);
         let patience = patience.unwrap_or(Duration::MAX);
-        // If the process has ended, the write fails, and the wait for the rows below returns the
-        // error.
+        // If the process has ended, this write fails. The error is returned further down, where the
+        // code waits for the rows.
         if let Some(orders) = &mut running.orders {
             let _ = frames::write(orders, &order);
         }

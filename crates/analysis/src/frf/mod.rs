@@ -33,7 +33,7 @@ pub struct FrfSettings {
     pub estimator: Estimator,
     /// Spectral lines of a segment.
     pub lines: LineChoice,
-    /// Spectral lines to exclude from the chosen ones.
+    /// Spectral lines to exclude from the chosen lines.
     pub without: LeftOut,
     /// Segments of the average.
     #[serde(deserialize_with = "words::written::one")]
@@ -67,11 +67,11 @@ pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, Ana
 /// Estimates the frequency responses and the coherence of one or several records of the same
 /// machine from the averaged auto- and cross-spectra of the segments of all records.
 ///
-/// The number of forces may differ from the number of responses. The records need the same numbers
-/// of both, the same time step, and periods or segments of the same length; their own lengths may
-/// differ. Without periods and segments, records that end at rest or have the same force are
-/// averaged as a whole; others are cut into segments like one record. It is enough that each force
-/// acts in one record.
+/// The number of forces may differ from the number of responses. All records need the same number
+/// of forces, the same number of responses, the same time step, and periods or segments of the same
+/// length; the records may differ in length. Without periods and segments, records that end at rest
+/// or have the same force are averaged as a whole; other records are cut into segments, as a single
+/// record is. It is enough that each force acts in one record.
 ///
 /// # Errors
 /// As [`frf`]; [`AnalysisError::NoRecord`] without a record, and [`AnalysisError::Estimate`] if the
@@ -85,7 +85,7 @@ pub fn frf_of_records(
     let lines = LineRule { choice: &how.lines, without: &how.without };
     if let Some(rule) = &how.hits {
         if period_given {
-            let why = "hits have no `period`: leave one of them out".into();
+            let why = "hits have no period: leave `hits` or `period` out".into();
             return Err(AnalysisError::Setting { setting: "hits", why });
         }
         let records = held_of(measurements, hold)?;
@@ -139,7 +139,7 @@ fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, An
         let [(response, kind), (of_first, kind_of_first)] = [held, first].map(Block::response);
         let wrong = |what: String, of_first: String| AnalysisError::Setting {
             setting: "response",
-            why: format!("{} has {what}, the first record {of_first}", held.file),
+            why: format!("{} has {what}, but the first record has {of_first}", held.file),
         };
         if kind != kind_of_first {
             return Err(wrong(format!("a {kind}"), format!("a {kind_of_first}")));
@@ -152,7 +152,7 @@ fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, An
     Ok(records)
 }
 
-/// Maximum ratio of the amplitudes of unexcited forces to the exciting force on a line.
+/// Maximum ratio of the amplitude of an unexcited force to that of the exciting force on a line.
 const IDLE: f64 = 0.1;
 
 /// Frequency responses to forces with interleaved lines.
@@ -163,8 +163,8 @@ pub(crate) struct Interleaved {
 }
 
 /// Returns the frequency responses to each force on the lines that it alone excites, and the
-/// crosstalk of the other forces on these lines; `None` unless several forces have interleaved
-/// lines of whole periods.
+/// crosstalk of the other forces on these lines; `None` if the forces do not have interleaved lines
+/// of whole periods.
 fn interleaved(
     recorded: &Windowed,
     how: &FrfSettings,
@@ -240,7 +240,7 @@ impl Estimator {
             return Ok(());
         }
         let why = format!(
-            "h2 of {} needs as many responses, and there are {responses}: use h1 or hv",
+            "h2 of {} needs as many responses as forces; the number of responses is {responses}: use h1 or hv",
             message::count(forces, "force")
         );
         Err(AnalysisError::Setting { setting: "estimator", why })
@@ -377,8 +377,8 @@ pub(crate) struct Responses {
     pub driven: Vec<usize>,
     /// Degrees of freedom with only noise in their force channels, counted from 0.
     pub idle: Vec<usize>,
-    /// Forces coherent with another one, so that the responses to them cannot be separated, by
-    /// degrees of freedom counted from 0.
+    /// Forces that are coherent with another force, so that their responses cannot be separated;
+    /// degrees of freedom are counted from 0.
     pub following: Vec<Crosstalk>,
     pub segments: Segments,
     /// Number of segments of each record.
@@ -424,8 +424,8 @@ impl Responses {
         let apart: Vec<usize> =
             (0..acting.len()).filter(|at| following.iter().all(|one| one.force != *at)).collect();
         let mut average = average.with_inputs(&apart);
-        // Lines of periods were selected by the scatter of the periods, requested lines by the
-        // user.
+        // Some lines are already selected: the lines of periods by the scatter of the periods, and
+        // requested lines by the user.
         if !matches!((segments, rule.choice), (Segments::Periods(_), _) | (_, LineChoice::Lines(_)))
         {
             average = average.at(&average.driven())?;

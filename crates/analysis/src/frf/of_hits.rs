@@ -17,8 +17,8 @@ use crate::text::significant;
 /// Number of parts of a window for the test whether the response has decayed.
 pub(super) const PARTS: usize = 20;
 
-/// Maximum RMS of the last part of a window, or before the pulse, relative to the largest part, for
-/// a response that has decayed.
+/// Maximum RMS of a decayed response in the last part of a window, or before the pulse, relative to
+/// the largest RMS of a part.
 const DIED_OUT: f64 = 0.02;
 
 /// Frequency responses from hits, with remarks.
@@ -40,9 +40,9 @@ pub(crate) struct AverageOfHits {
     segments: Segments,
     /// Decay rate of the exponential window, in 1/s.
     added_decay: Option<f64>,
-    /// Largest RMS of the last part of a window relative to its largest part.
+    /// Largest RMS in the last part of a window, relative to the largest RMS of a part.
     at_end: f64,
-    /// Largest RMS before the pulse relative to the largest part.
+    /// Largest RMS before the pulse, relative to the largest RMS of a part.
     before: f64,
 }
 
@@ -119,15 +119,16 @@ pub(super) fn responses_of_hits(
     let mut remarks = cut.remarks.clone();
     if at_end > DIED_OUT {
         remarks.push(format!(
-            "at the end of a window the response is still {} % of its largest: leakage widens resonances; fit the hits with `hits` of an identification, which estimates the transients, or give \
+            "at the end of a window the RMS of the response is still {} % of its largest RMS: leakage widens \
+             resonances; fit the hits with `hits` of an identification, which estimates the transients, or give \
              `exponential_percent`",
             significant(100.0 * at_end, 2)
         ));
     }
     if before > DIED_OUT {
         remarks.push(format!(
-            "before a hit the response is still {} % of its largest, which no window corrects: wait longer \
-             between hits, or fit them with `hits` of an identification",
+            "before a hit the RMS of the response is still {} % of its largest RMS, which no window corrects: wait \
+             longer between hits, or fit the hits with `hits` of an identification",
             significant(100.0 * before, 2)
         ));
     }
@@ -145,8 +146,8 @@ pub(super) fn responses_of_hits(
     Ok(OfHits { responses, cut, added_decay, remarks })
 }
 
-/// Returns the RMS of some samples of a response relative to its largest part, the largest ratio of
-/// all channels.
+/// Returns the ratio of the RMS of some samples of a response to the largest RMS of its parts; of
+/// several channels, the largest ratio.
 pub(super) fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
     let rms = |samples: &[f64]| {
         (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()

@@ -74,7 +74,7 @@ impl Segmentation {
         let why = if len > tried[enough].0 {
             "in which the narrowest peak is wider than the window alone would make it"
         } else {
-            "that keep 90 % of the information (coherence, number of averages and lines)"
+            "that give at least 90 % of the largest information (from coherence, number of averages and of lines)"
         };
         let remark = format!("segments of {len} samples were chosen: the shortest {why}");
         Ok(Some((Self { segment: Some(len), ..self.clone() }, remark)))

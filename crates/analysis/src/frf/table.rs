@@ -102,7 +102,7 @@ pub struct Response {
     /// Degree of freedom that is driven, counted from 1.
     pub force: usize,
     /// Real part, one value per frequency, in the unit of the table. On lines that another force
-    /// excites (interleaved lines), this and the other values are not a number.
+    /// excites (interleaved lines), all values are NaN.
     pub real: Vec<f64>,
     /// Imaginary part, one value per frequency, in the unit of the table.
     pub imaginary: Vec<f64>,
@@ -110,8 +110,8 @@ pub struct Response {
     pub magnitude: Vec<f64>,
     /// Phase, one value per frequency, in degrees.
     pub phase_deg: Vec<f64>,
-    /// Standard error of the magnitude, and of real and imaginary part alike: √(E|ΔH|²/2), one
-    /// value per frequency, in the unit of the table.
+    /// Standard error of the magnitude, of the real part and of the imaginary part (all equal):
+    /// √(E|ΔH|²/2), one value per frequency, in the unit of the table.
     pub standard_error: Vec<f64>,
 }
 
@@ -191,7 +191,8 @@ impl FrfTable {
             let name = |force: usize| &table.force_names[parts[force].driven[0]];
             let [force, driver] = [one.force, one.driver].map(name);
             format!(
-                "on the lines of {driver}, {force} has {} % of the amplitude of {driver}: the response to {force} was subtracted there, interpolated between the lines of {force}",
+                "on the lines of {driver}, {force} has {} % of the amplitude of {driver}: an \
+                 interpolation of the response to {force} between the lines of {force} was subtracted",
                 significant(100.0 * one.share, 2)
             )
         }));
@@ -396,8 +397,8 @@ impl FrfTable {
         })
     }
 
-    /// Returns the names of the responses and of the forces if they are points with a direction, as
-    /// universal files name their channels, and no two responses or forces have the same.
+    /// Returns the names of the responses and of the forces if all are points with a direction, as
+    /// in universal files, and no two responses or forces have the same name.
     fn points(&self) -> Option<[Vec<String>; 2]> {
         let forces: BTreeSet<usize> = self.responses.iter().map(|r| r.force - 1).collect();
         let of_forces: BTreeSet<&str> =
@@ -487,7 +488,8 @@ impl Response {
         }
     }
 
-    /// Returns the values at other indices; a frequency without an index has NaN.
+    /// Returns the values at the indices `places`, one for each frequency of the result; NaN for a
+    /// frequency without an index.
     fn spread(self, places: &[Option<usize>]) -> Self {
         let spread = |values: &[f64]| -> Vec<f64> {
             places.iter().map(|at| at.map_or(f64::NAN, |at| values[at])).collect()

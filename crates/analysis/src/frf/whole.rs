@@ -3,11 +3,12 @@
 use super::of_hits::{PARTS, over_largest};
 use crate::measurement::Windowed;
 
-/// Maximum RMS of the last part of a record, including noise, relative to its largest part, for a
-/// record that ends at rest.
+/// Maximum RMS in the last part of a record that ends at rest, including noise, relative to the
+/// largest RMS of a part.
 const AT_REST: f64 = 0.05;
 
-/// Maximum ratio of the RMS difference of two equal forces, including noise, to their RMS.
+/// Maximum RMS difference, including noise, of two forces that count as equal, relative to the RMS
+/// of the first.
 const SAME_FORCE: f64 = 0.1;
 
 /// Returns whether several records have no transients: bursts with force and response at rest at

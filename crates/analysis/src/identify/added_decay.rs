@@ -12,7 +12,7 @@ use crate::AnalysisError;
 /// Returns the decay that all tables have in common, in 1/s; `None` without a window.
 ///
 /// # Errors
-/// [`AnalysisError::Setting`] if they differ.
+/// [`AnalysisError::Setting`] if the decays of the tables differ.
 pub(crate) fn common_rate(tables: &[FrequencyResponses]) -> Result<Option<f64>, AnalysisError> {
     let Some(first) = tables.first() else { return Ok(None) };
     match tables.iter().find(|table| table.added_decay != first.added_decay) {
@@ -28,7 +28,8 @@ pub(crate) fn common_rate(tables: &[FrequencyResponses]) -> Result<Option<f64>, 
 }
 
 /// Returns a table whose velocities and accelerations are iω and (iω)² times the displacement, as
-/// the estimators assume. Under the window they are iω + σ and (iω + σ)² times the displacement.
+/// the estimators assume. With an exponential window, the measured ones are iω + σ and (iω + σ)²
+/// times the displacement.
 pub(crate) fn as_derivatives(
     table: &FrequencyResponses,
     quantity: ResponseQuantity,
@@ -56,7 +57,7 @@ pub(crate) fn as_derivatives(
 /// K + σC + σ²M.
 ///
 /// # Errors
-/// [`AnalysisError::Setting`] if the window mixes a known entry with one that is not.
+/// [`AnalysisError::Setting`] if the window mixes a known entry with an unknown entry.
 pub(super) fn unknowns(unknowns: &Unknowns, rate: f64) -> Result<Unknowns, AnalysisError> {
     let mut windowed = unknowns.clone();
     for p in Parameter::all(unknowns.dof()).filter(|p| p.matrix() == Matrix::Mass) {
@@ -70,7 +71,7 @@ pub(super) fn unknowns(unknowns: &Unknowns, rate: f64) -> Result<Unknowns, Analy
             let (known, free) = (name(known)?, name(free)?);
             let why = format!(
                 "the exponential window of the table mixes {known}, which is known, with {free}, which is not: \
-                 leave {known} free, or state {free} as well"
+                 do not state {known}, or state {free} as well"
             );
             Err(AnalysisError::Setting { setting: "structure", why })
         };

@@ -115,8 +115,8 @@ pub(crate) fn rows(
     Ok(rows.iter().map(row).collect())
 }
 
-/// Returns the finding on a response that the fit attributes to unmeasured forces, although only
-/// the residual shows them.
+/// Returns the finding that the fit attributes the residual to unmeasured forces, if only the
+/// residual indicates these forces.
 fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding> {
     let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
     let is_seen = fitted.misfit.is_none() && fitted.noise.iter().any(is_of_forces);

@@ -1,4 +1,4 @@
-//! Comparison of a fit with its parts and with larger models.
+//! Comparison of a fit with fits to parts of its data and with larger models.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use mechid_spectra::frf::Frf;
 use mechid_spectra::{FrequencyData, SpectraError};
 use nalgebra::DMatrix;
 
-/// Comparison of a fit with its parts and with larger models.
+/// Comparison of a fit with fits to parts of its data and with larger models.
 #[derive(Default)]
 pub(super) struct Compared {
     /// Findings of both comparisons.
@@ -19,8 +19,9 @@ pub(super) struct Compared {
 }
 
 impl Compared {
-    /// Compares a fit with its parts. If `records` has the samples of its rows (an empty list: none
-    /// are known), it also compares the fit with larger models.
+    /// Compares a fit with fits to parts of its data. With `records`, which describe the samples of
+    /// the rows (an empty list if these are not known), it also compares the fit with larger
+    /// models.
     pub(super) fn new(
         fit: &PartsOfFit<'_>,
         splits: &[(Split, RowParts)],

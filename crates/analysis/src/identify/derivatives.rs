@@ -18,8 +18,8 @@ pub struct Prepared {
     pub velocity: Record,
     pub acceleration: Option<Record>,
     pub force: Record,
-    /// `true` if all samples, of the force too, are second derivatives of the quantities in the
-    /// names.
+    /// `true` if all samples, including those of the force, are second derivatives of the
+    /// quantities in the names.
     pub twice_differentiated: bool,
 }
 

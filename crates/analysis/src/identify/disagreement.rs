@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use super::checks::CheckRow;
 use crate::{AnalysisError, text};
 
-/// Ratio, above 1, of the standard errors that the disagreement of model and data requires to the
-/// standard errors that follow from the noise.
+/// Ratio of the standard errors that the disagreement of model and data requires to those that
+/// follow from the noise; above 1.
 #[derive(Debug)]
 struct ErrorScale {
     /// The ratio.
@@ -20,8 +20,8 @@ struct ErrorScale {
 }
 
 impl ErrorScale {
-    /// Returns the largest scale of the checks that warn: the scatter of the parts, or the size of
-    /// the residual, whose degrees of freedom are `spare`.
+    /// Returns the largest scale of the checks that warn. The scale follows from the scatter of the
+    /// parts of the data, or from the size of the residual, which has `spare` degrees of freedom.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle
@@ -69,7 +69,7 @@ pub(super) struct Disagreement {
 }
 
 impl Disagreement {
-    /// Creates additions that no check has judged yet.
+    /// Creates additions before the checks decide which of them apply.
     pub(super) fn new(omitted: Option<DMatrix<f64>>, explained: Option<DMatrix<f64>>) -> Self {
         Self { omitted, explained, scale: None }
     }
@@ -131,13 +131,14 @@ impl Disagreement {
     /// Returns the remarks on standard errors that include the additions.
     pub(super) fn remarks(&self, checks: &[CheckRow]) -> Vec<String> {
         let term = self.omitted.as_ref().map(|_| {
-            "standard errors and intervals include the effect of the omitted term (see alternative)"
+            "standard errors and intervals include the effect of the term that the model omits (check: alternative)"
                 .to_owned()
         });
         let explanation = checks.iter().find(|check| check.is_explanation());
         let explanation = explanation.filter(|_| self.explained.is_some()).map(|check| {
             format!(
-                "standard errors and intervals include the change of the parameters by the model that explains the residual (see {})",
+                "standard errors and intervals include the change of the parameters to those of the model that \
+                 explains the residual (check: {})",
                 check.subject
             )
         });

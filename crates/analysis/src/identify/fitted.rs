@@ -34,8 +34,9 @@ pub struct Fitted {
     /// `true` for least squares: the checks after the fit may then show its bias instead of a
     /// fault.
     pub least_squares: bool,
-    /// Estimate with its uncertainty; with nonlinear terms, of the linear part. Without a scale of
-    /// the equations it is one of the systems with the same modes ([`Unscaled`](super::Unscaled)).
+    /// Estimate with its uncertainty; for a fit with nonlinear terms, the estimate of the linear
+    /// part. If the equations have no scale, it is the estimate of one of the systems with the same
+    /// modes ([`Unscaled`](super::Unscaled)).
     pub estimate: Estimate,
     /// Estimate with nonlinear terms, if there are any.
     pub nonlinear: Option<WithTerms>,
@@ -191,7 +192,7 @@ impl Fitted {
             let how_few = match spare {
                 0 => "no equation remains to estimate the errors".to_owned(),
                 _ => format!(
-                    "the standard errors themselves are known to {} % only",
+                    "the standard errors themselves are uncertain by {} %",
                     significant(100.0 * error, 2)
                 ),
             };
@@ -203,8 +204,8 @@ impl Fitted {
         })
     }
 
-    /// Adds the disagreement of model and data that the checks show to the standard errors. With
-    /// nonlinear terms it adds only the effect of further terms, because the standard errors
+    /// Increases the standard errors by the disagreement of model and data that the checks show.
+    /// With nonlinear terms it adds only the effect of further terms, because the standard errors
     /// already follow from the residual.
     pub(super) fn count_disagreement(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
         let unjudged = std::mem::take(&mut self.disagreement);

@@ -10,10 +10,10 @@ use serde::Serialize;
 
 use crate::AnalysisError;
 
-/// One line of one record; for frequency responses, one line under one of the forces.
+/// One line of one record; for frequency responses, one line for one of the forces.
 ///
 /// Complex numbers are pairs of real and imaginary part. Responses are in the SI unit of the
-/// measured quantity. The force is the measured one, for frequency responses one newton.
+/// measured quantity. The force is the measured force or, for frequency responses, 1 N.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedLine {
     /// Frequency, in Hz.

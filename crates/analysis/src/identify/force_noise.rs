@@ -49,7 +49,8 @@ impl ForceNoise {
     /// given, otherwise estimated between the hits or above the band.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] unless one level is stated for all forces, or one for each.
+    /// [`AnalysisError::Setting`] if the number of stated levels is neither 1 nor the number of
+    /// forces.
     pub(crate) fn from_record(
         held: &Block,
         driven: &[usize],

@@ -1,5 +1,5 @@
-//! Nonlinear terms that are missing in a fit with other such terms, and their effect on its
-//! parameters.
+//! Nonlinear terms that a fit with other nonlinear terms lacks, and their effect on the parameters
+//! of this fit.
 
 use mechid_checks::{Finding, NamedChange, NonlinearTermsLeftOut, PValue};
 use mechid_estimate::{EstimateError, Unknowns};
@@ -70,9 +70,9 @@ impl FurtherTerms {
         Self::new(&fit.estimate, &larger.estimate, explained, p_value)
     }
 
-    /// Compares a fit with a larger one, whose last terms are the further ones; `None` if the
-    /// larger one has no further terms. With the probability `p_value`, noise alone makes further
-    /// terms as certain.
+    /// Compares a fit with a larger fit, whose last terms are the further terms; `None` if the
+    /// larger fit has no further terms. `p_value` is the probability that noise alone gives a
+    /// further term at least as significant.
     fn new(
         fit: &NonlinearEstimate,
         larger: &NonlinearEstimate,
@@ -124,7 +124,7 @@ fn with_terms(
 }
 
 /// Returns the smallest p-value of the coefficients of the added terms: the probability that noise
-/// alone makes the most certain one differ as much from zero.
+/// alone gives a coefficient that differs from zero by at least as many standard errors.
 fn least_p_value<'a>(
     fit: &NonlinearEstimate,
     added: impl Iterator<Item = &'a str>,

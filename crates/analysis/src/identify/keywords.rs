@@ -233,7 +233,10 @@ impl Keywords {
             return Err(refused(stray, why));
         }
         if self.lines.is_some() && self.band_hz.is_some() {
-            return Err(refused("lines", "it excludes `band_hz`: leave one of them out"));
+            return Err(refused(
+                "lines",
+                "`lines` and `band_hz` exclude each other: leave one of them out",
+            ));
         }
         if self.criterion.is_some() && self.candidates.is_none() {
             return Err(refused("criterion", "it belongs to `candidates`"));
@@ -268,7 +271,7 @@ impl Keywords {
             }
             Some(Extent::WholePeriod) if self.force_noise.is_some() => Err(refused(
                 "force_noise",
-                "it is for open records: periods show the noise of their force by their scatter",
+                "it is for open records: for whole periods, the scatter of the force shows its noise",
             )),
             Some(Extent::WholePeriod) if self.hits.is_some() => {
                 Err(refused("extent", "a hit is not a period"))
@@ -320,7 +323,7 @@ impl Keywords {
             search,
             weighting: self.weighting.unwrap_or_default(),
         };
-        // Least squares on the equation of motion is for whole periods.
+        // The default extent for least squares on the equation of motion is whole periods.
         let periods = (self.method == Some(Method::LeastSquares)).then_some(Extent::WholePeriod);
         Ok(Source::Terms(TermFit { terms, estimator, extent: self.extent.or(periods), lines }))
     }

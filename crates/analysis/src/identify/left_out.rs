@@ -130,8 +130,8 @@ impl LeftOut {
     }
 }
 
-/// Returns the lines of the fit, including lines without force: there the nonlinear forces and the
-/// response must cancel.
+/// Returns the lines of the fit, including lines without force, on which the nonlinear forces must
+/// balance the linear forces of the response.
 pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let sampling = held.force.sampling().with_len(held.period)?;
     let driven = rule.lines(&held.force, held.period)?;

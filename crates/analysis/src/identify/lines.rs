@@ -92,7 +92,7 @@ pub fn choose_lines(
 }
 
 /// Returns a warning if the forces do not drive all lines of the records, with advice; `None` if
-/// the lines were chosen, or if the forces drive all of them.
+/// the settings choose the lines, or if the forces drive all lines.
 pub(super) fn few(records: &[Windowed], choice: &LineChoice) -> Option<String> {
     if *choice != LineChoice::Driven {
         return None;
@@ -137,11 +137,11 @@ mod tests {
         assert_eq!(choose(None, Some("4:7")).unwrap(), [5, 7]);
         assert_eq!(
             choose(None, Some("8:20")).unwrap_err().to_string(),
-            "no excited line between 8 and 20 Hz: the force has its lines between 3.000000 and 7.000000 Hz"
+            "no excited line between 8 and 20 Hz: the excited lines are between 3.000000 and 7.000000 Hz"
         );
         assert_eq!(
             choose(Some("even"), None).unwrap_err().to_string(),
-            "no excited line among even: the force has its lines between 3 and 7"
+            "no excited line among even: the excited lines are between 3 and 7"
         );
     }
 

@@ -17,9 +17,9 @@
 //! | `mass`, `structure` | what is known of M, C and K |
 //! | `coherence` | coherence of the records that were fitted |
 //! | `fitted` | a fit: the estimate, its data and settings, its residual |
-//! | `compared`, `disagreement` | a fit beside its parts and larger models; standard errors where they disagree |
+//! | `compared`, `disagreement` | comparison with parts and larger models; standard errors |
 //! | `acquisition` | force between samples and AC coupled channels of open records |
-//! | `force_noise` | noise of the forces, stated or as the record shows it |
+//! | `force_noise` | noise of the forces, stated or estimated from the record |
 //! | `sinusoids` | sinusoids in open records that are not responses to the forces |
 //! | `fitted_lines` | the lines of a fit one by one, with standard errors and residual |
 //! | `unscaled` | equations of motion that the data determine only up to factors |
@@ -115,7 +115,7 @@ pub const CONSPICUOUS: f64 = 0.05;
 ///
 /// # Errors
 /// [`AnalysisError::NoRecord`]; [`AnalysisError::Unfit`] if the fit fails and the checks of its
-/// data explain why, otherwise that failure; errors of the settings, such as
+/// data explain why; the error of the fit if they do not; errors of the settings, such as
 /// [`AnalysisError::TimeDomainMotions`]; and [`AnalysisError::Io`] if a file cannot be read again.
 pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identified, AnalysisError> {
     check_distinct(measurements)?;
@@ -240,20 +240,22 @@ impl Identify {
     }
 
     /// Returns an error if open records or hits have a period, or if the noise of each line is
-    /// requested: they have only one value at each line.
+    /// requested: they have only one value on each line, which does not show its noise.
     fn check_open(&self, period_given: bool) -> Result<(), AnalysisError> {
         let (noise, setting, of_period) = match &self.source {
             Source::Hits(how) => {
-                (&how.noise, "hits", "hits have no `period`: leave one of them out")
+                (&how.noise, "hits", "hits have no period: leave `hits` or `period` out")
             }
             Source::Open(how) if how.noise.force.is_some() => (
                 &how.noise,
                 "force_noise",
-                "it is for open records: periods show the noise of their force by their scatter",
+                "it is for open records: for whole periods, the scatter of the force shows its noise",
             ),
-            Source::Open(how) => {
-                (&how.noise, "extent", "an open record has no `period`: leave one of them out")
-            }
+            Source::Open(how) => (
+                &how.noise,
+                "extent",
+                "an open record has no period: leave `extent` or `period` out",
+            ),
             _ => return Ok(()),
         };
         let (setting, why) = match (period_given, noise.response) {
@@ -303,8 +305,7 @@ impl Identify {
             Source::Terms(how) => nonlinear::fit(records, unknowns, how, period_given),
             Source::Segments(how) => responses::fit(records, unknowns, how, period_given),
             Source::Samples(_) if unknowns.is_related() => {
-                let why =
-                    "symmetric matrices and proportional damping belong to `domain` frequency";
+                let why = "symmetric matrices and proportional damping are available only with `domain` frequency";
                 Err(AnalysisError::Setting { setting: "structure", why: why.into() })
             }
             Source::Samples(how) => how.fit(records, unknowns),
@@ -318,9 +319,9 @@ impl Identified {
         &self.summary
     }
 
-    /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear
-    /// part. Without a scale of the equations it is one of the systems with the same modes
-    /// ([`IdentificationSummary::unscaled`]).
+    /// Returns the estimate of M, C and K with its covariance; for a fit with nonlinear terms, the
+    /// estimate of the linear part. If the equations have no scale, it is the estimate of one of
+    /// the systems with the same modes ([`IdentificationSummary::unscaled`]).
     pub fn estimate(&self) -> &Estimate {
         &self.fitted.estimate
     }
@@ -457,7 +458,7 @@ impl Identified {
     ///
     /// # Errors
     /// [`AnalysisError::ValidationPeriod`] if a steady state has fewer samples than a period,
-    /// [`AnalysisError::Window`] if the record does not have them.
+    /// [`AnalysisError::Window`] if the record does not have these samples.
     pub fn validation_window(
         &self,
         other: Measurement,

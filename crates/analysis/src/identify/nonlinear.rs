@@ -29,7 +29,8 @@ use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Minimum number of records or windows for cross-validation of a candidate, each excluded once.
+/// Minimum number of records or windows for cross-validation of a candidate, in which each is
+/// excluded once.
 const HELD_OUT_RECORDS: usize = 3;
 
 /// Nonlinear terms of an identified system, which [`Machine::read`](crate::Machine::read) can read.
@@ -120,11 +121,12 @@ pub struct TermRow {
 /// Levels of distortion, and the kind of term that explains most of the residual of a linear model.
 #[derive(Debug, Serialize)]
 pub struct DistortionRow {
-    /// Level on even lines; `None` unless only odd lines are driven.
+    /// Level on even lines; `None` if even lines are driven.
     pub even: Option<Level>,
     /// Level on odd lines without excitation.
     pub odd: Option<Level>,
-    /// Part of the force that a linear model does not explain on the lines (pure number).
+    /// Part of the force on the lines of the fit that a linear model does not explain (pure
+    /// number).
     pub linear_leaves: f64,
     /// The finding, in a sentence.
     pub text: String,
@@ -183,7 +185,7 @@ fn fitted(
     let further = FurtherTerms::from_periods(&data, unknowns, how, &stepped, &estimated);
     let (omitted, squared_change) =
         further.map(|further| (further.finding, further.squared_change)).unzip();
-    // With several periods, the misfit compares the residual with their noise instead.
+    // With several periods, the misfit already compares the residual with the noise of the periods.
     let residuals = match misfit {
         Some(_) => Vec::new(),
         None => white_residuals(records, &white),

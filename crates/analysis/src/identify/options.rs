@@ -168,7 +168,7 @@ pub enum TermEstimator {
 pub struct SpectralLines {
     /// Lines to use.
     pub choice: LineChoice,
-    /// Lines to exclude from the chosen ones.
+    /// Lines to exclude from the chosen lines.
     pub without: LeftOut,
 }
 
@@ -284,7 +284,7 @@ pub enum Between {
     Linear,
     /// A cubic spline.
     Spline,
-    /// The Fourier series of the window, which must hold whole periods.
+    /// The Fourier series of the window, which must contain whole periods.
     BandLimited,
 }
 
@@ -334,7 +334,7 @@ impl Derivatives {
         SavitzkyGolay::new(window / 2, order).map(Some).map_err(|error| wrong(error.to_string()))
     }
 
-    /// Returns the number of samples in the sliding window; 0 where all samples are used at once.
+    /// Returns the number of samples in the sliding window; 0 if all samples are used at once.
     pub(crate) fn window(self) -> usize {
         match self {
             Self::Spectral => 0,
@@ -378,7 +378,7 @@ impl fmt::Display for Derivatives {
 
 impl Identify {
     /// Fits spectral lines by this method: maximum likelihood for periodic or open windows, the
-    /// others for whole periods.
+    /// other methods for whole periods.
     pub fn spectra(method: Method) -> Self {
         let lines = SpectralLines::default();
         let periods = |estimator| {

@@ -27,8 +27,8 @@ const DECIBELS: f64 = 20.0 / std::f64::consts::LN_10;
 const MAX_LEVEL: f64 = 400.0;
 
 /// Returns the model that explains the responses of tables far better than the `result` from their
-/// `data`, if there is one: with a delay, with structural damping, of another quantity, or of
-/// magnitudes given as levels.
+/// `data`, if there is such a model: with a delay, with structural damping, for another measured
+/// quantity, or for magnitudes given as levels.
 pub(super) fn better_model_of(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -185,7 +185,7 @@ fn level_responses(
         table
     };
     let tables: Vec<FrequencyResponses> = tables.iter().map(without_noise).collect();
-    // A negative level that was read as a magnitude has its phase shifted by π.
+    // If a negative level (dB) was read as a magnitude, its phase is shifted by π.
     let magnitude = |z: Complex<f64>| z * (sign * (sign * z.norm() / DECIBELS).exp() / z.norm());
     let (fit, model) = refitted(&tables, how, quantity, estimate, &magnitude)?;
     let log_area = |z: &Complex<f64>| {

@@ -64,8 +64,8 @@ pub struct Compared {
 }
 
 impl Prediction {
-    /// Returns the measured responses with the predicted ones, for the buffered part of the record.
-    /// An open record starts from the state that fits it best.
+    /// Returns the measured and the predicted responses for the buffered part of the record. The
+    /// prediction of an open record starts from the state that fits the record best.
     pub(crate) fn predict(
         self,
         model: &Model,
@@ -106,7 +106,7 @@ impl Prediction {
         let (force, rest) = (&measured.force, InitialState::rest(system.dof()));
         match self {
             Prediction::Steady => predict_periodic(system, force),
-            // The first part of a long period is not periodic, either.
+            // Only the first part of a long period is in memory, and this part is not periodic.
             Prediction::Sampled { discretisation, extent }
                 if extent == Extent::Open || measured.held_to().is_some() =>
             {
@@ -121,8 +121,8 @@ impl Prediction {
 }
 
 /// Returns the steady state of a nonlinear system under the mean period of the measured force, as
-/// the channels record it, repeated for every buffered period. Of several steady states it is the
-/// one nearest to the measured response.
+/// the channels record it, repeated for every buffered period. Of several steady states, it returns
+/// the state nearest to the measured response.
 pub(crate) fn steady_state(
     system: &NonlinearSystem,
     channels: ChannelPhase,

@@ -54,7 +54,8 @@ pub fn fit(
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
-    // An undetermined parameter ends the fit here with its name, before it makes a later step fail.
+    // If a parameter is undetermined, the fit ends here with an error that names it; otherwise a
+    // later step would fail.
     estimate.system()?;
     let periodic = segments.are_periods();
     let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));
@@ -129,8 +130,8 @@ struct Outcome {
     settled: bool,
 }
 
-/// Returns the estimate. Maximum likelihood replaces the `responses` by the fitted ones, which are
-/// corrected for the bias of the window.
+/// Returns the estimate. Maximum likelihood replaces the `responses` by the fitted responses, which
+/// are corrected for the bias of the window.
 fn estimated(
     responses: &mut [Responses],
     unknowns: &Unknowns,

@@ -126,7 +126,7 @@ impl WindowRow {
 
 impl ModeRow {
     /// Returns frequencies and damping of the modes of an identified system, or of an exactly
-    /// `known` one.
+    /// `known` system.
     pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
         let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
         let rounding = EIGENVALUE_ROUNDING * largest;

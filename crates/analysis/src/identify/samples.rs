@@ -52,8 +52,8 @@ impl SampleFit {
     }
 
     /// Processes a record in chunks. Each chunk after the first begins with the last sample of the
-    /// previous one; the callback receives a flag for the last. If every sample depends on all
-    /// others, the record is one chunk.
+    /// previous one; the callback receives a flag for the last chunk. If every sample depends on
+    /// all others, the record is one chunk.
     fn chunks(
         &self,
         recorded: &Windowed,
@@ -80,8 +80,8 @@ impl SampleFit {
         if held.held_to().is_some() { Extent::Open } else { self.extent() }
     }
 
-    /// Checks whether a window stated as one period is periodic; uses the first and last samples if
-    /// it is not fully buffered.
+    /// Checks whether a window stated as one period is periodic; uses only the first and last
+    /// samples if the window is not fully buffered.
     fn seam(&self, recorded: &Windowed, p: &Prepared, end: Option<Record>) -> Vec<Finding> {
         match (self.extent(), recorded.held.held_to(), end) {
             (Extent::Open, ..) | (_, Some(_), None) => Vec::new(),
@@ -132,7 +132,7 @@ impl SampleFit {
             if let Some((factor, interpolation)) = self.refinement() {
                 return Ok(rows.push_refined(p.states(), extent, factor, interpolation)?);
             }
-            // After its last sample a period continues with its first.
+            // The sample after the last sample of a period is its first sample.
             let closes = last && extent == Extent::WholePeriod;
             let p = if closes { p.followed_by(held)? } else { p };
             let [x, v, force] = p.states();
@@ -222,7 +222,8 @@ impl SampleFit {
             let [samples, fitted] =
                 missing_force(&estimate, p.states(), discretisation, extent, self.refinement())?;
             let force = p.force.window(0, samples.len())?;
-            // An error of a measured state affects the intervals before and after it.
+            // An error of a measured state affects the interval before this state and the interval
+            // after it.
             let noise_span = self.noise_span() + 1;
             Ok(Residual::Samples(SampleResidual { samples, fitted, force, noise_span }))
         };
@@ -282,7 +283,9 @@ impl SampleFit {
         let residual = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
         if self.derivatives == Some(Derivatives::Spectral) && residual > CONSPICUOUS {
             remarks.push(
-                "spectral derivatives contain the noise of every line, excited or not, and with a measured acceleration mainly that of the low lines: leave `domain` time and `derivatives` out to fit the same whole periods on the excited lines only"
+                "spectral derivatives contain the noise of every line, excited or not; those computed from an \
+                 acceleration contain mainly the noise of the low lines. Leave `domain` time and `derivatives` \
+                 out to fit the same whole periods on the excited lines only"
                     .into(),
             );
         }
@@ -290,8 +293,8 @@ impl SampleFit {
     }
 }
 
-/// Replaces the warning about a force held between the samples by a check of the identified modes,
-/// which are more specific.
+/// Replaces the warning about a force held between the samples by a check against the identified
+/// modes, which is more specific.
 fn judge_step_by_modes(
     findings: &mut [Finding],
     estimate: &Estimate,

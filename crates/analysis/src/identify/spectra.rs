@@ -82,7 +82,8 @@ pub(super) fn fit(
         noise_through,
         remark,
     } = estimated(&spectra, &data, unknowns, estimator)?;
-    // An undetermined parameter ends the fit here with its name, before it makes a later step fail.
+    // If a parameter is undetermined, the fit ends here with an error that names it; otherwise a
+    // later step would fail.
     estimate.system()?;
     let RecordFindings { before, after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
@@ -315,7 +316,7 @@ struct SpectralEstimate {
     remark: Option<String>,
 }
 
-/// Returns the estimate of a method from the spectra with means `data`. Without a method it is
+/// Returns the estimate of a method from the spectra with means `data`. Without a method, it uses
 /// maximum likelihood if the periods show the noise and the search converges, otherwise least
 /// squares.
 fn estimated(
@@ -331,7 +332,7 @@ fn estimated(
             let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
             let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
             Ok(SpectralEstimate {
-                estimator: "instrumental variables: each half of the periods is the instrument of the other",
+                estimator: "instrumental variables: each half of the periods is the instrument of the other half",
                 estimate: instrumental_variables(&first, &second, unknowns)?,
                 misfit: None,
                 noise: Vec::new(),
@@ -443,9 +444,9 @@ fn likelihood(
 }
 
 /// Returns least squares if it explains the response as well as maximum likelihood. Also returns
-/// least squares if the residual of maximum likelihood is more than noise, unless least squares
-/// leaves a residual that is [`MUCH`] times as large. Otherwise noise has biased least squares:
-/// returns maximum likelihood with this reason.
+/// least squares if the residual of maximum likelihood is more than noise and the residual of least
+/// squares is less than [`MUCH`] times as large. Otherwise noise has biased least squares: returns
+/// maximum likelihood with this reason.
 fn preferred(
     data: &FrequencyData,
     plain: SpectralEstimate,
@@ -460,15 +461,15 @@ fn preferred(
     };
     let unknown = likely.estimate.unknowns().independent() as f64;
     let equations = 2.0 * (data.dof() * data.len()) as f64;
-    // The excess of least squares is measured twice, in units of the residual of maximum
-    // likelihood: with equal weights, and with the weights of maximum likelihood.
+    // The excess of the residual of least squares over that of maximum likelihood is computed
+    // twice: with equal weights, and with the weights of maximum likelihood.
     let unweighted = ((of_plain / of_likely).powi(2) - 1.0) * equations;
     let weighted = likely.estimate.squared_distance(&plain.estimate).unwrap_or(0.0);
     let excess = unweighted.max(weighted) / unknown;
     if of_plain <= ROUNDING || excess.is_nan() || excess <= EXCESS {
         return Ok(plain);
     }
-    // A wrong model makes both estimates wrong.
+    // If the model is wrong, the estimates of both methods are wrong.
     let fit_findings =
         after_spectral_fit(std::slice::from_ref(data), &likely.estimate, Extent::WholePeriod)?;
     let is_noise = |finding: &Finding| finding.verdict() == Verdict::Good;
@@ -478,7 +479,8 @@ fn preferred(
         return Ok(plain);
     }
     let reason = format!(
-        "maximum likelihood was used: least squares, which is biased by noise, leaves {} % of the motion unexplained instead of {} %",
+        "maximum likelihood was used: least squares, which is biased by noise, leaves \
+         {} % of the motion unexplained, maximum likelihood {} %",
         significant(100.0 * of_plain, 3),
         significant(100.0 * of_likely, 3)
     );
@@ -515,7 +517,7 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
 const FINE: f64 = 3e-5;
 
 /// Returns the quantisation steps of responses and forces, in their units; 0 for a channel without
-/// steps or with fine ones.
+/// steps or with fine steps.
 fn steps(held: &Block) -> Vec<f64> {
     let of = |record: &Record| -> Vec<f64> {
         let channels = (0..record.channels()).map(|channel| {

@@ -115,10 +115,10 @@ impl Structure {
         self.forms.is_empty()
     }
 
-    /// Returns the unknowns that remain.
+    /// Returns the unknowns that remain after all statements are applied.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if there is no such entry, and this or
+    /// [`AnalysisError::Estimate`] if a stated entry does not exist, and this error or
     /// [`AnalysisError::Setting`] if statements or known masses contradict each other.
     pub fn apply(&self, mut unknowns: Unknowns) -> Result<Unknowns, AnalysisError> {
         let has = |form: Form| self.forms.contains(&form);

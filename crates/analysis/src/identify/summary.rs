@@ -52,7 +52,7 @@ pub struct IdentificationSummary {
     pub lines: Option<LinesUsed>,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Parameters, one each, except those of [`unscaled`](Self::unscaled) equations.
+    /// Parameters, one row each, except those of [`unscaled`](Self::unscaled) equations.
     pub parameters: Vec<ParameterRow>,
     /// Equations of motion without scale, whose parameters do not follow from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -76,15 +76,15 @@ pub struct IdentificationSummary {
     pub hits: Vec<HitRow>,
     /// Checks before and after the fit.
     pub checks: Vec<CheckRow>,
-    /// Every line of the fit, if they were asked for.
+    /// Every line of the fit; `None` if not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted_lines: Option<Vec<FittedLine>>,
     /// Prediction of a record that was not fitted.
     pub validation: Option<Validation>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// M, C and K, as `mechid force --system` and others read them; `None` if equations have no
-    /// scale.
+    /// M, C and K, as `mechid force --system` and other commands read them; `None` if equations
+    /// have no scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
     /// Covariance of the estimated parameters, for quantities that follow from them; `None` for
@@ -126,8 +126,8 @@ pub struct FitRow {
     /// Sinusoids in open records that are not a response to the forces and were subtracted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sinusoids: Vec<SinusoidRow>,
-    /// Factor on the standard errors from the noise: above 1 if parts of the data disagree or the
-    /// residual exceeds the noise.
+    /// Factor that multiplies the standard errors computed from the noise: above 1 if parts of the
+    /// data disagree or the residual exceeds the noise.
     pub error_scale: f64,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
@@ -252,7 +252,10 @@ impl IdentificationSummary {
         let negative = |p: &&ParameterRow| p.row == p.column && p.estimate.value < 0.0;
         for p in self.parameters.iter().filter(negative).filter(|p| !is_told || p.matrix != "mass")
         {
-            doubts.push(format!("{} is negative: no passive machine has that", p.name));
+            doubts.push(format!(
+                "{} is negative, which is not possible for a passive machine",
+                p.name
+            ));
         }
         let extrapolated = self.nonlinear.iter().flat_map(|nonlinear| &nonlinear.extrapolation);
         doubts.extend(extrapolated.filter_map(ExtrapolationRow::doubt));

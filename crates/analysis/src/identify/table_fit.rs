@@ -45,8 +45,8 @@ pub(super) struct TableFit {
 }
 
 impl TableFit {
-    /// Fits `data`, those of the `measured` tables. An exponential window added a `decay` rate, in
-    /// 1/s, to every mode.
+    /// Fits the `data` of the `measured` tables. `decay` is the rate, in 1/s, that an exponential
+    /// window added to the decay of every mode.
     pub(super) fn new(
         data: &FrequencyData,
         unknowns: &Unknowns,
@@ -299,7 +299,7 @@ impl Scope<'_> {
         let row =
             |(when, name, finding): Row| CheckRow::new(when, name, &finding, &Channels::default());
         // With an exponential window, or without a scale, the fitted parameters are not those of
-        // the machine, so their changes do not apply.
+        // the machine, so that their changes by another model are no changes of the machine.
         let is_same =
             !self.is_unscaled && self.tables.iter().all(|table| table.added_decay.is_none());
         let [omitted, explained] =

@@ -30,8 +30,8 @@ use crate::text::{compact, paragraph, significant};
 /// together; each needs the response at every point where a force acts.
 ///
 /// Maximum likelihood weights every response by its variance: from its standard error if the table
-/// has one, otherwise from coherence and averages. Without either, the noise is white, in
-/// proportion to the response, or the sum of both, as the residual shows.
+/// has one, otherwise from coherence and averages. Without standard errors and coherence, the noise
+/// is estimated from the residual: white, in proportion to the response, or the sum of these two.
 ///
 /// # Errors
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoResponse`] if a response is missing,
@@ -102,7 +102,8 @@ fn remarks(
             .chain(measured.iter().flat_map(|measured| measured.remarks.iter().cloned()))
             .chain(added_decay.map(|rate| {
                 format!(
-                    "an exponential window adds {} 1/s to the decay rate of every mode of the table: this was subtracted from damping and stiffness",
+                    "an exponential window adds {} 1/s to the decay rate of every mode of the table: this effect was \
+                     removed from damping and stiffness",
                     significant(rate, 4)
                 )
             }))
@@ -139,7 +140,7 @@ pub struct ResponseSummary {
     pub frequencies: FrequencyRow,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Parameters, one each, without the entries of [`unscaled`](Self::unscaled) equations.
+    /// Parameters, one row each, without the entries of [`unscaled`](Self::unscaled) equations.
     pub parameters: Vec<ParameterRow>,
     /// Equations of motion without scale, whose parameters do not follow from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -158,8 +159,8 @@ pub struct ResponseSummary {
     pub checks: Vec<CheckRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// M, C and K, as `mechid force --system` and others read them; `None` if equations have no
-    /// scale.
+    /// M, C and K, as `mechid force --system` and other commands read them; `None` if equations
+    /// have no scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
     /// Covariance of the estimated parameters, for quantities derived from them; `None` for more

@@ -96,8 +96,9 @@ fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
     "; by reciprocity a row of responses also serves as a column (`structure` symmetric)"
 }
 
-/// Returns a table with missing responses replaced by their reciprocal ones, with a remark. Returns
-/// the table itself if the responses to every force are complete, or if reciprocity completes none.
+/// Returns a table with missing responses replaced by the reciprocal responses, with a remark.
+/// Returns the table itself if the responses to every force are complete, or if reciprocity cannot
+/// complete the responses to any force.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.5 (symmetric matrices have a symmetric
@@ -235,7 +236,7 @@ impl Tabulated {
         self.is_averaged.then_some(&self.coherent)
     }
 
-    /// Replaces the averaged responses by ones corrected for the bias of the window.
+    /// Replaces the averaged responses by responses that are corrected for the bias of the window.
     pub(super) fn replace(
         &mut self,
         responses: &mut dyn Iterator<Item = Frf>,
@@ -330,7 +331,8 @@ fn columns(
 ) -> Result<Vec<(FrequencyData, usize)>, AnalysisError> {
     let column = |(input, dof): (usize, &usize)| {
         let response: Vec<_> = response.iter().map(|h| h.columns(input, 1).into_owned()).collect();
-        // A standard error applies to the real part and to the imaginary part.
+        // The standard error is that of the real part and also that of the imaginary part, so the
+        // variance of the complex value is twice its square.
         let variance: Option<Vec<_>> = errors.map(|errors| {
             errors.iter().map(|e| e.columns(input, 1).map(|e| 2.0 * e * e)).collect()
         });
@@ -341,8 +343,9 @@ fn columns(
     driven.iter().enumerate().map(column).collect()
 }
 
-/// Returns the responses with points in positive directions: a force or a response in −Z is one in
-/// +Z with the opposite sign. Points requested in negative directions are unchanged.
+/// Returns the responses with points in positive directions: a force or a response in −Z becomes a
+/// force or a response in +Z with the opposite sign. Points requested in negative directions are
+/// unchanged.
 pub(crate) fn with_positive_directions<'a>(
     table: &'a FrequencyResponses,
     points: &[String],
@@ -388,7 +391,7 @@ pub(crate) fn response_data(
 ) -> Result<(FrequencyData, Option<&'static str>), AnalysisError> {
     if table.added_decay.is_some() {
         let why = format!(
-            "{} was measured with an exponential window: use it with `identify`",
+            "{} was measured with an exponential window, which adds damping: use a table without this window",
             table.file
         );
         return Err(AnalysisError::Setting { setting: "exponential_percent", why });
@@ -533,7 +536,8 @@ impl Columns<'_> {
         let averages = averages.ok_or_else(|| AnalysisError::Setting {
             setting: "averages",
             why: format!(
-                "{} has coherences: from how many independent averages? (The standard errors follow from both)",
+                "{} has coherences: state their number of independent averages; coherences and averages \
+                 give the standard errors",
                 table.file
             ),
         })?;

@@ -13,8 +13,9 @@ use crate::AnalysisError;
 /// determine the modes.
 ///
 /// If no force acts on a degree of freedom and no entry of its equation is known, this equation may
-/// be multiplied by any number, and added to any other equation whose mass is free in this column.
-/// The responses to the forces do not change, and neither do poles and mode shapes.
+/// be multiplied by any number. It may also be added to any other equation, if the entry of M that
+/// couples that equation to this degree of freedom is unknown. Neither changes the responses to the
+/// forces, the poles or the mode shapes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Unscaled {
     /// Degrees of freedom without force and without known entry in their equation, counted from 1.
@@ -59,7 +60,7 @@ impl Unscaled {
 
     /// Returns the equations without scale, and the unknowns of one of the systems with the same
     /// modes. This system has unit masses on the degrees of freedom `free`, counted from 0, and no
-    /// mass that couples other equations to these.
+    /// mass that couples other equations to these degrees of freedom.
     fn normalised(unknowns: &Unknowns, free: &[usize]) -> Result<(Self, Unknowns), AnalysisError> {
         let (mut normalised, mut equations) = (unknowns.clone(), Vec::new());
         for row in 0..unknowns.dof() {
@@ -129,8 +130,8 @@ impl fmt::Display for Unscaled {
             if equations.len() == 1 { ("has", "it is") } else { ("have", "they are") };
         write!(
             f,
-            "no force acts on {forced}, and {their}: the modes do not depend on that, but {rows} of M, C and K \
-             {have} an unknown scale, so {they} not given; state masses (`mass`), or apply a force {there}"
+            "no force acts on {forced}, and {their}: the modes do not depend on this, but {rows} of M, C and K \
+             {have} an unknown scale, so {they} not reported; state masses (`mass`), or apply a force {there}"
         )
     }
 }

@@ -73,7 +73,7 @@ impl ValidationWindow {
 }
 
 /// Returns the part of a predicted window to buffer. An open record is predicted in chunks, so it
-/// needs no more than a fitted record.
+/// needs no more memory than a fitted record.
 pub(super) fn hold(fitted: Hold, prediction: Prediction) -> Hold {
     match (fitted, prediction) {
         (Hold::Whole, _) => Hold::Whole,

@@ -118,7 +118,8 @@ pub fn measured(
 ) -> Result<(Vec<Channel>, Vec<Drawn>), AnalysisError> {
     let stored = window.hold.saturating_mul(shown.len());
     check_memory(file.head().file(), stored, INSPECT_BYTES, file.memory())?;
-    // A text is read once for all columns. Stored samples need only one copy for each thread.
+    // A text file is read once for all columns together. Columns in memory are copied in groups of
+    // one column per thread.
     let at_once = if file.is_whole() { rayon::current_num_threads() } else { shown.len() };
     let table = file.head();
     let (mut channels, mut drawn) = (Vec::new(), Vec::new());

@@ -154,7 +154,8 @@ impl Inspection<'_> {
         }
         summary.remarks.extend(open_line.map(|line| {
             format!(
-                "line {line} is the last and has no line break: the file may be cut off there, and its last number with it"
+                "line {line} is the last and has no line break: the file may be cut off \
+                 there, so that its last number is incomplete"
             )
         }));
         Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })
@@ -187,7 +188,7 @@ impl Inspection<'_> {
         !self.columns.is_empty() || Some(column) != instants
     }
 
-    /// Selects the plotted columns, and returns a remark on the others.
+    /// Selects the plotted columns, and returns a remark on the other columns.
     fn choose_drawn(&self, table: &Table, shown: &mut [Shown]) -> Option<String> {
         if !self.how.curves {
             return None;
@@ -213,7 +214,7 @@ impl Inspection<'_> {
     }
 
     /// Returns the requested columns, or the numeric ones of the usual length; their number of
-    /// samples; and the reasons why the others are omitted.
+    /// samples; and the reasons why the other columns are omitted.
     fn shown(
         &self,
         table: &Table,
@@ -247,8 +248,8 @@ impl Inspection<'_> {
         Ok((shown, len, left_out))
     }
 
-    /// Returns the time step, in s. A default time axis may be wrong: then the step is `None`, with
-    /// a remark.
+    /// Returns the time step, in s. If the step of a default time axis cannot be determined, the
+    /// step is `None`, with a remark.
     fn step(
         &self,
         file: &RecordFile,
@@ -260,7 +261,8 @@ impl Inspection<'_> {
         let asked_for = self.reading.time.is_some() || matches!(time, TimeAxis::RateHz(_));
         let sampling = match sampling {
             Some(sampling) if !file.is_whole() => sampling,
-            // The beginning of a text is enough; other files offer more samples for comparison.
+            // For a text, its beginning is enough. Of other files, `head` has all samples, which
+            // gives a more reliable comparison.
             _ => file.head().sampling(&time, self.columns),
         };
         match sampling {

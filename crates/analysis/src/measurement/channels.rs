@@ -114,7 +114,7 @@ impl Channels {
         ResponseQuantity::ALL.into_iter().find(|kind| !self.response(*kind).is_empty())
     }
 
-    /// Returns common names for several records of the same machine. A force has its name in the
+    /// Returns common names for several records of the same machine. A force has the name from the
     /// first record in which it acts; a force that acts at several points in turn, as of a roving
     /// hammer, is also named after the point: `force at a1`.
     pub(crate) fn together(records: &[&Self]) -> Self {
@@ -157,7 +157,9 @@ impl Channels {
         let count = count.unwrap_or(0);
         if let Some(dof) = dofs.iter().find(|dof| !(1..=count).contains(*dof)) {
             let responses = message::count(count, "response");
-            return Err(wrong(format!("no degree of freedom {dof}, only {responses}")));
+            return Err(wrong(format!(
+                "there is no degree of freedom {dof}: the record has {responses}"
+            )));
         }
         let column = |dof: usize, at: usize| if at + 1 == dof { force.as_str() } else { ABSENT };
         let of = |dof: &usize| Self {

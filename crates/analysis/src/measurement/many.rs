@@ -20,7 +20,7 @@ pub(crate) fn records_of(
     Ok(ParquetFile::open(path, &reading.limits())?.records(column)?)
 }
 
-/// Opens the requested record, or the only one.
+/// Opens the requested record, or the only record of the file.
 pub(super) fn open_one(
     reading: &Reading,
     path: &Path,

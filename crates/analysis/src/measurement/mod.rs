@@ -551,7 +551,7 @@ impl Block {
     }
 }
 
-/// Returns a record followed by the samples of a later one.
+/// Returns a record followed by the samples of a later record.
 pub(crate) fn joined(record: &Record, later: &Record) -> Result<Record, AnalysisError> {
     let (before, len) = (record.len(), record.len() + later.len());
     let mut data = DMatrix::zeros(len, record.channels());

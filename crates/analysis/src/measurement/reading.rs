@@ -28,7 +28,7 @@ pub struct Reading {
     /// Column that names the record of each row, in a Parquet file with many records.
     pub record_column: Option<String>,
     /// Record to read from a file with many records, by its name in `record_column`; `None`: the
-    /// only one.
+    /// only record of the file.
     pub record_id: Option<String>,
     /// Units of columns, by their names or numbers; they replace those in the headers: `g`, `lbf`,
     /// `ms`.
@@ -102,8 +102,8 @@ impl Reading {
         }
     }
 
-    /// Returns the requested time axis, otherwise the one of the file, otherwise the time column
-    /// identified by its name.
+    /// Returns the requested time axis. Without a request, returns the time axis of the file; if
+    /// the file has none, the time column identified by its name.
     pub fn time_axis<'a>(&'a self, table: &'a Table) -> Option<TimeAxis<'a>> {
         match (self.sample_rate_hz, &self.time) {
             (Some(rate_hz), _) => Some(TimeAxis::RateHz(rate_hz)),

@@ -5,8 +5,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use super::{CHUNK_SAMPLES, Measurement};
 use crate::AnalysisError;
 
-/// Refuses two records that are equal in every sample: noise makes two tests differ. Both together
-/// would halve the variances of all results.
+/// Refuses two records that are equal in every sample: noise makes two tests differ. A record that
+/// is used twice would wrongly halve the variances of all results.
 ///
 /// # Errors
 /// [`AnalysisError::RepeatedRecord`], and if a file cannot be read.

@@ -25,9 +25,10 @@ fn text_of(table: &Table, column: usize) -> String {
 }
 
 impl Channels {
-    /// Returns the columns of a record by the quantities that they state, in the order of the file;
-    /// empty unless every column but that of time states a unit, and exactly one kind of response
-    /// was measured: otherwise only the user knows which columns belong to the test.
+    /// Returns the columns of a record by the quantities that they state, in the order of the file.
+    /// Every column except that of time must state a unit, and exactly one kind of response must be
+    /// measured. Otherwise the result is empty, because only the user knows which columns belong to
+    /// the test.
     ///
     /// # Errors
     /// Those of [`Reading::open`].
@@ -61,9 +62,9 @@ impl Channels {
     }
 
     /// Returns the same columns, with a force column for each degree of freedom that has a
-    /// response. Points such as `12+Z`, after which a universal file names its columns, pair forces
-    /// with responses. One force and one response without points are also a pair. All other columns
-    /// give an empty result.
+    /// response. A force and a response are a pair if they have the same point, such as `12+Z`; a
+    /// universal file names its columns after points. One force and one response without points are
+    /// also a pair. If the columns cannot be paired, the result is empty.
     #[must_use]
     pub fn paired_by_point(self) -> Self {
         let Some(kind) = self.first_response() else { return Self::default() };

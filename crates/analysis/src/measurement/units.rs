@@ -106,7 +106,7 @@ pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     }
     let what = match &stated.unit {
         Some(unit) => format!(
-            "may be a unit with the factor {} to {}, which {}",
+            "may be a unit; its factor {} to {} {}",
             message::number(unit.in_si),
             unit.quantity.si(),
             match stated.evidence {
@@ -184,8 +184,8 @@ const LONG_S: f64 = 1000.0;
 /// needs it, but day numbers read as seconds give it.
 const FAST_HZ: f64 = 1e7;
 
-/// Minimum doubtful sampling rate, in Hz, of instants above [`DAY_NUMBERS`]: the rate of day
-/// numbers at 1 Hz.
+/// Minimum doubtful sampling rate, in Hz, of instants above [`DAY_NUMBERS`]: day numbers of samples
+/// at 1 Hz give this rate if they are read as seconds.
 const RATHER_FAST_HZ: f64 = 86_400.0;
 
 /// Smallest instant that may be a day number: 20,000 is a day of 1954 in a spreadsheet.
@@ -214,7 +214,7 @@ pub(crate) fn doubtful_time(
     if !(is_slow || is_fast) || table.says_unit_of_time(column) {
         return None;
     }
-    // The largest unit with a plausible sampling rate.
+    // This is the largest unit of time that gives a plausible sampling rate.
     let small = [("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
     let small = small.into_iter().find(|(_, size)| rate_hz / size > SLOW_HZ);
     let (unit, factor) = if is_slow { small.unwrap_or(("ms", 1e-3)) } else { ("days", DAY_S) };
@@ -226,8 +226,8 @@ pub(crate) fn doubtful_time(
 /// smaller error is negligible against the noise of frequencies.
 const RATE_ERROR: f64 = 1e-5;
 
-/// Maximum ratio of rounding to time step of instants that are rounded; equally spaced instants
-/// have 1.
+/// Maximum ratio of the rounding step of instants to their time step. Equally spaced instants have
+/// the ratio 1, so a larger ratio shows no rounding.
 const EVEN: f64 = 0.99;
 
 /// Returns a remark if the digits of a time column make the sampling rate so uncertain that the
@@ -241,13 +241,14 @@ pub(crate) fn coarse_time(
     let instants = table.column(name).ok()?;
     let (first, last) = (instants.first()?, instants.last()?);
     let per_sample = (last - first) / (instants.len() - 1) as f64;
-    // Equally spaced instants are multiples of the time step, which then appears as their rounding.
+    // Exact instants are multiples of the time step; the quantisation step is then the time step
+    // itself.
     let rounding = quantisation_step(instants)? / per_sample;
     let error = rounding / sampling.len() as f64;
     (rounding < EVEN && error > RATE_ERROR).then(|| {
         format!(
-            "{}: the times of {} are rounded to {} s, so the sampling rate of {} Hz, and all frequencies \
-             with it, is uncertain by up to {} %: give `sample_rate`",
+            "{}: the times of {} are rounded to {} s, so the sampling rate of {} Hz and all frequencies \
+             are uncertain by up to {} %: give `sample_rate`",
             table.file(),
             table.label(table.find(name).unwrap_or_default()),
             significant(rounding * sampling.dt(), 2),

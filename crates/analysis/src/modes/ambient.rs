@@ -131,7 +131,7 @@ fn row(mode: &AmbientMode) -> ModalModeRow {
         value: [value.re, value.im],
         standard_error: Some([error(at), error(shape.len() + at)]),
     });
-    // The error of the damping ratio is negligible in the damped frequency.
+    // The error of the damping ratio has a negligible effect on the damped frequency.
     let damped = |value: &ModalValue| {
         let scale = |x: f64| root * x;
         Uncertain {
@@ -169,11 +169,11 @@ fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(needed, 3)
         ),
         DropReason::DampingUndetermined { ratio } => format!(
-            "its damping ratio is {} times its standard error: a harmonic or a chance peak",
+            "its damping ratio is only {} times its standard error: it may be a harmonic or a chance peak",
             significant(ratio, 2)
         ),
         DropReason::OutsideBand => "it is outside of the band".into(),
-        DropReason::OverDamped { .. } => "it is too damped for a mode".into(),
+        DropReason::OverDamped { .. } => "its damping is too high for a mode".into(),
         DropReason::NumberReached { number } => {
             format!("the maximum number of modes, {number}, was found before it")
         }

@@ -81,8 +81,8 @@ impl Averaged {
 
     /// Returns the bias of the averages in the responses of modes on some rows.
     ///
-    /// Modes outside the band are smooth within it, so their bias is negligible; their residual
-    /// terms are not valid outside the band.
+    /// The responses of modes outside the band are smooth within the band, so their bias is
+    /// negligible; the residual terms are not valid outside the band.
     pub fn bias(
         &self,
         rows: &[usize],
@@ -125,8 +125,8 @@ pub(super) struct Sharpened {
 
 impl Sharpened {
     /// Alternates between a fit of the modes and the correction of the responses for the window
-    /// bias of these modes, until the modes no longer change. If a later fit fails, the last fit is
-    /// the result and has not settled.
+    /// bias of these modes, until the modes no longer change. If a later fit fails, the last
+    /// successful fit is the result, and the correction has not converged.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias by a window).

@@ -83,8 +83,7 @@ pub struct LoneRow {
 ///
 /// Points with the same name are the same. A name without a direction (`3`) matches the only
 /// direction of the other set at this point (`3+Z`). Sets without a common name, but with the same
-/// number of entries, are compared entry by entry if the names of one of them are the numbers from
-/// 1.
+/// number of entries, are compared entry by entry if the names of one set are the numbers from 1.
 ///
 /// # Errors
 /// [`AnalysisError::NoCommonPoint`] without a common point.
@@ -141,8 +140,8 @@ fn common_points(
         second.points.iter().position(|other| other == name).map(|at| (at, 1.0)).or_else(|| {
             let directions = |at: &usize| same_direction(name, &second.points[*at]);
             let mut some = (0..second.points.len()).filter_map(|at| Some((at, directions(&at)?)));
-            // A name without a direction is ambiguous if the other set has several directions
-            // there.
+            // A name without a direction is ambiguous if the other set has several directions at
+            // this point.
             some.next().filter(|_| some.next().is_none())
         })
     };
@@ -296,7 +295,10 @@ impl fmt::Display for ModeComparison {
         let [first, second] = &self.sets;
         writeln!(f, "first: {first}\nsecond: {second}")?;
         let points = message::count(self.points.len(), "point");
-        writeln!(f, "{points} in common; p is adjusted for all tests; ± is one standard error")?;
+        writeln!(
+            f,
+            "{points} in common; p is adjusted for the number of tests; ± is one standard error"
+        )?;
         let frequencies = ["frequency (Hz)", "first", "second", "difference", "±", "p"];
         f.write_str(
             &self.pair_table(frequencies, |pair| Some(pair.natural_frequency_hz.cells(1.0, 6))),

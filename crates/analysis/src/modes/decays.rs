@@ -1,4 +1,4 @@
-//! Modes of several free decays, which share them.
+//! Common modes of several free decays.
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 

@@ -38,8 +38,8 @@ pub struct StabilisationRows {
 
 /// Singular values of the frequency responses at each frequency.
 ///
-/// Peaks of the first singular value are modes; a peak of the second one at the same frequency is a
-/// second mode.
+/// Peaks of the first singular value are modes; a peak of the second singular value at the same
+/// frequency is a second mode.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ModeIndicator {
     /// `true` for measured responses (tables), `false` for the responses of the identified modes

@@ -27,8 +27,9 @@ use crate::text::significant;
 /// Records of a test, and the band of the fit.
 pub(super) struct Test {
     pub recorded: Recorded,
-    /// The same records, but with the force of the first record as a separate input; `None` unless
-    /// one force acts in several records, at points that are not stated.
+    /// The same records, but with the force of the first record as a separate input; `None` if
+    /// there are several forces, if there is only one record, or if the points of the force are
+    /// stated.
     pub struck_apart: Option<Recorded>,
     pub band_hz: [f64; 2],
 }
@@ -135,7 +136,7 @@ pub(super) fn modes_of_tables(
     } else {
         vec![None; estimate.modes().len()]
     };
-    // Standard errors are at least those for independent errors of the outputs.
+    // Standard errors are never reduced below those for independent errors of the outputs.
     let scale =
         |ratio: Option<f64>| tables.error_inflation() * ratio.unwrap_or(1.0).max(1.0).sqrt();
     let scales: Vec<f64> = scatter.into_iter().map(scale).collect();

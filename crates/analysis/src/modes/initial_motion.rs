@@ -52,7 +52,7 @@ impl FreeMotion {
                 continue;
             };
             let measured = record.channel(*column);
-            // Channels of different quantities and sizes weigh the same.
+            // All channels get the same weight, although their quantities and amplitudes differ.
             let scale = measures::rms(measured).max(f64::MIN_POSITIVE).recip();
             let predicted = from_rest.channel(*output);
             for first in (0..settle).step_by(SAMPLES_AT_ONCE) {

@@ -86,8 +86,8 @@ impl ModeSet {
     /// Takes modes from the JSON of a result, or of frequencies and shapes alone.
     ///
     /// # Errors
-    /// [`AnalysisError::SavedModes`] if it has none or an unknown field beside frequencies and
-    /// shapes, [`AnalysisError::NothingToCompare`].
+    /// [`AnalysisError::SavedModes`] if the JSON has no modes, or an unknown field in addition to
+    /// frequencies and shapes, [`AnalysisError::NothingToCompare`].
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
         // Every mode of a result has an eigenvalue.
         if json["modes"].get(0).is_none_or(|mode| mode.get("eigenvalue").is_some()) {

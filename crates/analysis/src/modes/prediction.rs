@@ -19,11 +19,11 @@ use crate::text::significant;
 /// Predicts the response of the modes of a test to the forces of a record, in the band of the
 /// test.
 ///
-/// With a period, it is the steady state under the mean period; otherwise the response over the
-/// whole window, from rest or with the free motion that fits the first samples (`settle`) best.
-/// There is no prediction outside the band, and measured responses are compared within it. The
-/// standard error of a channel is the RMS of the errors due to the uncertainty of the modes and of
-/// this free motion; the residual terms are assumed exact.
+/// With a period, the prediction is the steady state under the mean period. Otherwise it is the
+/// response over the whole window, from rest or with the free motion that fits the first samples
+/// (`settle`) best. There is no prediction outside the band, and measured responses are compared
+/// within it. The standard error of a channel is the RMS of the errors due to the uncertainty of
+/// the modes and of this free motion; the residual terms are assumed exact.
 ///
 /// # Errors
 /// [`AnalysisError::NoForce`], [`AnalysisError::Setting`] if the columns differ from those of the

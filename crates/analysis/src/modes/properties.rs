@@ -29,7 +29,8 @@ impl Properties {
         *self == Self::default()
     }
 
-    /// Returns the properties as constraints; `driving_points` has a force and a response each.
+    /// Returns the properties as constraints; `driving_points` has the indices of pairs of a force
+    /// and a response.
     fn constraints(
         self,
         settings: &ModesSettings,

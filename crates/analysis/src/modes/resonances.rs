@@ -42,8 +42,8 @@ pub(crate) fn surplus_of_tables(
 
 /// Returns the remark if the lines show more modes than there are `responses`.
 fn surplus_of(data: &LineData, responses: usize) -> Option<String> {
-    // The initial estimates need a fraction of the time and show that most records have no more
-    // modes.
+    // The initial estimates need a fraction of the time of a fit. For most records they already
+    // show that there are not more modes than responses.
     if initial_mode_count(data).ok()? <= responses {
         return None;
     }

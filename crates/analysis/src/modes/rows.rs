@@ -48,8 +48,8 @@ pub(super) fn row(
 }
 
 /// Returns the modal mass of a mode by the driving point that determines it best; `None` if the
-/// entries of its shape have several units. `points` have force and response in the same direction,
-/// then in opposite ones.
+/// entries of its shape have several units. The first list of driving points has force and response
+/// in the same direction, the second in opposite directions.
 pub(super) fn modal_mass(
     estimate: &ModalEstimate,
     mode: usize,
@@ -118,7 +118,7 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(100.0 * standard_error, 2)
         ),
         DropReason::TooDamped => {
-            "it is too damped for a mode: it represents modes outside of the band".into()
+            "its damping is too high for a mode: it represents modes outside of the band".into()
         }
         DropReason::OutsideBand => "its frequency left the band".into(),
         DropReason::Twin { other_hz } => format!(
@@ -130,10 +130,10 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(ratio, 2)
         ),
         DropReason::NotStated => {
-            "it is part of the model, but near no stated frequency (`near_hz`)".into()
+            "it is part of the model, but not near a stated frequency (`near_hz`)".into()
         }
         DropReason::BeyondNumber { .. } => {
-            "`modes` asks for fewer modes, and the others explain more".into()
+            "`modes` asks for fewer modes, and the modes in the result explain more".into()
         }
         _ => "it is not a mode of the record".into(),
     };

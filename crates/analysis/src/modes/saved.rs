@@ -49,7 +49,7 @@ pub struct SavedModes {
     /// Remarks to read before using the numbers.
     #[serde(default, alias = "remarks")]
     pub notes: Vec<String>,
-    /// Frequency over amplitude of a nonlinear response; `None` for a linear one.
+    /// Frequency over amplitude of a nonlinear response; `None` for a linear response.
     pub backbone: Option<SavedBackbone>,
     system: Option<serde::de::IgnoredAny>,
     /// Stabilisation diagram and mode indicator, if they were saved.

@@ -33,8 +33,8 @@ pub struct ModesSettings {
     /// Known properties of the structure; none by default.
     #[serde(skip_serializing_if = "Properties::is_empty")]
     pub properties: Properties,
-    /// Share of each record, from 0 to 0.8, at its end, that a second fit excludes and predicts; 0
-    /// for no such validation.
+    /// Share at the end of each record, from 0 to 0.8, that a second fit excludes and predicts; 0
+    /// for no validation.
     pub validate: f64,
 }
 
@@ -65,8 +65,7 @@ pub enum ModalTest {
         #[serde(default)]
         from_s: Option<f64>,
         /// End of the part of each decay that is used, in s from the first sample of the window;
-        /// `None`: the end of the window, or the time at which a channel has fallen to its
-        /// rounding.
+        /// `None`: the end of the window, or the time at which quantisation distorts a channel.
         #[serde(default)]
         to_s: Option<f64>,
     },

@@ -101,8 +101,8 @@ impl Recorded {
         Ok(Self { parts, inputs, outputs, driving_points, opposite_points, hits })
     }
 
-    /// Reads records like [`Recorded::from_forced`], with one force in the first of them and
-    /// another one in all others.
+    /// Reads records like [`Recorded::from_forced`], with one force in the first record and another
+    /// force in all other records.
     pub fn struck_apart(
         measurements: &[Measurement],
         rule: Option<&HitRule>,
@@ -321,9 +321,9 @@ impl Columns {
 }
 
 impl Places {
-    /// Returns the points of the forces. If none are stated, these are the names of the force
-    /// columns, if all names are points: of the first record or, if every record has one force
-    /// column, of all records.
+    /// Returns the points of the forces. If none are stated, they are the names of the force
+    /// columns, if all these names are points. The columns are those of the first record or, if
+    /// every record has one force column, those of all records.
     fn forces_of(&self, measurements: &[Measurement]) -> Cow<'_, [String]> {
         let of_record = |measurement: &Measurement| measurement.source().names.force.clone();
         let names: Vec<Vec<String>> = measurements.iter().map(of_record).collect();
@@ -366,7 +366,7 @@ pub(super) fn outputs_of(channels: &Channels) -> Vec<Output> {
     ResponseQuantity::ALL.into_iter().flat_map(outputs).collect()
 }
 
-/// Checks that a record has as many forces and responses of each kind as the first one.
+/// Checks that a record has as many forces and responses of each kind as the first record.
 fn check_alike(first: &Measurement, other: &Measurement) -> Result<(), AnalysisError> {
     let [expected, got] = [first, other].map(|measurement| &*measurement.source().names);
     let compared = |setting, expected: &[String], got: &[String]| {
@@ -374,7 +374,7 @@ fn check_alike(first: &Measurement, other: &Measurement) -> Result<(), AnalysisE
             return Ok(());
         }
         let [got, expected] = [got, expected].map(|names| message::count(names.len(), "column"));
-        let why = format!("{} has {got}, the first record {expected}", other.name());
+        let why = format!("{} has {got}, but the first record has {expected}", other.name());
         Err(AnalysisError::Setting { setting, why })
     };
     compared("force", &expected.force, &got.force)?;

@@ -74,8 +74,8 @@ impl ModalSystem {
             serde_json::from_value(json).map_err(|error| refused(error.to_string()))?;
         let Some(model) = saved.model else {
             return Err(refused(
-                "they have no frequency responses: `mechid modes` gives these from records with \
-                 forces or from tables"
+                "the modes have no frequency responses: `mechid modes` computes frequency responses from \
+                 records with forces or from tables"
                     .into(),
             ));
         };
@@ -121,7 +121,7 @@ impl ModalSystem {
             return Ok((0..columns.len()).collect());
         }
         let why = format!(
-            "{} for the forces {} of {}: name them, or give one column for each",
+            "{} for the forces {} of {}: name the columns, or give one column for each force",
             message::count(columns.len(), "column"),
             self.inputs.join(", "),
             self.name

@@ -23,7 +23,7 @@ impl Modes {
         let (DiagramData::Forced(forced), ModalTest::Forced { hits }) =
             (&self.source, &analysis.test)
         else {
-            let why = "without measured forces there is nothing to predict from".into();
+            let why = "without measured forces, no response can be predicted".into();
             return Err(AnalysisError::Setting { setting: "validate", why });
         };
         let recorded = Recorded::from_forced(measurements, hits.as_ref(), &analysis.places)?;
@@ -49,7 +49,7 @@ impl Modes {
     }
 }
 
-/// Returns the share of the variance of each measured response that the modelled one explains.
+/// Returns the share of the variance of each measured response that the modelled response explains.
 pub(super) fn explained(
     measured: &DMatrix<Complex<f64>>,
     modelled: &DMatrix<Complex<f64>>,

@@ -93,7 +93,10 @@ pub fn choose(
             "displacement, velocity and acceleration of every degree of freedom are given".into(),
         )
     } else if request.periodic {
-        (Method::Shrinkage, "whole periods, the lines with force not given".into())
+        (
+            Method::Shrinkage,
+            "the record has whole periods, but the lines with force are not given".into(),
+        )
     } else {
         (Method::Kalman, "an open record".into())
     };
@@ -276,8 +279,8 @@ fn lines(
 }
 
 /// Returns the source of the noise if it is not stated: the lines without force, if there are
-/// enough. The lines outside a band are not such lines, because forces outside the band may act
-/// that are not reconstructed.
+/// enough. Lines outside a band do not count as lines without force: forces that are not
+/// reconstructed may act on them.
 fn outside(request: &Request, motion: &Measurement) -> Noise {
     let given = request.lines.as_ref().filter(|_| request.periodic);
     let needed = mechid_force::MIN_OUTSIDE_LINES;

@@ -31,8 +31,8 @@ pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     ))
 }
 
-/// Uses the scatter of the periods as the noise of every channel without a known level: it gives
-/// the expected residual of the mean of the periods.
+/// Uses the scatter of the periods as the noise of every channel without a known level: the scatter
+/// determines the expected residual of the mean of the periods.
 pub fn add_scatter(unexplained: Option<&mut Vec<Unexplained>>, recorded: &Recorded, held: &Held) {
     let (Some(channels), Some(scatter)) = (unexplained, &held.scatter) else { return };
     for (channel, scatter) in channels.iter_mut().zip(scatter) {

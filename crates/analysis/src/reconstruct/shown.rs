@@ -9,9 +9,9 @@ use crate::text::significant;
 
 /// Returns a remark on the frequencies at which the response to a force is smaller than the noise.
 ///
-/// A displacement shows even a constant force, so with one there is no remark. Dynamic stiffness
-/// cannot decide where noise prevails. If lines or a band are requested, the user has already
-/// chosen the frequencies.
+/// A displacement shows even a constant force, so with a displacement there is no remark. The
+/// method of dynamic stiffness cannot decide at which frequencies noise prevails. If lines or a
+/// band are requested, the user has already chosen the frequencies.
 pub fn remark(channels: &[Channel], request: &Request, how: &How) -> Option<String> {
     if channels.iter().any(|channel| channel.quantity == ResponseQuantity::Displacement) {
         return None;

@@ -28,7 +28,7 @@ pub struct ForceSummary {
     pub sample_rate_hz: f64,
     /// `true` if the standard errors include the uncertainty of the machine.
     pub machine_uncertainty: bool,
-    /// `true` if they include the noise of the record.
+    /// `true` if the standard errors include the noise of the record.
     pub noise_uncertainty: bool,
     /// Parameters that the method chose.
     pub chosen: Vec<Chosen>,
@@ -127,7 +127,7 @@ impl ForceSummary {
         }
         if let Some(band) = self.band_hz {
             let [low, high] = band.map(|hz| significant(hz, 4));
-            let _ = writeln!(text, "  force and standard error: of {low} to {high} Hz");
+            let _ = writeln!(text, "  force and standard error: from {low} to {high} Hz");
         }
         let error = if self.counts_machine_alone() {
             "standard error, machine only (N)"

@@ -112,7 +112,8 @@ impl<'a> Tally<'a> {
             .collect()
     }
 
-    /// Returns the remark on how the strongest line was determined; `None` if it needs none.
+    /// Returns the remark on how the strongest line was determined; `None` if no remark is
+    /// necessary.
     pub fn remark(&self) -> Option<String> {
         self.strongest.remark()
     }

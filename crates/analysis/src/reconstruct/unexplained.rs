@@ -112,11 +112,8 @@ fn causes(request: &Request, dofs: usize) -> Vec<String> {
     let mut causes = Vec::new();
     if request.forced.len() < dofs {
         let forced: Vec<String> = request.forced.iter().map(|dof| (dof + 1).to_string()).collect();
-        let degrees = if forced.len() == 1 { "degree" } else { "degrees" };
         let forced = listed(&forced);
-        causes.push(format!(
-            "a force acts elsewhere than on {degrees} of freedom {forced} (`forced`)"
-        ));
+        causes.push(format!("a force acts on a degree of freedom other than {forced} (`forced`)"));
     }
     if matches!(request.rule, Rule::Given(_)) {
         causes.push("`parameter` suppresses too much of the force".into());
@@ -124,7 +121,9 @@ fn causes(request: &Request, dofs: usize) -> Vec<String> {
     if !request.periodic && request.start == Start::FromRest {
         causes.push("the record does not begin at rest".into());
     }
-    causes.push("a sensor is dead, exchanged or in another unit".into());
+    causes.push(
+        "a sensor is dead, two sensors are interchanged, or a column has the wrong unit".into(),
+    );
     causes.push("the machine differs from the one given".into());
     causes
 }

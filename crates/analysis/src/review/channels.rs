@@ -28,7 +28,8 @@ pub struct Channel {
     pub scatter: Option<f64>,
 }
 
-/// Minimum ratio to the level; a smaller number is rounding.
+/// Minimum ratio of a mean to the peak, or of the scatter of the periods to the RMS of the mean
+/// period; a smaller ratio is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Returns the columns in the order force, displacement, velocity, acceleration.
@@ -68,7 +69,8 @@ pub fn channels(held: &Block, whole: &Whole, names: &Channels) -> Vec<Channel> {
     channels
 }
 
-/// Returns the part of a channel, whose mean period varies by `level`, that does not repeat.
+/// Returns the RMS of the part of a channel that differs from period to period, relative to
+/// `level`, the RMS of the mean period.
 fn scatter(all: &Gathered, channel: usize, level: f64) -> Option<f64> {
     let share = all.scatter(channel)? / level;
     (level > 0.0).then_some(if share > ROUNDING { share } else { 0.0 })

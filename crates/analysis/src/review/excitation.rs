@@ -5,7 +5,7 @@ use mechid_signal::{Record, Spectrum};
 
 use crate::AnalysisError;
 
-/// Maximum difference of an excited line from the strongest one, in dB: the lines of a multisine
+/// Maximum difference of an excited line from the strongest line, in dB: the lines of a multisine
 /// are far above the noise between them.
 pub const DROP_DB: f64 = 20.0;
 

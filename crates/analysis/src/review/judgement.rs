@@ -1,4 +1,4 @@
-//! Evidence for and against the numbers.
+//! Evidence for and against the identified values.
 
 use mechid_checks::{Subject, Verdict};
 
@@ -14,7 +14,7 @@ const OVERSTATED: f64 = 0.5;
 /// Minimum fit of a good prediction of another record, in per cent.
 const POOR_FIT: f64 = 50.0;
 
-/// Returns the evidence against the numbers, the worst first.
+/// Returns sentences with the evidence against the identified values, the worst first.
 pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.identified.summary();
     let mut doubts = sentences_with(&report.checks, Verdict::Bad);
@@ -54,7 +54,7 @@ fn sentences_with(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
     sentences.into_iter().map(|(_, sentence)| sentence).collect()
 }
 
-/// Returns the evidence for the numbers.
+/// Returns sentences with the evidence that supports the identified values.
 pub fn merits(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.identified.summary();
     let good = report.checks.iter().filter(|check| !check.is_conspicuous());
@@ -114,7 +114,7 @@ fn predicted(contents: &Review<'_>) -> impl Iterator<Item = (f64, String)> {
         Some((
             least,
             format!(
-                "{}, samples {first} to {last}: at least {} % of every motion is predicted",
+                "{}, samples {first} to {last}: at least {} % of every response is predicted",
                 validation.file,
                 significant(least, 3)
             ),

@@ -42,7 +42,7 @@ pub struct RecordReview<'a> {
     pub name: Option<&'a str>,
     /// Index of the record, counted from 0.
     pub index: usize,
-    /// Lines of a period; `None` unless such lines were fitted.
+    /// Lines of a period; `None` if no lines of a period were fitted.
     pub lines: Option<Vec<usize>>,
     /// Levels of the columns used.
     pub channels: Vec<Channel>,
@@ -87,7 +87,8 @@ impl<'a> RecordReview<'a> {
         let recorded = &identified.records()[at];
         let buffered = &recorded.held;
         let lines = match identified.spectra() {
-            // Lines of segments differ from lines of the record.
+            // Segments have other lines than the whole record, so the lines of the record are
+            // chosen here.
             Some(_) if identified.prediction() == Prediction::Steady => {
                 let lines = identified.summary().analysis.source.lines();
                 let choice = lines.map_or(&LineChoice::Driven, |lines| &lines.choice);

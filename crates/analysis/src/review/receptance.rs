@@ -26,13 +26,13 @@ const EXPLAINED: f64 = 0.5;
 /// Maximum ratio of the other forces to a force that acts alone on a line.
 const ALONE: f64 = 1e-3;
 
-/// Maximum ratio of the other forces to a force that acts alone, if the others are only noise of
-/// their load cells.
+/// Maximum ratio of the other forces to a force that acts alone, if the channels of the other
+/// forces contain only noise of their load cells.
 const ALONE_WITH_NOISE: f64 = 0.1;
 
 /// Minimum coherence from line to line of a force channel that contains a part of another force.
 const CROSSTALK_COHERENCE: f64 = 0.5;
-/// Minimum number of lines for this coherence.
+/// Minimum number of lines for a coherence from line to line.
 const FEWEST_LINES: usize = 8;
 
 /// A measured receptance and its origin.
@@ -137,7 +137,7 @@ fn measured(
         data = data.and(&spectra(part)?)?;
     }
     let origin = if is_periodic {
-        "measured on the lines of whole periods that carry force".into()
+        "measured on the excited lines of whole periods".into()
     } else {
         format!(
             "by H1 from segments of {} samples (Hann window, 50 % overlap), on the lines where the force \
@@ -146,8 +146,8 @@ fn measured(
             segment(first)
         )
     };
-    // Towards half the sampling rate, a force that is held or linear between its samples is smaller
-    // than its samples show, and so is the motion.
+    // Near half the sampling rate, the spectrum of a force that is held or linear between its
+    // samples is smaller than the samples show, and so is the response.
     let origin = origin
         + "; near half the sampling rate, the response also depends on the force between the samples";
     Ok((data, origin))
@@ -155,8 +155,8 @@ fn measured(
 
 fn period_spectra(part: &RecordReview<'_>) -> Result<FrequencyData, AnalysisError> {
     let buffered = part.held();
-    // The scatter of several periods is their noise; a period longer than the memory has only its
-    // mean.
+    // The scatter of several periods gives their noise. If a period does not fit in memory, only
+    // the mean of the periods is available.
     let force = if buffered.force.len() < buffered.period {
         &part.whole.period(buffered).force
     } else {

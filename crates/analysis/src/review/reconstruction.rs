@@ -1,4 +1,5 @@
-//! Force reconstructed from the motion with the identified machine, compared with the measured one.
+//! Force reconstructed from the motion with the identified machine, compared with the measured
+//! force.
 
 use mechid_force::{self as force, Channel, IdentifiedForce, Rule, Start, channel_errors};
 use mechid_model::ResponseQuantity;
@@ -11,7 +12,7 @@ use crate::measurement::Block;
 use crate::reconstruct::Method;
 use crate::reconstruct::method::{Request, find};
 
-/// A reconstructed force and the measured one.
+/// A reconstructed force and the measured force.
 pub struct Reconstruction {
     /// Name of the method.
     pub method: &'static str,

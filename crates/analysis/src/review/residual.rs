@@ -1,4 +1,4 @@
-//! Residual of the measured response after the prediction of the identified system.
+//! Difference between the measured response and the prediction of the identified system.
 
 use mechid_checks::SpectralResidual;
 use mechid_signal::correlation::{Correlation, cross_correlation, whiteness};

@@ -16,8 +16,7 @@ use crate::measurement::{Block, CHUNK_SAMPLES, Hold};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// Steps from sample to sample by Euler's rule, as in the dissertation; the bias is
-    /// proportional to the step.
+    /// Steps from sample to sample by Euler's rule; the bias is proportional to the step.
     Euler,
     /// Steps from sample to sample, the force held between them.
     Held,
@@ -45,7 +44,7 @@ impl Estimator {
         }
     }
 
-    /// Returns whether it needs whole periods.
+    /// Returns whether the estimator needs whole periods.
     pub(crate) fn is_of_spectra(self) -> bool {
         matches!(self, Estimator::LeastSquares | Estimator::MaximumLikelihood)
     }
@@ -138,9 +137,9 @@ impl Gathered {
 #[derive(Debug)]
 pub struct Decimated {
     factor: usize,
-    /// Number of samples before the next one that is used.
+    /// Number of samples before the next used sample.
     skip: usize,
-    /// The last used sample, if the next one is fitted together with it.
+    /// The last used sample, if it is fitted together with the next used sample.
     last: Option<Samples<'static>>,
     gathered: Gathered,
 }

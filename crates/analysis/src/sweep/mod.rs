@@ -36,9 +36,9 @@ pub struct SweepSettings {
     pub settings: Settings,
     /// Estimator.
     pub estimator: Estimator,
-    /// Known masses; `None`: the masses of a described experiment, none for a record.
+    /// Known masses; `None`: the masses of a described experiment; for a record, no mass is known.
     pub mass: Option<KnownMass>,
-    /// Natural frequency that NPI counts, in Hz; `None`: the lowest of the machine.
+    /// Natural frequency whose cycles NPI counts, in Hz; `None`: the lowest of the machine.
     pub natural_frequency_hz: Option<f64>,
 }
 
@@ -105,8 +105,8 @@ pub fn sweep_experiment(
 /// # Errors
 /// [`AnalysisError::NpiOfRecord`], [`AnalysisError::SweepRate`] or [`AnalysisError::Decimation`]
 /// for settings that the record does not have, [`AnalysisError::DegreesOfFreedom`] if the reference
-/// has another number of them, [`AnalysisError::NoSetting`], [`AnalysisError::EmptySweep`] if no
-/// setting gives an estimate.
+/// has another number of degrees of freedom, [`AnalysisError::NoSetting`],
+/// [`AnalysisError::EmptySweep`] if no setting gives an estimate.
 pub fn sweep_record(
     measurement: &Measurement,
     how: &SweepSettings,

@@ -31,7 +31,8 @@ impl Kind {
     }
 }
 
-/// Returns the whole number, one or more, that a setting (a pure number, to rounding) means.
+/// Returns a setting (a pure number) as a whole number of at least 1; `None` if it differs from a
+/// whole number by more than rounding.
 pub(crate) fn whole(value: f64) -> Option<usize> {
     let nearest = value.round();
     // Rates read from files differ by rounding.

@@ -52,8 +52,8 @@ pub struct Point {
     pub step_s: f64,
     /// Samples in one cycle of the natural frequency, a pure number.
     pub samples_per_cycle: Option<f64>,
-    /// Largest error of an entry relative to the largest entry of its matrix; without a reference
-    /// the largest standard error; a ratio.
+    /// Largest error of an entry relative to the largest entry of its matrix; without a reference,
+    /// the largest standard error relative to this entry. A ratio.
     pub error: Option<f64>,
     /// Parameters, one each.
     pub parameters: Vec<SweptParameter>,
@@ -157,7 +157,7 @@ impl SweepSummary {
             }
         }
         text += if self.has_reference() {
-            "\nThe error is that of the worst entry, relative to the largest of its matrix"
+            "\nThe error is that of the worst entry, relative to the largest entry of its matrix"
         } else {
             "\nThe error is the largest standard error, relative to the largest entry of its \
              matrix: it does not include bias"

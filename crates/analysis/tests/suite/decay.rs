@@ -175,7 +175,7 @@ fn what_cannot_be_analysed_is_refused() {
     let refused = |how: DecaySettings| decay(&measurement(), &how).unwrap_err().to_string();
     let default = DecaySettings::default();
     let outside = refused(DecaySettings { from_s: Some(9.0), ..default });
-    assert_eq!(outside, "`from`: 9 s is not in the window of 4 s");
+    assert_eq!(outside, "`from`: 9 s is not in the window, which is 4 s long");
     let nothing = refused(DecaySettings { from_s: Some(1.0), to_s: Some(1.0), ..default });
     assert_eq!(nothing, "`to`: it must be after `from`");
     assert!(refused(DecaySettings { from_s: Some(f64::NAN), ..default }).contains("NaN"));

@@ -157,7 +157,7 @@ fn what_modes_cannot_do_is_refused() {
         predict_with_modes(&record, &system, &settle).unwrap_err().to_string()
     };
     assert!(refused(2).contains("do not determine the motion of all modes"), "{}", refused(2));
-    assert!(refused(SAMPLES).contains("fitted to 2 to 8191"), "{}", refused(SAMPLES));
+    assert!(refused(SAMPLES).contains("needs 2 to 8191"), "{}", refused(SAMPLES));
 }
 
 /// A hammer strikes downwards, the sensors count upwards: the modal masses are those of the same
@@ -211,5 +211,5 @@ fn records_with_other_columns_are_refused() {
     let fewer = Measurement::from_columns(forces.sampling(), &columns, &channels).unwrap();
     let settings = ModesSettings::default();
     let error = mechid_analysis::modes(&[both, fewer], &settings).unwrap_err().to_string();
-    assert!(error.contains("has 1 column, the first record 2 columns"), "{error}");
+    assert!(error.contains("has 1 column, but the first record has 2 columns"), "{error}");
 }

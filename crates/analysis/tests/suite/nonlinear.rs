@@ -603,7 +603,7 @@ fn intervals_of_a_model_that_lacks_a_term_hold() {
                 let linear = fit.estimate().parameter(name).unwrap();
                 assert_eq!(linear.standard_error, estimate.standard_error, "{name}");
             }
-            assert!(fit.to_string().contains("include the effect of the omitted term"));
+            assert!(fit.to_string().contains("the effect of the term that the model omits"));
         }
     };
     wrong(&periods, &of_periods("k3: x1^3"));

@@ -235,7 +235,12 @@ fn frequency_responses_take_fewer_responses_than_forces() {
         frf(&open(force, response), &how(estimator)).unwrap_err().to_string()
     };
     let h2 = why("f1,f2", "x", Estimator::H2);
-    assert!(h2.contains("h2 of 2 forces needs as many responses, and there are 1"), "{h2}");
+    assert!(
+        h2.contains(
+            "h2 of 2 forces needs as many responses as forces; the number of responses is 1"
+        ),
+        "{h2}"
+    );
     let same = why("f1,f1", "x", Estimator::H1);
     assert!(same.contains("do not act independently"), "{same}");
     // As many periods as forces give no average.

@@ -139,7 +139,7 @@ fn intervals_of_late_responses_include_the_delay() {
             assert!((p.value - exact).abs() < 1.96 * p.standard_error, "{p} {exact}: {found}");
         }
         assert!(
-            found.to_string().contains("the model that explains the residual (see delay)"),
+            found.to_string().contains("the model that explains the residual (check: delay)"),
             "{found}"
         );
     }
@@ -444,7 +444,7 @@ fn what_a_table_lacks_is_told() {
     assert_eq!(
         refused(&gap, &usual),
         "table has no response at 2 to a force at 1: every point needs a response to every force, and \
-         every force a response at its own point (choose `points`)"
+         every force needs a response at its point (choose `points`)"
     );
     // With a single point the table is complete, although the machine is another one.
     let alone = IdentifyResponses { points: vec!["2".into()], ..usual.clone() };
@@ -454,7 +454,7 @@ fn what_a_table_lacks_is_told() {
         let (response, values) = (response.to_owned(), vec![0.9; 40]);
         coherent.coherence.push(CoherenceFunction { response, reference: None, values });
     }
-    assert!(refused(&coherent, &usual).contains("from how many independent averages?"));
+    assert!(refused(&coherent, &usual).contains("state their number of independent averages"));
     let band = Some(Band { low_hz: 100.0, high_hz: 200.0 });
     let how = IdentifyResponses { band, ..usual.clone() };
     assert!(matches!(identify_responses(&[table], &how), Err(AnalysisError::EmptyBand { .. })));

@@ -84,8 +84,8 @@ fn modes_are_those_of_the_machine_and_nothing_else_is_given() {
         }
         assert!(text.contains("2 displacement 3"), "{text}");
         let note = "note: no force acts on degrees of freedom 2 and 3, and their masses are not known: the modes do \
-                    not depend on that, but rows 1, 2 and 3 of M, C and K have an unknown scale, so they are \
-                    not given; state masses (`mass`), or apply a force on each of them";
+                    not depend on this, but rows 1, 2 and 3 of M, C and K have an unknown scale, so they are \
+                    not reported; state masses (`mass`), or apply a force on each of them";
         assert!(text.contains(note), "{text}");
         let json = serde_json::to_value(&found).unwrap();
         assert_eq!(json["unscaled"]["degrees_of_freedom"], serde_json::json!([2, 3]));

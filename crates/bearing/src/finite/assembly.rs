@@ -9,7 +9,8 @@
 //!
 //! Galerkin's equations with bilinear pressure P and test functions N, ∫ H³ ∇P·∇N + (∂H/∂θ + 2
 //! ∂H/∂τ) N = 0, balance the flow at an inner node. At a node on a front (the start or the end of
-//! the film) they make the slope of the pressure zero, which determines the position of the front.
+//! the film) the equations require that the pressure has no slope; this determines the position of
+//! the front.
 
 use nalgebra::{DMatrix, Vector2};
 
@@ -131,8 +132,8 @@ impl Assembly {
 impl Element {
     fn new(film: &Film, relative: Vector2<f64>, column: usize, row: usize) -> Self {
         let rows = film.rows();
-        // The front of the last row follows that of the row before: without pressure it has no
-        // equation.
+        // The last row has no pressure, so its front has no equation. Its front is that of the row
+        // before.
         let next = (row + 1).min(rows - 1);
         let [start, end] = &film.fronts;
         let fronts = [start[row], end[row], start[next], end[next]];

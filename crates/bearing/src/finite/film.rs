@@ -88,7 +88,7 @@ impl Film {
 }
 
 /// Returns the rows from the middle to the end, denser towards the end of a long bearing, where the
-/// pressure falls within about a radius.
+/// pressure falls to zero within a length of about one radius.
 fn axial_nodes(half_length: f64, rows: usize) -> Vec<f64> {
     let grading = half_length / (half_length + 2.0);
     (0..=rows)
@@ -105,7 +105,7 @@ fn column_nodes(relative: Vector2<f64>, fronts: [f64; 2], along: usize) -> Vec<f
     let thinnest = relative[1].atan2(relative[0]);
     let eccentricity = relative.norm().min(limits::GRADED_ECCENTRICITY);
     let root = ((1.0 + eccentricity) / (1.0 - eccentricity)).sqrt();
-    // Sommerfeld's substitution is tan(γ/2) = root tan(θ/2), applied turn by turn.
+    // Sommerfeld's substitution is tan(γ/2) = root tan(θ/2), applied within each turn of 2π.
     let turned = |angle: f64, root: f64| {
         let turns = (angle / TAU).round();
         let half = (angle - turns * TAU) / 2.0;

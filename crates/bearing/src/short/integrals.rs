@@ -22,8 +22,8 @@ impl Integrals {
         let e = eccentricity;
         let q = (1.0 - e) * (1.0 + e);
         let root = q.sqrt();
-        // The angles γ belong to the end and to the start half a turn before it; γ passes ±π where
-        // θ does.
+        // `last` is the angle γ at the end, `first` is γ at the start, half a turn before. γ passes
+        // ±π where θ does.
         let (sin, cos) = end.sin_cos();
         let last = (root * sin).atan2(cos - e);
         let first = (-root * sin).atan2(-cos - e);

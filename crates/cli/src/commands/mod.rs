@@ -111,8 +111,8 @@ impl Command {
         }
     }
 
-    /// Returns the message shown during a long computation; `None` if the subcommand shows one
-    /// itself, or must not show one.
+    /// Returns the message shown during a long computation; `None` if the subcommand shows its
+    /// progress itself, or must not show a message.
     pub fn waiting(&self) -> Option<&'static str> {
         match self {
             Command::Fleet(_) | Command::Sweep(_) => None,

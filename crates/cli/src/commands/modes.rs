@@ -228,13 +228,13 @@ impl ModesArgs {
         self.test_outcome(modes, words)
     }
 
-    /// Opens the records by the columns of the first one.
+    /// Opens the records with the columns of the first record.
     fn open_records(&self, channels: &Channels) -> Result<Vec<Measurement>, CliError> {
         let mut records = vec![self.input.open(channels)?];
         for record in &self.more {
             let mut channels = channels.clone();
             // All records have the columns of the first one, except for the force column of a
-            // roving hammer: if no column is named, each record states its own.
+            // roving hammer: if the user names no column, each record states its force column.
             if let Some(Channels { force, .. }) = self.channels_of(record)
                 && force.len() == 1
                 && channels.force.len() == 1
@@ -358,8 +358,8 @@ impl ModesArgs {
         names: &[String],
     ) -> Result<Outcome, CliError> {
         let saved = SavedModes::from_result(summary)?;
-        // The geometry names its points after the columns, or after the points where they were
-        // measured.
+        // The points of the geometry have the names of the columns, or the names of the measured
+        // points.
         let shapes = self.shapes.mode_shapes(modes, names).or_else(|error| {
             self.shapes.mode_shapes(modes, &saved.shapes().1).map_err(|_| error)
         })?;
@@ -425,7 +425,7 @@ impl ModesArgs {
         refused.push(("further files", !self.more.is_empty()));
         self.refuse("a machine", &refused)?;
         if self.modes.is_none() && !self.near_hz.is_empty() {
-            let why = "for a machine it needs `modes`, the number of modes to find".into();
+            let why = "for a machine, `near_hz` needs `modes`, the number of modes to find".into();
             return Err(AnalysisError::Setting { setting: "near_hz", why }.into());
         }
         if let Some(count) = self.modes {

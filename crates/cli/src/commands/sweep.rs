@@ -145,7 +145,7 @@ impl SweepArgs {
         how: &SweepSettings,
         bar: &ProgressBar,
     ) -> Result<SweepSummary, CliError> {
-        let why = "belongs to a record; the experiment described has its own";
+        let why = "belongs to a record; the description of the experiment states this itself";
         for (option, given) in [
             ("--force", !self.channels.force.is_empty()),
             ("--period", self.input.period.is_some()),

@@ -293,7 +293,7 @@ fn bad_descriptions_are_told_by_name() {
     machine["elements"].as_array_mut().unwrap().push(beside);
     write(at, "beside.json", &machine);
     let text = mechid(at, "identify rig.csv --machine beside.json --period 512");
-    let told = "the data determine s1.k and beside only by their sum s1.k + beside";
+    let told = "the data determine s1.k and beside only through their sum s1.k + beside";
     assert!(text.contains(told), "{text}");
     let message = refused(at, "identify rig.csv --machine three.json --mass 3");
     assert!(message.contains("cannot be used with"), "{message}");
@@ -417,7 +417,7 @@ fn hits_of_a_hammer_and_the_page() {
         assert!(page.contains(part), "{part}: {page}");
     }
     let message = refused(at, &format!("identify {fit} --period 512"));
-    assert!(message.contains("hits are not periods: leave out --period"), "{message}");
+    assert!(message.contains("hits has no periods: leave --period out"), "{message}");
     let message = refused(at, "report hits.csv --frf-table --output page.html");
     assert!(message.contains("--frf-table needs --machine in a report"), "{message}");
 }
@@ -438,5 +438,5 @@ fn fleets_identify_machines_of_elements() {
     let both = json!({"elements": settings, "channels": {"force": ["force_1"]}});
     write(at, "both.json", &both);
     let message = refused(at, "fleet rig.csv --analysis both.json --output more");
-    assert!(message.contains("has columns and settings of its own"), "{message}");
+    assert!(message.contains("states its columns and settings itself"), "{message}");
 }

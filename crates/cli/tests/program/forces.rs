@@ -173,7 +173,7 @@ fn sample_by_sample_the_noise_stated_is_counted() {
     close(&written, 1, &error, 1e-11);
     // A single level for three columns, or a negative level, must be refused.
     for (levels, words) in [
-        ("1e-6", "--noise gives 1 level, the response has 3 columns"),
+        ("1e-6", "--noise gives 1 level, but the response has 3 columns"),
         ("1e-6,-1,1", "must be positive"),
     ] {
         let call = format!("force rec.csv --system machine.json {ALL} --noise {levels}");

@@ -439,7 +439,7 @@ fn frequency_responses_are_estimated_and_fitted() {
     assert_eq!(json(folder, &three)["segments"]["hop"], 256);
     for (more, part) in [
         ("--from-frf h3", "h3"),
-        ("--from-frf h1 --method instrumental", "instrumental variables need periods"),
+        ("--from-frf h1 --method instrumental", "instrumental variables need single periods"),
         ("", "--segment: it belongs to --from-frf"),
     ] {
         refused(folder, &format!("identify r.csv {common} {more}"), &[part]);

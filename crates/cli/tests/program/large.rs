@@ -160,8 +160,11 @@ fn what_a_large_machine_does_not_have_is_refused() {
     };
     for (rest, expected) in [
         (r#", "outputs": []"#, "`outputs` is an empty list of degrees of freedom"),
-        (r#", "outputs": [101]"#, "outputs names degree of freedom 101, the system has 100"),
-        (r#", "outputs": [3, 3]"#, "outputs names degree of freedom 3 twice"),
+        (
+            r#", "outputs": [101]"#,
+            "`outputs` names degree of freedom 101 (counted from 1), but the system has 100",
+        ),
+        (r#", "outputs": [3, 3]"#, "`outputs` names degree of freedom 3 twice"),
         (
             r#", "nonlinear": {"terms": "k3: x101^3", "coefficients": [1]}"#,
             "the system has 100 degrees of freedom",
@@ -180,7 +183,7 @@ fn what_a_large_machine_does_not_have_is_refused() {
         (
             "\"dof\": 2",
             "\"dof\": 200",
-            "the excitation drives degree of freedom 200, the system has 100",
+            "the excitation drives degree of freedom 200 (counted from 1), but the system has 100",
         ),
     ] {
         assert!(described.contains(from), "{from}");

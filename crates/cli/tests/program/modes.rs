@@ -166,8 +166,8 @@ fn faults_of_a_test_are_told_in_a_line_each() {
     two_shakers(path, "off.csv", 0.6, |[f1, _, a1, a2]| [f1, 0.0, a1, a2]);
     two_shakers(path, "one.csv", 0.6, |[f1, _, a1, a2]| [f1, 2.0 * f1, a1, a2]);
     for (file, told) in [
-        ("dead.csv", "a2: constant or zero in the band, a sensor that is dead"),
-        ("off.csv", "force f2: constant or zero in the band, a shaker that is off"),
+        ("dead.csv", "a2: constant or zero in the band; the sensor may be dead"),
+        ("off.csv", "force f2: constant or zero in the band; the shaker may be off"),
         ("one.csv", "force f2 is a multiple of f1 in the band"),
     ] {
         let message = refused(path, &format!("modes {file} {SHAKERS}"));

@@ -66,7 +66,7 @@ fn a_sweep_that_finds_nothing_says_why() {
     assert!(
         !done
             && error.contains("no setting gave an estimate")
-            && error.contains("at the first one, 1"),
+            && error.contains("at the first setting, 1"),
         "{error}"
     );
 }

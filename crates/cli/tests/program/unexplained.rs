@@ -82,7 +82,7 @@ fn a_force_sought_in_too_few_places_is_told() {
         let found = report(folder.path(), &way);
         let told = remarks(&found);
         for words in [
-            "a force acts elsewhere than on degree of freedom 1 (`forced`)",
+            "a force acts on a degree of freedom other than 1 (`forced`)",
             "the standard error of the force is not reliable",
         ] {
             assert!(told.contains(words), "{way}: {told}");
@@ -122,7 +122,7 @@ fn sensors_that_are_dead_or_exchanged_are_told() {
         motion(folder.path(), &[1]);
         let swapped = "--displacement displacement_2,displacement_1 --forced 1";
         let told = remarks(&report(folder.path(), &format!("{swapped} {way}")));
-        assert!(told.contains("a sensor is dead, exchanged or in another unit"), "{way}: {told}");
+        assert!(told.contains("two sensors are interchanged"), "{way}: {told}");
         for level in ["0", "3.3e-4"] {
             with_column(folder.path(), "displacement_2", |_| level.into());
             let arguments = format!("{BOTH} --forced 1 {way}");

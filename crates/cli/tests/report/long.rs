@@ -194,7 +194,7 @@ fn an_open_record_says_which_samples_it_shows() {
     let captions: Vec<String> = tagged(&document, "figcaption").into_iter().map(text).collect();
     for (id, part) in [
         ("force", "history of the window, and line amplitudes of samples 1 to 262144 taken as"),
-        ("fit", "under the measured force over samples 1 to 262144; below"),
+        ("fit", "for the measured force over samples 1 to 262144; below"),
         ("residual-spectrum", "of the residual, samples 1 to 262144: the spectrum of pure noise"),
         ("correlations", "with the force, samples 1 to 262144; for pure noise, 95 %"),
         ("reconstructed-force", "their difference, samples 1 to 262144."),

@@ -369,7 +369,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
         (&["--validate", "rig.csv:257", "--periods", "1"], true),
     ] {
         mechid(folder.path(), &[&USUAL[..], more].concat());
-        assert_eq!(page(folder.path()).contains("of every motion is predicted"), proves);
+        assert_eq!(page(folder.path()).contains("of every response is predicted"), proves);
         assert_eq!(page(folder.path()).contains("agreement proves little"), !proves);
     }
 }

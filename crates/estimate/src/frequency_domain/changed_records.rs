@@ -17,11 +17,11 @@ use crate::limits::DELAY_STEPS;
 use crate::{EstimateError, Unknowns};
 
 /// Maximum likelihood for the lines of open records with changed channels, such as a delayed force;
-/// each change has its own estimate of the transients and of the errors of pulses.
+/// the transients and the errors of pulses are estimated again for each change.
 #[derive(Debug, Clone)]
 pub struct ChangedRecords<'a> {
     unknowns: &'a Unknowns,
-    /// Noise estimated from the residual without a change.
+    /// Noise estimated from the residual of the unchanged records.
     noise: NoiseSpectrum,
     /// Number of real equations minus the number of unknowns.
     spare: usize,

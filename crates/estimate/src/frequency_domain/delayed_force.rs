@@ -34,7 +34,7 @@ struct Group {
 
 impl<'a> DelayedForce<'a> {
     /// Prepares the fit for forces on the degrees of freedom `driven`, counted from 0. `None` if
-    /// the data do not determine an entry, which does not depend on the delay.
+    /// the data do not determine an entry; this does not depend on the delay.
     pub fn new(data: &'a FrequencyData, unknowns: &Unknowns, driven: &[usize]) -> Option<Self> {
         Self::weighted(data, late_weight(data), unknowns, driven)
     }
@@ -71,9 +71,10 @@ impl<'a> DelayedForce<'a> {
         Some(Self { data, weight, driven: driven.len(), groups })
     }
 
-    /// Returns the ratio of residual power to the power of the right-hand side, summed over the
-    /// driven equations, with the force `delay` (s) later. For related equations it is the ratio of
-    /// all equations together, times the number of forces. `None` if it is not finite.
+    /// Returns, for a force that is `delay` (s) later, the ratio of residual power to the power of
+    /// the right-hand side; the ratios of the driven equations are added. For related equations it
+    /// is the ratio for all equations together, times the number of forces. `None` if it is not
+    /// finite.
     ///
     /// # Source
     /// Ours.

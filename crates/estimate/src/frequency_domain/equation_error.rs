@@ -65,7 +65,7 @@ pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateE
 /// Returns estimates of [`equation_error`] with every row divided by the standard deviation of its
 /// equation error, from the stated noise and the measured receptance, so that noisy lines have
 /// little weight. The first one uses all lines, the second one only lines with little noise: a
-/// noisy line with hardly any force would give a far too soft system.
+/// noisy line with hardly any force would make the stiffness far too small.
 ///
 /// There is no estimate if no noise is stated, or if the lines do not determine a parameter.
 pub(super) fn weighted_equation_errors<'a>(
@@ -79,8 +79,8 @@ pub(super) fn weighted_equation_errors<'a>(
     })
 }
 
-/// Returns a weight for each row of a search for a delay: by the stated noise for lines with little
-/// noise, or 1 if no noise is stated.
+/// Returns a weight for each row of a search for a delay. The weight follows from the stated noise
+/// and is 0 on lines with much noise; it is 1 if no noise is stated.
 pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
     match noise_weight(data, WEIGHTING_CLEAR) {
         Some(weight) => (0..data.len()).map(weight).collect(),
@@ -88,8 +88,9 @@ pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
     }
 }
 
-/// Returns for each row the inverse standard deviation of its equation error by the stated noise; 0
-/// if the noise is more than the share `clear` of the power of the row.
+/// Returns, for each row, the inverse standard deviation of the equation error that the stated
+/// noise causes; 0 if the noise power of the motion is more than the fraction `clear` of the power
+/// of the motion.
 fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f64> {
     let noise = data.noise()?;
     let n = data.dof();
@@ -105,8 +106,8 @@ fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f6
     })
 }
 
-/// Returns the rows of [`equation_error`] with the force `delay` seconds later and a weight on each
-/// line.
+/// Returns the rows of [`equation_error`] with a weight on each line; the force is `delay` seconds
+/// later.
 pub(super) fn weighted_rows(
     data: &FrequencyData,
     delay: f64,

@@ -12,7 +12,8 @@ use super::Whitened;
 use crate::Unknowns;
 use crate::pulse_covariance::PulseCovariance;
 
-/// Weighted responses to a force of 1 N on every line, one for each degree of freedom.
+/// For each degree of freedom, the weighted responses on all lines to a force of 1 N at this degree
+/// of freedom.
 pub(super) struct ForceResponses(Vec<DVector<f64>>);
 
 impl ForceResponses {
@@ -95,8 +96,8 @@ pub(super) fn remove(transients: &[RecordColumns<DMatrix<f64>>], columns: &mut D
 }
 
 /// Returns the covariance of the residuals of every record with pulses: independent errors of the
-/// lines, of this `level`, plus the errors of the pulses without the part that the transients
-/// explain. `None` if an effect is not finite.
+/// lines with the power `level`, plus the errors of the pulses. The part that the transients
+/// explain is removed from the errors of the pulses. `None` if an effect is not finite.
 pub(super) fn pulse_covariances(
     data: &FrequencyData,
     responses: &ForceResponses,

@@ -16,12 +16,12 @@ use crate::limits::INITIAL_ROUNDS;
 use crate::relations::Relations;
 use crate::{Estimate, Unknowns};
 
-/// Exponents e of the weights ω^e, for noise that is white in the displacement: its equation error
-/// grows with ω² where the mass dominates.
+/// Exponents e of the weights ω^e, for white noise on the displacement: the equation error that it
+/// causes grows with ω² where the mass dominates.
 const EXPONENTS: [i32; 3] = [0, -2, -3];
 /// Linear estimates from spectra, one equation of motion after another.
 pub(super) struct InitialEstimates<'a> {
-    /// Data as measured; for open records under a Hann window, which reduces their transients.
+    /// Data as measured. Open records are under a Hann window, which reduces their transients.
     data: Cow<'a, FrequencyData>,
     /// Number of unknown transient loads; their initial estimates are zero.
     ends: usize,
@@ -33,7 +33,7 @@ pub(super) struct InitialEstimates<'a> {
     nominal: Option<DVector<f64>>,
 }
 
-/// Unknowns of one equation of motion, each with its index among all unknowns.
+/// Unknowns of one equation of motion; each has its index among all unknowns.
 struct Equation {
     row: usize,
     parameters: Vec<(usize, Parameter)>,
@@ -92,9 +92,9 @@ impl<'a> InitialEstimates<'a> {
     }
 
     /// Returns all initial estimates, the most reliable first; the rounds of one iteration form one
-    /// family. The order is: total and ordinary least squares weighted by the dynamic stiffness of
-    /// the round before, the nominal system, then ordinary least squares with the weights ω^e and
-    /// with the weights of the noise.
+    /// family. The order is: total and ordinary least squares, weighted by the dynamic stiffness of
+    /// the round before; total least squares with equal weights; the nominal system; ordinary least
+    /// squares with the weights ω^e and with the weights of the noise.
     pub(super) fn families(&self) -> Vec<Vec<DVector<f64>>> {
         let powers =
             EXPONENTS.map(|exponent| self.estimate(Kind::Ordinary, &self.powers(exponent)));

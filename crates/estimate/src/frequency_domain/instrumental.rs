@@ -15,10 +15,10 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// Solves the equation of motion with two measurements of the same experiment, each the instrument
 /// of the other.
 ///
-/// The normal equations ΦᵀΦ θ = Φᵀy of least squares are biased because the noise of Φ is squared;
-/// in ZᵀΦ θ = Zᵀy, with the same regressors Z from other periods, the two noises are independent.
-/// The estimate is consistent, with more scatter than [`output_error`](super::output_error). Forces
-/// may be noisy, too.
+/// The normal equations ΦᵀΦ θ = Φᵀy of least squares are biased because the noise of Φ is squared.
+/// In ZᵀΦ θ = Zᵀy, Z has the same regressors from other periods, so the noise of Z and the noise of
+/// Φ are independent. The estimate is consistent, but it has more scatter than that of
+/// [`output_error`](super::output_error). Forces may be noisy, too.
 ///
 /// `first` and `second` must come from different periods (see
 /// [`RepeatedPeriods::halves`](mechid_spectra::RepeatedPeriods::halves)). The standard errors allow
@@ -104,8 +104,8 @@ impl Terms {
 struct Equation {
     parameters: Vec<Parameter>,
     values: DVector<f64>,
-    /// Derivative of the values with respect to the right-hand side, times the residual: one column
-    /// per row of the equations.
+    /// Derivative of the values with respect to the right-hand side, times the residual; one column
+    /// for each row of the equation.
     scores: DMatrix<f64>,
     rows: usize,
     residual_nrmse: f64,

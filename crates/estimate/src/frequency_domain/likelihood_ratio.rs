@@ -18,9 +18,9 @@ pub struct LikelihoodRatio {
     pub p_value: f64,
 }
 
-/// Compares fits of the same data by two models, a pair (larger, smaller) for each of several
-/// independent sets of data; `restrictions` (a pure number) is the number of fixed parameters of
-/// all sets together. `None` if a noise level is not known beforehand.
+/// Compares fits of two models to the same data: one pair (larger, smaller) for each of several
+/// independent sets of data. `restrictions` (a pure number) is the number of fixed parameters of
+/// all sets together. `None` if a noise level is not known before the fit.
 ///
 /// With weights from repeated periods the statistic divided by `restrictions` follows Fisher's F.
 ///

@@ -54,7 +54,8 @@ impl Line {
         &self.displacement
     }
 
-    /// Displacement under the most likely force, given its noise and the measured displacement.
+    /// Displacement under the most likely force. The most likely force follows from the noise of
+    /// the force and the measured displacement.
     pub(super) fn likely_displacement(&self) -> &ComplexVector {
         &self.likely
     }
@@ -99,7 +100,7 @@ impl Line {
         self.displacement.iter().all(|z| z.is_finite())
     }
 
-    /// Computes L⁻¹e and L⁻¹G for a given L; returns `false` if L is singular.
+    /// Computes L⁻¹e and L⁻¹G with the given L; returns `false` if L is singular.
     pub(super) fn whiten<'x>(
         &mut self,
         measured: impl Iterator<Item = &'x Complex<f64>>,

@@ -1,5 +1,5 @@
-//! Blocks of lines with the columns that act on them, for an orthogonal decomposition of many
-//! columns that are zero on most lines.
+//! Blocks of lines, each with the columns that are nonzero on it, for an orthogonal decomposition
+//! of many columns that are zero on most lines.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::limits::GRAM_LINES;
 
 /// Lines whose products are computed together, and the columns that are nonzero on at least one of
-/// them. The transient of a record has nonzero columns on the lines of this record only.
+/// these lines. The transient of a record has nonzero columns on the lines of this record only.
 #[derive(Clone)]
 pub(super) struct LineBlock {
     pub(super) lines: Range<usize>,
@@ -44,8 +44,8 @@ impl LineBlock {
         (0..lines).step_by(GRAM_LINES).map(block).collect()
     }
 
-    /// Adds the columns that the triangular factor `r` couples to the columns of the block, so that
-    /// new rows of the block change no other columns.
+    /// Adds the columns that the triangular factor `r` couples to the columns of the block. After
+    /// this, new rows of the block do not change the remaining columns.
     pub(super) fn close(&mut self, r: &DMatrix<f64>) {
         let mut used = vec![false; r.ncols()];
         self.columns.iter().for_each(|column| used[*column] = true);

@@ -9,8 +9,9 @@ use super::whitened::Whitened;
 use crate::Estimate;
 use crate::limits::{CORRELATED_DISTANCES, CORRELATED_LINES, LINE_STEP};
 
-/// Returns the ratio of the variance of the parameters to that for independent lines, 1 + 2 Σ ρ_d
-/// with the correlation ρ_d of the errors of lines d apart; 1 if the residual shows none.
+/// Returns the ratio of the variance of the parameters to that for independent lines: 1 + 2 Σ ρ_d,
+/// where ρ_d is the correlation of the errors of lines d apart. The ratio is 1 if the residual
+/// shows no correlation.
 ///
 /// The ratio is right if the response changes little from line to line, and too large for
 /// resonances as narrow as a line.

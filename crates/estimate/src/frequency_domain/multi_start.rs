@@ -16,9 +16,10 @@ use crate::{EstimateError, Unknowns};
 /// Range of sums of squares that the noise explains.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plausible {
-    /// Expected sum of squares of a correct model; `None` if the level of the noise is not known.
+    /// Expected value of the sum of squares of a correct model; `None` if the level of the noise is
+    /// unknown.
     pub expected: Option<f64>,
-    /// Maximum ratio of a sum of squares to its expected value by chance.
+    /// Largest ratio of a sum of squares to its expected value that chance alone explains.
     pub factor: f64,
 }
 
@@ -35,12 +36,14 @@ pub(super) struct GlobalMinimum {
 /// Searches from one initial estimate after another; afterwards `problem` is at the best minimum.
 ///
 /// The search ends when the first few initial estimates have led to the same minimum. Otherwise it
-/// restarts from the best minima: a few steps with a random weight for every line, then a search in
-/// the original data, until several successive restarts have not found a better minimum. Local
-/// minima due to the noise change with the weights; the global one hardly moves.
+/// restarts from the best minima: a restart is a few steps with a random weight for every line,
+/// followed by a search in the original data. The restarts end when several in succession have
+/// found no better minimum. Local minima due to the noise change with the weights; the global one
+/// hardly moves.
 ///
 /// Searches after the first one begin on the lines of `thin`, the same problem with fewer lines, if
-/// there is one. They continue on all lines if they end near the best minimum so far or below it.
+/// there is one. A search continues on all lines if it ends near the best minimum so far or below
+/// that minimum.
 ///
 /// # Errors
 /// [`EstimateError::NotConverged`] if no search ends at a minimum.
@@ -112,8 +115,8 @@ fn search_thin(
     })
 }
 
-/// Returns the data and the noise on fewer lines, for the beginning of searches; `None` if there
-/// are few already.
+/// Returns the data and the noise on fewer lines, for the beginning of searches; `None` if the data
+/// have few lines.
 pub(super) fn thinned(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -142,9 +145,10 @@ fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
     }
 }
 
-/// Returns the best of some rounds of linear least squares, each with the weights of the round
-/// before. Such rounds cross wide regions in which a search would need many small steps. There are
-/// no rounds if the noise already explains the data; `None` if the sum of squares does not exist.
+/// Returns the best result of some rounds of linear least squares, each with the weights of the
+/// round before. These rounds cross wide regions in which a search would need many small steps.
+/// There are no rounds if the noise explains the data before the first one; `None` if the sum of
+/// squares does not exist.
 ///
 /// # Source
 /// Sanathanan & Koerner (1963), IEEE Transactions on Automatic Control 8, 56–58.
@@ -191,8 +195,8 @@ struct End {
 }
 
 impl Ends {
-    /// Counts a search with its end, if it has one, and returns whether this is the best end so
-    /// far.
+    /// Counts a search and its end, if there is one. Returns whether this end is a new one and the
+    /// best so far.
     fn push(&mut self, ended: Option<Minimum>) -> bool {
         self.searches += 1;
         let Some(minimum) = ended else { return false };
@@ -222,7 +226,8 @@ impl Ends {
         matches!(&self.distinct[..], [end] if end.count == self.searches && end.minimum.converged)
     }
 
-    /// Returns whether the noise explains several ends, or the best one has not converged.
+    /// Returns whether the noise explains the difference between the two best ends, or the best end
+    /// has not converged.
     fn many(&self) -> bool {
         let Some(best) = self.distinct.first() else { return true };
         let bound = best.minimum.cost * self.plausible.factor;
@@ -245,7 +250,8 @@ impl Ends {
 }
 
 impl GlobalMinimum {
-    /// Returns the minimum near this one for other weights of the same residuals.
+    /// Returns the minimum of a search that starts at this minimum, with other weights of the same
+    /// residuals.
     ///
     /// # Errors
     /// [`EstimateError::NotConverged`].
@@ -260,7 +266,8 @@ impl GlobalMinimum {
 }
 
 /// Returns the best member of each family. The first family comes first, then the others by rising
-/// sum of squares; members with the same sum of squares as another one come last.
+/// sum of squares. A member comes last if its sum of squares is about the same as that of a better
+/// member.
 fn in_order(problem: &mut impl Restartable, families: Vec<Vec<DVector<f64>>>) -> Vec<DVector<f64>> {
     let mut best: Vec<(usize, f64, DVector<f64>)> = Vec::new();
     for (family, members) in families.into_iter().enumerate() {

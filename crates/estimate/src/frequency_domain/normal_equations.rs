@@ -37,9 +37,9 @@ struct Equation {
     columns: Vec<usize>,
 }
 
-/// Coordinates u = T θ, equation by equation, in which the regressors are orthonormal, scaled to a
-/// Gram matrix of unit diagonal. For related entries they are coordinates of the independent
-/// unknowns.
+/// Coordinates u = T θ, equation by equation. In them the regressors are orthonormal; the scale
+/// gives the Gram matrix a unit diagonal. For related entries these are coordinates of the
+/// independent unknowns.
 pub(super) struct Coordinates {
     /// Number of columns of the layout.
     columns: usize,
@@ -112,11 +112,11 @@ impl Layout {
     /// linearly dependent, or if values overflow.
     ///
     /// With H = WᴴW, the entry for the unknown in column a of equation i and the unknown in column
-    /// b of equation j is 2 Re Σ φ̄_a φ_b H_ij. This is the product of a matrix of pairs (a, b) and
-    /// a matrix of pairs (i, j), with 1/dof of the operations for the rows of J. The condition
-    /// number of the Gram matrix is the square of that of J. This is harmless for regressors that
-    /// are orthonormal over the lines weighted by ‖W_l‖; rounding of the Gram matrix slows the
-    /// search but does not change the minimum, where Jᵀr = 0.
+    /// b of equation j is 2 Re Σ φ̄_a φ_b H_ij. This sum is the product of a matrix of pairs (a, b)
+    /// and a matrix of pairs (i, j); it takes 1/dof of the operations that the rows of J would
+    /// take. The condition number of the Gram matrix is the square of that of J. This square is
+    /// harmless for regressors that are orthonormal over the lines weighted by ‖W_l‖; rounding of
+    /// the Gram matrix slows the search but does not change the minimum, where Jᵀr = 0.
     /// With a `tangent` S (entries and transient loads × unknowns), the unknowns are the
     /// independent ones.
     ///
@@ -153,8 +153,8 @@ impl Layout {
     }
 
     /// Returns the triangular factor R of the regressors φ, with each line weighted by the size of
-    /// its W, and replaces them by R⁻ᵀφ. Dependent regressors are allowed for `related` entries: a
-    /// degree of freedom without force has dependent regressors, but its relations determine its
+    /// its W, and replaces them by R⁻ᵀφ. For `related` entries the regressors may be linearly
+    /// dependent, as at a degree of freedom without force: the relations still determine the
     /// entries.
     ///
     /// # Source
@@ -319,8 +319,8 @@ fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 
 }
 
 impl Coordinates {
-    /// Changes from entries to the independent unknowns and returns their Gram matrix, of unit
-    /// diagonal. `None` if unknowns are dependent to rounding.
+    /// Changes from entries to the independent unknowns and returns the Gram matrix of these
+    /// unknowns, with unit diagonal. `None` if unknowns are dependent to rounding.
     fn relate(&mut self, tangent: &DMatrix<f64>, gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut moved = DMatrix::zeros(self.scale.len(), tangent.ncols());
         for (mut to, column) in moved.column_iter_mut().zip(tangent.column_iter()) {
@@ -356,8 +356,8 @@ impl Coordinates {
         Some(gram)
     }
 
-    /// Returns 2 Re Σ φ̄ y for every unknown: Jᵀ applied to values that become y when weighted by
-    /// W_lᴴ. `weighted` has y for each block, 2 lines × dof, real parts first.
+    /// Returns 2 Re Σ φ̄ y for every unknown. This is Jᵀ applied to values whose product with W_lᴴ
+    /// is y. `weighted` has y for each block, 2 lines × dof, real parts first.
     pub(super) fn project<'b>(
         &self,
         weighted: impl Iterator<Item = (&'b BlockFactors, &'b DMatrix<f64>)>,

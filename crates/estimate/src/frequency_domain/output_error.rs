@@ -32,7 +32,8 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// - no noise stated: the noise of each channel is estimated from the residual, white in the
 ///   measured quantity or with a smooth spectrum ([`Pooling::Automatic`]); the force is exact.
 ///
-/// Weights from few repeated periods are uncertain; the covariance allows for that.
+/// Weights from few repeated periods are uncertain; the covariance of the estimate includes this
+/// uncertainty.
 ///
 /// # Errors
 /// The errors of [`equation_error`], [`EstimateError::Undetermined`] if the data do not determine a
@@ -55,7 +56,7 @@ pub fn output_error(
 ///
 /// # Errors
 /// As [`output_error`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the
-/// machine has another number of degrees of freedom.
+/// nominal system has another number of degrees of freedom than `data`.
 ///
 /// # Source
 /// As [`output_error`].
@@ -65,7 +66,7 @@ pub fn output_error_near(
     nominal: Option<&SecondOrderSystem>,
 ) -> Result<OutputErrorFit, EstimateError> {
     if let Some(system) = nominal {
-        check_size("degrees of freedom of the expected machine", unknowns.dof(), system.dof())?;
+        check_size("degrees of freedom of the nominal system", unknowns.dof(), system.dof())?;
     }
     search_near(data, unknowns, nominal, Pooling::Automatic)
 }

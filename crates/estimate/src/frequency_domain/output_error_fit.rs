@@ -26,8 +26,8 @@ pub struct OutputErrorFit {
     pub estimate: Estimate,
     /// Ratio of the weighted residual power to its expectation. If model and noise are correct, it
     /// is 1 with a standard deviation of about √(2/ν) (more if the noise is estimated from few
-    /// periods), where ν is the number of residuals minus the number of parameters. It is much
-    /// larger if the model is wrong (a nonlinearity, missing degrees of freedom), and 1 by
+    /// periods), where ν is the number of residuals minus the number of parameters. The ratio is
+    /// much larger if the model is wrong (a nonlinearity, missing degrees of freedom). It is 1 by
     /// definition if the noise is estimated from the residual.
     pub misfit_ratio: f64,
     /// Twice the negative log-likelihood, up to a constant and corrected for sampled weights, a
@@ -43,14 +43,14 @@ pub struct OutputErrorFit {
     /// Number of searches that ended at this minimum; if two or more agree, it is probably the
     /// global minimum.
     pub agreeing: usize,
-    /// Estimated noise spectra of the weights: one of each experiment from its periods, or one from
-    /// the residual; empty if the noise is known beforehand.
+    /// Estimated noise spectra of the weights: one for each experiment, from its periods, or one
+    /// from the residual; empty if the noise is stated.
     pub noise: Vec<NoiseModel>,
     /// Noise spectrum of the weights: stated, or estimated from the residual up to a common level.
     pub spectrum: NoiseSpectrum,
     /// Transient loads of open records, `None` if all rows belong to periods.
     pub ends: Option<EndLoads>,
-    /// Sinusoids that are not a response to the forces and are subtracted from each open record;
+    /// For each open record, the subtracted sinusoids, which are not a response to the forces;
     /// empty if the noise is stated.
     pub sinusoids: Vec<Vec<Sinusoid>>,
     /// Most likely amplitudes of the errors of pulses, one for each pattern of
@@ -73,7 +73,7 @@ impl OutputErrorFit {
         theta.into()
     }
 
-    /// Returns the minimum of the fit; its sum of squares is not known any more.
+    /// Returns the minimum of the fit, without its sum of squares, which the fit does not store.
     pub(super) fn minimum(&self, unknowns: &Unknowns) -> GlobalMinimum {
         let minimum = Minimum {
             parameters: self.theta(unknowns),
@@ -117,8 +117,8 @@ impl OutputErrorFit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EndLoads {
     tau: Vec<f64>,
-    /// Statistic τᵀ Cov(τ)⁻¹ τ, a pure number: for records of whole periods it is χ² distributed
-    /// with one degree of freedom per load.
+    /// Statistic τᵀ Cov(τ)⁻¹ τ of the loads τ, a pure number. For records of whole periods it is χ²
+    /// distributed with one degree of freedom per load.
     pub statistic: f64,
     /// Ratio of the power of the loads on the lines to the power of the forces.
     pub share: f64,
@@ -136,15 +136,15 @@ impl EndLoads {
         &self.tau
     }
 
-    /// Returns the probability that records of whole periods give a larger statistic: the upper
-    /// tail of the χ² distribution.
+    /// Returns the probability that records of whole periods give a larger statistic than this one:
+    /// the upper tail of the χ² distribution.
     pub fn p_value(&self) -> f64 {
         let chi_squared = ChiSquared::new(self.tau.len() as f64);
         chi_squared.map_or(f64::NAN, |chi_squared| chi_squared.sf(self.statistic))
     }
 
-    /// Returns the fitted records, each with its transient loads subtracted from the force (N), as
-    /// if it were a period.
+    /// Returns the fitted records as if each were a period: the transient loads are subtracted from
+    /// the force (N).
     ///
     /// # Errors
     /// [`NumericsError::Size`] if there are more or fewer open records or degrees of freedom.
@@ -164,8 +164,8 @@ impl EndLoads {
     }
 
     /// Returns the fitted records, each as the response to its force alone: the response of
-    /// `system` to the transient loads is subtracted from the displacement (m), where its
-    /// receptance exists.
+    /// `system` to the transient loads is subtracted from the displacement (m), on lines where the
+    /// receptance of `system` exists.
     ///
     /// # Errors
     /// As [`EndLoads::without_transients`], and [`NumericsError::Size`] for another number of
@@ -203,8 +203,8 @@ impl EndLoads {
     }
 }
 
-/// Returns the plausible range of a sum of `spare` squares, which are weighted with a variance of
-/// `known` degrees of freedom.
+/// Returns the range of a sum of squares that the noise explains. The sum has `spare` degrees of
+/// freedom, and the variance of its weights has `known` degrees of freedom.
 pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
     let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
     Plausible { expected, factor: 1.0 + FIT_PLAUSIBLE * spread }
@@ -307,7 +307,7 @@ pub(super) fn finish(
     })
 }
 
-/// Returns the uncertainty of estimated weights; the transient loads count as known.
+/// Returns the uncertainty of estimated weights; the transient loads are treated as exact.
 pub(super) fn uncertain_weights(
     data: &FrequencyData,
     unknowns: &Unknowns,

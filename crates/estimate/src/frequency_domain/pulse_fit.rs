@@ -20,14 +20,14 @@ pub(super) struct PulseFit {
     /// Inverse of the Fisher information about the independent unknowns of M, C and K, divided by
     /// the level of the noise.
     pub(super) covariance: DMatrix<f64>,
-    /// Number of amplitudes that the lines determine. Each amplitude counts with the share of its
+    /// Number of amplitudes that the lines determine. Each amplitude counts as the fraction of its
     /// information that comes from the lines.
     pub(super) determined: f64,
 }
 
 impl PulseFit {
-    /// Returns whether the errors of pulses can be estimated with the parameters: there are some,
-    /// no force has noise of another kind, and the fit is not too large.
+    /// Returns whether the errors of pulses can be estimated together with the parameters: the data
+    /// state such errors, no force has another kind of noise, and the fit is not too large.
     pub(super) fn is_possible(data: &FrequencyData, unknowns: &Unknowns) -> bool {
         let effects = |pulse: &PulseErrors| 2 * data.dof() * pulse.rows().len() * pulse.count();
         let total: usize = data.pulse_errors().iter().map(effects).sum();
@@ -48,9 +48,10 @@ impl PulseFit {
             && noisy.all(|(row, force)| has_pulse(row, force))
     }
 
-    /// Finds the amplitudes together with a step of the parameters from `theta`, in the `noise` of
-    /// the responses with the common factor `level`. The model is linearised at the amplitudes
-    /// `before`. `None` if a response does not exist or the sensitivities are linearly dependent.
+    /// Estimates the amplitudes together with a step of the parameters from `theta`; the noise of
+    /// the responses is `noise` times the common factor `level`. The model is linearised at the
+    /// amplitudes `before`. `None` if a response does not exist or the sensitivities are linearly
+    /// dependent.
     ///
     /// The residual is r + P b − J Δθ: P are the effects of the amplitudes b, which have unit
     /// variance, and J are the sensitivities. The part that the transients explain is removed from
@@ -98,9 +99,9 @@ impl PulseFit {
     }
 }
 
-/// Returns columns over all residuals, whitened by the covariance of the errors of pulses, with the
-/// rows of the amplitudes below them. The last column is a residual without the effects of the
-/// amplitudes `before`; the returned residual contains them.
+/// Returns columns over all residuals, whitened by the covariance of the errors of pulses; the rows
+/// of the amplitudes are below these columns. The last given column is a residual without the
+/// effects of the amplitudes `before`; the returned residual contains these effects.
 fn whitened(
     columns: DMatrix<f64>,
     pulses: &[RecordColumns<PulseCovariance>],

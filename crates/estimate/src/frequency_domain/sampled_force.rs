@@ -55,9 +55,9 @@ impl<'a> SampledResponse<'a> {
     }
 }
 
-/// Returns the data with an equivalent band-limited force (N). At samples `dt` (s) apart, `system`
-/// responds to this force as it responds to the force of the data, which is held or linear between
-/// its samples. `None` for Euler's rule, and if a response does not exist.
+/// Returns the data with an equivalent band-limited force (N). The force of the data is held or
+/// linear between its samples, which are `dt` (s) apart; at the samples `system` responds to both
+/// forces in the same way. `None` for Euler's rule, and if a response does not exist.
 ///
 /// # Source
 /// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (sampling of a

@@ -13,7 +13,7 @@ pub(super) trait Restartable: SumOfSquares<Linearisation = NormalEquations> {
     fn linear_step(&mut self) -> Option<DVector<f64>>;
 
     /// Gives every spectral line a random weight of mean 1 and standard deviation √5, or the weight
-    /// 1 without a seed. Parameters accepted before must be tried again.
+    /// 1 without a seed. Parameters that were accepted before this call must be tried again.
     fn resample(&mut self, seed: Option<u64>);
 }
 

@@ -1,4 +1,4 @@
-//! Structural damping in place of viscous damping.
+//! Fit of structural damping instead of viscous damping.
 
 use mechid_model::Matrix;
 use mechid_spectra::FrequencyData;
@@ -17,9 +17,9 @@ pub struct StructuralDamping {
     pub displacement: DMatrix<Complex<f64>>,
 }
 
-/// Fits structural damping with the `unknowns` of an equation of motion, where D (N/m) has the
-/// unknowns of C. The least squares are weighted by the receptance of the round before. `None` if a
-/// known entry of C is not zero, or if the data do not determine an entry.
+/// Fits structural damping. The `unknowns` are those of an equation of motion; D (N/m) has the
+/// unknowns of C. Each round of least squares is weighted by the receptance of the round before.
+/// `None` if a known entry of C is not zero, or if the data do not determine an entry.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.4 (structural damping); Sanathanan & Koerner

@@ -35,9 +35,10 @@ struct Weighted {
     noise: NoiseSpectrum,
 }
 
-/// Estimates the parameters and, in alternation, the noise of each channel of the motion: white of
-/// unknown level, or with a spectrum from the residual. The noise of the forces is the stated one.
-/// The search begins at a minimum `from` of nearly the same data, or at all initial estimates.
+/// Estimates the parameters and, in alternation, the noise of each channel of the motion: white
+/// noise of unknown level, or noise with a spectrum from the residual. The noise of the forces is
+/// as stated. The search begins at a minimum `from` of nearly the same data, or at all initial
+/// estimates.
 pub(super) fn with_unknown_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -76,7 +77,7 @@ pub(super) fn with_unknown_noise(
         let fit = finished(&reduced, unknowns, (weighted, is_white), subtracted)?;
         return Ok(OutputErrorFit { sinusoids, ..fit });
     };
-    // The amplitudes are estimated again with the final weights.
+    // The amplitudes of the pulses are estimated again with the final weights.
     let (searches, steps) = (weighted.fit.searches, weighted.fit.minimum.steps);
     let with_pulses = data.without_sinusoids(&sinusoids);
     let (pulses, data, weighted) = with_pulse_fit(&with_pulses, unknowns, weighted, amplitudes)?
@@ -94,7 +95,7 @@ struct Subtracted {
     pulses: Option<PulseFit>,
 }
 
-/// Data without the errors of the pulses of their forces, with a fit in white noise.
+/// Data without the errors of their force pulses, and a fit to them with white noise.
 struct WithoutPulses {
     /// Most likely amplitudes of the errors.
     amplitudes: Vec<f64>,
@@ -104,9 +105,9 @@ struct WithoutPulses {
     is_rounding: bool,
 }
 
-/// Alternates between an estimate of the errors of the force pulses and a fit in white noise to the
-/// data without these errors. It begins with a fit in which every line has independent errors.
-/// `None` if there are no pulses or too many, or if the first round fails.
+/// Alternates between an estimate of the errors of the force pulses and a fit, with white noise, to
+/// the data without these errors. The first fit assumes independent errors on all lines. `None` if
+/// there are no pulses or too many, or if the first round fails.
 fn without_pulses(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -140,7 +141,7 @@ fn without_pulses(
 }
 
 /// Estimates the errors of pulses, linearised at the amplitudes `before`, and fits the data without
-/// these errors in the same noise; `None` as for [`PulseFit::new`].
+/// these errors; the noise of the responses does not change. `None` as for [`PulseFit::new`].
 fn with_pulse_fit(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -215,8 +216,8 @@ fn response_noise(
     Ok(Some(noise.with_model(NoiseModel::Proportional { with_white })))
 }
 
-/// Returns the result of a fit to data without the errors that were subtracted before. The flag is
-/// `true` if the noise of the fit is white.
+/// Returns the result of a fit to data without the errors in `subtracted`. The flag is `true` if
+/// the noise of the fit is white.
 fn finished(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -248,7 +249,8 @@ fn finished(
     finish(data, unknowns, &mut misfit, &fit, scale)
 }
 
-/// A fit in white noise to open records without the sinusoids that its residual shows.
+/// A fit, with white noise, to open records without the sinusoids that the residual of this fit
+/// shows.
 struct FitWithSinusoids<'a> {
     /// Data without the sinusoids.
     data: Cow<'a, FrequencyData>,
@@ -257,8 +259,8 @@ struct FitWithSinusoids<'a> {
 }
 
 impl<'a> FitWithSinusoids<'a> {
-    /// Alternates between the sinusoids in the open records of `data` and a fit to the data without
-    /// them.
+    /// Alternates between an estimate of the sinusoids in the open records of `data` and a fit to
+    /// the data without these sinusoids.
     fn find(
         &mut self,
         data: &'a FrequencyData,
@@ -281,7 +283,8 @@ impl<'a> FitWithSinusoids<'a> {
             }
             let reduced = data.without_sinusoids(&sinusoids);
             let change = (reduced.displacement() - self.data.displacement()).norm();
-            // The first fit included the sinusoids and may have ended at a wrong minimum.
+            // The first fit was made with the sinusoids in the data and may have ended at a wrong
+            // minimum, so the first round searches anew.
             let from = (round > 0).then(|| self.white.fit.clone());
             self.white = with_white_noise(&reduced, unknowns, nominal, from)?.0;
             (self.data, self.sinusoids) = (Cow::Owned(reduced), sinusoids);
@@ -293,7 +296,7 @@ impl<'a> FitWithSinusoids<'a> {
     }
 }
 
-/// Fits with white noise of unknown level per channel, and returns whether the residual is only
+/// Fits with white noise of unknown level on each channel, and returns whether the residual is only
 /// rounding. The search begins at a minimum `from` of nearly the same data, or at all initial
 /// estimates.
 fn with_white_noise(
@@ -329,8 +332,9 @@ fn with_white_noise(
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
         // The level of rounding errors does not converge.
         let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= RESIDUAL_ROUNDING * x);
-        // With a wrong model the level of a channel may fall without end: the fit is a minimum for
-        // its weights, and the residual shows the error of the model.
+        // With a wrong model, the level of a channel may decrease in every round, until the number
+        // of rounds ends the search. The fit is then a minimum for its weights, and the residual
+        // shows the error of the model.
         if settled || exact || (known_force && data.dof() == 1) || rounds == MAX_ROUNDS {
             drop(misfit);
             return Ok((Weighted { fit, noise }, exact));
@@ -406,8 +410,8 @@ fn spectrum_of_residual(
     Ok((!is_white).then(|| noise.with_force_variance(data.force_variance())))
 }
 
-/// Returns the leverage of each row and channel, the share of its noise that the parameters fit,
-/// rows × n; `None` for large fits, where it is small.
+/// Returns the leverage of each row and channel, rows × n: the fraction of the noise that the
+/// parameters fit. `None` for large fits, where the leverage is small.
 fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option<DMatrix<f64>> {
     let (n, rows) = (data.dof(), data.len());
     if 2 * n * rows * unknowns.free().len() > MAX_LEVERAGES {

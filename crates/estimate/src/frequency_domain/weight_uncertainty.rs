@@ -11,7 +11,7 @@ use crate::limits::MAX_LEVERAGES;
 pub(super) struct WeightUncertainty {
     /// Matrix to add to the inverse of the Fisher information.
     pub(super) excess: DMatrix<f64>,
-    /// Smallest number of degrees of freedom of the variance of a parameter.
+    /// Smallest number of degrees of freedom among the variances of the parameters.
     pub(super) degrees_of_freedom: f64,
 }
 
@@ -19,10 +19,10 @@ impl WeightUncertainty {
     /// Computes the correction for an estimate at the entries `values`, weighted by `noise`; `None`
     /// if the noise is not a smooth spectrum, or for large fits.
     ///
-    /// The logarithms of the noise powers are B β with the basis B, where β has ν times the unit
-    /// information. With the orthonormal sensitivities Q_l of line l, P_i = Σ b_li Q_lᵀQ_l and h_l
-    /// = Σ b_li², the covariance of the estimate grows by Λ = (Σ h_l Q_lᵀQ_l − Σ P_i P_i)/ν, and
-    /// the inverse of the Fisher information is too small by the same matrix.
+    /// The logarithms of the noise powers are B β with the basis B; the information about β is ν
+    /// times the identity matrix. With the orthonormal sensitivities Q_l of line l, P_i = Σ b_li
+    /// Q_lᵀQ_l and h_l = Σ b_li², the covariance of the estimate grows by Λ = (Σ h_l Q_lᵀQ_l − Σ
+    /// P_i P_i)/ν, and the inverse of the Fisher information is too small by the same matrix.
     ///
     /// # Source
     /// Kenward & Roger (1997), Biometrics 53, 983–997; degrees of freedom: Satterthwaite (1946),

@@ -10,8 +10,9 @@ use crate::relations::Relations;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
-/// Residual of a system on spectra, with its sensitivity to the free parameters, both weighted by
-/// the covariance L Lᴴ of the residual from the noise on displacement and force.
+/// Residual of a system for given spectra, and the sensitivity of the residual to the free
+/// parameters. Both are weighted by L Lᴴ, the covariance of the residual due to the noise on
+/// displacement and force.
 ///
 /// Real and imaginary parts are separate: row 2(n·line + channel) is the real part of a line and
 /// channel, the next row its imaginary part.
@@ -20,11 +21,12 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
 /// maximum likelihood in errors-in-variables.
 pub struct Whitened {
-    /// Residual √2·L⁻¹(X − G F): independent numbers of unit variance for the true system and
-    /// noise. One entry for each real and imaginary part of each line and channel.
+    /// Residual √2·L⁻¹(X − G F), with one entry for the real and one for the imaginary part of each
+    /// line and channel. If system and noise are correct, the entries are independent and have unit
+    /// variance.
     pub residual: DVector<f64>,
-    /// Derivative of −`residual` with respect to the free parameters (the independent ones if they
-    /// are related) at the most likely force. Residuals × parameters, in inverse SI units.
+    /// Derivative of −`residual` with respect to the free parameters (for related entries, the
+    /// independent unknowns) at the most likely force: residuals × parameters, in inverse SI units.
     pub sensitivity: DMatrix<f64>,
 }
 
@@ -47,7 +49,7 @@ impl Whitened {
         Some(whitened)
     }
 
-    /// Computes the residual without its sensitivity, which needs memory for residuals × parameters
+    /// Computes only the residual; the sensitivity would need memory for residuals × parameters
     /// numbers.
     pub fn residual_of(
         data: &FrequencyData,
@@ -58,8 +60,8 @@ impl Whitened {
         Self::sensitive_to(&[], data, unknowns, values, covariance)
     }
 
-    /// Returns the displacement G F̂ (rows × n, in m) under the most likely force, given its noise
-    /// and the displacement; `None` as for [`Whitened::new`].
+    /// Returns the displacement G F̂ (rows × n, in m) under the most likely force F̂, which follows
+    /// from the noise of the force and the measured displacement; `None` as for [`Whitened::new`].
     pub(super) fn likely_displacement<'a>(
         data: &FrequencyData,
         system: &SecondOrderSystem,
@@ -121,7 +123,8 @@ pub(crate) fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>
     Some((q, root))
 }
 
-/// Computes the weighted residual and receptance of one line; `None` if they do not exist.
+/// Computes the weighted residual and receptance of one line; `None` if one of the two does not
+/// exist.
 fn whiten(
     line: &mut Line,
     matrices: &[DMatrix<f64>; 3],

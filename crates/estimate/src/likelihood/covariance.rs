@@ -9,7 +9,8 @@ use super::residual::Residual;
 use super::response_model::ResponseModel;
 use super::search::Minimum;
 
-/// Singular value decomposition of the Jacobian of the residual, with columns of unit length.
+/// Singular value decomposition of the Jacobian of the residual; the columns of the Jacobian are
+/// scaled to unit length.
 #[derive(Debug, Clone)]
 pub(super) struct Information {
     /// Indices of the parameters that are not at a bound.
@@ -29,7 +30,7 @@ pub(super) struct Information {
     pub(super) is_determined: Vec<bool>,
 }
 
-/// Minimum component of a parameter in a direction that depends on it.
+/// Minimum component of a direction along a parameter if the direction depends on this parameter.
 const PART: f64 = 1e-6;
 
 impl Information {
@@ -97,8 +98,9 @@ impl Information {
         }
     }
 
-    /// Returns groups of parameters that are determined only in combinations: the parameters, and
-    /// the gradients of the combinations, each scaled to a largest coefficient of 1.
+    /// Returns groups of parameters that are determined only in combinations: the indices of the
+    /// parameters and the gradients of the combinations. Each gradient is scaled so that its
+    /// largest coefficient is 1.
     pub(super) fn combinations(&self) -> Vec<(Vec<usize>, Vec<Vec<f64>>)> {
         let null = self.directions.columns_range(self.rank..);
         let takes_part = |at: usize, column: usize| null[(at, column)].abs() > PART;

@@ -13,7 +13,7 @@ use super::residual::real_rows;
 use super::response_model::{LineResponse, ResponseModel};
 use super::search::Linearisation;
 
-/// Delay that explains most of a residual, of one output or of all.
+/// Delay, of one output or of all outputs, that explains most of a residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayScore {
     /// Output that is late; `None` if all outputs are late by the same time.
@@ -22,11 +22,11 @@ pub struct DelayScore {
     pub delay: f64,
     /// Standard error of the delay, in s.
     pub standard_error: f64,
-    /// Probability that noise alone gives a delay as large relative to its standard error; it
-    /// allows for the choice among the outputs.
+    /// Probability that noise alone gives at least this ratio of delay to standard error for one of
+    /// the tested delays.
     pub p_value: f64,
-    /// Change of each parameter if the delay is an unknown of the model, in its unit and to first
-    /// order.
+    /// First-order change of each parameter, in the unit of the parameter, if the delay is an
+    /// unknown of the model.
     pub changes: Vec<f64>,
 }
 
@@ -51,9 +51,9 @@ struct Sums {
     explained: DMatrix<f64>,
 }
 
-/// Returns the delay that explains most of the residual beyond what the parameters explain; `None`
-/// if the data do not determine any. Outputs with a `known` entry of `false` have a delay among the
-/// parameters, and are not tested.
+/// Returns the delay that explains most of the residual beyond the part that the parameters
+/// explain; `None` if the data do not determine a delay. Outputs whose `known` entry is `false`
+/// have a delay among the parameters; they are not tested.
 pub(super) fn delay_score<M: ResponseModel>(
     fit: &Fit<'_, M>,
     linearised: &Linearisation,
@@ -85,7 +85,8 @@ pub(super) fn delay_score<M: ResponseModel>(
     Some(DelayScore { output, delay, standard_error, p_value, changes })
 }
 
-/// Returns the direction of a delay of one output or of all, among the delays of p outputs.
+/// Returns the direction, in the space of the delays of p outputs, of a delay of one output or of
+/// all outputs.
 fn direction_of(output: Option<usize>, p: usize) -> DVector<f64> {
     DVector::from_fn(p, |at, _| f64::from(output.is_none_or(|one| one == at)))
 }
@@ -144,8 +145,8 @@ impl Sums {
                 for (at, (line, weighted)) in block.lines.iter().enumerate() {
                     let row = block.first + at;
                     let errors = block.white(at, p);
-                    // The modelled outputs are the measured ones minus their errors. They include
-                    // the transient, and belong to the most likely inputs.
+                    // The modelled outputs are the measured outputs minus their errors. They
+                    // include the transient, and are the response to the most likely inputs.
                     let input = data.inputs().row(row).transpose();
                     let likely = weighted.likely_input(input.clone(), &errors);
                     let mut modelled = data.outputs().row(row).transpose();

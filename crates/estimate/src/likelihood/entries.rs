@@ -61,7 +61,7 @@ pub fn identify_entries(
     Ok(LikelihoodEstimate::new(&fit, &names, settings.confidence))
 }
 
-/// Parameters of the entries; related entries share one.
+/// Parameters of the entries; related entries share a parameter.
 struct Entries<'a> {
     unknowns: &'a Unknowns,
     near: &'a SecondOrderSystem,

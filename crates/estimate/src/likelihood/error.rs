@@ -3,8 +3,7 @@
 use mechid_model::elements::MachineError;
 use mechid_signal::message;
 
-/// Line data and a model that do not lead to an estimate; every variant carries the offending
-/// numbers.
+/// Error of a fit of a model to line data; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LikelihoodError {

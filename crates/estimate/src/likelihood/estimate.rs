@@ -19,7 +19,8 @@ pub enum IntervalKind {
     Wald,
     /// Limits of the profile likelihood, for a weakly determined parameter or near a bound.
     Profile,
-    /// Range from the bound with the estimate to the one-sided limit of the profile likelihood.
+    /// Range from a bound to the one-sided limit of the profile likelihood; the estimate is at this
+    /// bound.
     OneSided,
     /// Full range between the bounds, because the data do not determine the parameter.
     Open,
@@ -35,8 +36,8 @@ pub struct PriorReport {
     pub standard_deviation: f64,
     /// Share of the information about the parameter that comes from its prior, 0 to 1.
     pub share: f64,
-    /// Probability of a larger difference of the estimate from the mean if prior and data agree;
-    /// `None` if the data have no information.
+    /// Probability of a larger difference between the estimate and the mean of the prior, if prior
+    /// and data agree; `None` if the data have no information about the parameter.
     pub p_value: Option<f64>,
 }
 
@@ -60,7 +61,7 @@ pub struct ParameterEstimate {
     pub prior: Option<PriorReport>,
 }
 
-/// Parameters with only some combinations determined by the data.
+/// Parameters for which the data determine only some combinations.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Combination {
@@ -70,8 +71,8 @@ pub struct Combination {
     /// combinations; other values with the same combinations fit equally well.
     pub values: Vec<f64>,
     /// Coefficients of the parameters in the differential of each determined combination; the
-    /// largest one is 1. Units: that of the parameter with the largest coefficient per unit of each
-    /// parameter.
+    /// largest coefficient is 1. The unit of a coefficient is the unit of the parameter with the
+    /// largest coefficient, divided by the unit of its parameter.
     pub determined: Vec<Vec<f64>>,
 }
 
@@ -97,13 +98,13 @@ impl fmt::Display for Combination {
         }
         let sums = self.determined.iter().map(|coefficients| self.combination(coefficients));
         let sums: Vec<String> = sums.collect();
-        write!(f, "the data determine {names} only by {}", sums.join(" and "))
+        write!(f, "the data determine {names} only through {}", sums.join(" and "))
     }
 }
 
 impl Combination {
     /// Returns whether only a common factor of all values is undetermined: every determined
-    /// combination depends on their ratios alone.
+    /// combination depends only on ratios of the values.
     fn has_common_factor(&self) -> bool {
         let is_ratio = |coefficients: &Vec<f64>| {
             let terms = || coefficients.iter().zip(&self.values).map(|(c, value)| c * value);
@@ -139,7 +140,7 @@ impl Combination {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FoundMinimum {
-    /// Values of the parameters, one for each, in its unit.
+    /// Values of the parameters, each in the unit of its parameter.
     pub parameters: Vec<f64>,
     /// Sum of squares including the priors, a pure number: −2 times the log-likelihood, up to a
     /// constant.
@@ -156,8 +157,9 @@ pub struct FoundMinimum {
 pub struct LikelihoodEstimate {
     /// Parameters, in the order of the model.
     pub parameters: Vec<ParameterEstimate>,
-    /// Covariance of the parameters, one row and one column for each, in the product of their
-    /// units; 0 for parameters at a bound. Undetermined directions do not contribute.
+    /// Covariance of the parameters, parameters × parameters, each entry in the product of the
+    /// units of its two parameters; 0 for parameters at a bound. Undetermined directions do not
+    /// contribute.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub covariance: DMatrix<f64>,
     /// Logarithm of the likelihood, a pure number.
@@ -165,12 +167,13 @@ pub struct LikelihoodEstimate {
     /// Ratio of the sum of squares in units of the noise to its expectation: 1 for a correct model;
     /// `None` if the noise comes from the residual.
     pub misfit_ratio: Option<f64>,
-    /// Probability of a larger misfit if model and noise are correct; `None` if it is unknown.
+    /// Probability of a larger misfit than this one if model and noise are correct; `None` if the
+    /// noise comes from the residual.
     pub misfit_p_value: Option<f64>,
-    /// Factor on the standard errors and intervals from the noise, because model and data differ by
-    /// more than the noise; otherwise 1.
+    /// Factor that multiplies the standard errors and intervals if model and data differ by more
+    /// than the noise; otherwise 1.
     pub error_scale: f64,
-    /// `true` if the noise of all outputs was found white; `None` where it is stated.
+    /// `true` if the noise of all outputs was found to be white; `None` if the noise is stated.
     pub white_noise: Option<bool>,
     /// Ratio of the root mean squares of residual and output, per output.
     pub relative_residual: Vec<f64>,
@@ -193,7 +196,7 @@ impl LikelihoodEstimate {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// Returns the values of the parameters, one for each, in its unit.
+    /// Returns the values of the parameters, each in the unit of its parameter.
     pub fn values(&self) -> Vec<f64> {
         self.parameters.iter().map(|parameter| parameter.value).collect()
     }
@@ -287,8 +290,9 @@ fn interval<M: ResponseModel>(
     ([end(-1.0), end(1.0)], IntervalKind::Profile)
 }
 
-/// Returns the share of a prior and its test: with the prior variance s² and the posterior variance
-/// v, the difference of the estimate from the mean has the variance s² − v if data and prior agree.
+/// Returns the share of a prior and the test of this prior. If data and prior agree, the difference
+/// of the estimate from the prior mean has the variance s² − v, with the prior variance s² and the
+/// posterior variance v.
 fn prior<M: ResponseModel>(
     fit: &Fit<'_, M>,
     at: usize,

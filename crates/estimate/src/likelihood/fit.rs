@@ -42,7 +42,7 @@ pub(super) struct Fit<'a, M> {
     /// Ratio of the sum of squares of the data to its expectation; `None` if the noise comes from
     /// the residual.
     pub(super) misfit_ratio: Option<f64>,
-    /// Probability of a larger misfit under a correct model.
+    /// Probability of a larger misfit than this one if the model is correct.
     pub(super) misfit_p_value: Option<f64>,
     pub(super) is_white: Option<bool>,
 }
@@ -81,7 +81,11 @@ fn check<M: ResponseModel>(
     let dimensions = model.dimensions();
     for (what, expected, got) in [
         ("outputs of the data, one per sensor", dimensions.outputs, data.outputs().ncols()),
-        ("inputs of the data, one per input", dimensions.inputs, data.inputs().ncols()),
+        (
+            "inputs of the data, one per input of the machine",
+            dimensions.inputs,
+            data.inputs().ncols(),
+        ),
         ("lines of the data", model.omega().len(), data.len()),
     ] {
         if expected != got {
@@ -140,17 +144,18 @@ fn with_known_noise<'a, M: ResponseModel>(
     })
 }
 
-/// Expected sum of squares of a correct model in units of the noise, whose covariances may be
-/// sampled.
+/// Mean and variance of the sum of squares of a correct model, in units of the noise. The
+/// covariances of the noise may be sample covariances.
 struct Expected {
     cost: f64,
     variance: f64,
 }
 
 impl Expected {
-    /// Computes the mean and the variance for sample covariances with `freedom` degrees of freedom
-    /// each and `total` together; `spare` is the number of real residuals minus the number of
-    /// parameters. Rows with a common covariance have one statistic, Hotelling's T².
+    /// Computes the mean and the variance of the sum of squares. Each sample covariance has
+    /// `freedom` degrees of freedom, and all covariances together have `total`; `spare` is the
+    /// number of real residuals minus the number of parameters. Rows with the same sample
+    /// covariance form one statistic, Hotelling's T².
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -176,7 +181,7 @@ impl Expected {
         self.variance.sqrt()
     }
 
-    /// Returns the probability of a larger sum of squares.
+    /// Returns the probability that a correct model has a larger sum of squares than `cost`.
     fn p_value(&self, cost: f64) -> f64 {
         share_above_of(cost, self.cost, 0.5 * self.variance)
     }
@@ -264,8 +269,8 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Returns the ratio of the standard errors to those of the noise alone: the Birge ratio if the
-    /// misfit is too large for the noise, otherwise 1.
+    /// Returns the ratio of the standard errors to the standard errors from the noise alone: the
+    /// Birge ratio if the misfit is too large for the noise, otherwise 1.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -306,7 +311,8 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         Some(-0.5 * self.minimum.cost - log_determinant)
     }
 
-    /// Returns the ratio of the root mean squares of error and output, per output.
+    /// Returns, for each output, the ratio of the root mean square of the error to that of the
+    /// output.
     pub(super) fn relative_errors(&self) -> Option<Vec<f64>> {
         let errors = self.residual().errors(&self.minimum.parameters)?.errors;
         let norm = |of: &DMatrix<Complex<f64>>, at: usize| of.column(at).norm();

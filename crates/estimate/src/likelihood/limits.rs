@@ -1,50 +1,52 @@
 //! Limits of the likelihood, with their reasons.
 
-/// Order of the polynomial in s that the transient of an open record adds to every output. It
-/// describes aliasing, which is smooth over the band. Together with the state loads, order 3
-/// corresponds to the load polynomial of order 5 of a machine with all degrees of freedom measured.
+/// Order of the polynomial in s that the transient of an open record adds to every output. The
+/// polynomial describes aliasing, which is smooth over the band. Order 3, together with the state
+/// loads, corresponds to a load polynomial of order 5 of a machine whose degrees of freedom are all
+/// measured.
 pub(super) const TRANSIENT_ORDER: usize = 3;
 
 /// Minimum relative length of the component of a transient column that is orthogonal to the other
-/// columns; a column with less counts as linearly dependent, because rounding would decide its
-/// coefficient.
+/// columns; a column with a shorter component counts as linearly dependent, because rounding would
+/// determine its coefficient.
 pub(super) const TRANSIENT_RANK: f64 = 1e-12;
 
-/// Minimum ratio of singular values of the scaled Jacobian for a determined combination of
-/// parameters: the rounding of the responses, with a reserve.
+/// Minimum ratio of a singular value of the scaled Jacobian to the largest one if the combination
+/// of parameters is determined; the rounding of the responses is well below it.
 pub(super) const RANK: f64 = 1e-9;
 
-/// Minimum share of the squared effect of a delay that the parameters do not explain. Below it
-/// rounding would decide the delay; above it the standard error of the delay does.
+/// Minimum fraction of the squared effect of a delay that the parameters do not explain. Below it
+/// the delay counts as undetermined, because rounding would determine its value.
 pub(super) const DETERMINED_DELAY: f64 = 1e-9;
 
 /// Maximum relative standard error for a Wald interval. For a larger one the interval comes from
 /// the profile of the likelihood, because the likelihood is not quadratic over such a distance.
 pub(super) const WEAK: f64 = 0.3;
 
-/// Relative noise assumed in the first steps of every search: they weight relative deviations of
-/// the response, so that a resonance at a wrong frequency does not dominate all other lines.
+/// Noise, relative to the response, that the first steps of every search assume. These steps weight
+/// relative deviations of the response, so that a resonance at a wrong frequency does not dominate
+/// all other lines.
 pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 
-/// Rise of the sum of squares after the first steps over that of the search with the lowest
-/// minimum, in units of the noise, above which a search ends. With the noise of
+/// Maximum excess of the sum of squares after the first steps of a search over that of the search
+/// with the lowest minimum, in units of the noise. Above it the search ends. With the noise of
 /// [`FIRST_RELATIVE_NOISE`], which is more than that of most measurements, the end of such a search
 /// is less likely by a factor e²⁵.
 pub(super) const HOPELESS_RISE: f64 = 50.0;
 
 /// Numbers (real and imaginary parts of the lines) per unknown in the first steps of every search:
-/// enough for their minimum to be near that of all lines, with which the search continues. With a
-/// fifth of them the resonances of a long record can lie between the lines.
+/// with this number the minimum is near the minimum for all lines, on which the search continues.
+/// With a fifth of this number the resonances of a long record can be between the lines.
 pub(super) const SEARCH_NUMBERS: usize = 100;
 
 /// Damping of a step, relative to the unit diagonal of the Gram matrix, above which the curvature
-/// of the residual is not worth an evaluation: weakly determined directions, along which the
-/// residual is curved, hardly change.
+/// of the residual is not evaluated: such a step hardly moves along the weakly determined
+/// directions, in which the residual is curved.
 pub(super) const SHORT_STEP: f64 = 1.0;
 
 /// Maximum number of responses to state loads (of the sensors, and for each parameter, over all
-/// lines) that stay in memory between a residual and its derivative: 64 MiB. With more, they are
-/// computed again for each record.
+/// lines) that stay in memory between a residual and its derivative: 64 MiB. If there are more, the
+/// responses are computed again for each record.
 pub(super) const KEPT_RESPONSES: usize = 1 << 22;
 
 /// Maximum number of steps of a search.
@@ -65,19 +67,20 @@ pub(super) const PROFILE_MARGIN: f64 = 1.1;
 /// Maximum number of steps between values on either side of the limit of a profile interval.
 pub(super) const PROFILE_SECANTS: usize = 20;
 
-/// Relative deviation from the required rise of the sum of squares that ends the search for the
-/// limit of a profile interval. The limit then differs by a two-thousandth of its distance from the
-/// estimate.
+/// Deviation from the required rise of the sum of squares, relative to this rise, that ends the
+/// search for the limit of a profile interval. The error of the limit is then about a
+/// two-thousandth of its distance from the estimate.
 pub(super) const PROFILE_TOLERANCE: f64 = 1e-3;
 
 /// Maximum relative difference of the sums of squares of two searches with the same minimum.
 pub(super) const SAME_MINIMUM: f64 = 1e-6;
 
-/// Maximum relative difference of a parameter after the first steps of two searches with the same
-/// minimum; a parameter that the lines of these steps do not determine differs by more.
+/// Maximum relative difference of a parameter after the first steps of two searches that would end
+/// at the same minimum. A parameter that the lines of these steps do not determine differs by more.
 pub(super) const SAME_PARAMETER: f64 = 1e-3;
 
-/// Maximum excess of the misfit of a correct model over its expectation, in standard deviations.
+/// Maximum excess of the misfit of a correct model over its expected value, in standard deviations
+/// of the misfit.
 pub(super) const PLAUSIBLE: f64 = 6.0;
 
 /// Relative change of the noise levels that ends the rounds of weighting.
@@ -86,55 +89,58 @@ pub(super) const NOISE_LEVEL_CHANGE: f64 = 1e-6;
 /// Maximum number of rounds that alternate between the levels of white noise and the parameters.
 pub(super) const NOISE_ROUNDS: usize = 30;
 
-/// Number of rounds of weighting by a noise spectrum: the first is efficient, the others refine the
-/// shape of the spectrum.
+/// Number of rounds of weighting by a noise spectrum: the first one gives an efficient estimate,
+/// the others refine the shape of the spectrum.
 pub(super) const COLOURED_ROUNDS: usize = 3;
 
 /// Minimum power of a residual relative to the noise of the round before; a line without residual
 /// would have an unbounded weight.
 pub(super) const LEAST_POWER: f64 = 1e-12;
 
-/// Minimum share of its noise that a residual is assumed to keep after the fit (1 − leverage).
+/// Minimum assumed fraction of the noise that remains in a residual after the fit (1 − leverage).
 pub(super) const LEAST_KEPT: f64 = 0.1;
 
 /// Maximum number of state loads of a machine with open records: the cost of a line grows with
 /// their square.
 pub(super) const MOST_STATES: usize = 150;
 
-/// Maximum number of degrees of freedom of a machine with a state load on each of them. In a larger
-/// machine the sensors respond to fewer independent loads, which are determined first.
+/// Maximum number of degrees of freedom of a machine in which each degree of freedom has a state
+/// load. In a larger machine the sensors respond to fewer independent loads; these loads are
+/// determined first.
 pub(super) const EACH_STATE_DOFS: usize = 24;
 
-/// Maximum number of lines on which the state loads are found: between two of them every mode still
-/// contributes much more than [`STATE_RESPONSE`] to the response.
+/// Maximum number of lines on which the state loads are determined. Between two of these lines
+/// every mode still contributes much more than [`STATE_RESPONSE`] to the response.
 pub(super) const STATE_LINES: usize = 1000;
 
-/// Minimum response of the sensors to a state load, relative to the response to the other state
-/// loads: the noise of measurements is a hundred times larger.
+/// Minimum response of the sensors to a state load (the load that has the effect of the initial and
+/// final state of a record), relative to the response to the other state loads. The noise of
+/// measurements is at least a hundred times this limit.
 pub(super) const STATE_RESPONSE: f64 = 1e-6;
 
-/// Maximum number of known coefficients that are tried as unknowns where a machine does not explain
-/// the data: each costs the derivatives of the response on all lines.
+/// Maximum number of known coefficients that are tried as unknowns if a machine does not explain
+/// the data. Each of them needs the derivatives of the response on all lines.
 pub(super) const FREED_COEFFICIENTS: usize = 24;
 
-/// Maximum number of lines times the cube of the degrees of freedom with unknown terms, if a known
-/// coefficient is tried as an unknown: a step takes about a second.
+/// Maximum product of the number of lines and the cube of the number of degrees of freedom with
+/// unknown terms, if a known coefficient is tried as an unknown. At the limit a step takes about a
+/// second.
 pub(super) const FREED_WORK: f64 = 1e9;
 
 /// Number of searches that must end at the lowest minimum if the known noise explains it; otherwise
 /// the search uses all initial estimates.
 pub(super) const CONFIRMED: usize = 2;
 
-/// Number of searches that must end at the lowest minimum if the noise is unknown, because then no
-/// misfit shows whether the minimum is the correct one.
+/// Number of searches that must end at the lowest minimum if the noise is unknown: without known
+/// noise, no misfit shows whether the minimum is the correct one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 
-/// Number of degrees of freedom of a noise level that is known exactly: with more, Fisher's
-/// distribution does not change.
+/// Number of degrees of freedom that represents an exactly known noise level: with a larger number,
+/// Fisher's distribution hardly changes.
 pub(super) const KNOWN_FREEDOM: f64 = 1e6;
 
-/// Maximum number of records of a fit that are compared with each other: the cost grows with the
-/// square of their number.
+/// Maximum number of records of a fit that are compared with each other. The cost of the comparison
+/// grows with the square of the number of records.
 pub(super) const COMPARED_RECORDS: usize = 16;
 
 /// p-value of the misfit to known noise below which the misfit scales standard errors and
@@ -142,8 +148,8 @@ pub(super) const COMPARED_RECORDS: usize = 16;
 /// necessary.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
 
-/// Maximum share of a gradient outside the determined combinations for a determined quantity; a
-/// share up to this limit is rounding of the singular vectors.
+/// Maximum fraction of the gradient of a determined quantity that is outside the determined
+/// combinations; a fraction up to this limit is rounding of the singular vectors.
 pub(super) const UNDETERMINED_PART: f64 = 1e-5;
 
 /// Maximum ratio of the sum of the terms of a combination to the sum of their absolute values if

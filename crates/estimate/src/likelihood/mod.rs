@@ -1,4 +1,4 @@
-//! One likelihood for the line data of all records and all models.
+//! The likelihood of line data, the same for all kinds of records and models.
 //!
 //! [`LineData`](mechid_spectra::LineData) has the inputs, the outputs and the covariance of their
 //! noise, line by line. A [`ResponseModel`] is the model. All data and models share one residual

@@ -7,7 +7,7 @@ use super::LikelihoodError;
 use super::limits::{HOPELESS_RISE, SAME_MINIMUM, SAME_PARAMETER, STEPS};
 use super::search::{Bounds, Effort, LeastSquaresProblem, Minimum, minimise};
 
-/// A minimum with the number of searches that ended there.
+/// A minimum, and the number of searches that ended at it.
 #[derive(Debug, Clone)]
 pub(super) struct SearchEnd {
     pub(super) minimum: Minimum,
@@ -24,9 +24,9 @@ pub(super) struct Minima {
     pub(super) searches: usize,
 }
 
-/// Returns the initial estimates of all searches: the given one, then random ones, where each value
-/// is multiplied by a log-normal factor within its bounds. A value with a negative lower and a
-/// positive upper bound is drawn uniformly between them.
+/// Returns the initial estimates of all searches: the given one, followed by random ones. In a
+/// random estimate each value is multiplied by a log-normal factor and stays within its bounds. A
+/// value with a negative lower and a positive upper bound is drawn uniformly between them.
 pub(super) fn starts(
     given: &[f64],
     bounds: &Bounds,
@@ -55,10 +55,11 @@ pub(super) fn starts(
 }
 
 /// Searches from one initial estimate after another: first with weights relative to the response,
-/// then with the weights of the noise. A search stops after its first steps if they end far above
-/// the first steps of the lowest minimum, or at the same point as the first steps of another
-/// search. No further search begins when enough searches have ended at the lowest minimum;
-/// `agreeing` returns this number for a sum of squares.
+/// then with the weights of the noise. A search stops after its first steps in two cases: if their
+/// sum of squares is far above that of the search with the lowest minimum after its first steps, or
+/// if they end at the same point as the first steps of another search. No further search begins
+/// when enough searches have ended at the lowest minimum; `agreeing` returns this number for a sum
+/// of squares.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search converges.
@@ -98,7 +99,9 @@ pub(super) fn search(
             let steps = best.minimum.steps + refined.steps;
             best.minimum = Minimum { steps, ..refined };
         }
-        None => log::debug!("the lowest minimum is known to {:.0e}", Effort::ROUGH.tolerance),
+        None => {
+            log::debug!("the lowest minimum is accurate only to {:.0e}", Effort::ROUGH.tolerance)
+        }
     }
     Ok(minima)
 }
@@ -114,9 +117,9 @@ impl Minima {
         known.map(|end| end.searches += 1).is_some()
     }
 
-    /// Returns whether the first steps of a search end so far above the first steps of the lowest
-    /// minimum that the search is very unlikely to end lower. The rise is relative to the misfit of
-    /// the lowest minimum if this misfit is larger than the noise.
+    /// Returns whether, after the first steps, the sum of squares of a search is far above that of
+    /// the search with the lowest minimum. Such a search is very unlikely to end lower. The rise is
+    /// relative to the misfit of the lowest minimum if this misfit is larger than the noise.
     fn is_hopeless(&self, near: &Minimum) -> bool {
         let best = self.ends.first().and_then(|end| end.near.first());
         best.is_some_and(|best| {

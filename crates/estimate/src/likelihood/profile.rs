@@ -8,9 +8,10 @@ use super::response_model::ResponseModel;
 use super::search::{Bounds, Effort, minimise};
 
 /// Returns the limit of an interval of a parameter below (`direction` −1) or above (+1) its
-/// estimate. At this limit the sum of squares, minimised over all other parameters, is larger by
-/// `rise`. If the bound is nearer, the limit is the bound; if the sum never rises by `rise`, the
-/// limit is infinite. The search begins at the distance `first` from the estimate.
+/// estimate. At this limit the sum of squares, minimised over all other parameters, is larger than
+/// at the estimate by `rise`. If the bound is nearer, the limit is the bound; if the sum never
+/// rises by `rise`, the limit is infinite. The search begins at the distance `first` from the
+/// estimate.
 ///
 /// # Source
 /// Venzon & Moolgavkar (1988), Applied Statistics 37, 87–94; Raue et al. (2009), Bioinformatics 25,
@@ -58,9 +59,9 @@ struct Profile<'a, 'b, M: ResponseModel> {
     rise: f64,
 }
 
-/// Value of a parameter with the square root of the rise of the sum of squares, which is about
-/// linear in the distance from the estimate. The root is infinite where the response does not
-/// exist, because the likelihood is zero there.
+/// Value of a parameter, and the square root of the rise of the sum of squares at this value. The
+/// root is approximately proportional to the distance from the estimate. The root is infinite where
+/// the response does not exist, because the likelihood is zero there.
 #[derive(Clone, Copy)]
 struct Point {
     value: f64,
@@ -68,7 +69,7 @@ struct Point {
 }
 
 impl<M: ResponseModel> Profile<'_, '_, M> {
-    /// Fits all other parameters at a value of this one.
+    /// Fits all other parameters while this parameter has the given value.
     fn at(&mut self, value: f64) -> Point {
         let mut fixed: Bounds = self.fit.space.bounds.clone();
         (fixed.min[self.parameter], fixed.max[self.parameter]) = (value, value);
@@ -91,7 +92,7 @@ impl<M: ResponseModel> Profile<'_, '_, M> {
         let needed = self.rise.sqrt();
         for step in 0..PROFILE_SECANTS {
             let share = (needed - inside.root) / (outside.root - inside.root);
-            // Every other step halves the distance, in case that the secant hardly shortens it.
+            // Every other step halves the interval, because a secant step may hardly shorten it.
             let share = if step % 2 == 0 && share > 0.0 { share } else { 0.5 };
             let point = self.at(inside.value + share * (outside.value - inside.value));
             if self.is_limit(point) {

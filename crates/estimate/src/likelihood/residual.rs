@@ -30,14 +30,14 @@ pub(super) struct PriorRow {
 ///
 /// With noisy inputs the covariance S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ depends on the parameters;
 /// the sum of squares is the likelihood after the true inputs and outputs of each line have been
-/// eliminated. The derivative is taken at the most likely input û. Because û is a minimum, Jᵀr is
-/// half the gradient of the sum of squares, and JᵀJ is the Fisher information. The transient τ of
-/// each open record is eliminated, too: residual and derivative are projected onto the orthogonal
-/// complement of its columns A. Errors of pulses are common to all lines of a record: their
-/// amplitudes are unknowns of unit variance, each with a row of its own.
+/// eliminated. The derivative is taken at the most likely input û. Because û minimises the sum of
+/// squares, Jᵀr is half the gradient of this sum, and JᵀJ is the Fisher information. The transient
+/// τ of each open record is eliminated, too: residual and derivative are projected onto the
+/// orthogonal complement of the columns A. Errors of pulses are common to all lines of a record:
+/// their amplitudes are unknowns of unit variance, and each amplitude has one row.
 ///
-/// Row 2(p·line + output) is a real part, the next row the imaginary part; then the amplitudes of
-/// the errors of pulses, then the priors.
+/// Row 2(p·line + output) is a real part, the next row the imaginary part. These rows are followed
+/// by the amplitudes of the errors of pulses, and these by the priors.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -56,13 +56,13 @@ pub(super) struct LineErrors {
     pub(super) errors: DMatrix<Complex<f64>>,
     /// Receptance G of each line.
     pub(super) receptances: Vec<DMatrix<Complex<f64>>>,
-    /// Number of amplitudes of pulses that the lines determine. Each amplitude counts with the
-    /// share of its information that comes from the lines.
+    /// Number of amplitudes of pulses that the lines determine. Each amplitude counts as the
+    /// fraction of its information that comes from the lines.
     pub(super) determined_amplitudes: f64,
 }
 
 /// Lines that are computed together: a block of rows of the residual of one record. The last block
-/// of a record with pulses has no lines, but the rows of the amplitudes of the pulses.
+/// of a record with pulses has no lines; it has the rows of the amplitudes of the pulses.
 pub(super) struct Block<L> {
     /// Index of the first row in the residual.
     pub(super) first_row: usize,
@@ -72,9 +72,10 @@ pub(super) struct Block<L> {
     pub(super) lines: Vec<(L, WeightedLine)>,
     /// Rows of the residual, one column.
     residual: DMatrix<f64>,
-    /// Weighted columns of the transient; empty once they are in its basis.
+    /// Weighted columns of the transient; empty after the basis of the transient has been computed.
     columns: DMatrix<f64>,
-    /// Weighted effects of the amplitudes of pulses; empty once they are in their covariance.
+    /// Weighted effects of the amplitudes of pulses; empty after the covariance of the pulse errors
+    /// has been computed.
     effects: DMatrix<f64>,
 }
 
@@ -97,10 +98,10 @@ struct Fitted<'a> {
     amplitudes: Option<&'a DMatrix<f64>>,
 }
 
-/// Residual at one set of parameters, and what its derivative needs.
+/// Residual at one set of parameters, and the data for its derivative.
 pub(super) struct Evaluation<'a, L> {
-    /// Responses of the lines; `None` if there are too many to keep. They are then computed again
-    /// for the derivative.
+    /// Responses of the lines; `None` if there are too many to store. In this case they are
+    /// computed again for the derivative.
     pub(super) records: Option<Vec<RecordResidual<'a, L>>>,
     /// Residual of all records, then of the amplitudes of pulses and of the priors.
     pub(super) residual: DVector<f64>,
@@ -296,9 +297,9 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(jacobian)
     }
 
-    /// Calls `visit` with the residual of each record: its lines with their responses and the
-    /// factors L of their covariance, and its linear unknowns. `None` if a response does not exist
-    /// or a visit fails.
+    /// Calls `visit` with the residual of each record. It has the lines, their responses, the
+    /// factors L of their covariance, and the linear unknowns of the record. `None` if a response
+    /// does not exist or a visit fails.
     pub(super) fn for_each_record(
         &self,
         parameters: &[f64],
@@ -364,8 +365,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
 }
 
 impl<L> RecordResidual<'_, L> {
-    /// Removes from columns over all rows of the residual what the transient of this record
-    /// explains.
+    /// Removes the part that the transient of this record explains from columns over all rows of
+    /// the residual.
     pub(super) fn remove_transient(&self, columns: &mut DMatrix<f64>) {
         let Some((basis, _)) = &self.transient else { return };
         let rows = |block: &Block<L>| columns.rows(block.first_row, block.residual.len()).into();

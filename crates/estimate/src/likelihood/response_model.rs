@@ -32,12 +32,14 @@ pub trait ResponseModel: Sync {
     /// Returns the angular frequency (rad/s) of each line of the model.
     fn omega(&self) -> &[f64];
 
-    /// Returns the response at a line with parameters in their units, `None` if it does not exist.
+    /// Returns the response at a line; the parameters are in their units. `None` if the response
+    /// does not exist.
     fn at(&self, parameters: &[f64], row: usize) -> Option<Self::Line<'_>>;
 
-    /// Returns the covariance of the outputs due to the uncertainty of the model itself (p × p, in
-    /// the products of their units), at a line with the response `line` under `input` (q, in the
-    /// units of the inputs); `None` for an exact model.
+    /// Returns the covariance of the outputs due to the uncertainty of the model itself; `None` for
+    /// an exact model. `line` is the response at the line, and `input` (q entries, in the units of
+    /// the inputs) acts on the model. The covariance is p × p, each entry in the product of the
+    /// units of its two outputs.
     fn covariance<'l>(
         &'l self,
         _row: usize,
@@ -60,9 +62,10 @@ pub trait LineResponse {
     /// Returns the response to a unit of each state load, p × states.
     fn state_response(&self) -> Option<&DMatrix<Complex<f64>>>;
 
-    /// Writes the derivative of the response to `input` (q), to the model's own loads and to
-    /// `states` (amplitudes of the state loads, which may be empty) with respect to each parameter,
-    /// p × parameters, in units of the outputs per unit of the parameters.
+    /// Writes the derivative of the response with respect to each parameter: p × parameters, in
+    /// units of the outputs per unit of the parameters. The response is that to `input` (q
+    /// entries), to the loads of the model itself and to `states` (amplitudes of the state loads;
+    /// may be empty).
     fn sensitivity(
         &self,
         parameters: &[f64],

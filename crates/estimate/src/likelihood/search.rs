@@ -7,17 +7,17 @@ use super::limits::{SAME_MINIMUM, SHORT_STEP, STEPS};
 
 /// A sum of squares with its derivative.
 pub(super) trait LeastSquaresProblem {
-    /// Residual at one set of parameters, and what its derivative needs.
+    /// Residual at one set of parameters, and the data for its derivative.
     type Evaluation;
 
-    /// Computes the residual, `None` if it does not exist.
+    /// Computes the residual; `None` if it does not exist.
     fn evaluate(&self, parameters: &[f64]) -> Option<Self::Evaluation>;
 
     /// Returns the residual of an evaluation.
     fn residual<'e>(&self, evaluation: &'e Self::Evaluation) -> &'e DVector<f64>;
 
-    /// Returns the residual of an evaluation at `parameters` with its Jacobian, `None` if that does
-    /// not exist.
+    /// Returns the residual of an evaluation at `parameters` and its Jacobian; `None` if the
+    /// Jacobian does not exist.
     fn linearised(&self, parameters: &[f64], evaluation: Self::Evaluation)
     -> Option<Linearisation>;
 }
@@ -29,7 +29,7 @@ pub(super) struct Linearisation {
     pub(super) jacobian: DMatrix<f64>,
 }
 
-/// Bounds of the parameters; a parameter without a bound has an infinite one.
+/// Bounds of the parameters; the bound of an unbounded parameter is infinite.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bounds {
     pub(super) min: Vec<f64>,
@@ -43,7 +43,7 @@ impl Bounds {
         }
     }
 
-    /// Returns whether a parameter is at a bound that a descent would violate.
+    /// Returns whether a parameter is at a bound across which the sum of squares decreases.
     fn blocks(&self, at: usize, value: f64, gradient: f64) -> bool {
         let is_fixed = self.min[at] == self.max[at];
         let below = value <= self.min[at] && gradient > 0.0;
@@ -64,14 +64,15 @@ pub(super) struct Minimum {
     pub(super) at_bound: Vec<bool>,
 }
 
-/// Ratio of the length of a step to the length of the parameters, both scaled by the columns of the
-/// Jacobian, that also ends a search; it decides for data without noise.
+/// Ratio of the length of a step to the length of the parameters that also ends a search; both
+/// lengths are scaled by the columns of the Jacobian. For data without noise this criterion ends
+/// the search.
 const STEP_TOLERANCE: f64 = 1e-12;
 /// First damping, relative to the unit diagonal of the Gram matrix.
 const FIRST_DAMPING: f64 = 1e-8;
-/// Minimum damping; a smaller one is set to zero.
+/// Minimum damping; a smaller value is set to zero.
 const LEAST_DAMPING: f64 = 1e-13;
-/// Maximum damping; with a larger one the step would be rounding.
+/// Maximum damping; with a larger value the step would be only rounding.
 const MAX_DAMPING: f64 = 1e12;
 /// Maximum ratio of the curvature correction to its step; a larger correction is not used.
 const MAX_CORRECTION: f64 = 0.75;
@@ -142,12 +143,12 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Effort for the final estimate: within about 10⁻⁶·√(residuals) standard errors of the
-    /// minimum.
+    /// Effort for the final estimate: it ends within about 10⁻⁶·√(number of residuals) standard
+    /// errors of the minimum.
     pub(super) const FINAL: Self = Self { steps: STEPS, tolerance: 1e-12 };
-    /// Effort to distinguish minima, whose sums of squares differ by more than [`SAME_MINIMUM`].
-    /// The smaller tolerance of the final estimate would cost many steps near a wrong minimum,
-    /// where the residual is large and the steps converge only linearly.
+    /// Effort to distinguish minima. The sums of squares of different minima differ by more than
+    /// [`SAME_MINIMUM`]. The smaller tolerance of the final estimate would cost many steps near a
+    /// wrong minimum, where the residual is large and the steps converge only linearly.
     pub(super) const ROUGH: Self = Self { steps: STEPS, tolerance: 1e-2 * SAME_MINIMUM };
 }
 
@@ -189,7 +190,7 @@ pub(super) fn minimise(
         }
         let next = descend(problem, bounds, &local, &parameters, cost, &mut damping);
         let Some((next, evaluation)) = next else {
-            // No damped step descends: this is a minimum to rounding.
+            // No damped step reduces the cost: this is a minimum up to rounding.
             return Some(Minimum { steps, converged: true, ..ended(&local, &parameters, cost) });
         };
         parameters = next;
@@ -206,8 +207,8 @@ fn ended(local: &Local<'_>, parameters: &[f64], cost: f64) -> Minimum {
     Minimum { parameters: parameters.to_vec(), cost, numbers, steps: 0, converged: false, at_bound }
 }
 
-/// Takes the last step, which is too small to matter for the sum of squares, if it does not
-/// increase the sum.
+/// Takes the last step if it does not increase the sum of squares; its effect on the sum is
+/// negligible.
 fn polished(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,
@@ -230,8 +231,8 @@ fn cost_at(problem: &impl LeastSquaresProblem, parameters: &[f64]) -> Option<f64
     problem.evaluate(parameters).map(|evaluation| problem.residual(&evaluation).norm_squared())
 }
 
-/// Returns the next parameters, with a lower sum of squares, and their residual; `None` if no
-/// damping gives a decrease.
+/// Returns the next parameters, which have a lower sum of squares, and their residual; `None` if no
+/// damping gives a lower sum.
 fn descend<P: LeastSquaresProblem>(
     problem: &P,
     bounds: &Bounds,

@@ -17,8 +17,8 @@ pub(super) struct Thinned<'a, M> {
 }
 
 impl<'a, M: ResponseModel> Thinned<'a, M> {
-    /// Takes one of every n lines of each record, so that about [`SEARCH_NUMBERS`] numbers per
-    /// unknown remain; all lines if there are fewer.
+    /// Takes one of every n lines of each record, so that about [`SEARCH_NUMBERS`] real numbers per
+    /// unknown remain. It takes all lines if the data have fewer numbers.
     pub(super) fn new(residual: &Residual<'a, M>) -> Self {
         let Residual { model, data, .. } = residual;
         let dimensions = model.dimensions();
@@ -36,7 +36,8 @@ impl<'a, M: ResponseModel> Thinned<'a, M> {
         Self { model, rows, omega }
     }
 
-    /// Returns the data of these lines, without the errors of pulses, which the first steps ignore.
+    /// Returns the data of these lines without the errors of pulses, because the first steps ignore
+    /// these errors.
     pub(super) fn lines(&self, data: &LineData) -> Option<LineData> {
         data.rows(&self.rows).map(LineData::without_pulse_noise)
     }

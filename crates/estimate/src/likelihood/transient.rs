@@ -10,7 +10,8 @@ use rayon::prelude::*;
 
 use super::limits::{TRANSIENT_ORDER, TRANSIENT_RANK};
 
-/// Number of powers of s in the loads M (s Δx + Δv) + C Δx from a difference of states.
+/// Number of powers of s in M (s Δx + Δv) + C Δx, the loads due to the difference between the
+/// initial and the final state.
 const STATE_ORDERS: usize = 2;
 
 /// Returns the number of unknowns of the transient of a record with `outputs` outputs and `states`
@@ -22,7 +23,8 @@ pub(super) fn len(transient: Transient, outputs: usize, states: usize) -> usize 
     }
 }
 
-/// Linear unknowns of a record: those of its transient and the amplitudes of its pulse errors.
+/// Linear unknowns of a record: the unknowns of its transient and the amplitudes of its pulse
+/// errors.
 pub(super) struct RecordUnknowns<'a> {
     /// Number of unknowns of the transient.
     pub(super) transient: usize,
@@ -95,9 +97,9 @@ pub(super) struct LineColumns {
 }
 
 impl LineColumns {
-    /// Passes the weighted columns of the transient to `write` with their indices, p entries each:
-    /// the response to the state loads in powers of s/ω₀, then a polynomial in s/ω₀ for every
-    /// output, which describes aliasing.
+    /// Passes the weighted columns of the transient (p entries each) and their indices to `write`.
+    /// The first columns are the response to the state loads in powers of s/ω₀. A polynomial in
+    /// s/ω₀ for every output follows; it describes aliasing.
     pub(super) fn for_each_of_transient(
         &self,
         omega: f64,
@@ -115,9 +117,9 @@ impl LineColumns {
         }
     }
 
-    /// Passes the weighted effects of the amplitudes of the pulse errors on y − G u to `write` with
-    /// their indices, p entries each. They have a negative sign, because the measured inputs u
-    /// contain the errors.
+    /// Passes the weighted effects of the amplitudes of the pulse errors on y − G u (p entries
+    /// each) and their indices to `write`. The effects have a negative sign, because the measured
+    /// inputs u contain the errors.
     pub(super) fn for_each_of_pulses(
         &self,
         omega: f64,
@@ -131,8 +133,8 @@ impl LineColumns {
     }
 }
 
-/// Orthonormal basis Q of the weighted columns A of a transient, by blocks of rows: A P = Q R after
-/// scaling, with a permutation P.
+/// Orthonormal basis Q of the weighted columns A of a transient, stored in blocks of rows: A P = Q
+/// R with a permutation P, where the columns of A are scaled to unit length.
 pub(super) struct TransientBasis {
     /// Rows of Q.
     pub(super) blocks: Vec<DMatrix<f64>>,
@@ -144,7 +146,7 @@ pub(super) struct TransientBasis {
 }
 
 impl TransientBasis {
-    /// Combines the factors of the blocks of rows of A; `None` if they are not finite or
+    /// Combines the factors of the blocks of rows of A; `None` if a factor is not finite or if
     /// there is no block.
     ///
     /// # Source
@@ -183,8 +185,8 @@ impl TransientBasis {
         Some(Self { blocks, triangle, permutation: top.p().clone(), lengths })
     }
 
-    /// Removes the components of vectors in the space of the basis from their blocks of rows, and
-    /// returns the components, one column per vector.
+    /// Removes the components in the space of the basis from vectors that are given in blocks of
+    /// rows, and returns these components, one column per vector.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM J. Numerical Analysis 10, 413–432 (variable projection).

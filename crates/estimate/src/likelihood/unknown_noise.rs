@@ -1,5 +1,5 @@
-//! Noise of the outputs, estimated from the residual in alternation with the parameters: levels,
-//! then spectra.
+//! Noise of the outputs, estimated from the residual in alternation with the parameters: first
+//! levels, later spectra.
 
 use mechid_spectra::LineData;
 use nalgebra::DMatrix;
@@ -38,7 +38,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Residual { model: self.model, data: self.data, weights, priors: self.priors }
     }
 
-    /// Returns the weights of the first search: white noise of a tenth of each output.
+    /// Returns the weights of the first search: white noise with a tenth of the RMS value of each
+    /// output.
     pub(super) fn first_weights(&self) -> Weights {
         let (lines, outputs) = self.data.outputs().shape();
         let power = |column: usize| {

@@ -7,14 +7,14 @@ use super::covariance::Information;
 
 impl Information {
     /// Adds the contribution of the errors of noise spectra to the covariance, and returns the
-    /// smallest number of degrees of freedom of the variance of a parameter. `jacobian` is the
-    /// derivative of the residual, and `bases` are the basis functions of the log powers of each
-    /// record. `None`, without a change of the covariance, if a parameter is not determined.
+    /// smallest number of degrees of freedom among the variances of the parameters. `jacobian` is
+    /// the derivative of the residual, and `bases` are the basis functions of the log powers of
+    /// each record. `None`, without a change of the covariance, if a parameter is not determined.
     ///
-    /// The logarithms of the noise powers are B β with the basis B, where β has unit information.
-    /// With the orthonormal sensitivities Q_l of line l, P_i = Σ b_li Q_lᵀQ_l and h_l = Σ b_li²,
-    /// the covariance of the estimate grows by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the inverse of
-    /// the Fisher information is too small by the same matrix.
+    /// The logarithms of the noise powers are B β with the basis B; the information about β is the
+    /// identity matrix. With the orthonormal sensitivities Q_l of line l, P_i = Σ b_li Q_lᵀQ_l and
+    /// h_l = Σ b_li², the covariance of the estimate grows by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and
+    /// the inverse of the Fisher information is too small by the same matrix.
     ///
     /// # Source
     /// Kenward & Roger (1997), Biometrics 53, 983–997; degrees of freedom: Satterthwaite (1946),

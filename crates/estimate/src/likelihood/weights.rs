@@ -20,7 +20,7 @@ pub(super) struct Weights {
 pub(super) struct WeightedLine {
     /// Lower triangular factor L.
     pub(super) lower: DMatrix<Complex<f64>>,
-    /// Covariance S_uy − S_uu Gᴴ of the errors of the inputs with e; empty for exact inputs.
+    /// Covariance S_uy − S_uu Gᴴ between the errors of the inputs and e; empty for exact inputs.
     cross: DMatrix<Complex<f64>>,
 }
 
@@ -64,7 +64,8 @@ impl Weights {
         Self::new(covariance.collect(), self.outputs)
     }
 
-    /// Adds noise relative to the response: an amplitude `share` of every output.
+    /// Adds noise that is proportional to the response: on each output, its amplitude is `share`
+    /// times the amplitude of this output.
     pub(super) fn with_relative(&self, data: &LineData, share: f64) -> Self {
         let mut covariance = self.covariance.clone();
         for (row, matrix) in covariance.iter_mut().enumerate() {
@@ -141,8 +142,8 @@ impl Weights {
 }
 
 impl WeightedLine {
-    /// Returns the most likely input û = u − Q (L Lᴴ)⁻¹ e, given its noise and the outputs; `white`
-    /// is L⁻¹e.
+    /// Returns the most likely input û = u − Q (L Lᴴ)⁻¹ e, which follows from the noise of the
+    /// inputs and the measured outputs; `white` is L⁻¹e.
     pub(super) fn likely_input(
         &self,
         input: DVector<Complex<f64>>,

@@ -12,24 +12,24 @@ use nalgebra::{DMatrix, DVector};
 use super::{At, Step};
 use crate::{Estimate, EstimateError};
 
-/// Returns the mean missing force (N) of each measured interval, and the inertia force (N) to
-/// compare it with: intervals × degrees of freedom, on the time axis of the records.
+/// Returns the mean missing force (N) of each measured interval, and the inertia force (N) for a
+/// comparison. Each is intervals × degrees of freedom, on the time axis of the records.
 ///
 /// From each measured state (displacement in m, velocity in m/s) the motion of the identified
 /// system under the force (N) is predicted one interval ahead; M (ẋ measured − ẋ predicted)/Δt is
-/// the force that is missing for the measured velocity. Least squares then remove, equation by
-/// equation, the part that a change of the free parameters explains, so that the uncertainty of the
-/// parameters does not appear as a missing force. The rest shows a wrong known mass or a wrong type
-/// of model.
+/// the force that is missing for the measured velocity. Least squares remove, equation by equation,
+/// the part of this force that a change of the free parameters explains, so that the uncertainty of
+/// the parameters does not appear as a missing force. The remaining force shows a wrong known mass
+/// or a wrong type of model.
 ///
-/// For a correct model the residual of this fit is white if random forces disturb the motion. White
-/// noise on the measured motion enters two neighbouring intervals, so its residual is correlated at
-/// lag 1 only.
+/// For a correct model the remaining force is white if random forces disturb the motion. White
+/// noise on the measured motion affects two neighbouring intervals, so it makes the remaining force
+/// correlated at lag 1 only.
 ///
-/// `between` is the factor and the interpolation of a refined fit: the prediction then takes this
-/// number of steps per interval, under the interpolated force. Motions between the samples are not
-/// used, so an interval has one error for any number of points. The discretisation defines the
-/// force between points; for Euler it is held.
+/// `between` is the factor and the interpolation of a refined fit: the prediction takes `factor`
+/// steps per interval, under the interpolated force. Motions between the samples are not used, so
+/// an interval has one error for any number of points. The discretisation defines the force between
+/// points; for Euler's rule the force is held.
 ///
 /// # Errors
 /// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not fit the machine or
@@ -100,8 +100,8 @@ fn remainder(columns: DMatrix<f64>, target: DVector<f64>) -> Result<DVector<f64>
 }
 
 impl Step {
-    /// Returns the velocities (intervals × n) predicted `steps` steps after the states at the
-    /// starts of the intervals.
+    /// Returns the velocities (intervals × n) that are predicted `steps` steps after the start of
+    /// each interval, from the state at the start.
     fn ahead(
         &self,
         force: &Record,

@@ -12,8 +12,9 @@ use crate::EstimateError;
 use crate::limits::INITIAL_UNSEEN;
 
 /// Estimates the displacement and velocity at the first sample so that [`predict`] fits the
-/// measured motions best, each channel relative to its size. All samples count, so noise on the
-/// first one does not matter, and one measured quantity is enough.
+/// measured motions best; the error of each channel is divided by the size of the channel. All
+/// samples are used, so noise on the first sample has little effect, and one measured quantity is
+/// enough.
 ///
 /// An unobservable part of the state (such as the position of a free body with a measured
 /// acceleration only) is set to 0.
@@ -36,17 +37,17 @@ pub fn fitted_start(
     fit.start()
 }
 
-/// Estimate of the initial state of a record that comes in segments, as [`fitted_start`]: memory
-/// does not grow with the record.
+/// Estimate of the initial state, as by [`fitted_start`], of a record that is given in segments:
+/// memory does not grow with the length of the record.
 ///
 /// # Source
-/// As [`fitted_start`]; chapter 6 there (a triangular factor updated by rows).
+/// As [`fitted_start`]; also chapter 6 of the same book (a triangular factor updated by rows).
 #[derive(Debug, Clone)]
 pub struct StartFit {
     system: SecondOrderSystem,
     discretisation: Discretisation,
-    /// Present states of the superposed motions: the free responses to each unit initial state, and
-    /// the response from rest to the force.
+    /// States, at the last sample so far, of the superposed motions: the free response to each unit
+    /// initial state, and the response from rest to the force.
     runs: Vec<InitialState>,
     /// Triangular factor for each measured channel of the columns
     /// \[free responses | measured motion minus response from rest\].
@@ -72,8 +73,9 @@ impl StartFit {
         Ok(Self { system: system.clone(), discretisation, runs, channels, sizes })
     }
 
-    /// Adds the next segment, which begins with the last sample of the preceding one: force (N) and
-    /// the measured motions, the same quantities each time (samples × degrees of freedom).
+    /// Adds the next segment, which begins with the last sample of the preceding segment. A segment
+    /// has the force (N) and the measured motions (samples × degrees of freedom); all segments have
+    /// the same quantities.
     ///
     /// # Errors
     /// As [`predict`] for [`Extent::Open`]; [`NumericsError::Size`] or [`EstimateError::Signal`] if
@@ -162,7 +164,7 @@ impl StartFit {
     }
 }
 
-/// Returns the state at the last sample; rest if its squares underflow.
+/// Returns the state at the last sample; it is rest if the squares of the state underflow.
 fn last(response: &Response) -> Result<InitialState, EstimateError> {
     let last_sample = |record: &Record| record.data().row(record.len() - 1).transpose();
     let (x, v) = (last_sample(response.displacement()), last_sample(response.velocity()));

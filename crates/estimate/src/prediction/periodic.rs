@@ -8,9 +8,10 @@ use nalgebra::{Complex, DMatrix};
 use crate::EstimateError;
 
 /// Predicts displacement, velocity and acceleration of a machine in the steady state. The force (N)
-/// is the band-limited one through the samples of whole periods, as in a fit of spectra.
+/// between the samples of whole periods is band-limited, as in a fit of spectra.
 ///
-/// The prediction is zero at half the sampling rate (even length), where samples have no phase.
+/// For a record of even length the prediction is zero at half the sampling rate, because samples
+/// have no phase at this frequency.
 ///
 /// # Errors
 /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels,

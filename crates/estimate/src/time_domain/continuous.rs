@@ -8,7 +8,8 @@ use crate::EstimateError;
 
 /// Continuous-time \[A B\] from \[Φ − I, Γ\], and its derivative.
 ///
-/// The logarithm is computed for the state (x, Δt ẋ), in which both rows of Φ have the same size.
+/// The logarithm is computed for the state (x, Δt ẋ): with this scale the entries of both block
+/// rows of Φ have similar sizes.
 pub(super) struct Continuous {
     dt: f64,
     dof: usize,

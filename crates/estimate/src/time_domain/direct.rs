@@ -10,12 +10,12 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 /// There is no discretisation error: the equation holds at each instant for any time step. For
 /// several records, or records too long for memory, push their rows to an [`EquationOfMotion`].
 ///
-/// This fit cannot verify an integrator that enforces this equation at its steps: it returns the
-/// exact parameters for a wrong motion, too.
+/// This fit cannot verify an integrator that enforces the equation of motion at its steps: even if
+/// the motion is wrong, the fit returns the exact parameters.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] if the force has another time axis, otherwise as
-/// [`EquationOfMotion::solve`].
+/// [`EstimateError::Signal`] if the time axis of the force differs from that of the response, and
+/// the errors of [`EquationOfMotion::solve`].
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 5 (least squares); equation of

@@ -14,7 +14,7 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
 
 /// M̂, Ĉ, K̂ and their sampled and continuous state equations.
 ///
-/// The residual ratios of its [`Estimate`] refer to the velocity increments ẋ⁺ − ẋ.
+/// The residual ratios of the [`Estimate`] refer to the velocity increments ẋ⁺ − ẋ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeDomainFit {
     estimate: Estimate,
@@ -94,7 +94,7 @@ impl TimeDomainFit {
     /// Inconsistency of the identified dx/dt with the measured velocity: the largest deviation of
     /// the upper half of A from \[0 I\] for the state (x, Δt ẋ), a pure number.
     ///
-    /// It shows a velocity of the wrong scale or a wrong discretisation.
+    /// A large value shows a wrong scale of the velocity or a wrong discretisation.
     ///
     /// # Source
     /// Ours.
@@ -153,7 +153,8 @@ pub(super) struct Regression {
     /// True if the force at the next sample has coefficients, too.
     two_forces: bool,
     pub(super) solution: Solution,
-    /// Coefficients, regressors × 2n; if several sets fit equally well, the smallest one.
+    /// Coefficients, regressors × 2n; if several sets fit equally well, the set with the smallest
+    /// norm.
     coefficients: DMatrix<f64>,
 }
 
@@ -294,7 +295,8 @@ impl Fitted<'_> {
         let (findings, Product { rows: inverse, places, .. }) = equations.findings(unknowns)?;
         let motion = equations.motion_and_force();
         let sensitivity = |(at, p): (usize, &Parameter)| {
-            // The columns are ẋ, x, F; the sensitivity has x, ẋ and the nonzero forces.
+            // The columns of `motion` are ẋ, x, F; the sensitivity has the order x, ẋ, nonzero
+            // forces.
             let by_column = inverse.row(places[at].1) * motion;
             let order =
                 (n..2 * n).chain(0..n).chain(self.regression.forces.iter().map(|j| 2 * n + j));

@@ -1,8 +1,8 @@
 //! M, C and K from sampled displacement, velocity and force.
 //!
 //! From one sample to the next the state z = (x, ẋ) of a machine changes by z⁺ = Φ z + Γ F. Φ and Γ
-//! are fitted by least squares, with every entry free, and converted to M, C and K by an assumption
-//! about the force between the samples ([`Discretisation`]). A force that is identically zero is
+//! are fitted by least squares, with every entry free. An assumption about the force between the
+//! samples ([`Discretisation`]) converts them to M, C and K. A force that is identically zero is
 //! omitted.
 //!
 //! | Discretisation | The force between samples | Error on noise-free data |
@@ -11,10 +11,10 @@
 //! | [`Discretisation::ZeroOrderHold`] | held, as by a digital converter | none if it is held |
 //! | [`Discretisation::FirstOrderHold`] | linear | none if it is linear; ∝ Δt² if it is smooth |
 //!
-//! When the acceleration is measured too, [`equation_of_motion`] needs no discretisation at all.
+//! If the acceleration is measured, too, [`equation_of_motion`] needs no discretisation.
 //!
-//! Noise on displacement or velocity biases all these estimates, because they are regressors; for
-//! noisy periodic records use the [frequency domain](crate::frequency_domain).
+//! Displacement and velocity are regressors, so noise on them biases all these estimates. For noisy
+//! periodic records use the [frequency domain](crate::frequency_domain).
 //!
 //! ```
 //! use mechid_estimate::Unknowns;

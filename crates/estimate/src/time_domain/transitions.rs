@@ -29,7 +29,7 @@ pub struct Transitions {
 }
 
 impl Transitions {
-    /// Creates transitions without a pair, for records with the time step `dt` in seconds.
+    /// Creates transitions without any pair of samples, for records with the time step `dt` (s).
     ///
     /// # Errors
     /// [`EstimateError::NoDof`], [`EstimateError::Signal`] for an invalid time step.

@@ -156,7 +156,7 @@ impl<'a> Inverse<'a> {
     }
 
     /// Returns the eigenvalue of the system for the eigenvalue `theta` of the operator; of two
-    /// candidates, it is the one nearer to `about`.
+    /// candidates, the eigenvalue nearer to `about`.
     pub(super) fn eigenvalue(&self, theta: Complex<f64>, about: Complex<f64>) -> Complex<f64> {
         let omega = self.shift.im;
         if omega == 0.0 {

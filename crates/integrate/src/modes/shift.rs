@@ -40,7 +40,7 @@ impl Reach {
     }
 
     /// Returns whether the first of the modes in the order of the search is well inside the radius;
-    /// outside it unknown modes may precede them.
+    /// outside the radius, unknown modes may precede it.
     pub(super) fn covers(&self, modes: &[Candidate], search: ModeSearch) -> bool {
         let (Some(first), Some(last)) = (self.first(modes), modes.last()) else { return true };
         let last = last.value();
@@ -80,8 +80,9 @@ pub(super) fn merge(
     modes
 }
 
-/// Returns the next shift. If not all modes wanted have converged, it is near one that has not. If
-/// they have (`all_converged`) but the radius is too small, it follows from the first mode.
+/// Returns the next shift. If not all wanted modes have converged, the shift is near a mode that
+/// has not. If all have converged (`all_converged`) but the radius is too small, the shift follows
+/// from the first mode.
 pub(super) fn next_shift(
     found: &[Candidate],
     reach: &Reach,

@@ -90,7 +90,8 @@ impl Space {
             return Err(overflow());
         }
         let remainder = DMatrix::from_fn(self.basis.len() - m, m, |i, j| entry(m + i, j));
-        // Column j ends with the entry of the basis vector that its image added.
+        // The last entry of column j belongs to the basis vector that the image of basis vector j
+        // added.
         let below = self.columns.iter().enumerate().map(|(j, column)| column.len() - 1 - j);
         let below = below.max().unwrap_or(0);
         let mut modes: Vec<Candidate> = Vec::new();
@@ -105,8 +106,8 @@ impl Space {
         Ok(modes)
     }
 
-    /// Returns the mode of an eigenvalue of the operator with its eigenvector in the basis; its
-    /// relative residual in the space is `missed`.
+    /// Returns the mode for an eigenvalue of the operator and the eigenvector in the basis;
+    /// `missed` is the relative residual of this eigenvector in the space.
     fn candidate(
         &self,
         system: &SparseSystem,
@@ -125,8 +126,8 @@ impl Space {
         let mut value = inverse.eigenvalue(theta, about);
         let mut residual = residual_of(system, value, &shape);
         if missed <= limits::RITZ_RESIDUAL && residual > limits::MODE_RESIDUAL {
-            // Rounding in the space is relative to its largest θ; one more product reduces its
-            // share in the directions of smaller θ.
+            // The rounding errors of the basis are relative to its largest θ. One more product with
+            // the operator reduces their share in the directions of smaller θ.
             let [re, im] = [z.map(|z| z.re), z.map(|z| z.im)].map(|part| inverse.apply(&part));
             shape = re.rows(0, n).zip_map(&im.rows(0, n), Complex::new);
             value -= newton_step(system, value, &shape);

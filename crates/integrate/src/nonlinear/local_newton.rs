@@ -19,7 +19,8 @@ pub(crate) struct LocalForces {
 #[derive(Debug, Clone)]
 struct Member {
     force: Arc<dyn NonlinearForce>,
-    /// For each degree of freedom of the force, its index among those of all forces.
+    /// For each degree of freedom of this force, the index among the degrees of freedom of all
+    /// forces.
     at: Vec<usize>,
     x: Vec<f64>,
     v: Vec<f64>,
@@ -128,7 +129,7 @@ impl Member {
 /// Equation a = a_linear − W g(x̂ + β̂ a, v̂ + γ̂ a, t) for the accelerations a; W has the columns
 /// of M̂⁻¹ at the nonlinear forces g.
 ///
-/// Only the p accelerations at these forces are unknown; the others follow from them.
+/// Only the p accelerations at these forces are unknown; all other accelerations follow from them.
 #[derive(Debug)]
 pub(crate) struct LocalNewton {
     forces: LocalForces,

@@ -8,9 +8,9 @@ use crate::system::{Matrices, System};
 
 /// A linear system with nonlinear forces: M ẍ + C ẋ + K x + Σ g(x, ẋ, t) = F.
 ///
-/// Implicit schemes solve for the few degrees of freedom of these forces by Newton's method; the
-/// others remain linear, so that a step costs little more. Stability is checked for the linear part
-/// only.
+/// Implicit schemes solve for the few degrees of freedom of these forces by Newton's method. All
+/// other degrees of freedom remain linear, so that a step takes only a little more time than
+/// without the forces. Stability is checked for the linear part only.
 ///
 /// ```
 /// use mechid_integrate::{Newmark, SystemWithForces, TermForces, integrate};

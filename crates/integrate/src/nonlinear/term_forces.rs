@@ -20,7 +20,7 @@ use crate::nonlinear::force::{NonlinearForce, Tangents};
 pub struct TermForces {
     /// Degrees of freedom of the terms, counted from 0, in ascending order.
     dofs: Vec<usize>,
-    /// Each term with its coefficient, and its coordinate in terms of these degrees of freedom.
+    /// Each term with its coefficient, and its coordinate by index into `dofs`.
     terms: Vec<(Term, f64, Coordinate)>,
 }
 
@@ -28,7 +28,7 @@ impl TermForces {
     /// Creates the forces from terms and their coefficients, each in its own unit.
     ///
     /// # Errors
-    /// [`ModelError::Coefficients`] unless there is one finite coefficient for each.
+    /// [`ModelError::Coefficients`] unless there is one finite coefficient for each term.
     pub fn new(terms: &Terms, coefficients: &[f64]) -> Result<Self, ModelError> {
         terms.check_coefficients(coefficients)?;
         let mut dofs: Vec<usize> = terms.iter().flat_map(|term| ends(term.coordinate())).collect();

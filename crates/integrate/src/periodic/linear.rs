@@ -19,11 +19,11 @@ use crate::system::System;
 /// Finds the response that repeats with the force. The samples of the force are one period (samples
 /// × n, in N).
 ///
-/// Over one period the scheme is an affine map of its state, z_N = Φ z_0 + g. The periodic
-/// state solves (I − Φ) z_0 = g; one pass from rest gives g, a second one the response. The cost is
-/// about two passes, plus the powers of a matrix with two rows per degree of freedom (three for
-/// Houbolt and Wilson θ). If the damping is so small that rounding over the period leaves a gap,
-/// the same factors reduce the gap and the pass is repeated.
+/// Over one period the scheme is an affine map of its state, z_N = Φ z_0 + g. The periodic state
+/// solves (I − Φ) z_0 = g; one pass from rest gives g, and a second pass gives the response. The
+/// cost is about two passes, plus the powers of a matrix with two rows per degree of freedom (three
+/// for Houbolt and Wilson θ). If the damping is so small that rounding over the period leaves a
+/// gap, the same factors reduce the gap and the pass is repeated.
 ///
 /// For more than 300 degrees of freedom Φ is not formed: z_0 is found in the Krylov space of g, Φ
 /// g, Φ² g … (GMRES), at one pass per vector. Few vectors suffice if most of the motion decays
@@ -155,7 +155,7 @@ fn by_products(
     for _ in 0..limits::PERIODIC_SEARCHES {
         let gap = shooting.gap(&start)?;
         if !Shooting::missed(&gap).is_finite() {
-            // The integration refuses this response and reports the sample that overflows.
+            // `response` returns the error that names the sample at which the motion overflows.
             return shooting.response(&start, motion);
         }
         let solution = gmres::solve(&gap, limits::PERIODIC_GMRES_RESIDUAL, most, |state, end| {
@@ -177,7 +177,7 @@ fn by_products(
         start += solution.vector.component_mul(&shooting.scales);
         let size = Shooting::missed(&start.component_div(&shooting.scales));
         let missed = Shooting::missed(&solution.vector) / size;
-        // A correction as large as the one before is rounding.
+        // A correction that is as large as the previous one is only rounding.
         let solved = solution.residual <= limits::PERIODIC_GMRES_RESIDUAL;
         if solved
             && (missed <= limits::PERIODIC_GAP

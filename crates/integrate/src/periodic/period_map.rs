@@ -65,8 +65,8 @@ impl PeriodMap {
         self.map(state, |rest| rest.fill(0.0))
     }
 
-    /// Returns the periodic state; `state` is the end of a period that begins at rest, under the
-    /// same forces.
+    /// Returns the periodic state; `state` is the state at the end of a period that begins at rest,
+    /// under the same forces.
     pub(crate) fn repeat(&self, state: &[f64]) -> Vec<f64> {
         self.map(state, |rest| {
             self.factored.solve_mut(rest);
@@ -119,8 +119,8 @@ impl Blocks {
         }
     }
 
-    /// Returns G with (rows of A at the accelerations) = G (rows of A at the rest), if it exists to
-    /// rounding.
+    /// Returns G with (rows of A at the accelerations) = G (all other rows of A), if such a G
+    /// exists to rounding.
     fn following(&self) -> Option<DMatrix<f64>> {
         let states = self.rest_rest.nrows();
         let amplification = &self.rest_rest + DMatrix::identity(states, states);

@@ -147,8 +147,8 @@ impl<'a> Shooting<'a> {
         Ok(())
     }
 
-    /// Returns the response that begins in `state`, written into a `motion` with as many samples as
-    /// a period.
+    /// Returns the response that begins in `state`, written into `motion`, which has one sample for
+    /// each sample of a period.
     pub(crate) fn response(
         mut self,
         state: &DVector<f64>,

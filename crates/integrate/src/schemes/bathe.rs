@@ -88,7 +88,7 @@ impl Scheme for Bathe {
     fn conventions(&self) -> Vec<Convention> {
         let force = match self.force {
             SubStepForce::Linear => "linear between t and t+Δt",
-            SubStepForce::Supplied => "supplied (function of time or samples there)",
+            SubStepForce::Supplied => "supplied (function of time or samples at this instant)",
         };
         vec![
             Convention { what: "force at t+γΔt", choice: force },

@@ -35,7 +35,7 @@ pub enum CentralDifferenceStart {
 /// later; no quantity is shifted.
 ///
 /// The state has the velocities at half steps, which avoids the cancellation in differences of
-/// displacements at small steps; otherwise the numbers are the same.
+/// displacements at small steps; apart from rounding, the results are those of the usual formula.
 ///
 /// # Source
 /// Dissertation eqs. (3.3.1.1)–(3.3.1.4) and table 3.1; Bathe (1982), section 9.2.1. The half-step

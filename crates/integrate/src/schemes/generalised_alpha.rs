@@ -45,10 +45,11 @@ enum Member {
 /// γ = ½ − α_m + α_f                      β = ¼ (1 − α_m + α_f)²
 /// ```
 ///
-/// The method is of second order and unconditionally stable. ρ∞, the spectral radius at very large
-/// steps, is the fraction of its amplitude that a motion too fast for the step keeps in each step:
-/// 1 damps no motion, 0 removes it in one step. Of all schemes with this property it damps slow
-/// motions least. It uses the loads at t and t + Δt, and starts from the consistent acceleration.
+/// The method is of second order and unconditionally stable. ρ∞ is the spectral radius at very
+/// large steps: in each step, the amplitude of a motion that is too fast for the step is multiplied
+/// by ρ∞. With 1 no motion is damped, with 0 such a motion vanishes in one step. For a given ρ∞,
+/// [`new`](Self::new) returns the member that damps slow motions least. The method uses the loads
+/// at t and t + Δt, and starts from the consistent acceleration.
 ///
 /// # Source
 /// Chung & Hulbert, J. Appl. Mech. 60 (1993), 371–375, eqs. (1)–(6), (17) and (25); HHT-α: Hilber,

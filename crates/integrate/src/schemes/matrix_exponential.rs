@@ -21,11 +21,11 @@ use crate::system::{Matrices, System};
 /// ```
 ///
 /// Here x are the displacements, F the forces, and S the matrix of the first-order form. The only
-/// error is in the force between its samples: none for a force that is held or linear there,
-/// otherwise first or second order. The scheme is stable at any step if the system is. At a jump of
-/// a held force the acceleration is the limit from the right. A step costs products of dense
-/// matrices with two rows per degree of freedom, so that at most 250 degrees of freedom are
-/// allowed.
+/// error is that of the force between its samples. It is zero if the force is really held or linear
+/// there; otherwise it is of first order (held) or of second order (linear). The scheme is stable
+/// at any step if the system is. At a jump of a held force the acceleration is the limit from the
+/// right. A step costs products of dense matrices with two rows per degree of freedom, so that at
+/// most 250 degrees of freedom are allowed.
 ///
 /// # Source
 /// Van Loan, IEEE Trans. Autom. Control 23 (1978), 395–404.
@@ -105,8 +105,8 @@ fn exponentials(
     linear: bool,
 ) -> Result<[DMatrix<f64>; 3], IntegrateError> {
     let n = system.dof();
-    // In step units, the second half of the state is Δt ẋ, and the last quarter is the change of
-    // the force.
+    // In step units, the state consists of x, Δt ẋ, the force, and the change of the force over the
+    // step.
     let mut generator = DMatrix::zeros(4 * n, 4 * n);
     generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&StateTransition::rate(system, dt));
     generator.view_mut((n, 2 * n), (n, n)).copy_from(&StateTransition::force_input(system, dt));

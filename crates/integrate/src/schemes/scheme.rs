@@ -24,7 +24,7 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// Returns the scheme and its parameters, such as `Newmark (β = 0.25, γ = 0.5)`.
     fn name(&self) -> String;
 
-    /// Returns the conventions in force.
+    /// Returns the conventions that the scheme uses.
     fn conventions(&self) -> Vec<Convention>;
 
     /// Returns the instant within each step at which the force must be supplied, as a fraction of

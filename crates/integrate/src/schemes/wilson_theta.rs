@@ -47,7 +47,7 @@ impl WilsonTheta {
         Ok(Self { theta, load: WilsonLoad::Projected })
     }
 
-    /// Returns the same scheme with another load at t + θΔt.
+    /// Returns the same scheme with a different rule for the load at t + θΔt.
     #[must_use]
     pub fn with_load(self, load: WilsonLoad) -> Self {
         Self { load, ..self }
@@ -58,7 +58,7 @@ impl WilsonTheta {
         self.theta
     }
 
-    /// The load convention in force.
+    /// The load convention that the scheme uses.
     pub fn load(&self) -> WilsonLoad {
         self.load
     }

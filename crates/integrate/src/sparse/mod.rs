@@ -1,6 +1,7 @@
 //! Sparse matrices: products and factorisations. Narrow bands are factored by band; otherwise
-//! `faer` factors symmetric positive definite matrices by Cholesky and others by LU, without
-//! exchanges of rows if the pattern is nearly symmetric and the pivots allow it.
+//! `faer` factors symmetric positive definite matrices by Cholesky, and all other matrices by LU.
+//! The LU factorisation exchanges no rows if the pattern is nearly symmetric and the pivots are
+//! large enough.
 
 mod banded;
 mod fill;
@@ -82,7 +83,8 @@ impl SparseLu {
         let diagonals = ordering.diagonals(matrix.pattern());
         if diagonals > limits::NARROW_BAND_DIAGONALS
             && let Some(plan) = CholeskyPlan::new(matrix, sizes)
-            // An entry that is addressed by an index costs about as much time as two of a band.
+            // An entry that is addressed by an index takes about as much time as two entries of a
+            // band matrix.
             && (diagonals > limits::BAND_DIAGONALS || 2 * plan.work() < diagonals * matrix.nrows())
             && let Some(factors) = plan.factor(limit)?
         {

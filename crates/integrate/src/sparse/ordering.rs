@@ -123,7 +123,8 @@ impl Graph {
         order
     }
 
-    /// Returns a node at the edge of its component: hardly any node is farther from the others.
+    /// Returns a node at the edge of its component: hardly any node is farther from the other nodes
+    /// of the component.
     fn peripheral(&self, mut node: u32) -> u32 {
         let mut depth = 0;
         // Each round but the last increases the depth; a few rounds are enough.

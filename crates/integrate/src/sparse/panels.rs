@@ -188,12 +188,12 @@ impl Panel {
 
 /// Returns the width of the panel from column `first` on that has the lowest cost per column.
 fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
-    // Except for the diagonal, the rows of a column are also rows of column j, where j is its
-    // second row. If j is the next column for every column of a panel, the last column has the rows
-    // of all columns.
+    // Let j be the second row of a column: except for the diagonal, all rows of the column are also
+    // rows of column j. If j is the next column for every column of a panel, the last column has
+    // the rows of all columns.
     let follows = |j: &usize| columns.column(*j).0.iter().nth(1) == Some(j + 1);
     let chain = 1 + (first..n - 1).take(WIDTHS[0] - 1).take_while(follows).count();
-    // The unit of cost is an entry; a row and a panel cost several.
+    // The unit of cost is one entry; each row and each panel cost as much as several entries.
     let cost = |width: usize| {
         let rows = columns.column(first + width - 1).0.len() + width;
         (rows * (width + PER_ROW) + PER_PANEL) as f64 / width as f64

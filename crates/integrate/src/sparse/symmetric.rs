@@ -15,8 +15,8 @@ use crate::sparse::general::{pattern, reciprocal_condition};
 use crate::sparse::panels::{Columns, Panels};
 
 /// Factors of a matrix in an order of minimum degree, with rows and columns scaled by the sizes of
-/// their terms. They have a fraction of the entries of a band or of LU factors with exchanges of
-/// rows.
+/// their terms. These factors have far fewer entries than a band, or than LU factors with exchanges
+/// of rows.
 #[derive(Debug)]
 pub(crate) struct CholeskyFactors {
     panels: Panels,

@@ -17,8 +17,8 @@ use crate::sparse::panels::{Columns, Panels};
 use crate::sparse::{NotFactored, combination};
 
 /// Factors L U of a matrix in an order of minimum degree of the pattern of A + Aᵀ, with rows and
-/// columns scaled by the sizes of their terms. Both have the pattern of a Cholesky factor, a
-/// fraction of the entries of a band or of factors with exchanges of rows.
+/// columns scaled by the sizes of their terms. L and U have the pattern of a Cholesky factor, with
+/// far fewer entries than a band, or than factors with exchanges of rows.
 ///
 /// # Source
 /// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 5

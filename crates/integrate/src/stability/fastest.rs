@@ -58,8 +58,8 @@ impl<'a> Fastest<'a> {
 /// Returns the system that moves only along the vector x = `shape`, with mass x*Mx, damping x*Cx
 /// and stiffness x*Kx; its two degrees of freedom are the real and imaginary parts.
 ///
-/// If `shape` belongs to an eigenvector of the amplification matrix, its eigenvalue is also one of
-/// this system.
+/// If `shape` belongs to an eigenvector of the amplification matrix, the eigenvalue of this
+/// eigenvector is also an eigenvalue of the returned system.
 pub(super) fn reduced(
     equations: &Equations,
     shape: &DVector<Complex<f64>>,
@@ -74,8 +74,8 @@ pub(super) fn reduced(
     Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
 }
 
-/// Returns the system along the fastest motion of a passive system, with its eigenvalue of M⁻¹A (A
-/// is one of the matrices) raised to `value`.
+/// Returns the system along the fastest motion of a passive system; the eigenvalue of M⁻¹A (A is
+/// one of the matrices) is increased to `value`.
 pub(super) fn reduced_to(
     equations: &Equations,
     top: &passive::Top,

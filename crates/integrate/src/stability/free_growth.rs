@@ -22,7 +22,7 @@ use crate::system::System;
 /// in up to 40 vectors. The steps are those of the average acceleration method, whose motions grow
 /// exactly if those of the system do. If many motions grow or decay at about the same rate, these
 /// vectors may not suffice; the motion is then followed for 20 more periods. Growth that is slow
-/// against the period may be missed.
+/// compared with the period may be missed.
 ///
 /// ```
 /// use mechid_integrate::growth_per_period;

@@ -1,4 +1,5 @@
-//! Growth of a motion per step: the amplification matrix, its eigenvalues and bounds of them.
+//! Growth of a motion per step: the amplification matrix, its eigenvalues and bounds of these
+//! eigenvalues.
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::RealSchur;
@@ -25,7 +26,7 @@ pub(crate) fn log_square(mu: Complex<f64>) -> f64 {
     (2.0 * mu.re + mu.norm_sqr()).ln_1p()
 }
 
-/// Returns the eigenvalues μ of D; those of the amplification matrix are 1 + μ.
+/// Returns the eigenvalues μ of D; the eigenvalues of the amplification matrix are 1 + μ.
 pub(crate) fn eigenvalues(transition: &Transition) -> Option<Vec<Complex<f64>>> {
     let mut change = transition.change.clone();
     Transition::balance(&mut change)?;
@@ -33,8 +34,8 @@ pub(crate) fn eigenvalues(transition: &Transition) -> Option<Vec<Complex<f64>>> 
 }
 
 /// The amplification matrix, given by its products, in coordinates x, ẋ/ω, ẍ/ω² (and the scheme's
-/// memory of accelerations). For the fastest motion, which decides, these coordinates are of the
-/// same size.
+/// memory of accelerations). For the fastest motion, which determines the stability, these
+/// coordinates are of the same size.
 pub(super) struct Amplification<'a> {
     stepper: &'a mut dyn Stepper,
     /// 1/ω, in s.
@@ -97,8 +98,8 @@ pub(super) fn own_growth(eigenvalues: &[Complex<f64>]) -> f64 {
 /// Returns ln ρ(A), or an upper bound of it that is at most `enough`.
 ///
 /// ‖A^m‖^(1/m) decreases to ρ for m = 1, 2, 4 … (Gelfand's formula); each power is the square of
-/// the one before, scaled. A few products of matrices prove that a motion is damped, long before
-/// eigenvalues would, and there is no iteration that could fail to converge.
+/// the one before, scaled. A few products of matrices prove that a motion is damped. This takes
+/// less time than the eigenvalues, and there is no iteration that could fail to converge.
 pub(super) fn growth(transition: &Transition, enough: f64) -> f64 {
     let mut power = transition.amplification();
     if Transition::balance(&mut power).is_none() {

@@ -63,9 +63,9 @@ pub fn spectral_radius(
 /// seconds; `None` if there is no limit.
 ///
 /// The search covers steps from a thousandth of the shortest time scale 1/|λ| of the system up to a
-/// million times that, in factors of √2. The first step at which the motion grows is then refined
-/// to rounding by bisection. For an unstable system, twice the growth of the system itself is
-/// allowed.
+/// million times this time scale, in factors of √2. The first step at which the motion grows is
+/// then refined to rounding by bisection. For an unstable system, twice the growth of the system
+/// itself is allowed.
 ///
 /// For more than 20 degrees of freedom, the limit is the limit of a single degree of freedom that
 /// moves along the fastest mode. Finding this mode takes a hundred products with the matrices. If

@@ -5,8 +5,8 @@
 ///
 /// Let x be an eigenvector of the amplification matrix, and m = x*Mx, c = x*Cx and k = x*Kx, which
 /// are real. The eigenvalue of x is then also an eigenvalue for the system of one degree of freedom
-/// with m, c and k. Its k/m and c/m do not exceed the largest eigenvalues of M⁻¹K and M⁻¹C. So a
-/// limit for one degree of freedom is a limit for any number.
+/// with m, c and k. The k/m and c/m of this system do not exceed the largest eigenvalues of M⁻¹K
+/// and M⁻¹C. So a limit for one degree of freedom is a limit for any number of degrees of freedom.
 ///
 /// # Source
 /// Hughes (1987), sections 9.1 and 9.2.

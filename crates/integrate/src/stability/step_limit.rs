@@ -42,7 +42,7 @@ impl Examined<'_> {
         stepper: &mut dyn Stepper,
     ) -> Result<(), IntegrateError> {
         let known = self.stable_steps != StableSteps::Unknown;
-        // For one or two degrees of freedom the whole matrix is the least work.
+        // For one or two degrees of freedom, the computation with the whole matrix is the fastest.
         let passive = known && system.dof() > 2 && passive::is_passive(system);
         if passive && self.is_known_stable(system, dt) {
             return Ok(());

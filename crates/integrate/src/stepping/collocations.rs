@@ -43,7 +43,7 @@ struct Collocation {
     motion_map: [Vec<f64>; 2],
     /// Displacement and velocity at every collocation due to a force of 1 N at this one.
     moves: [[f64; MOST]; 2],
-    /// Change E of the state due to this force.
+    /// Change E of the state due to a force of 1 N at this collocation.
     change: Vec<f64>,
     /// Force, in N, equivalent to an acceleration of 1 m/s²; infinite if the scheme is explicit.
     per_acceleration: f64,
@@ -111,7 +111,7 @@ impl Collocations {
 
     /// Takes up to `steps` steps from `state` under the loads of `streams` and writes the first
     /// numbers of each state into `columns`. Step number `from` is the first. Returns the number of
-    /// steps; it ends before a step whose equation it does not solve.
+    /// steps taken; the function stops before a step whose equation it cannot solve.
     pub(crate) fn advance(
         &self,
         state: &mut [f64],
@@ -244,7 +244,7 @@ struct FixedCollocation<const S: usize, const Q: usize> {
     after: f64,
     /// Displacement and velocity at this collocation due to a force of 1 N.
     own: [f64; 2],
-    /// Displacement and velocity at every collocation due to this force.
+    /// Displacement and velocity at every collocation due to a force of 1 N at this one.
     moves: [[f64; Q]; 2],
     change: [f64; S],
     is_explicit: bool,
@@ -282,7 +282,7 @@ impl<const S: usize, const W: usize, const R: usize> Rows<S, W, R> {
         }
     }
 
-    /// Computes two independent sums at a time, which takes half as long.
+    /// Computes two independent sums at a time, in half the time of one after the other.
     fn times(&self, z: &[f64; S], w: &[f64; W]) -> [f64; R] {
         let [mut even, mut odd] = [[0.0; R]; 2];
         for j in (0..S).step_by(2) {
@@ -345,7 +345,7 @@ impl NonlinearForce for Probe {
 
     fn force(&self, time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
         let mut state = self.state();
-        // Newton's method evaluates a constant force exactly once more after the tangent.
+        // After the tangent, Newton's method evaluates a constant force exactly one more time.
         if std::mem::take(&mut state.goes_on) {
             state.asked.pop();
         }

@@ -137,8 +137,8 @@ impl Linear {
 /// Matrix M̂ = M + γ̂ C + β̂ K, factored once, with C and K for the right-hand side.
 ///
 /// Every implicit scheme writes displacement and velocity at its collocation instant as x̂ + β̂ a
-/// and v̂ + γ̂ a: a known part plus the unknown acceleration. It requires equilibrium there,
-/// including the nonlinear forces of the system.
+/// and v̂ + γ̂ a: a known part plus the unknown acceleration. The scheme requires equilibrium at
+/// this instant, including the nonlinear forces of the system.
 #[derive(Debug)]
 pub(crate) struct EffectiveMatrix {
     linear: Linear,

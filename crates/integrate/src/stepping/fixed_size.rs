@@ -37,8 +37,8 @@ impl FixedSize {
     }
 
     /// Takes `steps` steps from `state` under the loads of `streams` and writes the first numbers
-    /// of each state into `columns`. Returns whether all of them are finite; `None`, without a
-    /// step, if there is no loop of that size.
+    /// of each state into `columns`. Returns whether all states are finite. If there is no loop for
+    /// this size, takes no step and returns `None`.
     pub(crate) fn advance(
         &self,
         state: &mut [f64],
@@ -100,7 +100,8 @@ impl FixedSize {
     }
 }
 
-/// Returns whether `factor` steps of `dt` are short against every period, (ωΔt)² below about 1.
+/// Returns whether `factor` steps of `dt` are short compared with every period: (ωΔt)² is below
+/// about 1.
 ///
 /// The entries of D are rounded once and are of the order of (ωΔt)². Beyond that limit an undamped
 /// motion would grow or decay by up to ε in every step; the stepper rounds anew in each step and
@@ -110,8 +111,8 @@ pub(crate) fn resolves(transition: &Transition, dt: f64, n: usize, factor: f64) 
     (0..n).all(|i| change(i) <= 1.0)
 }
 
-/// Returns z(t+2Δt) = z + (2D + D²) z + (B + DB) F(t) + B F(t+Δt); its loads are those of both
-/// steps.
+/// Returns z(t+2Δt) = z + (2D + D²) z + (B + DB) F(t) + B F(t+Δt); the loads of this transition are
+/// the loads of both steps.
 fn doubled(one: &Transition) -> Transition {
     let d = &one.change;
     let later = |b: &DMatrix<f64>| b + d * b;

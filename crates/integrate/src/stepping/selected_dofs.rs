@@ -9,7 +9,7 @@ use crate::error::IntegrateError;
 #[derive(Debug, Clone, Copy)]
 pub struct SelectedDofs<'a> {
     /// Degree of freedom of each channel of the force, without repetition; no force acts on the
-    /// others.
+    /// other degrees of freedom.
     pub forced: &'a [usize],
     /// Degree of freedom of each channel of the response.
     pub observed: &'a [usize],

@@ -78,7 +78,7 @@ impl<'a> Motion<'a> {
         columns.map(|c| &mut c[from..from + len]).collect()
     }
 
-    /// Returns the stored quantities on the time axis of `table`, `Q` of x, ẋ and ẍ.
+    /// Returns the stored quantities on the time axis of `table`: the first `Q` of x, ẋ and ẍ.
     fn into_records<const Q: usize>(
         self,
         table: &ForceTable<'_>,

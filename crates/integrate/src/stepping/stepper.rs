@@ -27,23 +27,24 @@ pub struct Loads<'a> {
     pub time: f64,
     /// F(t), in N, one entry per degree of freedom.
     pub now: &'a [f64],
-    /// F(t + Δt/2), or at another instant within the step, likewise in N per degree of freedom.
+    /// F(t + Δt/2), or the force at another instant within the step, in N, one entry per degree of
+    /// freedom.
     pub middle: &'a [f64],
-    /// F(t + Δt), likewise in N per degree of freedom.
+    /// F(t + Δt), in N, one entry per degree of freedom.
     pub next: &'a [f64],
-    /// F(t + 2Δt), likewise in N per degree of freedom.
+    /// F(t + 2Δt), in N, one entry per degree of freedom.
     pub beyond: &'a [f64],
 }
 
 impl<'a> Loads<'a> {
-    /// Returns loads without force at t = 0; `zeros` has zeros for all of them.
+    /// Returns loads without force at t = 0; `zeros` has one zero per degree of freedom.
     pub(crate) fn none(zeros: &'a [f64]) -> Self {
         Self { time: 0.0, now: zeros, middle: zeros, next: zeros, beyond: zeros }
     }
 }
 
-/// A scheme prepared for one system and one step: the map from one state to the next. It is linear
-/// if the system is.
+/// A scheme prepared for one system and one step: the map from one state to the next. The map is
+/// linear if the system is linear.
 ///
 /// The state at t begins with the motion at t, `[x, ẋ, ẍ]`, 3·n numbers at the same instant; the
 /// memory of the scheme follows. Stepping does not allocate, and fails only if a nonlinear equation
@@ -69,8 +70,8 @@ pub trait Stepper: Send {
     /// not converge; a step of a linear system does not fail.
     ///
     /// # Panics
-    /// If `state` or `change` is shorter than [`state_len`](Self::state_len), or a load that is
-    /// read shorter than [`dof`](Self::dof).
+    /// If `state` or `change` is shorter than [`state_len`](Self::state_len), or if a load that the
+    /// scheme reads is shorter than [`dof`](Self::dof).
     fn change(
         &mut self,
         state: &[f64],
@@ -105,14 +106,16 @@ pub trait Stepper: Send {
         Ok(())
     }
 
-    /// Returns the sample at which the scheme's own recurrence replaces its starting procedure.
+    /// Returns the sample at which the starting procedure ends and the recurrence of the scheme
+    /// begins.
     fn first(&self) -> usize {
         0
     }
 
     /// Starts the motion from `initial`. The forces at samples 0 ..= [`first`](Self::first) are
     /// `early` (N). Writes the motion `[x, ẋ, ẍ]` (m, m/s, m/s², one entry per degree of freedom)
-    /// at each of these samples into `motions`, and the state at the last of them into `state`.
+    /// at each of these samples into `motions`, and the state at the last of these samples into
+    /// `state`.
     ///
     /// # Errors
     /// [`IntegrateError::NotAtRest`] if the starting procedure does not allow an initial velocity;

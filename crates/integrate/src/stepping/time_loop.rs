@@ -33,7 +33,8 @@ pub fn integrate<'a>(
 }
 
 /// Simulates as [`integrate`] does and returns only the displacement, samples × n in m. It needs a
-/// third of the memory; for few degrees of freedom, writing the memory takes most of the time.
+/// third of the memory of [`integrate`]. For few degrees of freedom it also takes less time,
+/// because most of the time is used to write to memory.
 ///
 /// ```
 /// use mechid_integrate::{Newmark, integrate, integrate_displacement};
@@ -62,7 +63,8 @@ pub fn integrate_displacement<'a>(
 }
 
 /// Computes the motion of some degrees of freedom of `system` from `initial` under a sampled force
-/// (in N) on some: the force has samples × `dofs.forced`, the response samples × `dofs.observed`.
+/// (in N) that acts on some degrees of freedom: the force has samples × `dofs.forced`, the response
+/// samples × `dofs.observed`.
 ///
 /// ```
 /// use mechid_integrate::{Newmark, SelectedDofs, integrate_selected};

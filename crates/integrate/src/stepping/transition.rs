@@ -25,7 +25,7 @@ impl Transition {
     }
 
     /// Creates the same map and calls `after` after each unit state, then after each unit load, in
-    /// their order.
+    /// the order of the columns.
     pub(crate) fn read(stepper: &mut dyn Stepper, mut after: impl FnMut()) -> Self {
         let (n, len) = (stepper.dof(), stepper.state_len());
         let (instants, zeros) = (stepper.instants(), vec![0.0; n]);

@@ -194,7 +194,7 @@ enum Between {
 
 impl Excitation {
     /// Returns the force over one period, in N. If `within_step` is given, the force is shifted by
-    /// this fraction of a step; this is an error for a force that is unknown between samples.
+    /// this fraction of a step; a shift is an error for a force that is unknown between samples.
     pub fn sampled(
         &self,
         sampling: Sampling,

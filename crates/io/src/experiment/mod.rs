@@ -96,8 +96,8 @@ impl Experiment {
     /// Reads the description of an experiment in a file, or on standard input as `-`.
     ///
     /// # Errors
-    /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`]; the names of
-    /// other files in it are relative to its folder.
+    /// [`IoError::Read`] if the file cannot be read, otherwise as [`Experiment::parse`]. Names of
+    /// other files in the description are relative to the folder of this file.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let (file, experiment) = json::read::<Self>(path.as_ref())?;
         experiment.loaded(file, json::folder(path.as_ref()))
@@ -117,7 +117,8 @@ impl Experiment {
     }
 
     /// Sets the name for messages, and reads the system or its matrices in files relative to
-    /// `folder`. Nonlinear terms of the description replace those of the file with the system.
+    /// `folder`. Nonlinear terms of the description replace the nonlinear terms of the file with
+    /// the system.
     fn loaded(mut self, file: String, folder: &Path) -> Result<Self, IoError> {
         let LoadedSystem { sparse, nonlinear, files } = self.system.load(&file, folder)?;
         let nonlinear = self.nonlinear.take().or(nonlinear);
@@ -178,8 +179,8 @@ impl Experiment {
         }
     }
 
-    /// Returns the degrees of freedom, counted from 0, of the force channels: all; for a sparse
-    /// system those with an excitation, in rising order.
+    /// Returns the degrees of freedom, counted from 0, of the force channels: all degrees of
+    /// freedom or, for a sparse system, the degrees of freedom with an excitation, in rising order.
     ///
     /// # Errors
     /// [`IoError::Description`] for a degree of freedom that the system does not have, and those of
@@ -189,7 +190,7 @@ impl Experiment {
         for excitation in &self.excitation {
             if !(1..=dof).contains(&excitation.dof) {
                 return Err(self.wrong(format!(
-                    "the excitation drives degree of freedom {}, the system has {dof}",
+                    "the excitation drives degree of freedom {} (counted from 1), but the system has {dof}",
                     excitation.dof
                 )));
             }
@@ -203,8 +204,9 @@ impl Experiment {
         Ok(if driven.is_empty() { vec![0] } else { driven.into_iter().collect() })
     }
 
-    /// Returns the degrees of freedom, counted from 0, whose response is recorded: those described
-    /// as `outputs`; by default all, for a sparse system those with a force.
+    /// Returns the degrees of freedom, counted from 0, whose response is recorded: the described
+    /// `outputs`. By default, these are all degrees of freedom or, for a sparse system, the degrees
+    /// of freedom with a force.
     ///
     /// # Errors
     /// [`IoError::Description`] for an empty list, for a degree of freedom that the system does not
@@ -218,11 +220,11 @@ impl Experiment {
         for (place, output) in outputs.iter().enumerate() {
             if !(1..=dof).contains(output) {
                 return Err(self.wrong(format!(
-                    "outputs names degree of freedom {output}, the system has {dof}"
+                    "`outputs` names degree of freedom {output} (counted from 1), but the system has {dof}"
                 )));
             }
             if outputs[..place].contains(output) {
-                return Err(self.wrong(format!("outputs names degree of freedom {output} twice")));
+                return Err(self.wrong(format!("`outputs` names degree of freedom {output} twice")));
             }
         }
         Ok(outputs.iter().map(|output| output - 1).collect())
@@ -290,7 +292,7 @@ impl Experiment {
         let wrong = |got| {
             let (got, dof) =
                 (message::count(got, "entry"), message::count(dof, "degree of freedom"));
-            format!("{what} has {got}, the system has {dof}")
+            format!("{what} has {got}, but the system has {dof}")
         };
         given.values(dof).map_err(|got| self.wrong(wrong(got)))
     }

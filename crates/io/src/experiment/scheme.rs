@@ -171,7 +171,7 @@ pub enum FirstDisplacements {
     /// Taylor step with the consistent acceleration.
     #[default]
     Taylor,
-    /// The displacement of the first sample: at rest until then.
+    /// The displacement of the first sample: the system is at rest before it.
     Rest,
 }
 

@@ -43,8 +43,8 @@ pub struct ExperimentStudy {
 /// Choice of the runs of a study.
 #[derive(Debug)]
 pub enum StudyRuns {
-    /// Number of runs that differ in their noise alone: the seed increases by 1 from the described
-    /// one.
+    /// Number of runs that differ in their noise alone: the seed increases by 1 from run to run,
+    /// beginning at the described one.
     Seeds(usize),
     /// Table with a row for each run, and a column for each field that changes.
     Table(Box<Table>),
@@ -103,7 +103,8 @@ impl ExperimentStudy {
                 })?;
                 if noise.seed.saturating_add(*count as u64) > LARGEST_WHOLE {
                     return Err(refused(format!(
-                        "{count} seeds from {} on exceed {LARGEST_WHOLE}: choose a smaller seed",
+                        "{count} seeds, counted up from {}, exceed the largest possible seed, \
+                         {LARGEST_WHOLE}: choose a smaller first seed",
                         noise.seed
                     )));
                 }
@@ -245,7 +246,10 @@ mod tests {
             (1..=3).map(|run| study.experiment(run).unwrap().noise.unwrap().seed).collect();
         assert_eq!(seeds, [0, 1, 2].map(|more| 9_007_199_254_740_980 + more));
         let refused = super::tests::study(&StudyRuns::Seeds(100)).unwrap_err().to_string();
-        assert!(refused.contains("100 seeds from 9007199254740980 on exceed"), "{refused}");
+        assert!(
+            refused.contains("100 seeds, counted up from 9007199254740980, exceed"),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -91,15 +91,15 @@ impl Attributes {
         let number = |names: &[&str], default: f64| match named(names) {
             None => Ok(default),
             Some((_, Value::Number(number))) if *number != 0.0 || default == 0.0 => Ok(*number),
-            Some((name, _)) => {
-                Err(format!("numbers whose attribute {name} is not one usable number"))
-            }
+            Some((name, _)) => Err(format!(
+                "numbers whose attribute {name} is not a single number, or is a factor of 0"
+            )),
         };
         let (factor, offset) = (number(&FACTORS, 1.0)?, number(&[OFFSET], 0.0)?);
         match named(&UNCLEAR_OFFSETS).filter(|_| named(&FACTORS).is_some()) {
             Some((name, _)) => Err(format!(
-                "numbers with a factor and the attribute {name}, an offset that may be added before or after \
-                 the multiplication: store it as {OFFSET}, which is added after the multiplication"
+                "numbers with a factor and the offset {name}; it is not clear whether this offset is added before or \
+                 after the multiplication: store it as {OFFSET}, which is added after the multiplication"
             )),
             None => Ok(Some((factor, offset)).filter(|scaling| *scaling != (1.0, 0.0))),
         }

@@ -1,7 +1,8 @@
 //! Timetables among the objects of MATLAB 7.3.
 //!
 //! A variable of a class holds the number of its object. A table of integers that all variables
-//! share, `#subsystem#/MCOS`, lists the properties of the objects; its other cells are the values.
+//! share, `#subsystem#/MCOS`, lists the properties of the objects; the other cells of `MCOS` are
+//! the values of these properties.
 //!
 //! # Source
 //! The format is not published; after the description and the writer of the package `mat-io` 1.0.
@@ -39,7 +40,7 @@ const FIRST_VALUE: usize = 2;
 /// come before them.
 const NAMES: usize = 40;
 
-/// Property of a timetable that holds all others.
+/// Property of a timetable that contains all other properties.
 const ALL_PROPERTIES: &str = "any";
 
 /// Milliseconds in a second.
@@ -50,7 +51,7 @@ pub(super) struct Objects {
     cells: Vec<Object>,
     names: Vec<String>,
     classes: Vec<u32>,
-    /// Properties that the class wrote by a function of its own.
+    /// Properties that a special function of the class wrote.
     saved: Vec<u32>,
     objects: Vec<u32>,
     properties: Vec<u32>,

@@ -1,8 +1,8 @@
 //! Soft links in groups of the format before HDF5 1.8.
 //!
-//! The decoder expects an object behind each entry of such a group. A soft link has none, and one
-//! of them made all members of its group unreadable. Its entry is therefore removed first, in
-//! memory.
+//! The decoder expects an object behind each entry of such a group. A soft link has no object, so
+//! that a single soft link makes all members of its group unreadable. The entries of soft links are
+//! therefore removed first, in memory.
 //!
 //! # Source
 //! The HDF Group, *HDF5 File Format Specification*, version 3, sections III.B (Disk Format: Level

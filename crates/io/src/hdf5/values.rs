@@ -91,7 +91,7 @@ fn unusable_class(attributes: &Attributes) -> Option<&'static str> {
         Some("function_handle") => Some("a function"),
         _ if attributes.has("MATLAB_object_decode") => Some(
             "an object of MATLAB, such as a timetable or a string: save S = struct('time', \
-             seconds(T.Time - T.Time(1)), 'x', T.x) of it",
+             seconds(T.Time - T.Time(1)), 'x', T.x) instead",
         ),
         _ if attributes.has("MATLAB_sparse") => Some("a sparse matrix"),
         _ => None,
@@ -202,7 +202,7 @@ impl CompoundType for Pair {
 
 /// Reads complex numbers.
 fn complex(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, Trouble> {
-    // While they are decoded, the stored bytes need memory in addition to the numbers.
+    // During decoding, the stored bytes need memory in addition to the numbers.
     let lengths = lengths(dataset, 4, len, budget)?;
     let pairs = dataset.read_compound::<Pair>();
     let pairs = pairs.map_err(|error| {

@@ -121,7 +121,7 @@ fn object(elements: &mut Elements<'_>) -> &'static str {
     let mut words = [(); 2].map(|()| elements.next().ok().flatten().map(|word| text(word.data)));
     match words[1].take().as_deref() {
         Some("timetable") => {
-            "a timetable: save S = struct('time', seconds(T.Time - T.Time(1)), 'x', T.x) of it"
+            "a timetable: save S = struct('time', seconds(T.Time - T.Time(1)), 'x', T.x) instead"
         }
         Some("table") => "a table: save table2struct(T, 'ToScalar', true)",
         Some("timeseries") => "a timeseries: save struct('time', T.Time, 'x', T.Data)",
@@ -256,7 +256,7 @@ fn structs(
         _ => 0.0,
     };
     if !(length >= 1.0 && length.fract() == 0.0) {
-        return Err(Fault::new(at, "the field names of a struct have no length"));
+        return Err(Fault::new(at, "the length of the field names of a struct is not stated"));
     }
     let names = elements.required("field names")?;
     let names: Vec<String> = names.data.chunks_exact(length as usize).map(text).collect();

@@ -106,7 +106,10 @@ impl<'a> Elements<'a> {
         let data = remaining.get(..len).ok_or_else(|| {
             Fault::new(
                 at,
-                format!("an element of {len} bytes has {}: the file is cut short", remaining.len()),
+                format!(
+                    "an element of {len} bytes has only {}: the file is cut short",
+                    remaining.len()
+                ),
             )
         })?;
         self.next += 8 + if is_padded(kind) { len.next_multiple_of(8) } else { len };

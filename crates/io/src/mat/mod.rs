@@ -1,8 +1,8 @@
 //! MATLAB files of level 5, which versions 5 to 7.2 write, compressed or not.
 //!
 //! This reader replaces two existing crates: one accepts only the header of MATLAB itself (not that
-//! of SciPy) and silently omits what a truncated file lacks; the other prints to the terminal, and
-//! reads neither structs nor doubles that are stored as bytes.
+//! of SciPy) and reads a truncated file without an error; the other crate prints to the terminal,
+//! and reads neither structs nor doubles that are stored as bytes.
 //!
 //! # Source
 //! The MathWorks, *MAT-File Format*.

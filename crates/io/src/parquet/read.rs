@@ -339,8 +339,8 @@ enum Kind {
     /// Unsigned integers.
     Unsigned,
     /// Instants in integer units, with the number of units per second. They are read as seconds
-    /// from the first one, because the seconds since 1970 would leave an f64 too few digits for a
-    /// sampling step.
+    /// from the first instant on, because an f64 has too few digits for seconds since 1970 with the
+    /// resolution of a sampling step.
     Instants(f64),
 }
 
@@ -412,7 +412,7 @@ impl Kind {
                 append(column, rows, |v| integer(*v, v.cast_unsigned() as f64), into)
             }
             _ => Err(Trouble::Damaged(
-                "the type of a column is not the one that the file states".into(),
+                "a column does not have the type that the file states for it".into(),
             )),
         }
     }

@@ -33,7 +33,7 @@ pub(super) struct Plan {
 /// Row with a different number of fields or too many bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BadRow {
-    /// A row with another number of fields.
+    /// A row whose number of fields differs from that of the first row.
     Ragged { line: u64, fields: usize },
     /// A row that is too long.
     TooLong { line: u64 },
@@ -229,7 +229,7 @@ impl Batch {
             {
                 self.columns[column].push(value);
             }
-            // The number has the other decimal sign than the file.
+            // The decimal sign of this number differs from that of the rest of the file.
             Some(Number { sign, .. }) => {
                 let sign = match sign {
                     Some(DecimalSign::Comma) => DecimalSign::Point,
@@ -252,7 +252,7 @@ impl Plan {
     }
 
     /// Checks the number of fields of a row. A difference in empty fields at the end is accepted:
-    /// some programs end some lines with a delimiter and others not.
+    /// some programs end only some of the lines with a delimiter.
     pub fn check(&self, line: u64, fields: usize, filled: usize) -> Result<(), BadRow> {
         if fields < self.filled || filled > self.width {
             return Err(BadRow::Ragged { line, fields });

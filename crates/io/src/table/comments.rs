@@ -31,14 +31,15 @@ const UNITS: [&str; 6] = ["units", "unit", "einheiten", "einheit", "unités", "u
 #[derive(Debug, Default)]
 pub(super) struct Comments {
     lines: Vec<CommentLine>,
-    /// Comments with names or units whose number is not that of the columns, the nearest first.
+    /// Comments whose number of names or units differs from the number of columns, the nearest
+    /// first.
     unfitting: Vec<Unfitting>,
     definitions: Definitions,
     /// Names of the columns, if each has a definition with a unit.
     defined_names: Option<Vec<String>>,
 }
 
-/// Comment with names or units whose number is not that of the columns.
+/// Comment whose number of names or units differs from the number of columns.
 #[derive(Debug)]
 struct Unfitting {
     text: String,
@@ -127,16 +128,16 @@ impl Comments {
         without_names.map(|(_, line)| units_of(&line.fields, line.are_units))
     }
 
-    /// Returns remarks on comments that were not read because the number of their names or units is
-    /// not that of the `columns`. If the columns have names from elsewhere, only comments with
+    /// Returns remarks on comments that were not read because the number of their names or units
+    /// differs from the number of `columns`. If the columns already have names, only comments with
     /// units get a remark.
     pub fn remarks(&self, columns: usize, has_names: bool) -> impl Iterator<Item = String> {
         let unread = self.unfitting.iter().filter(move |line| line.has_units || !has_names);
         unread.map(move |Unfitting { text, fields, has_units }| {
             let what = if *has_units { "names or units" } else { "names" };
             format!(
-                "not read: the comment \"{}\" has {fields} fields and the table {}: if they are {what} of \
-                 columns, give each column one (units also with `unit`)",
+                "not read: the comment \"{}\" has {fields} fields, but the table has {}: if the fields are {what} \
+                 of columns, give one field for each column (units also with `unit`)",
                 escaped(text),
                 message::count(columns, "column")
             )
@@ -156,10 +157,10 @@ pub(super) fn units_of(fields: &[String], are_units: bool) -> Vec<String> {
 }
 
 impl Unfitting {
-    /// Detects names or units in a comment whose number of fields is not that of the columns.
-    /// Either a word says so, or the comment is directly above the table and its delimiters are not
-    /// single blanks. In the second case, at least half of the fields have a unit or the name of a
-    /// quantity, or all fields are single words.
+    /// Detects names or units in a comment whose number of fields differs from the number of
+    /// columns. Either a word such as `units` introduces them, or the comment is directly above the
+    /// table and its delimiters are not single blanks. In the second case, at least half of the
+    /// fields have a unit or the name of a quantity, or all fields are single words.
     fn new(text: &str, layout: Layout, is_adjacent: bool) -> Option<Self> {
         let (names, units) = (after_word(text, &NAMES), after_word(text, &UNITS));
         let stated = names.or(units);

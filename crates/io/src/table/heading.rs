@@ -31,7 +31,7 @@ pub(super) struct Above {
 pub(super) struct Heading {
     /// One name per column.
     pub names: Vec<String>,
-    /// Texts for the units of the columns; empty if there is no such row.
+    /// Texts for the units of the columns; empty if there is no row of units.
     pub units: Vec<String>,
     /// Row of numbers at which the table begins, counted from 0.
     pub begin: usize,
@@ -63,11 +63,11 @@ pub(super) fn first_rows(text: &[u8], layout: Layout) -> Vec<Beginning<'_>> {
 
 /// Numbers of fields in the rows of a table, up to the last field that is not empty.
 struct Filled {
-    /// Number in the first row, without a comment.
+    /// Number of fields in the first row, without a comment.
     first: usize,
-    /// Smallest number in the rows after the first.
+    /// Smallest number of fields in the rows after the first.
     usual: usize,
-    /// `true` if all rows after the first have this number.
+    /// `true` if all rows after the first have this number of fields.
     is_uniform: bool,
 }
 
@@ -232,7 +232,7 @@ impl NamesAndUnits {
         let before = units.and_then(|units| (0..units).rev().find(is_names));
         let quantities =
             |at: &usize| texts(&above[*at]).iter().filter(|text| is_named_quantity(text)).count();
-        // Without units, most names are in the row that states most quantities.
+        // Without a row of units, the row of names is the one that states most quantities.
         let most_quantities = || (0..above.len()).filter(is_names).max_by_key(quantities);
         let names = before
             .or_else(most_quantities)
@@ -240,7 +240,7 @@ impl NamesAndUnits {
         Some(Self { names, units: units.filter(|units| *units != names) })
     }
 
-    /// Returns the units in the other rows.
+    /// Returns the units in the rows other than the rows of names and units.
     fn further_units(&self, above: &[Beginning<'_>], layout: Layout) -> Vec<Vec<String>> {
         let is_other = |at: &usize| *at != self.names && Some(*at) != self.units;
         let others = (0..above.len()).filter(is_other).map(|at| &above[at]);

@@ -86,7 +86,8 @@ fn date(text: &str) -> Option<i64> {
     }
     let (year, month, day) = match (first, second, third) {
         ((4, Some(year)), (1 | 2, Some(month)), (1 | 2, Some(day))) => (year, month, day),
-        // The day comes before the month, except with a slash if only the other order is possible.
+        // With a slash, the first number is the month if it is at most 12. In all other cases it is
+        // the day.
         ((1 | 2, Some(a)), (1 | 2, Some(b)), (4, Some(year))) => {
             let month_first = separator == '/' && a <= 12;
             if month_first { (year, a, b) } else { (year, b, a) }

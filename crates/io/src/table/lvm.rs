@@ -56,7 +56,7 @@ pub(super) fn is_complete(text: &[u8]) -> bool {
 }
 
 impl LvmHeader {
-    /// Reads the headers of the file and of its first segment; `None` if there is none.
+    /// Reads the headers of the file and of its first segment; `None` if there is no such header.
     pub fn parse(text: &[u8], terminator: u8) -> Option<Self> {
         let start = &text[..text.len().min(MAX_BYTES)];
         let mut ends = memmem::find_iter(start, END);
@@ -143,7 +143,8 @@ impl ChannelRows {
     /// Returns the fields of a row, one per channel.
     ///
     /// If each channel has a column of instants, most programs write the field of a channel above
-    /// its values, with an empty field above the next instants. Others write no empty fields.
+    /// its values, with an empty field above the next instants. Other programs write no empty
+    /// fields.
     fn channel_fields(&self, fields: &[String], instants: Instants) -> Vec<String> {
         let is_packed = self.are_packed || is_packed(fields);
         let step = if instants == Instants::Each && !is_packed { 2 } else { 1 };
@@ -151,8 +152,8 @@ impl ChannelRows {
     }
 }
 
-/// Returns whether a field above a column of instants has text; it is empty if the row has one
-/// field per column.
+/// Returns whether a field above a column of instants has text; this field is empty if the row has
+/// one field per column.
 fn is_packed(fields: &[String]) -> bool {
     fields.iter().skip(1).step_by(2).any(|field| !field.is_empty())
 }

@@ -232,8 +232,8 @@ impl Table {
         self.names.len()
     }
 
-    /// Returns the most frequent number of samples of a column; it is equal for all columns of a
-    /// text.
+    /// Returns the most frequent number of samples of a column; in a text, all columns have the
+    /// same number.
     pub fn len(&self) -> usize {
         self.contents.samples
     }
@@ -272,8 +272,9 @@ impl Table {
         self.stated_unit(column, None)?.used().cloned()
     }
 
-    /// Returns what a column, by its index counted from 0, states about its unit if it should have
-    /// the quantity `wanted`: the unit, or a text that may be a unit and is not understood.
+    /// Returns what the column with index `column` (from 0) states about its unit: the unit, or a
+    /// text that may be a unit but is not understood. `wanted` is the quantity that the column
+    /// should have.
     ///
     /// # Panics
     /// If there is no such column.
@@ -330,7 +331,7 @@ impl Table {
     }
 
     /// Returns the factor that converts a column, by its index counted from 0, to the SI unit of
-    /// `wanted` (N, m, m/s, m/s²): 1 if it states no unit.
+    /// `wanted` (N, m, m/s, m/s²): 1 if the column states no unit.
     ///
     /// # Errors
     /// [`IoError::OtherQuantity`] if its unit is one of another quantity.
@@ -393,8 +394,8 @@ impl Table {
         (0..self.width()).find(is_time).map(|at| self.names[at].as_str())
     }
 
-    /// Returns whether a time column, by its index counted from 0, states its unit, in its name or
-    /// in the line of units; otherwise it is read in seconds.
+    /// Returns whether the time column with index `column` (from 0) states its unit, in its name or
+    /// in the line of units. Without a unit, it is read in seconds.
     ///
     /// # Panics
     /// If there is no such column.
@@ -403,8 +404,9 @@ impl Table {
         column.has_instants || time_unit::unit_of(column).is_some()
     }
 
-    /// Returns what a time column, by its index counted from 0, states about its unit, if that is
-    /// doubtful: a text that is not understood, a factor, or a unit of another quantity.
+    /// Returns what the time column with index `column` (from 0) states about its unit, if the
+    /// statement is doubtful: a text that is not understood, a factor, or a unit of another
+    /// quantity.
     ///
     /// # Panics
     /// If there is no such column.
@@ -433,13 +435,13 @@ impl Table {
         self.contents.lines.position(sample)
     }
 
-    /// Returns a list of the columns, for a message: `1 "time", 2 "force"`; only of the first ones
+    /// Returns a list of the columns, for a message: `1 "time", 2 "force"`; only the first columns
     /// if there are very many.
     pub fn available(&self) -> String {
         self.list(self.filled_columns())
     }
 
-    /// Returns a list of columns by their indices; only of the first ones if there are very many.
+    /// Returns a list of columns by their indices; only the first columns if there are very many.
     fn list(&self, mut columns: impl Iterator<Item = usize>) -> String {
         let mut list: Vec<String> =
             columns.by_ref().take(MOST_LISTED).map(|c| self.label(c)).collect();
@@ -502,7 +504,8 @@ impl Table {
     ///
     /// # Errors
     /// [`IoError::NotANumber`], [`IoError::EmptyField`] and [`IoError::NotFinite`] with the
-    /// position of the first one, [`IoError::NoNumbers`], and the errors of [`Table::find`].
+    /// position of the first wrong field, [`IoError::NoNumbers`], and the errors of
+    /// [`Table::find`].
     pub fn column(&self, wanted: &str) -> Result<&[f64], IoError> {
         self.values(self.find(wanted)?)
     }
@@ -530,8 +533,8 @@ impl Table {
     }
 
     /// Returns a record of the columns `wanted`, one channel each, on the given time axis. The
-    /// numbers are those of the file, in the units that its columns state: [`Table::to_si`] returns
-    /// the factors.
+    /// numbers are those of the file, in the units that the columns of the file state:
+    /// [`Table::to_si`] returns the factors.
     ///
     /// # Errors
     /// [`IoError::DuplicateColumn`] if a column is used twice (the time column included), and those

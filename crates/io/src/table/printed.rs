@@ -28,7 +28,7 @@ const BEGINNING: usize = 1024;
 ///
 /// The unit of the last digit is determined from the numbers themselves: the largest numbers of
 /// decimal places and of significant digits so far. The true value of each instant is within half a
-/// unit of the printed one; the instants are equally spaced as long as a straight line passes
+/// unit of the printed value; the instants are equally spaced as long as a straight line passes
 /// through all of these intervals. Such a line exists if the concave envelope of the lower ends
 /// lies below the convex envelope of the upper ends. This test needs one pass and few corners.
 #[derive(Debug)]
@@ -84,8 +84,8 @@ impl Intervals {
         others.upper_ends.iter().for_each(|corner| add_corner(&mut self.upper_ends, *corner));
     }
 
-    /// Returns by how much all intervals together would have to grow for a line to pass through
-    /// them; zero or less if one does.
+    /// Returns by how much all intervals together would have to grow for a straight line to pass
+    /// through them; zero or less if a line already does.
     fn overlap(&self) -> f64 {
         if self.is_curved {
             return f64::INFINITY;

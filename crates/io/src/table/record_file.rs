@@ -19,7 +19,7 @@ use crate::{IoError, standard};
 
 /// Record file whose samples need not fit in memory.
 ///
-/// A text with more rows than the memory may have is read again for each pass over its samples; the
+/// A text with more rows than may be in memory is read again for each pass over its samples; the
 /// memory needed does not grow with the file. Shorter texts, other formats, and sources that can be
 /// read only once (a pipe) are kept in memory as a whole.
 ///
@@ -221,8 +221,8 @@ impl RecordFile {
     }
 
     /// Passes the samples `window` of the columns `wanted` to `take` in blocks of `rows` rows
-    /// (samples × columns), each `advance` rows after the previous one; the last block may be
-    /// shorter.
+    /// (samples × columns); each block begins `advance` rows after the previous one. The last block
+    /// may be shorter.
     ///
     /// # Errors
     /// As [`Table::column`], [`IoError::Read`] if the file has become shorter, and those of `take`.
@@ -263,8 +263,7 @@ impl RecordFile {
         self.chunks(columns, &mut |chunk| {
             let last = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
             let mut next = window.start.max(chunk.first);
-            // The buffer grows by at most one block at a time, because a table in memory is a
-            // single chunk.
+            // A table in memory is a single chunk: copied whole, it would need its memory again.
             while next < last.min(window.end) {
                 let upto = last.min(window.end).min(next + rows);
                 for (values, column) in buffered.iter_mut().zip(chunk.columns) {

@@ -161,8 +161,8 @@ impl<'a> Source<'a> {
     /// Returns the format of the file.
     pub fn kind(&self) -> Kind {
         let head = &self.head;
-        // Programs other than MATLAB write version 7.3 with the words of level 5: only the number
-        // differs.
+        // Programs other than MATLAB begin a file of version 7.3 with the words of level 5: only
+        // the version number differs.
         let is_version_73 = head.get(VERSION) == Some(&VERSION_73);
         if head.starts_with(b"MATLAB 5.0 MAT-file") && !is_version_73 {
             Kind::Mat5
@@ -283,8 +283,8 @@ pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
     if gzip { IoError::Gzip { file, source } } else { IoError::Read { file, source } }
 }
 
-/// Returns whether the first line that is not empty has -1 in its columns 5 and 6, and the next one
-/// the number of a dataset in its first six columns, or a misplaced 58b.
+/// Returns whether the first line that is not empty has -1 in its columns 5 and 6, and whether the
+/// next line has the number of a dataset in its first six columns, or a misplaced 58b.
 fn is_uff(head: &[u8]) -> bool {
     let mut lines =
         head.split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end).skip_while(|line| line.is_empty());

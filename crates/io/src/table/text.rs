@@ -79,7 +79,8 @@ impl<'a> TextReader<'a> {
     /// returns whether the text has ended.
     pub fn read<E: From<IoError>>(&mut self, take: &mut TakeRows<'_, E>) -> Result<bool, E> {
         let (mut block, mut batch) = (Block::default(), Batch::default());
-        // The names come first, and a short text is read faster without threads.
+        // The first two blocks are read without threads: the names come first, and a short text is
+        // read faster in this way.
         for _ in 0..2 {
             loop {
                 if !self.blocks.next(self.layout, &mut block)? {
@@ -107,7 +108,7 @@ impl<'a> TextReader<'a> {
         let Self { layout, table, blocks, rows } = self;
         let (layout, plan) = (*layout, rows.plan());
         let shared = Mutex::new(Shared { blocks, next: 0 });
-        // Each thread processes one block while one more per thread waits to be appended.
+        // For each thread, one block is being read and one more waits to be appended.
         let (free, freed) = channel();
         let freed = Mutex::new(freed);
         let under_way = 2 * threads;

@@ -98,7 +98,7 @@ fn common_instants(table: &Table, columns: &[usize]) -> Result<Instants, IoError
             common = Some((*column, own));
             continue;
         };
-        // The first instants may differ by as much as the steps may.
+        // The tolerance for the first instants is the same as for the steps.
         let together = (own.start - instants.start).abs() <= STEP_TOLERANCE * instants.step
             && same(own.step, instants.step);
         if !together {

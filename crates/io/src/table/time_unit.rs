@@ -18,7 +18,7 @@ const NAMES: [&str; 8] = [
 /// Words for time, in lower case.
 const WORDS: [&str; 5] = ["time", "zeit", "temps", "tiempo", "tempo"];
 
-/// Words, in lower case, beside a word for time that still mean the time of the samples.
+/// Words, in lower case, that can be next to a word for time in the name of a time column.
 const BESIDE: [&str; 18] = [
     "absolute",
     "acquisition",
@@ -90,7 +90,7 @@ pub(super) fn unclear(column: &Column) -> Option<String> {
     (column.overriding.is_none() && (unclear || is_another)).then_some(stated.text)
 }
 
-/// Returns what a time column states about its unit, if that is doubtful.
+/// Returns what a time column states about its unit, if the statement is doubtful.
 pub(super) fn doubtful(column: &Column) -> Option<StatedUnit> {
     if column.overriding.is_some() || column.has_instants {
         return None;

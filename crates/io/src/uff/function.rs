@@ -47,7 +47,7 @@ pub(super) fn dataset(
 }
 
 /// Returns the size of the unit of the instants, in s, that the label of the abscissa states; a
-/// remark is added about another unit and about a label that is not a unit of time.
+/// remark is added if this unit is not the second, or if the label is not a unit of time.
 fn time_unit(header: &Header, remarks: &mut Vec<String>) -> f64 {
     let Some(stated) = header.abscissa_unit(Quantity::Time) else { return 1.0 };
     let is_time = |unit: &&Unit| unit.quantity == Quantity::Time;
@@ -56,10 +56,10 @@ fn time_unit(header: &Header, remarks: &mut Vec<String>) -> f64 {
     let remark = match in_s {
         Some(1.0) => return 1.0,
         Some(in_s) => format!(
-            "the labels of the file state instants in {text}: they were multiplied by {in_s} to get s"
+            "the labels of the file state instants in {text}: the instants were multiplied by {in_s} to get s"
         ),
         None => {
-            format!("the label {text} of the instants is not a unit of time: they are read in s")
+            format!("the label {text} of the instants is not a unit of time: s is assumed")
         }
     };
     if !remarks.contains(&remark) {

@@ -111,7 +111,9 @@ fn trace_lines(lines: &mut Lines<'_>, model: &mut Model) -> Result<(), Fault> {
         }
     }
     if chain.len() != count {
-        return Err(about.fault(format!("a trace line of {count} nodes has {}", chain.len())));
+        return Err(
+            about.fault(format!("a trace line states {count} nodes, but has {}", chain.len()))
+        );
     }
     let drawn = chain.windows(2).filter(|pair| pair[0] != 0 && pair[1] != 0);
     model.lines.extend(drawn.map(|pair| [pair[0], pair[1]]));

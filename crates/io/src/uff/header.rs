@@ -72,8 +72,8 @@ impl Header {
         let spacing: u32 = whole(&form, 20, 10)?;
         if !matches!(ordinate_type, 2 | 4 | 5 | 6) || spacing > 1 {
             return Err(form.fault(format!(
-                "data type {ordinate_type} of the ordinate with spacing {spacing} cannot be read, only the \
-                 types 2, 4, 5 and 6 with spacing 0 or 1"
+                "an ordinate of data type {ordinate_type} with spacing {spacing} cannot be read: the \
+                 possible types are 2, 4, 5 and 6, with spacing 0 or 1"
             )));
         }
         let is_even = spacing == 1;

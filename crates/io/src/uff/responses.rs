@@ -21,7 +21,7 @@ const FREQUENCY: u32 = 18;
 /// Data type of an excitation force.
 const EXCITATION_FORCE: u32 = 13;
 
-/// Data type of any quantity; the label or the user states which.
+/// Data type of any quantity; the label or the user states the quantity.
 const GENERAL: u32 = 1;
 
 /// Maximum relative difference between two equal frequencies printed in single precision.
@@ -99,7 +99,7 @@ fn add(
     if header.abscissa != FREQUENCY {
         let abscissa = header.abscissa;
         return Err(id.fault(format!(
-            "{} with an abscissa of type {abscissa}, not frequency (18)",
+            "{} has an abscissa of type {abscissa}, but needs frequency (18)",
             header.kind()
         )));
     }
@@ -131,7 +131,7 @@ fn add(
     let denominator = header.ordinate[1];
     if ![0, GENERAL, EXCITATION_FORCE].contains(&denominator) {
         return Err(id.fault(format!(
-            "a response per quantity of type {denominator}, not per excitation force (13)"
+            "the response is per quantity of type {denominator}, but must be per excitation force (13)"
         )));
     }
     let (quantity, values, standard_error) = (quantity(header), numbers, None);
@@ -152,7 +152,7 @@ fn frequency_unit(responses: &mut FrequencyResponses, header: &Header) -> f64 {
     let is_frequency = |unit: &&Unit| unit.quantity == Quantity::Frequency;
     let in_hz = stated.used().filter(is_frequency).map(|unit| unit.in_si);
     let remark = format!(
-        "the labels of the file state frequencies in {}: they were multiplied by {} to get Hz",
+        "the labels of the file state frequencies in {}: the frequencies were multiplied by {} to get Hz",
         escaped(&stated.text),
         in_hz.unwrap_or(1.0)
     );
@@ -224,13 +224,14 @@ fn same_frequencies(
     }
     let (len, got) = (responses.frequency_hz.len(), frequency_hz.len());
     if len != got {
-        return Err(id.fault(format!("{got} frequencies where the first function has {len}")));
+        return Err(id.fault(format!("{got} frequencies, but the first function has {len}")));
     }
     let pairs = responses.frequency_hz.iter().zip(&frequency_hz);
     match pairs.into_iter().find(|(a, b)| (*a - *b).abs() > SAME_FREQUENCY * a.abs().max(b.abs())) {
         None => Ok(()),
         Some((first, other)) => {
-            Err(id.fault(format!("{other} Hz where the first function has {first} Hz")))
+            Err(id
+                .fault(format!("a line is at {other} Hz, but at {first} Hz in the first function")))
         }
     }
 }

@@ -127,8 +127,9 @@ impl Dataset<'_> {
         self.ordinate.into_iter().for_each(|ordinate| axis(text, ordinate));
         axis(text, (0, "NONE", "NONE"));
         let numbers_per_value = if self.is_complex { 2 } else { 1 };
-        // A line has four numbers at even frequencies, as the standard requires. At uneven ones it
-        // has one complex or two real values, each after its frequency.
+        // For evenly spaced frequencies, a line has four numbers, as the standard requires. For
+        // unevenly spaced frequencies, it has one complex or two real values, each after its
+        // frequency.
         let values = match (is_even, self.is_complex) {
             (true, true) => 2,
             (true, false) => 4,
@@ -182,8 +183,8 @@ pub fn is_directed_point(name: &str) -> bool {
     name.contains(['+', '-']) && node_and_direction(name).is_some()
 }
 
-/// Returns the point of such a name in the opposite direction: `12-Z` for `12+Z`; `None` for a name
-/// without a direction.
+/// Returns the name of the same point in the opposite direction: `12-Z` for `12+Z`; `None` for a
+/// name without a direction.
 ///
 /// # Source
 /// As [`is_directed_point`].

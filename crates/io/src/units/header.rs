@@ -49,8 +49,8 @@ impl StatedUnit {
 }
 
 /// Returns what a column states about its unit: in its `name`, or as a separate text `unit` (in a
-/// line of units, a label or an attribute). If a quantity is `wanted`, units of it count also as
-/// words of the name.
+/// line of units, a label or an attribute). If a quantity is `wanted`, its units are also
+/// recognised as words of the name.
 pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option<StatedUnit> {
     let [name, unit] = [name, unit].map(with_plain_signs);
     let name = without_copy_number(name.trim());

@@ -113,8 +113,8 @@ impl Unit {
 }
 
 /// Returns what a column states about its unit: in its `name`, or as a separate text `unit` (in a
-/// line of units, a label or an attribute). If a quantity is `wanted`, units of it count also as
-/// words of the name.
+/// line of units, a label or an attribute). If a quantity is `wanted`, its units are also
+/// recognised as words of the name.
 pub fn stated_unit(name: &str, unit: &str, wanted: Option<Quantity>) -> Option<StatedUnit> {
     stated(name, unit, wanted)
 }

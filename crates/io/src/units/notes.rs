@@ -1,4 +1,4 @@
-//! Texts in brackets, and those of a row of units or of a label.
+//! Texts in brackets, in a row of units, or in a label.
 
 use std::ops::Range;
 
@@ -25,8 +25,8 @@ pub(super) struct Bracket {
     pub inner: Range<usize>,
 }
 
-/// Returns the outermost brackets of a name, with their contents; one that is never closed extends
-/// to the end.
+/// Returns the outermost brackets of a name, with their contents; a bracket that is never closed
+/// extends to the end.
 pub(super) fn brackets(name: &str) -> Vec<Bracket> {
     const PAIRS: [(char, char); 16] = [
         ('[', ']'),
@@ -135,7 +135,7 @@ pub(super) fn unit_in_notes(notes: &[&str], wanted: Option<Quantity>) -> Option<
 pub(super) fn bare_note(note: &str) -> &str {
     let mut note = note.trim();
     for quote in ['"', '\''] {
-        // The quotation mark alone is that of inches.
+        // A quotation mark alone is the sign for inches.
         let unquoted = note.strip_prefix(quote).and_then(|rest| rest.strip_suffix(quote));
         note = unquoted.filter(|rest| !rest.trim().is_empty()).unwrap_or(note).trim();
     }
@@ -198,7 +198,7 @@ fn without_unit_word(note: &str) -> &str {
 pub(super) fn read_note(note: &str, wanted: Option<Quantity>) -> Note {
     let note = bare_note(note);
     if let Some(unit) = Unit::parse(note) {
-        // Angular velocities are also in 1/s.
+        // The unit 1/s is also used for angular velocities.
         let is_bare = unit.quantity == Quantity::Frequency
             && note.chars().all(|c| c.is_numeric() || "/s^-⁻".contains(c));
         return if is_bare { Note::Qualified(unit) } else { Note::Unit(unit) };

@@ -10,7 +10,8 @@ use super::{Quantity, Unit};
 /// Maximum number of words of a unit: `m per s squared`.
 const MAX_WORDS: usize = 4;
 
-/// Maximum number of letters of a unit that must have its usual case: `MM` may be two initials.
+/// Maximum number of letters of a unit that is recognised only in its usual case (`mm`): `MM` may
+/// be two initials.
 const MAX_CASED: usize = 2;
 
 /// Spellings of units that are other words in the name of a column: `force_std`, `acc second`.

@@ -69,8 +69,8 @@ pub(super) fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWor
         .or_else(|| unclear(name, &words))
 }
 
-/// Returns the last words after the first one that are a unit of this quantity. If no quantity is
-/// given, the words are a unit of any quantity and have no other meaning.
+/// Returns the words at the end of a name, after its first word, that are a unit of this quantity.
+/// If no quantity is given, the words are a unit of any quantity and have no other meaning.
 fn unit_of_quantity(
     name: &str,
     words: &[Range<usize>],
@@ -108,8 +108,8 @@ fn unit_of_quantity(
     None
 }
 
-/// Reads a unit before the name: `lbf: Hammer`, `mm displacement`. It is used if it has no other
-/// meaning and the name is that of its quantity.
+/// Reads a unit before the name: `lbf: Hammer`, `mm displacement`. The unit is used if it has no
+/// other meaning and the name is that of the quantity of the unit.
 fn leading_unit(name: &str, words: &[Range<usize>], wanted: Quantity) -> Option<UnitWords> {
     let text_of = |span: &Range<usize>| &name[span.clone()];
     (1..words.len().min(MAX_WORDS)).rev().find_map(|count| {

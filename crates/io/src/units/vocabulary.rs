@@ -79,7 +79,8 @@ const TURN: f64 = std::f64::consts::TAU;
 
 use Dimension as D;
 
-/// Spellings that are units only in this case: `F_DN` may point down, and `F_CN` be a channel.
+/// Spellings that are units only with exactly these capital and small letters: `F_DN` may point
+/// down, and `F_CN` be a channel.
 pub(super) const CASED: [&str; 4] = ["nN", "cN", "dN", "hN"];
 
 /// All units. Spellings differ in case only where the units do (`mN` and `MN`).
@@ -329,7 +330,7 @@ pub(super) const VOCABULARY: &[Entry] = &[
     entry(&["krad"], D::NONE, 1e3 / TURN),
     entry(&["deg", "degree", "degrees", "°"], D::NONE, 1.0 / 360.0),
     entry(&["cycle", "cycles", "rev", "revs"], D::NONE, 1.0),
-    // Mass is a unit of apparent masses; a load cell in kg is read as one in kgf, and that is
+    // kg is a unit of apparent mass. A load cell in kg is read as if it were in kgf, and this is
     // reported.
     entry(
         &[
@@ -349,7 +350,8 @@ pub(super) const VOCABULARY: &[Entry] = &[
         1.0,
     ),
     entry(&["tonne", "tonnes"], D::MASS, 1e3),
-    // No force and no response has these units: a column in one of them is never read silently.
+    // Units of neither a force nor a response: a column in such a unit is never read without a
+    // report.
     entry(&["Nm", "newtonmeter", "newtonmetre"], D::MOMENT, 1.0),
     entry(&["mNm", "Nmm"], D::MOMENT, 1e-3),
     entry(&["cNm", "Ncm"], D::MOMENT, 1e-2),

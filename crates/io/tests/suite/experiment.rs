@@ -120,7 +120,7 @@ fn wrong_descriptions_say_what_is_wrong() {
         ),
         (
             description(r#"{ "mass": [[1, 2], [3]], "damping": 1, "stiffness": 2 }"#, FORCE, ""),
-            "row 2 of a matrix has 1 entry, the first has 2",
+            "row 2 of a matrix has 1 entry, but the first row has 2",
         ),
         (
             description(r#"{ "mass": 0, "damping": 1, "stiffness": 2 }"#, FORCE, ""),
@@ -128,7 +128,7 @@ fn wrong_descriptions_say_what_is_wrong() {
         ),
         (
             description(SDOF, r#"{ "dof": 2, "lines": "odd", "amplitude": 1 }"#, ""),
-            "the excitation drives degree of freedom 2, the system has 1",
+            "the excitation drives degree of freedom 2 (counted from 1), but the system has 1",
         ),
         (
             description(SDOF, r#"{ "lines": "1:16", "amplitude": 1 }"#, ""),
@@ -219,7 +219,7 @@ fn wrong_sparse_matrices_say_what_is_wrong() {
             "row 0, column 1: the matrix has rows and columns 1 to 2",
         ),
         ("columns", serde_json::json!([1, 3]), "row 2, column 3"),
-        ("size", serde_json::json!(1_u64 << 40), "is larger than"),
+        ("size", serde_json::json!(1_u64 << 40), "but at most 4194304 are possible"),
         ("size", serde_json::json!(-2), "invalid value"),
         ("entries", serde_json::json!(1), "unknown field `entries`"),
         ("values", serde_json::json!([1, null]), "invalid type: null"),

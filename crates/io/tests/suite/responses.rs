@@ -141,7 +141,7 @@ fn labels_of_the_abscissa_state_the_unit_of_the_frequencies() {
             assert!((hz / (number * in_hz) - 1.0).abs() < 1e-12, "{name}, {unit}: {hz}");
         }
         let remarks = found.remarks.join("; ");
-        assert!(remarks.contains("they were multiplied by"), "{remarks}");
+        assert!(remarks.contains("the frequencies were multiplied by"), "{remarks}");
         assert!(found.doubts.is_empty(), "{name}, {unit}: {:?}", found.doubts);
     }
     for (name, unit) in [("NONE", "NONE"), ("Frequency", "FREQUENCY"), ("Frequency", "HERTZ")] {
@@ -216,8 +216,8 @@ fn broken_tables_are_refused() {
     assert!(e.starts_with("\"drive end\" is not a point of a universal file"), "{e}");
     let text = two_by_one(vec![1.0, 2.0, 3.0]).to_universal_file().unwrap();
     for (what, by, message) in [
-        ("        18    0", "        17    0", "not frequency"),
-        ("        13    0", "        12    0", "not per excitation force"),
+        ("        18    0", "        17    0", "needs frequency (18)"),
+        ("        13    0", "        12    0", "must be per excitation force"),
     ] {
         assert!(text.contains(what));
         let e = FrequencyResponses::parse("b.unv", text.replace(what, by).as_bytes()).unwrap_err();
@@ -469,7 +469,7 @@ fn units_of_phases_and_coherences_are_read_or_refused() {
     let text = "frequency_hz,Re(H) [mm/s/N],Im(H) [mm/s/N]\n1,1,2\n2,1,2\n";
     assert!(parse(text).unwrap().doubts.is_empty());
     for (header, row, named) in [
-        ("magnitude [g/N],phase [furlong]", "1,45", "no known unit of angle"),
+        ("magnitude [g/N],phase [furlong]", "1,45", "not a unit of angle"),
         ("real [g/N],imaginary [m/s^2/N]", "1,2", "state one unit for both parts"),
         ("magnitude [g/N],phase [deg]", "-40,45", "it is no magnitude"),
     ] {

@@ -171,7 +171,7 @@ fn units_in_the_names_of_arrays_are_read() {
         assert!(responses.remarks.iter().all(|r| !r.contains("no units")), "{name}");
     }
     let error = with("accelerance_um_N").unwrap_err().to_string();
-    assert!(error.contains("um/N") && error.contains("contradicts its name"), "{error}");
+    assert!(error.contains("um/N") && error.contains("contradicts this name"), "{error}");
 }
 
 /// Judge: the definitions of the units; the values are the frequencies + i.

@@ -68,8 +68,8 @@ pub enum SimulateError {
     /// The search for the periodic response of a nonlinear machine fails.
     #[error(
         "no response that repeats every {period} s was found by a search that begins after {SETTLING} periods \
-         from rest: the best one changes by {missed:.1e} of its size in a period. Choose \
-         \"response\": \"from-rest\" to see how the response develops; if it repeats only after \
+         from rest: the best response changes by {missed:.1e} of its size in a period. Choose \
+         \"response\": \"from-rest\" to see how the response develops; if the response repeats only after \
          several periods of the force, describe these as one period (`samples`, `lines`)",
         period = message::number(*period)
     )]

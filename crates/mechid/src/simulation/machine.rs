@@ -74,8 +74,8 @@ impl Described {
         }
     }
 
-    /// Refuses the steady state of an unstable machine: it solves the equations, but no run reaches
-    /// it.
+    /// Refuses the steady state of an unstable machine: this state solves the equations, but no
+    /// simulation reaches it.
     pub(super) fn refuse_unstable_periodic(
         &self,
         experiment: &Experiment,

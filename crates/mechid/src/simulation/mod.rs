@@ -165,7 +165,7 @@ fn with_noise(
     let noise = experiment.noise;
     let add = |record: &Record, stream: u64, level: Option<Level>| match (level, noise) {
         (Some(level), Some(noise)) => {
-            // The experiment has one seed, and each quantity a separate stream.
+            // The experiment has one seed; each quantity gets a separate random sequence from it.
             noise::add_white(record, level.into(), noise.seed.wrapping_mul(4).wrapping_add(stream))
         }
         _ => Ok(record.clone()),
@@ -177,8 +177,8 @@ fn with_noise(
 }
 
 /// Computes the response of a described machine to `force` (samples × the degrees of freedom of
-/// [`Experiment::forced`], in N) instead of its excitation, by its scheme and with its initial
-/// conditions; noise and number of periods are ignored.
+/// [`Experiment::forced`], in N) instead of the described excitation, with the described scheme and
+/// initial conditions; noise and number of periods are ignored.
 ///
 /// # Errors
 /// As [`simulate`]; [`MidStepMissing`](mechid_integrate::IntegrateError::MidStepMissing) if the
@@ -223,8 +223,8 @@ fn map(
     )
 }
 
-/// Identifies a described experiment at many sampling steps, each simulated; `progress` is called
-/// after each.
+/// Simulates and identifies a described experiment at many sampling steps; `progress` is called
+/// after each sampling step.
 ///
 /// # Errors
 /// As [`sweep_experiment`].

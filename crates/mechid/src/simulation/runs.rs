@@ -28,7 +28,7 @@ pub struct RunsSummary {
 }
 
 /// Simulates the runs of a study into one Parquet file, which gets its name in
-/// [`write_all`](mechid_io::write_all); `progress` is called after each with the number of
+/// [`write_all`](mechid_io::write_all); `progress` is called after each run with the number of
 /// completed runs.
 ///
 /// # Errors

@@ -12,22 +12,23 @@ use super::spectrum::{Coefficients, hermitian_sum};
 use crate::decomposition::hermitian_eigen;
 
 /// Step of the second differences of the spectrum, in standard errors of a combination of
-/// parameters, and largest change of a parameter; the parameters have unit scale.
+/// parameters. It is also the largest change of a parameter in such a step; the parameters have
+/// unit scale.
 const ERROR_STEP: f64 = 0.05;
 
-/// Parts of the mean excess of the fitted spectrum over the true one, M = ½ Σ C_ab ∂²S/∂θ_a∂θ_b,
-/// with the covariance C of the parameters θ.
+/// Parts of the mean excess of the fitted spectrum over the true spectrum, M = ½ Σ C_ab
+/// ∂²S/∂θ_a∂θ_b, with the covariance C of the parameters θ.
 ///
 /// C = F Fᵀ with a lower-triangular F, so that M is half the sum of the second derivatives of S
 /// along the columns of F. The poles are the first parameters: only the first 2·modes columns
 /// change them.
 pub(super) struct Excess {
     centre: Coefficients,
-    /// Coefficients on both sides of the fit along the columns that change poles, with the factors
-    /// of their spectra in M.
+    /// Coefficients on both sides of the fit along the columns of F that change poles. Each has the
+    /// factor of its spectrum in M.
     moved: Vec<(Coefficients, f64)>,
-    /// Contribution of the other columns: half the sum of the second derivatives of ψγᵀ of each
-    /// mode, and of D Q Dᵀ.
+    /// Contribution of the columns of F that do not change poles: half the sum of the second
+    /// derivatives of ψγᵀ of each mode, and of D Q Dᵀ.
     residues: Vec<DMatrix<Complex<f64>>>,
     direct_power: DMatrix<f64>,
     /// Covariance of the noise parameters of each output.
@@ -35,14 +36,14 @@ pub(super) struct Excess {
 }
 
 impl Fit {
-    /// Returns the expected difference between the estimates and the true parameters for lines
-    /// without their transient; `None` if the information of the fit cannot be decomposed, or
-    /// determines no parameter.
+    /// Returns the expected difference between the estimates and the true parameters, for lines
+    /// without their transient. `None` if the information matrix of the fit cannot be decomposed or
+    /// does not determine any parameter.
     ///
     /// Averaged over the estimation errors, the fitted spectrum exceeds S by M ([`Excess`]). The
-    /// expected periodogram of the open record without its transient is also not quite S, the
-    /// spectrum of an endless record. The bias is one scoring step from S to the expected
-    /// periodogram minus M. It is proportional to 1/T, the standard errors to 1/√T.
+    /// expected periodogram of the open record without its transient also differs a little from S,
+    /// the spectrum of an endless record. The bias is one scoring step from S to the expected
+    /// periodogram minus M. The bias is proportional to 1/T, the standard errors to 1/√T.
     ///
     /// # Source
     /// Cox & Snell (1968), Journal of the Royal Statistical Society B 30, 248–265; Box (1971),

@@ -35,7 +35,7 @@ pub enum AmbientError {
         /// Ratio of the RMS value to the RMS value of the strongest channel.
         ratio: f64,
     },
-    /// A channel is a multiple of another.
+    /// A channel is a multiple of another channel.
     #[error(
         "channels {} and {} are copies of one another: all but {unexplained:.0e} of their \
          power is common; leave one out",
@@ -46,7 +46,7 @@ pub enum AmbientError {
         first: usize,
         /// Second channel, counted from 0.
         second: usize,
-        /// Part of the power that is not common.
+        /// Fraction of the power of one channel that the other channel does not explain.
         unexplained: f64,
     },
     /// The band has too few lines.
@@ -91,7 +91,7 @@ pub enum AmbientError {
     /// The requested number of modes is zero.
     #[error("`modes` and `max_modes` must be at least 1")]
     NoModesAsked,
-    /// Fewer modes were found than asked for.
+    /// Fewer modes were found than requested.
     #[error(
         "only {found} of {asked} modes were found between {from_hz} and {to_hz} Hz: ask for fewer (`modes`), or \
          widen `band_hz`"

@@ -13,7 +13,8 @@ use super::limits::{HARMONIC_LEVEL, TAPERS};
 /// Zero padding of the transform: frequencies are tested every quarter line.
 const PADDING: usize = 4;
 
-/// Number of steps of the refinement of a frequency; each step is the one before divided by 1.8.
+/// Number of steps in the refinement of a frequency; the step size is divided by 1.8 after each
+/// step.
 const REFINEMENTS: usize = 12;
 
 /// Sinusoid of constant amplitude in an ambient record, usually from a machine.
@@ -25,11 +26,11 @@ pub struct Harmonic {
     pub channel: usize,
     /// Amplitude in that channel, in its unit.
     pub amplitude: f64,
-    /// F statistic of a line against its neighbourhood, with 2 and 2 × tapers − 2 degrees of
-    /// freedom.
+    /// F statistic of a line relative to the neighbouring lines; it has 2 and 2 × tapers − 2
+    /// degrees of freedom.
     pub statistic: f64,
-    /// Probability of a statistic as large in a record without harmonics, for all frequencies and
-    /// channels of the band together (Bonferroni).
+    /// Probability of a statistic at least as large as this one in a record without harmonics, at
+    /// any frequency of the band and in any channel (Bonferroni).
     pub p_value: f64,
     /// Excess kurtosis of the signal within two lines of the frequency: −1.5 for a sinusoid, 0 for
     /// a random response.
@@ -38,8 +39,8 @@ pub struct Harmonic {
 
 /// Returns the harmonics of the channels in a band, by rising frequency.
 ///
-/// A resonance is not a harmonic, even if its peak is sharp: its amplitude and phase vary over the
-/// record, so that the tapers disagree.
+/// A resonance does not count as a harmonic, even if its peak is sharp. Its amplitude and phase
+/// vary over the record, so that the tapers give different amplitudes.
 ///
 /// # Errors
 /// [`AmbientError::Signal`] if the padded record cannot be transformed.
@@ -69,7 +70,8 @@ pub fn harmonics(record: &Record, band_hz: [f64; 2]) -> Result<Vec<Harmonic>, Am
         let lines = padded_lines(record.channel(channel), padded);
         for index in from..to {
             let statistic = f_statistic(&lines, index, &sums);
-            // Neighbouring quarter lines count as one test; the factor allows for the best of them.
+            // The lines are a quarter of a line spacing apart. `tested` counts `PADDING`
+            // neighbouring lines as one test; the factor `PADDING` allows for the best of them.
             let p_value = (PADDING as f64 * tested as f64 * distribution.sf(statistic)).min(1.0);
             if p_value < HARMONIC_LEVEL {
                 let frequency_hz = index as f64 * step_hz;
@@ -115,7 +117,7 @@ fn padded_lines(samples: &[f64], padded: usize) -> Vec<Complex<f64>> {
 }
 
 /// Returns Thomson's F statistic. The transform under a sine taper is the difference of two lines,
-/// one on either side.
+/// one on either side of the tested line.
 fn f_statistic(lines: &[Complex<f64>], index: usize, sums: &[f64]) -> f64 {
     let half = PADDING / 2;
     let tapered =
@@ -141,7 +143,7 @@ fn measured(record: &Record, mut harmonic: Harmonic) -> Harmonic {
     harmonic
 }
 
-/// Returns the frequency near `frequency_hz` at which the amplitude is largest.
+/// Returns the frequency near `frequency_hz` where the amplitude of the sinusoid is largest.
 fn refined(samples: &[f64], mut frequency_hz: f64, dt: f64) -> f64 {
     let mut step = 1.0 / (PADDING as f64 * samples.len() as f64 * dt);
     for _ in 0..REFINEMENTS {

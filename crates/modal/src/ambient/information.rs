@@ -85,7 +85,7 @@ impl LineInformation<'_> {
         sum: &mut DMatrix<f64>,
     ) {
         let p = self.inverse.nrows();
-        // The matrices S_a of all directions stand side by side.
+        // The matrices S_a of all directions are side by side.
         let mut derivatives = DMatrix::zeros(p, p * directions.len());
         for (a, direction) in directions.iter().enumerate() {
             let derivative = self.coefficients.derivative(self.kernels, direction);

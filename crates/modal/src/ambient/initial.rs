@@ -13,7 +13,8 @@ use super::spectrum::Coefficients;
 use crate::indicators::mean_phase;
 use crate::stabilisation::Pole;
 
-/// Quantile of the periodograms of a sensor that is the initial estimate of its noise.
+/// Quantile of the periodogram values of a sensor; this quantile is the initial estimate of the
+/// noise of the sensor.
 const NOISE_QUANTILE: f64 = 0.1;
 
 /// Number of corrections of the amplitudes: repeated, because modes overlap.
@@ -22,7 +23,7 @@ const AMPLITUDE_STEPS: usize = 3;
 /// Half width, in decay rates, of the lines that determine an amplitude.
 const AMPLITUDE_HALF_WIDTH: f64 = 2.0;
 
-/// Possible quantities of the outputs: kernel, and phase of ψ for a real mode.
+/// Possible quantities of the outputs. Each has a kernel and the phase of ψ for a real mode.
 const QUANTITIES: [(Kernel, f64); 5] = [
     (Kernel::Static, -FRAC_PI_2),
     (Kernel::Static, 0.0),
@@ -31,12 +32,13 @@ const QUANTITIES: [(Kernel, f64); 5] = [
     (Kernel::Vanishing, FRAC_PI_2),
 ];
 
-/// Returns the maximum of the likelihood for the quantity (displacement, velocity or acceleration,
-/// filtered or not) that explains the lines best; `None` if none has a likelihood.
+/// Returns the fit at the maximum of the likelihood, with the quantity (displacement, velocity or
+/// acceleration, filtered or not) that explains the lines best; `None` if the likelihood does not
+/// exist for any quantity.
 ///
-/// The comparison of quantities keeps the poles of the subspace models. Quantities differ in the
-/// tails of the resonances. With free poles, a wrong quantity would find a better maximum at other
-/// poles, with the damping ratios of sinusoids.
+/// The quantities are compared at the poles of the subspace models. They differ in the tails of the
+/// resonances. With free poles, a wrong quantity could have a larger maximum at other poles, with
+/// damping ratios near zero.
 pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
@@ -72,8 +74,8 @@ fn initial_parameters(
     for (r, mode) in modes.iter().enumerate() {
         let (frequency, damping) = (parameters.layout.frequency(r), parameters.layout.damping(r));
         parameters.values[frequency] = mode.pole.norm().ln();
-        // A search that starts at a resonance as narrow as a line, like that of a sinusoid, cannot
-        // leave it.
+        // A search cannot leave a resonance that is as narrow as a line, such as that of a
+        // sinusoid, so it does not start at one.
         let narrowest = MIN_DECAY_TIMES / (mode.pole.norm() * band.span.duration);
         parameters.values[damping] = mode.damping_ratio().max(narrowest).ln();
         let turn = Complex::cis(phase - mean_phase(&mode.vector));
@@ -85,8 +87,8 @@ fn initial_parameters(
     parameters
 }
 
-/// Scales each shape so that the model's power along it near its resonance equals the power of the
-/// lines.
+/// Scales each shape: near the resonance, the power of the model along the shape then equals the
+/// power of the lines.
 pub(super) fn match_amplitudes(
     parameters: &mut Parameters,
     pooled: &[PooledLines],
@@ -117,10 +119,10 @@ pub(super) fn match_amplitudes(
     }
 }
 
-/// Candidate of a further mode in the whitened lines.
+/// Candidate for a further mode, found in the whitened lines.
 pub(super) struct Candidate {
     pub pole: Pole,
-    /// Expected increase of 2 ln L by a mode at this pole.
+    /// Expected increase of 2 ln L due to a mode at this pole.
     pub gain: f64,
 }
 

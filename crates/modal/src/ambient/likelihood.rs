@@ -12,8 +12,8 @@ pub(super) const TASK: usize = 64;
 
 /// Returns the factor of a Hermitian matrix if it is positive definite.
 ///
-/// nalgebra takes complex square roots of the pivots: an indefinite matrix gives imaginary pivots
-/// instead of an error.
+/// nalgebra computes complex square roots of the pivots: for an indefinite matrix these roots are
+/// imaginary, and there is no error.
 pub(super) fn positive_factor(
     matrix: DMatrix<Complex<f64>>,
 ) -> Option<Cholesky<Complex<f64>, Dyn>> {

@@ -1,7 +1,8 @@
 //! Limits of the identification of ambient records.
 
 /// Smallest ζωT for an interval: with fewer decay times in the record the distribution of the
-/// estimates is far from normal, and intervals cover less than they state.
+/// estimates is far from normal, and intervals contain the true value less often than their level
+/// states.
 pub const MIN_DECAY_TIMES: f64 = 15.0;
 
 /// Highest frequency of the default band, as a share of half the sampling rate: above it the
@@ -17,11 +18,12 @@ pub(super) const DEFAULT_MAX_MODES: usize = 12;
 /// Smallest number of lines in the band per unknown of one mode; fewer do not determine it.
 pub(super) const MIN_LINES_PER_UNKNOWN: usize = 3;
 
-/// Minimum ratio of the RMS value of a channel to the RMS value of the strongest; a channel below
-/// it is dead. The limit is below the resolution of a twelve-bit converter, with a margin.
+/// Minimum ratio of the RMS value of a channel to the RMS value of the strongest channel; a channel
+/// below it counts as dead. The limit is far below the resolution of a twelve-bit converter.
 pub(super) const DEAD_CHANNEL: f64 = 1e-7;
 
-/// Number of orders of the subspace models above twice the requested number of modes.
+/// Number of additional orders of the subspace models: the orders go up to twice the requested
+/// number of modes plus this number.
 pub(super) const EXTRA_ORDERS: usize = 16;
 
 /// Smallest number of block rows of the Hankel matrix of covariances.
@@ -33,11 +35,11 @@ pub(super) const RESAMPLING: f64 = 2.5;
 /// Largest damping ratio of a pole that may be a mode.
 pub(super) const MAX_DAMPING: f64 = 0.2;
 
-/// Smallest share of the orders in which an initial mode has a pole.
+/// Minimum fraction of the model orders with a pole for an initial mode.
 pub(super) const MIN_SHARE: f64 = 0.3;
 
-/// Width of pooled lines, as a share of the distance to the nearest pole: the mean spectrum then
-/// equals the spectrum at the centre within 0.25 %.
+/// Width of pooled lines, as a share of the distance to the nearest pole: with this width the mean
+/// spectrum differs from the spectrum at the centre by at most 0.25 %.
 pub(super) const POOLING: f64 = 0.1;
 
 /// Width of pooled lines for the comparison of initial estimates and for the information of a step,
@@ -54,8 +56,8 @@ pub(super) const NOISE_TERMS_ADDED: usize = 2;
 /// Maximum number of polynomials of the noise; Akaike's criterion chooses the number.
 pub(super) const MOST_NOISE_TERMS: usize = 15;
 
-/// Gain in log-likelihood of a step below which a search ends: the parameters then move by less
-/// than a twentieth of their standard errors.
+/// Gain in log-likelihood of a step below which a search ends: a step with a smaller gain moves the
+/// parameters by less than a twentieth of their standard errors.
 pub(super) const ENOUGH: f64 = 1e-3;
 
 /// Largest step of the logarithm of a damping ratio or of another unknown of unit scale.
@@ -93,13 +95,14 @@ pub(super) const EXCLUDED_LINES: f64 = 2.0;
 /// copies.
 pub(super) const COPIED_CHANNEL: f64 = 1e-10;
 
-/// Ratio of the Wald statistic of a shape to the penalty of a mode, above which the mode needs no
-/// further test.
+/// Ratio of the Wald statistic of a shape to the penalty of a mode above which the mode is accepted
+/// without a further test.
 pub(super) const STRONG_EVIDENCE: f64 = 4.0;
 
 /// Maximum number of additional poles for harmonics, a background or modes outside the band.
 pub(super) const NUISANCE_POLES: usize = 4;
 
 /// Minimum number of squared amplitudes in a group of lines whose power is compared with the fitted
-/// spectrum. Far fewer are enough for the cube root of a power to have a normal distribution.
+/// spectrum. Even with far fewer amplitudes, the cube root of a power has nearly a normal
+/// distribution.
 pub(super) const MISFIT_GROUP: f64 = 100.0;

@@ -5,8 +5,8 @@ use nalgebra::{Complex, DMatrix};
 use super::parameters::Span;
 use super::transient::Transient;
 
-/// Maximum width of pooled lines, as a share of the band: the noise varies, even far from the
-/// poles.
+/// Maximum width of pooled lines, as a fraction of the band. Far from the poles this limit is
+/// needed because the noise varies with frequency.
 const WIDEST: f64 = 0.02;
 
 /// Lines of one record in a band, without the excluded ones.
@@ -59,7 +59,7 @@ impl BandLines {
         terms
     }
 
-    /// Pools lines over a share `part` of their distance to the nearest of `poles`.
+    /// Pools lines over the fraction `part` of their distance to the nearest of the `poles`.
     pub fn pooled(
         &self,
         poles: &[Complex<f64>],

@@ -26,8 +26,8 @@ pub struct SpectrumMisfit {
 }
 
 impl SpectrumMisfit {
-    /// Returns the factor on standard errors because of the misfit, a ratio: 1 if the statistic is
-    /// not larger than its expectation.
+    /// Returns the factor for standard errors due to the misfit, a pure number; it is 1 if the
+    /// statistic is at most its expected value.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.

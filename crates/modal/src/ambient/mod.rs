@@ -1,4 +1,4 @@
-//! Modes from responses alone: structures that wind, traffic or their own machinery excites.
+//! Modes from responses alone, for structures that are excited by wind, traffic or their machinery.
 //!
 //! A subspace method ([`ssi_cov`]) gives initial poles and shapes. Poles, shapes, correlated white
 //! forces on the modes and smooth sensor noise then maximise Whittle's likelihood with the expected

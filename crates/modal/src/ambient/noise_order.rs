@@ -11,7 +11,7 @@ use super::search::{Effort, Fit, full_step, search_pooled};
 /// criterion falls; `None` if it does not fall.
 ///
 /// Noise that the polynomials cannot follow is attributed to the tails of the resonances and biases
-/// the damping; longer records are affected more.
+/// the damping. Relative to the standard errors, this bias is larger for longer records.
 ///
 /// # Source
 /// Akaike (1974), IEEE Transactions on Automatic Control 19, 716–723.
@@ -23,7 +23,7 @@ pub(super) fn with_more_noise_terms(fit: &Fit, band: &BandLines) -> Option<Fit> 
     Some(best)
 }
 
-/// Returns the fit with further polynomials, if they lower the criterion.
+/// Returns the fit with further polynomials if they reduce Akaike's criterion.
 fn extended(fit: &Fit, band: &BandLines) -> Option<Fit> {
     let layout = &fit.parameters.layout;
     let terms = layout.noise_terms + NOISE_TERMS_ADDED;
@@ -40,8 +40,8 @@ fn extended(fit: &Fit, band: &BandLines) -> Option<Fit> {
     (gain > needed).then_some(next)
 }
 
-/// Returns the increase of 2 ln L that a search from `start` would reach if ln L were quadratic
-/// (score statistic).
+/// Returns the increase of 2 ln L from `start` to the maximum if ln L is quadratic (score
+/// statistic).
 fn expected_gain(start: &Parameters, band: &BandLines) -> Option<f64> {
     let lines = band.pooled(&start.poles(), POOLING, start.layout.noise_terms);
     let information = information(start, &lines, band.span)?;

@@ -1,5 +1,5 @@
-//! Number of modes: decided by the likelihood, with rules for poles that are significant but are
-//! not modes.
+//! Choice of the number of modes by the likelihood, with rules for poles that are significant but
+//! are not modes.
 
 use std::f64::consts::TAU;
 
@@ -27,7 +27,7 @@ pub(super) struct Wanted {
 /// Selected modes.
 pub(super) struct Chosen {
     pub fitted: FitWithTransient,
-    /// Indices of the poles that are modes; the others explain a background or noise.
+    /// Indices of the poles that are modes; the other poles explain a background or noise.
     pub sound: Vec<usize>,
 }
 
@@ -68,7 +68,7 @@ pub(super) fn choose(
 }
 
 impl Choice<'_> {
-    /// Returns the minimum increase of 2 ln L by a mode: a penalty of ln n per parameter.
+    /// Returns the minimum increase of 2 ln L for the acceptance of a mode: ln n per parameter.
     ///
     /// # Source
     /// Schwarz (1978), Annals of Statistics 6, 461–464.
@@ -148,8 +148,8 @@ impl Choice<'_> {
         fit
     }
 
-    /// Returns the fit without an insignificant mode, if there is one; modes with the least
-    /// evidence are tested first, strong modes not at all.
+    /// Returns the fit without an insignificant mode, if there is such a mode. Modes with the least
+    /// evidence are tested first; strong modes are not tested.
     fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
         let (parameters, needed) = (&fit.parameters, self.penalty());
         let covariance = fit.covariance()?;
@@ -166,7 +166,8 @@ impl Choice<'_> {
         weak.into_iter().find_map(|(_, mode)| {
             let mut next = self.without(fit, mode)?;
             if gain(&next) >= needed {
-                // Noise that its polynomials cannot follow looks like a mode with large damping.
+                // Noise that the polynomials of the noise model cannot follow looks like a mode
+                // with large damping.
                 next = with_more_noise_terms(&next, self.band)?;
             }
             let gain = gain(&next);

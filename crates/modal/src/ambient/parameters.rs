@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Kernel of a mode, distinguished by the response of the output to a constant force.
+/// Kernel of a mode; the kernels differ in the response of the output to a constant force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kernel {
     /// Static deflection, 1/(s − λ): for displacements and for velocities.
@@ -66,7 +66,8 @@ impl Layout {
         self.correlation(self.pairs.len()) + term * self.outputs + output
     }
 
-    /// Returns the parameters of poles and correlations: their derivatives have no simple form.
+    /// Returns the indices of the parameters of poles and correlations, whose derivatives have no
+    /// simple form.
     pub fn dense(&self) -> Vec<usize> {
         let correlations = self.correlation(0)..self.noise(0, 0);
         (0..2 * self.modes).chain(correlations).collect()
@@ -188,7 +189,8 @@ impl Parameters {
         result
     }
 
-    /// Returns the parameters with `terms` polynomials of the noise; those that are new are zero.
+    /// Returns the parameters with `terms` polynomials of the noise; the coefficients of new
+    /// polynomials are zero.
     pub fn with_noise_terms(&self, terms: usize) -> Self {
         let layout = Layout::new(self.layout.modes, self.layout.outputs, terms);
         let values = self.values.clone().resize_vertically(layout.len(), 0.0);

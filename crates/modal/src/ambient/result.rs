@@ -25,8 +25,7 @@ pub enum Uncertainty {
         /// Lower and upper end of the interval, in the unit of the value.
         interval: [f64; 2],
     },
-    /// The record is too short: the distribution of the estimate is not known well enough for an
-    /// interval.
+    /// The record is too short: the distribution of the estimate is too uncertain for an interval.
     RecordTooShort {
         /// ζωT, the length of the record in decay times of the mode.
         decay_times: f64,
@@ -57,7 +56,7 @@ impl ModalValue {
         Self { value, uncertainty }
     }
 
-    /// Returns the standard error; `None` if it is not known well enough.
+    /// Returns the standard error; `None` if the record is too short for one.
     pub fn standard_error(&self) -> Option<f64> {
         match self.uncertainty {
             Uncertainty::Known { standard_error, .. } => Some(standard_error),
@@ -79,7 +78,7 @@ impl ModalValue {
         Measured::new(self.value, self.standard_error().unwrap_or(0.0))
     }
 
-    /// Returns the interval of 95 %; `None` if it is not known well enough.
+    /// Returns the interval of 95 %; `None` if the record is too short for one.
     pub fn interval(&self) -> Option<[f64; 2]> {
         match self.uncertainty {
             Uncertainty::Known { interval, .. } => Some(interval),
@@ -95,18 +94,19 @@ pub struct AmbientMode {
     pub natural_frequency_hz: ModalValue,
     /// Damping ratio −Re λ/|λ|.
     pub damping_ratio: ModalValue,
-    /// Shape, relative to its largest entry, which is 1; units of the channels relative to the unit
-    /// of that entry.
+    /// Shape, relative to its largest entry, which is 1. Each entry has the unit of its channel
+    /// divided by the unit of the channel with the largest entry.
     pub shape: ShapeWithCovariance,
-    /// Power density of the force on the mode: the output of the largest entry has the one-sided
-    /// power density `force_power`/|jω − λ|² near the resonance, in its unit² (rad/s)²/Hz.
+    /// Power density of the force on the mode, in u² (rad/s)²/Hz, where u is the unit of the output
+    /// with the largest entry. Near the resonance, the one-sided power density of this output is
+    /// `force_power`/|jω − λ|².
     pub force_power: f64,
     /// Modal phase collinearity of the shape.
     pub mpc: Indicator,
     /// ζωT, the length of the record in decay times.
     pub decay_times: f64,
-    /// Index of the harmonic at the frequency of the mode, if there is one: the mode may be this
-    /// harmonic.
+    /// Index of the harmonic at the frequency of the mode, if there is such a harmonic: the mode
+    /// may be this harmonic.
     pub harmonic: Option<usize>,
 }
 
@@ -114,15 +114,15 @@ pub struct AmbientMode {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// The likelihood gains less than the penalty of the parameters.
+    /// The increase of 2 ln L is less than the penalty of the parameters of the mode.
     SmallGain {
-        /// Increase of 2 ln L by the mode. If the model without the mode has more polynomials of
-        /// the noise, their penalty is added.
+        /// Increase of 2 ln L due to the mode. If the model without the mode has more polynomials
+        /// of the noise, the penalty of these polynomials is added.
         gain: f64,
         /// Increase that was needed.
         needed: f64,
     },
-    /// The damping ratio does not differ from zero significantly, as for a harmonic or a chance
+    /// The damping ratio is not significantly larger than zero, as with a harmonic or a chance
     /// peak.
     DampingUndetermined {
         /// Ratio of the damping ratio to its standard error.
@@ -135,7 +135,7 @@ pub enum DropReason {
         /// Damping ratio.
         damping_ratio: f64,
     },
-    /// The number of modes was reached.
+    /// The requested or maximum number of modes was reached.
     NumberReached {
         /// Number of modes (`modes` or `max_modes`).
         number: usize,
@@ -178,7 +178,7 @@ pub struct AmbientEstimate {
     pub misfit: Option<SpectrumMisfit>,
     /// Correlation coefficients of the forces on the modes, modes × modes.
     pub force_correlation: DMatrix<f64>,
-    /// Whole spectrum, to fit it again to a part of the record.
+    /// Whole fitted spectrum; it can be fitted again to a part of the record.
     pub(super) spectrum: FittedSpectrum,
 }
 
@@ -196,8 +196,8 @@ pub(super) struct FittedSpectrum {
 
 impl AmbientEstimate {
     /// Returns the same estimate; the standard errors of each mode are multiplied by the entry of
-    /// `scales` for this mode (a pure number). Use it if halves of a record disagree by more than
-    /// their errors.
+    /// `scales` for this mode (a pure number). Use it if the halves of a record give modes that
+    /// differ by more than their standard errors.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -227,7 +227,7 @@ impl AmbientMode {
         }
     }
 
-    /// Reads a mode from a fit; `None` if its shape is zero or not finite.
+    /// Creates a mode from a fit; `None` if the shape of the mode is zero or not finite.
     pub(super) fn new(
         fit: &Fit,
         statistics: Statistics<'_>,
@@ -280,7 +280,7 @@ impl Statistics<'_> {
         self.covariance[(index, index)].max(0.0).sqrt()
     }
 
-    /// Returns the bias of a parameter, 0 if it exceeds [`MAX_BIAS`].
+    /// Returns the bias of a parameter; 0 if the bias exceeds [`MAX_BIAS`].
     fn bias(self, index: usize) -> f64 {
         let bias = self.bias[index];
         if bias.abs() <= MAX_BIAS * self.standard_error(index) { bias } else { 0.0 }

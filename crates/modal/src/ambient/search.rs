@@ -18,11 +18,12 @@ const EASIER: f64 = 0.125;
 /// Maximum number of trials of one step.
 const TRIALS: usize = 12;
 
-/// Minimum number of updates of the information at which it is computed anew if a step is refused.
+/// Minimum number of updates of the information after which it is computed again if a step is
+/// refused; after fewer updates, only the damping of the step increases.
 const TRUSTED_UPDATES: usize = 4;
 
-/// Minimum curvature along a step that an update takes from the gradients, as a share of the
-/// curvature before it.
+/// Minimum curvature along a step that an update takes from the gradients, relative to the
+/// curvature before the update.
 ///
 /// # Source
 /// Powell (1978), Lecture Notes in Mathematics 630, 144–157.
@@ -36,8 +37,8 @@ const SLOW_STEPS: usize = 2;
 const LEAST_LOG_DAMPING: f64 = -14.0;
 const LEAST_LOG_NOISE: f64 = -28.0;
 
-/// Minimum information of a parameter, relative to the largest: keeps the covariance finite for
-/// phases that the lines do not determine.
+/// Minimum information of a parameter, relative to the largest information. It keeps the covariance
+/// finite if the lines do not determine a phase.
 const LEAST_INFORMATION: f64 = 1e-10;
 
 /// Effort of a search.
@@ -53,12 +54,13 @@ pub(super) struct Effort {
 
 impl Effort {
     /// Effort to compare quantities at initial estimates. The initial poles are more accurate than
-    /// the initial amplitudes. With wrong amplitudes, a search with free poles would lower a
-    /// damping ratio to that of a sinusoid, and no later search would raise it again.
+    /// the initial amplitudes. With wrong amplitudes, a search with free poles would move a damping
+    /// ratio to nearly zero, as of a sinusoid, and no later search would increase it again.
     pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true };
     /// Effort to approach the maximum with coarse lines.
     pub const SHORT: Self = Self { iterations: 6, slow: 0.5, holds_poles: false };
-    /// Effort to test a mode: the penalty is a gain of several tens.
+    /// Effort to test a mode: steps with a gain below `slow` are not needed, because the gain of a
+    /// mode is compared with a penalty of several tens.
     pub const TEST: Self = Self { iterations: 40, slow: 0.5, holds_poles: false };
     /// Effort of the final search: further steps would move parameters by less than a tenth of
     /// their standard errors.
@@ -71,7 +73,8 @@ pub(super) struct Fit {
     pub parameters: Parameters,
     /// −log L.
     pub cost: f64,
-    /// Fisher information; after [`search`] only that of the last steps.
+    /// Fisher information; after [`search`] it is the information of the last steps, which is
+    /// approximate.
     pub information: DMatrix<f64>,
 }
 
@@ -80,22 +83,23 @@ pub(super) struct Fit {
 pub(super) struct SearchLines<'a> {
     /// Lines of the likelihood.
     pub pooled: &'a [PooledLines],
-    /// The same lines, pooled at least as coarsely, for the information of the steps: it determines
-    /// the path, not the maximum.
+    /// The same lines, pooled at least as coarsely as in `pooled`, for the information of the
+    /// steps. The information affects the path of the search, not the maximum.
     pub coarse: &'a [PooledLines],
     pub span: Span,
 }
 
-/// Searches from `start`; `None` if the likelihood is not defined there.
+/// Searches from `start`; `None` if the likelihood is not defined at `start`.
 ///
-/// The information costs much more than a gradient. The steps therefore update it from the
-/// gradients that they meet, and it is computed anew where they become slow or are refused.
+/// The information costs much more than a gradient. Each step therefore updates the information
+/// from the gradients before and after the step. The information is computed again if the steps
+/// become slow or are refused.
 pub(super) fn search(start: Parameters, lines: SearchLines<'_>, effort: Effort) -> Option<Fit> {
     let information = information(&start, lines.coarse, lines.span)?;
     search_with_information(start, information, 0, lines, effort)
 }
 
-/// Searches from `start` with information that was computed there (no `updates`), or near it.
+/// Searches from `start` with information that was computed at `start` (no `updates`) or near it.
 fn search_with_information(
     start: Parameters,
     information: DMatrix<f64>,
@@ -136,7 +140,7 @@ fn search_with_information(
 /// State of a search between two steps.
 struct Path<'a> {
     lines: SearchLines<'a>,
-    /// Index of the first parameter that may move; poles come before all others.
+    /// Index of the first parameter that may change; the poles come before all other parameters.
     first_free: usize,
     /// Gradient at the parameters of the fit.
     slope: DVector<f64>,
@@ -146,7 +150,7 @@ struct Path<'a> {
 }
 
 impl Path<'_> {
-    /// Makes one step and returns its gain in log-likelihood, 0 if no step succeeds.
+    /// Makes one step and returns its gain in log-likelihood; 0 if no step succeeds.
     fn step(&mut self, fit: &mut Fit) -> Option<f64> {
         for _ in 0..TRIALS {
             if let Some(step) = self.proposed(&fit.information) {
@@ -175,7 +179,7 @@ impl Path<'_> {
         Some(0.0)
     }
 
-    /// Returns the next step, which is zero for the parameters that do not move.
+    /// Returns the next step; it is zero for the parameters that may not change.
     fn proposed(&self, information: &DMatrix<f64>) -> Option<DVector<f64>> {
         let (first, free) = (self.first_free, self.slope.len() - self.first_free);
         let information = information.view((first, first), (free, free)).into_owned();
@@ -186,8 +190,8 @@ impl Path<'_> {
         Some(step)
     }
 
-    /// Computes the information of the steps at the parameters of the fit, unless it was computed
-    /// there.
+    /// Computes the information of the steps at the parameters of the fit, if it has been updated
+    /// since the last computation.
     fn renew(&mut self, fit: &mut Fit) -> Option<()> {
         if self.updates > 0 {
             fit.information = information(&fit.parameters, self.lines.coarse, self.lines.span)?;
@@ -200,8 +204,8 @@ impl Path<'_> {
     }
 }
 
-/// Updates the information by the change of the gradient over a step so that it stays positive
-/// definite.
+/// Updates the information by the change of the gradient over a step; the information stays
+/// positive definite.
 ///
 /// # Source
 /// Nocedal & Wright (2006), *Numerical Optimization*, 2nd ed., procedure 18.2 (damped BFGS).
@@ -222,8 +226,8 @@ fn update(information: &mut DMatrix<f64>, step: &DVector<f64>, change: &DVector<
     information.ger(-1.0 / curvature, &predicted, &predicted, 1.0);
 }
 
-/// Searches from `start` with lines pooled around its poles, and again with lines pooled around the
-/// resulting poles.
+/// Searches from `start` with lines that are pooled around the poles of `start`, and again with
+/// lines that are pooled around the resulting poles.
 pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort) -> Option<Fit> {
     let (terms, span) = (start.layout.noise_terms, band.span);
     let around = |parameters: &Parameters| {
@@ -281,8 +285,8 @@ fn scaled_symmetrically(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<
     DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * matrix[(i, j)] * scale[j])
 }
 
-/// Returns the inverse of a scaled information whose eigenvalues are at least
-/// [`LEAST_INFORMATION`] but for rounding; `None` if it is not finite.
+/// Returns the inverse of a scaled information matrix. Apart from rounding, its eigenvalues must be
+/// at least [`LEAST_INFORMATION`]. `None` if the inverse is not finite.
 fn inverse_of_determined(scaled: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut root = hermitian_eigen(scaled)?;
     for (mut column, information) in root.eigenvectors.column_iter_mut().zip(&root.eigenvalues) {
@@ -291,8 +295,8 @@ fn inverse_of_determined(scaled: DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(&root.eigenvectors * root.eigenvectors.transpose())
 }
 
-/// Returns the parameters after a step; the steps of parameters in which the likelihood is far from
-/// quadratic are limited.
+/// Returns the parameters after a step. The step is limited for parameters in which the likelihood
+/// is far from quadratic.
 fn moved(parameters: &Parameters, step: &DVector<f64>) -> Parameters {
     let layout = &parameters.layout;
     let mut next = parameters.clone();

@@ -1,8 +1,8 @@
-//! Expected periodogram of outputs that white, unmeasured forces drive through the modes.
+//! Expected periodogram of the outputs of modes that are driven by white, unmeasured forces.
 //!
 //! The outputs are y = Σ_r H_r w_r + n with H_r(s) = Σ ψ g(s, λ) over the pair (ψ, λ), (ψ*, λ*);
 //! the forces w on the modes are white with correlation Q, the noise n of each sensor is smooth.
-//! The covariance function is Σ ψ γᵀ exp(λτ) for τ > 0 with γ_r = Σ_s Q_rs H_s(−λ_r), and its
+//! The covariance function is Σ ψ γᵀ exp(λτ) for τ > 0 with γ_r = Σ_s Q_rs H_s(−λ_r), and the
 //! expected periodogram over a record of length T follows exactly:
 //!
 //! ```text
@@ -115,8 +115,8 @@ impl Coefficients {
         Kernels { value, derivative }
     }
 
-    /// Returns 1/(jω − λ) and minus its derivative by jω, or the sums of both over the frequencies
-    /// that fold onto ω.
+    /// Returns 1/(jω − λ) and minus its derivative with respect to jω, or the sums of both over the
+    /// frequencies that fold onto ω.
     pub fn inverse(
         &self,
         omega: f64,
@@ -250,7 +250,7 @@ fn add_pair(
     }
 }
 
-/// Returns A + Aᴴ + B of a real symmetric B.
+/// Returns A + Aᴴ + B with a real symmetric matrix B.
 pub(super) fn hermitian_sum(
     half: &DMatrix<Complex<f64>>,
     real: &DMatrix<f64>,

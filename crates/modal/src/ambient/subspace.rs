@@ -1,5 +1,6 @@
 //! Covariance-driven stochastic subspace identification (SSI-cov): poles and shapes of models of
-//! rising order from the covariances of the outputs; initial estimates of the likelihood.
+//! rising order, from the covariances of the outputs. They are the initial estimates for the
+//! maximum of the likelihood.
 
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use crate::stabilisation::{Pole, Stabilisation};
 /// mean.
 ///
 /// `block_rows` is the number of block rows of the Hankel matrix of the covariances; the largest
-/// lag is nearly twice that number of samples. `None` if there are fewer samples than lags, or a
+/// lag, in samples, is nearly twice `block_rows`. `None` if there are fewer samples than lags, or a
 /// decomposition fails.
 ///
 /// # Source
@@ -43,7 +44,8 @@ pub fn ssi_cov(
     let upper = observability.rows(0, rows - outputs).into_owned();
     let lower = observability.rows(outputs, rows - outputs);
     let (q, r) = upper.qr().unpack();
-    // Leading parts belong to lower orders: one factorisation serves all of them.
+    // The leading parts of the matrices belong to lower orders, so one factorisation is enough for
+    // all orders.
     let projected = q.tr_mul(&lower);
     let output = observability.rows(0, outputs);
     let models: Option<Vec<_>> = orders

@@ -16,7 +16,7 @@ const DURATION: f64 = 60.0;
 
 const SPAN: Span = Span { duration: DURATION, sample_interval: 0.05 };
 
-/// Three modes, two of them close together, at three outputs.
+/// Returns parameters of three modes, two of them close together, for a number of outputs.
 fn parameters(kernel: Kernel, outputs: usize) -> Parameters {
     let layout = Layout::new(3, outputs, 3);
     let mut random = ChaCha8Rng::seed_from_u64(8);
@@ -31,7 +31,7 @@ fn parameters(kernel: Kernel, outputs: usize) -> Parameters {
     Parameters { kernel, layout, values }
 }
 
-/// Lines whose periodogram is the one that is expected, times a factor.
+/// Returns lines whose periodogram is the expected periodogram times a factor.
 fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
     let omega: Vec<f64> =
         (40..400).map(|k| std::f64::consts::TAU * f64::from(k) / DURATION).collect();
@@ -72,8 +72,7 @@ fn gradients_are_the_differences_of_the_cost() {
     }
 }
 
-/// Judge: where the periodogram is the expected one, the information is the derivative of the
-/// gradient.
+/// If the periodogram equals its expected value, the information is the derivative of the gradient.
 #[test]
 fn the_information_is_the_curvature_at_the_expectation() {
     for kernel in [Kernel::Static, Kernel::Sampled, Kernel::Vanishing] {
@@ -97,8 +96,8 @@ fn the_information_is_the_curvature_at_the_expectation() {
     }
 }
 
-/// Judge: Σ (1 − |τ|/T) R(τ) exp(−jωτ) with the covariance function of the state equations, sampled
-/// finely.
+/// The reference is Σ (1 − |τ|/T) R(τ) exp(−jωτ) with the finely sampled covariance function R of
+/// the state equations.
 #[test]
 fn the_expected_periodogram_is_the_sum_of_the_covariances() {
     let mut parameters = parameters(Kernel::Static, 2);
@@ -169,7 +168,8 @@ fn modes_keep_their_values_when_others_come_and_go() {
     assert!((&back.values - &parameters.values).amax() < 1e-9);
 }
 
-/// One force may drive modes that are far apart.
+/// The correlation of modal forces may be large even for modes that are far apart, because one
+/// force may drive both.
 #[test]
 fn reordered_modes_keep_the_correlation_of_their_forces() {
     let layout = Layout::new(8, 2, 3);
@@ -186,8 +186,8 @@ fn reordered_modes_keep_the_correlation_of_their_forces() {
     assert!(gap.amax() < 1e-12, "{gap}");
 }
 
-/// Judge: the logarithm of the mean of n squared magnitudes of unit variance is −1/(2n) + O(1/n²) on
-/// average.
+/// The reference is the mean of the logarithm of the mean of n squared magnitudes of unit variance:
+/// −1/(2n) + O(1/n²).
 #[test]
 fn the_bias_of_a_noise_level_is_that_of_a_logarithm() {
     let layout = Layout::new(0, 1, 1);
@@ -206,8 +206,8 @@ fn the_bias_of_a_noise_level_is_that_of_a_logarithm() {
     assert!((bias + 0.01).abs() < 1e-5, "{bias}");
 }
 
-/// Judge: the estimate of the decay rate α of a complex Ornstein–Uhlenbeck process with zero mean is
-/// 1/T too high on average, to first order, as that of a complex autoregression of order one is. A
+/// The reference is a complex Ornstein–Uhlenbeck process with zero mean. To first order, the mean
+/// estimate of its decay rate α is too high by 1/T, as for a complex autoregression of order one. A
 /// lightly damped mode with little noise is such a process.
 #[test]
 fn the_bias_of_a_damping_ratio_is_that_of_an_autoregression() {
@@ -231,7 +231,8 @@ fn the_bias_of_a_damping_ratio_is_that_of_an_autoregression() {
     assert!((bias * decay_times - 1.0).abs() < 0.1, "{}", bias * decay_times);
 }
 
-/// Judge: half the sum of all mixed second differences of the spectrum, times the covariances.
+/// The reference is half the sum of all mixed second differences of the spectrum times the
+/// covariances.
 #[test]
 fn the_mean_excess_is_half_the_second_derivative_times_the_covariance() {
     let parameters = parameters(Kernel::Vanishing, 2);
@@ -266,8 +267,9 @@ fn the_mean_excess_is_half_the_second_derivative_times_the_covariance() {
     assert!(gap < 1e-3, "{gap:.1e} {excess} {exact}");
 }
 
-/// Judge: the covariance of two lines as the double sum of the covariance function of the state
-/// equations over all pairs of samples. Beside a resonance it is that of the transient.
+/// The reference is the covariance of two lines, computed as the double sum of the covariance
+/// function of the state equations over all pairs of samples. Away from a resonance this covariance
+/// is that of the transient.
 #[test]
 fn the_transient_correlates_the_lines() {
     let layout = Layout::new(1, 1, 1);

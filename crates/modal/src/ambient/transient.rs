@@ -1,14 +1,16 @@
-//! Transient of an open record: the part of its lines that comes from the motion at its two ends.
+//! Transient of an open record: the part of the lines that comes from the motion at the two ends of
+//! the record.
 //!
 //! A mode obeys z′ = λz + w. Its transform over the record is Z = W/(jω − λ) − L t, where t is the
-//! change of z over the record: one number for all lines. A likelihood of independent lines counts
-//! the transient L t as often as there are lines: one large change would then determine the
+//! change of z over the record: one number for all lines. A likelihood of independent lines would
+//! count the transient L t once for each line, so that one large change would determine the
 //! damping. Here t is a random effect: it is predicted from all lines together, and the lines
-//! without it are nearly independent.
+//! without the transient are nearly independent.
 //!
 //! For samples at intervals Δ, L = Δ/(1 − exp(−aΔ)) with a = jω − λ. The mean of W for a known t is
-//! tα/a* with α = −Re λ, so the response to t is −L (1 − α/a*). This is exact if the forces on the
-//! modes are independent; correlated forces of close modes change it, but hardly the estimates.
+//! tα/a* with α = −Re λ, so the response to t is −L (1 − α/a*). This response is exact if the
+//! forces on the modes are independent. Correlated forces of close modes change the response, but
+//! hardly change the estimates.
 
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
@@ -65,11 +67,11 @@ impl FitWithTransient {
     }
 }
 
-/// Searches from the parameters of `fit`, in alternation with the transient, until the likelihood
-/// rises no more.
+/// Alternates between a search that starts from the parameters of `fit` and a prediction of the
+/// transient, until the likelihood no longer rises.
 ///
-/// The information of the transient itself on the poles is not used: it contributes as much as one
-/// line of the many lines of a resonance.
+/// The information about the poles that the transient itself contains is not used: it is only as
+/// much as that of one of the many lines of a resonance.
 ///
 /// # Source
 /// After Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.
@@ -196,8 +198,8 @@ impl BandLines {
 }
 
 impl Coefficients {
-    /// Returns the lines of unit real and then unit imaginary changes of each mode over the record,
-    /// outputs × 2 modes.
+    /// Returns the lines due to unit changes of each mode over the record, outputs × 2 modes: the
+    /// real changes first, the imaginary changes after them.
     pub fn transient_gains(&self, omega: f64, span: Span) -> DMatrix<Complex<f64>> {
         let (outputs, modes) = self.shapes.shape();
         let mut gains = DMatrix::zeros(outputs, 2 * modes);

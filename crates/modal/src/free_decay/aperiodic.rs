@@ -6,7 +6,8 @@ use super::backbone::inverse;
 use super::fit::Data;
 use super::limits::{FASTEST_DECAY, FREE_DECAY_SURE, RATE_REFINEMENTS, SLOWEST_RETURN};
 
-/// Rates of decays without oscillation, with standard errors and criterion.
+/// Rates of decays without oscillation, their standard errors, and the information criterion of the
+/// fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Aperiodic {
     /// Rates per sample and their standard errors, rising.
@@ -15,8 +16,8 @@ pub(super) struct Aperiodic {
     pub criterion: f64,
 }
 
-/// Returns one or two decays without oscillation, whichever has the lower Bayesian information
-/// criterion; `None` if not even one decay lowers it.
+/// Returns one or two decays without oscillation: the number with the lower Bayesian information
+/// criterion. `None` if no decay lowers the criterion, or if the data do not determine a rate.
 ///
 /// # Source
 /// Schwarz (1978), Annals of Statistics 6, 461–464; Golub & Pereyra (1973), SIAM Journal on
@@ -75,7 +76,7 @@ fn residual(data: &Data, rates: &[f64]) -> Option<DMatrix<f64>> {
     Some(&data.samples - basis * solution)
 }
 
-/// Adds the best further rate from a grid to `rates`, and then refines all rates in turn.
+/// Adds the best further rate from a grid to `rates`, and afterwards refines all rates in turn.
 fn searched(data: &Data, rates: Vec<f64>) -> Option<Vec<f64>> {
     let slowest = SLOWEST_RETURN / data.len() as f64;
     let steps = ((FASTEST_DECAY / slowest).ln() / 0.5).ceil() as i32;

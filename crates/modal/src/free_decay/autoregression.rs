@@ -6,10 +6,11 @@ use super::limits::{MOST_ORDER, SAMPLES_PER_ORDER};
 /// Noise of one channel as an autoregression; of order 0 it is white.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Autoregression {
-    /// Coefficients of the best predictions from the last 1, 2 … samples, the latest sample first.
+    /// Coefficients of the best predictions from the preceding 1, 2 … samples; the coefficient of
+    /// the latest sample is the first.
     predictors: Vec<Vec<f64>>,
-    /// Standard deviation of the error of each prediction from 0, 1 … samples, relative to the
-    /// last.
+    /// Standard deviation of the error of each prediction from 0, 1 … samples, relative to that of
+    /// the last prediction in the list.
     deviations: Vec<f64>,
 }
 
@@ -66,8 +67,8 @@ impl Autoregression {
         2.0 * self.deviations.iter().map(|d| d.ln()).sum::<f64>()
     }
 
-    /// Returns the prediction errors of `values` from sample `before` on, all of one variance; the
-    /// first of the values is sample `first` of the record.
+    /// Returns the prediction errors of `values`, beginning with index `before`, scaled to equal
+    /// variance. The first of the values is sample `first` of the record.
     pub(super) fn whitened(&self, values: &[f64], first: usize, before: usize) -> Vec<f64> {
         let mut errors = values[before..].to_vec();
         let order = self.order();

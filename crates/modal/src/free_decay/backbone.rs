@@ -13,8 +13,8 @@ use super::limits::{
 };
 use super::poles::linear_columns;
 
-/// Frequency and damping over amplitude of a mode that a sum of decaying oscillations does not
-/// describe.
+/// Frequency and damping as functions of amplitude, for a mode that a sum of decaying oscillations
+/// does not describe.
 ///
 /// The amplitude a and the phase φ of the mode follow a slow flow, a' = −P(a) and φ' = W(a) with
 /// polynomials P and W. A linear mode has P proportional to a, and W constant.
@@ -25,10 +25,11 @@ pub struct Backbone {
     pub modes: Vec<usize>,
     /// Frequency and damping from the first amplitude down to the last one above the noise.
     pub points: Vec<BackbonePoint>,
-    /// Number of unknowns of the slow flow and its amplitudes, without the unknowns of other modes.
+    /// Number of unknowns of the slow flow and of its amplitudes; the unknowns of other modes are
+    /// not counted.
     pub unknowns: usize,
-    /// Decrease of the Bayesian information criterion from the linear modes to the slow flow, a
-    /// pure number.
+    /// Bayesian information criterion of the linear modes minus that of the slow flow, a pure
+    /// number.
     pub gain: f64,
 }
 
@@ -41,7 +42,7 @@ pub struct BackbonePoint {
     pub amplitude: f64,
     /// Frequency of the oscillation at this amplitude, in Hz.
     pub frequency_hz: Uncertain,
-    /// Decay rate −a'/a over the angular frequency, a ratio.
+    /// Ratio of the decay rate −a'/a to the angular frequency.
     pub damping_ratio: Uncertain,
 }
 
@@ -93,7 +94,7 @@ fn horner(coefficients: &[f64], u: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * u + c)
 }
 
-/// Record minus the response of all modes that are not replaced, to be whitened.
+/// Record minus the response of all modes that are not replaced, before it is whitened.
 struct Target<'a> {
     data: &'a Data,
     fit: &'a Fit,
@@ -134,7 +135,7 @@ impl<'a> Target<'a> {
         Self { data, fit, samples, deviations }
     }
 
-    /// Returns the residual of a flow with amplitudes and constants by least squares.
+    /// Returns a flow with its residual, and with amplitudes and constants from least squares.
     fn fitted(&self, flow: Flow) -> Option<Fitted> {
         let len = self.data.len();
         let path = flow.path(len)?;
@@ -169,8 +170,8 @@ impl<'a> Target<'a> {
     /// Returns the derivatives of the residual with respect to the coefficients, by central
     /// differences.
     fn jacobian(&self, flow: &Flow) -> Option<DMatrix<f64>> {
-        // The coefficients have the size of phases (rad) and nepers over the record: one step suits
-        // all.
+        // The coefficients are in radians or nepers over the record, so one step size suits all of
+        // them.
         const STEP: f64 = 1e-4;
         let columns = (0..flow.values.len()).map(|at| {
             let moved = |step: f64| {
@@ -183,7 +184,7 @@ impl<'a> Target<'a> {
         Some(DMatrix::from_columns(&columns.collect::<Option<Vec<_>>>()?))
     }
 
-    /// Searches the flow with the least squared residual.
+    /// Searches for the flow with the smallest sum of squared residuals.
     fn settled(&self, start: Flow) -> Option<Fitted> {
         let mut best = self.fitted(start)?;
         for _ in 0..BACKBONE_STEPS {
@@ -204,7 +205,7 @@ impl<'a> Target<'a> {
         Some(best)
     }
 
-    /// Returns minus twice the log-likelihood, without the constant that it shares with the linear
+    /// Returns minus twice the log-likelihood, without a constant that is the same for the linear
     /// modes.
     fn cost(&self, fitted: &Fitted) -> f64 {
         let len = self.data.len();
@@ -217,8 +218,8 @@ impl<'a> Target<'a> {
     }
 }
 
-/// Returns the inverse of a matrix of scalar products, whose columns may be of different units;
-/// `None` if it is singular.
+/// Returns the inverse of a Gram matrix of columns with different units; `None` if the matrix is
+/// singular.
 pub(super) fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = gram.diagonal().map(|g| if g > 0.0 { g.sqrt().recip() } else { 0.0 });
     let scaling = DMatrix::from_diagonal(&scale);
@@ -267,8 +268,8 @@ fn reference_response(
     (reference, modes.iter().map(|mode| complex(reference, *mode)).collect())
 }
 
-/// Returns the initial flow: polynomials of an order that fit the amplitude and phase rates of the
-/// linear modes best.
+/// Returns the initial flow: polynomials of the given order that best fit the amplitude and phase
+/// rates of the linear modes.
 fn initial_flow(modes: &[[Complex<f64>; 2]], len: usize, order: usize) -> Option<Flow> {
     const SAMPLES: usize = 400;
     let at = |k: f64| {
@@ -306,8 +307,8 @@ fn initial_flow(modes: &[[Complex<f64>; 2]], len: usize, order: usize) -> Option
 /// modes near it, by the Bayesian information criterion; `energies` are the energies of the modes,
 /// `scale` is the unit of each channel of the data.
 ///
-/// The linear modes nearest to the strongest one are replaced: one, then two, and so on. The order
-/// of the polynomials rises from two.
+/// The linear modes nearest in frequency to the strongest mode are replaced: first one mode, next
+/// two, and so on. The order of the polynomials rises from two.
 ///
 /// # Source
 /// Londoño, Neild & Cooper (2015), Journal of Sound and Vibration 339, 205–223 (backbones from
@@ -361,7 +362,7 @@ pub(super) fn backbone(
     best.map(|(_, backbone)| backbone)
 }
 
-/// Returns whether the first step from a linear mode is expected to lower the criterion.
+/// Returns whether, by a linear prediction, the first step from a linear mode lowers the criterion.
 fn is_promising(target: &Target<'_>, start: &Flow) -> bool {
     let expected_gain = || {
         let (fitted, jacobian) = (target.fitted(start.clone())?, target.jacobian(start)?);

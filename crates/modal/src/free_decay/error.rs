@@ -24,10 +24,10 @@ pub enum FreeDecayError {
     SilentChannel {
         /// Channel, counted from 0.
         channel: usize,
-        /// Value of all its samples, in the unit of the record.
+        /// Value of all samples of the channel, in the unit of the record.
         value: f64,
     },
-    /// No, or too many, modes were asked for.
+    /// The requested number of modes is zero or too large.
     #[error("{} cannot be fitted: give a number from 1 to {most}", message::count(*modes, "mode"))]
     NumberOfModes {
         /// Modes asked for.
@@ -45,7 +45,7 @@ pub enum FreeDecayError {
     NoDecay {
         /// Samples of the record.
         samples: usize,
-        /// Twice the gain of the log likelihood by the best oscillation, a pure number.
+        /// Twice the gain in log-likelihood due to the best oscillation, a pure number.
         gained: f64,
         /// Gain that a mode must exceed, a pure number.
         needed: f64,
@@ -53,13 +53,13 @@ pub enum FreeDecayError {
     /// A response returns to rest without oscillation.
     #[error("the response does not oscillate: {} it better than oscillations", returns(rates))]
     NoOscillation {
-        /// Decay rates and their standard errors, in 1/s, one or two, rising.
+        /// One or two decay rates, in rising order, each with its standard error, in 1/s.
         rates: Vec<[f64; 2]>,
     },
     /// A free response grows.
     #[error(
-        "the response at {frequency_hz:.4} Hz grows, at {growth_rate:.3e} ± {standard_error:.1e} 1/s: an \
-         unstable system, a force that still acts, or a record that begins before the release"
+        "the response at {frequency_hz:.4} Hz grows, at {growth_rate:.3e} ± {standard_error:.1e} 1/s: the \
+         system is unstable, a force still acts, or the record begins before the release"
     )]
     Grows {
         /// Frequency, in Hz.

@@ -19,15 +19,17 @@ use super::poles::{Pole, linear_columns};
 /// Mode of a free response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DecayMode {
-    /// Pole and shape with their standard errors; the shape is in the measured quantity, with its
-    /// largest entry 1.
+    /// Pole and shape with their standard errors. The shape is that of the measured quantity; its
+    /// largest entry is 1.
     pub mode: IdentifiedMode,
-    /// Amplitude at the first sample in the channel of largest shape, in the unit of the record.
+    /// Amplitude at the first sample, in the unit of the record, in the channel with the largest
+    /// entry of the shape.
     pub amplitude: Uncertain,
-    /// Phase at the first sample in that channel, in rad: the response is A e^{σt} cos(ωt + φ).
+    /// Phase φ at the first sample, in rad, in the channel with the largest entry of the shape: the
+    /// response is A e^{σt} cos(ωt + φ).
     pub phase: f64,
-    /// Ratio of the sum of squares of this mode to that of all modes, over all samples and
-    /// channels.
+    /// Ratio of the sum of squares of this mode to the sum over all modes; each sum is over all
+    /// samples and channels.
     pub energy_share: f64,
 }
 
@@ -56,7 +58,7 @@ pub struct DecayChannel {
     pub onset: Onset,
 }
 
-/// Comparison of the residual in the first samples with the residual in the others.
+/// Comparison of the residual in the first samples with the residual in the other samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onset {
     /// Number of samples of the onset.
@@ -92,20 +94,20 @@ pub struct FreeDecayEstimate {
 }
 
 impl FreeDecayEstimate {
-    /// Returns frequency and damping over amplitude of the strongest mode; `None` if linear modes
-    /// describe the response better.
+    /// Returns frequency and damping of the strongest mode as functions of amplitude; `None` if
+    /// linear modes describe the response better.
     pub fn backbone(&self) -> Option<&Backbone> {
         self.backbone.as_ref()
     }
 
-    /// Returns the sample, counted from 0, at which the response is excited again; `None` if it is
-    /// not.
+    /// Returns the sample, counted from 0, of a second excitation; `None` if there is no second
+    /// excitation.
     pub fn restart(&self) -> Option<usize> {
         self.restart
     }
 
-    /// Sets the sample of a second excitation; ignored if the strongest mode is nonlinear, which
-    /// explains the same residual.
+    /// Sets the sample of a second excitation. It is ignored if the strongest mode is nonlinear,
+    /// because the nonlinearity explains the same residual.
     pub(super) fn with_restart(self, restart: Option<usize>) -> Self {
         Self { restart: restart.filter(|_| self.backbone.is_none()), ..self }
     }
@@ -184,8 +186,8 @@ impl<'a> Spread<'a> {
         Uncertain { value, standard_error, degrees_of_freedom }
     }
 
-    /// Returns the variance of Re Σ w_c A_c, with the complex amplitude A_c of a mode in channel c,
-    /// relative to its origin.
+    /// Returns the variance of Re Σ w_c A_c, where A_c is the complex amplitude of a mode in
+    /// channel c at the sample [`Pole::origin`].
     fn variance(&self, mode: usize, weights: &[(usize, Complex<f64>)]) -> f64 {
         let mut through_poles = DVector::zeros(self.poles.nrows());
         let mut variance = 0.0;
@@ -201,7 +203,7 @@ impl<'a> Spread<'a> {
         variance + through_poles.dot(&(&self.poles * &through_poles))
     }
 
-    /// Returns the complex amplitude of a mode in a channel, relative to its origin.
+    /// Returns the complex amplitude of a mode in a channel, at the sample [`Pole::origin`].
     fn amplitude(&self, mode: usize, channel: usize) -> Complex<f64> {
         let linear = &self.fit.channels[channel].linear;
         Complex::new(linear[2 * mode], -linear[2 * mode + 1])
@@ -209,7 +211,7 @@ impl<'a> Spread<'a> {
 }
 
 /// Returns modes and channels of a fit; `scale` is the unit of each channel of the data, in the
-/// unit of the record. `None` if the fit does not determine some unknown.
+/// unit of the record. `None` if the fit does not determine all unknowns.
 pub(super) fn estimate(
     record: &Record,
     data: &Data,

@@ -8,8 +8,8 @@ use super::autoregression::Autoregression;
 use super::limits::{MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING};
 use super::poles::{Pole, columns, linear_columns};
 
-/// Record as samples × channels, each channel scaled to unit RMS about its mean; `constant` states
-/// whether each channel has a constant.
+/// Record as samples × channels. Each channel is scaled to unit RMS about its mean; `constant`
+/// states whether each channel has an unknown constant.
 #[derive(Debug)]
 pub(super) struct Data {
     pub samples: DMatrix<f64>,
@@ -35,12 +35,12 @@ pub(super) struct ChannelFit {
     pub square: f64,
     /// Triangular factor of the linear columns.
     pub factor: DMatrix<f64>,
-    /// Derivatives with respect to growth and turn of each pole, times N: the part in the space of
-    /// the linear columns.
+    /// Part of the derivatives in the space of the linear columns. The derivatives are those with
+    /// respect to growth and turn of each pole, times N.
     pub along: DMatrix<f64>,
     /// Part of the derivatives orthogonal to the linear columns.
     pub across: DMatrix<f64>,
-    /// Residual in the directions of the derivatives.
+    /// Components of the residual along the orthogonal parts of the derivatives.
     pub side: DVector<f64>,
 }
 
@@ -78,8 +78,8 @@ impl Data {
     /// Returns the triangular factor of \[linear columns | columns of poles times k/N | channels\]
     /// after whitening.
     ///
-    /// Modes that have decayed before a chunk have no columns there: most modes of a long record
-    /// last for only a small part of the record.
+    /// Modes that have decayed before a block of rows have no columns in this block: most modes of
+    /// a long record last for only a small part of the record.
     fn triangle(
         &self,
         poles: &[Pole],
@@ -145,8 +145,8 @@ impl Data {
         factor.push(&parts)
     }
 
-    /// Solves for the linear unknowns; `None` if the poles are impossible or too close to one
-    /// another.
+    /// Solves for the linear unknowns; `None` if the record cannot determine a pole, or if two
+    /// poles are too close.
     fn at(&self, poles: &[Pole], noise: &[Autoregression]) -> Option<Fit> {
         if !poles.iter().all(|pole| pole.is_possible(self.len())) {
             return None;
@@ -185,8 +185,8 @@ impl Data {
         Some(Fit { poles: poles.to_vec(), noise: noise.to_vec(), channels })
     }
 
-    /// Searches the maximum-likelihood poles from initial poles for given noise, until a step
-    /// decreases minus twice the log-likelihood by less than `tolerance`.
+    /// Searches for the maximum-likelihood poles for given noise, from initial poles. It ends when
+    /// a step decreases minus twice the log-likelihood by less than `tolerance`.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, with the Jacobian of
@@ -259,12 +259,12 @@ impl Fit {
     }
 }
 
-/// Triangle of the rows in which only some of the poles have not died away.
+/// Triangular factor of the rows in which only some of the poles have not decayed.
 struct FewColumns {
-    /// Indices of these poles among all.
+    /// Indices of these poles among all poles.
     alive: Vec<usize>,
     poles: Vec<Pole>,
-    /// Indices of the columns among those of all poles.
+    /// Indices of their columns among the columns of all poles.
     columns: Vec<usize>,
     width: usize,
     factor: TriangularFactor,
@@ -295,8 +295,8 @@ impl FewColumns {
     }
 }
 
-/// Returns the prediction errors of columns from row `before` on; the first row is sample `first`
-/// of the record.
+/// Returns the prediction errors of columns, beginning with row `before`; the first row is sample
+/// `first` of the record.
 fn whitened(
     noise: &Autoregression,
     columns: &DMatrixView<'_, f64>,
@@ -310,8 +310,8 @@ fn whitened(
     white
 }
 
-/// Returns the matrix that combines the columns times k/N to the derivatives of a channel with
-/// respect to growth and turn of each pole, times N.
+/// Returns a matrix of coefficients. With these coefficients, the columns times k/N give the
+/// derivatives of a channel with respect to growth and turn of each pole, times N.
 fn slopes(linear: &DVector<f64>, nonlinear: usize) -> DMatrix<f64> {
     let mut slopes = DMatrix::zeros(nonlinear, nonlinear);
     for at in (0..nonlinear).step_by(2) {
@@ -324,7 +324,7 @@ fn slopes(linear: &DVector<f64>, nonlinear: usize) -> DMatrix<f64> {
     slopes
 }
 
-/// Returns the minimiser y of ‖J y − r‖² + damping·‖y‖² and the expected decrease of ‖J y − r‖².
+/// Returns the minimiser y of ‖J y − r‖² + damping·‖y‖², and the predicted decrease of ‖J y − r‖².
 fn damped_step(
     jacobian: &DMatrix<f64>,
     side: &DVector<f64>,

@@ -47,20 +47,20 @@ pub(super) fn strongest(residual: &DMatrix<f64>) -> Option<Pole> {
     best.map(|(_, pole)| pole.possible(len))
 }
 
-/// Principal directions of the Hankel matrix of a record, strongest first; they give the poles of
-/// any number of decays.
+/// Principal directions of the Hankel matrix of a record, the strongest first. The poles of any
+/// number of decays follow from them.
 #[derive(Debug)]
 pub(super) struct Subspace {
     vectors: DMatrix<f64>,
     channels: usize,
-    /// Number of samples from one row of a channel to the next.
+    /// Number of samples between neighbouring rows of a channel.
     stride: usize,
     len: usize,
 }
 
 impl Subspace {
-    /// Decomposes the Hankel matrix of samples × channels whose noise has about the same level in
-    /// all channels; `None` if the record is too short or has too many channels.
+    /// Decomposes the Hankel matrix of `samples` (samples × channels); the noise must have about
+    /// the same level in all channels. `None` if the record is too short or has too many channels.
     ///
     /// The matrix has at most [`HANKEL_ROWS`] rows, and only its products are stored. A record with
     /// only low frequencies is decimated.
@@ -102,7 +102,7 @@ impl Subspace {
         Some(Self { vectors, channels, stride, len })
     }
 
-    /// Returns the poles of a number of decays; fewer if some eigenvalues are real.
+    /// Returns the poles of a number of decays; there are fewer if some eigenvalues are real.
     ///
     /// # Source
     /// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627; Roy & Kailath
@@ -132,8 +132,8 @@ impl Subspace {
     }
 }
 
-/// Returns the stride of a decimation, a power of two, for which hardly any power is above half the
-/// sampling rate.
+/// Returns the stride of a decimation, a power of two, for which hardly any power of the record is
+/// above half the decimated sampling rate.
 fn stride(samples: &DMatrix<f64>) -> Option<usize> {
     let len = samples.nrows();
     let plan = transform::forward(len);

@@ -9,31 +9,32 @@ pub(crate) const SAMPLES_PER_ORDER: usize = 20;
 /// Number of lags in the whiteness test of a residual.
 pub(crate) const ESTIMATE_LAGS: usize = 20;
 
-/// Ratio of the length of a record to the length of its onset, whose residual is compared with that
-/// of the other samples.
+/// Ratio of the length of a record to the length of its onset. The residual of the onset is
+/// compared with that of the other samples.
 pub(crate) const ONSET_SHARE: usize = 50;
 
 /// Minimum number of samples of the onset.
 pub(crate) const LEAST_ONSET: usize = 10;
 
-/// Number of rows of a block of columns: bounds the memory.
+/// Number of rows of a block of columns; it limits the memory.
 pub(crate) const POLE_CHUNK: usize = 4096;
 
-/// Decay, in nepers, after which a mode has no columns: to 10⁻¹⁵ of its first amplitude, below the
-/// digits of a fit. Smaller values would lose information, larger ones cost time.
+/// Decay, in nepers, after which a mode has no columns: its amplitude is then 10⁻¹⁵ of its first
+/// amplitude, less than the rounding of a fit. A smaller limit would lose information, a larger one
+/// would cost time.
 pub(crate) const DEAD: f64 = 35.0;
 
 /// Maximum number of steps of a search.
 pub(crate) const MAX_STEPS: usize = 50;
 
-/// Decrease of minus twice the log-likelihood that ends the last search.
+/// Decrease of minus twice the log-likelihood in a step below which the last search ends.
 pub(crate) const FINE: f64 = 1e-7;
 
-/// Decrease of minus twice the log-likelihood that ends a search in the comparison of numbers of
-/// modes.
+/// Decrease of minus twice the log-likelihood in a step below which a search in the comparison of
+/// numbers of modes ends.
 pub(crate) const COARSE: f64 = 1e-2;
 
-/// Damping above which a search ends: no step lowers the cost.
+/// Damping of a step above which a search ends, because no step lowers the cost.
 pub(crate) const MAX_DAMPING: f64 = 1e8;
 
 /// Maximum residual, relative to the RMS of a channel, that counts as rounding.
@@ -48,15 +49,15 @@ pub(crate) const SAMPLES_PER_MODE: usize = 12;
 /// Maximum number of samples of a free decay.
 pub(crate) const MOST_SAMPLES: usize = 1 << 18;
 
-/// Minimum ratio of a growth rate to its standard error for a growth that is not scatter.
+/// Minimum ratio of a growth rate to its standard error; below it the growth counts as scatter.
 pub(crate) const FREE_DECAY_SURE: f64 = 4.0;
 
 /// Growth over the record, in nepers, above which the amplitude of a mode refers to the last
-/// sample: avoids an overflow.
+/// sample. This avoids an overflow.
 pub(crate) const FROM_THE_END: f64 = 3.0;
 
-/// Number of samples after which an exponential is computed directly instead of from the sample
-/// before: limits rounding errors.
+/// Number of samples after which an exponential is computed directly instead of from the preceding
+/// sample. This limits rounding errors.
 pub(crate) const POLE_AFRESH: usize = 32;
 
 /// Fastest decay of a mode, in nepers per sample.
@@ -71,28 +72,30 @@ pub(crate) const MOST_DAMPING: f64 = 0.9;
 /// Highest frequency of a mode, relative to half the sampling rate.
 pub(crate) const POLE_HIGHEST: f64 = 0.98;
 
-/// Probability that noise alone gains as much as is required of a further decay.
+/// Probability that noise alone has the gain that is required of a further decay.
 pub(crate) const FALSE_DECAY: f64 = 1e-3;
 
-/// Number of successive decays without gain that ends the search for more.
+/// Number of successive decays without sufficient gain after which the search for further decays
+/// ends.
 pub(crate) const SELECTION_PATIENCE: usize = 2;
 
-/// Maximum number of alternate estimates of the noise colour and the poles.
+/// Maximum number of rounds that alternate between the noise colour and the poles.
 pub(crate) const COLOUR_ROUNDS: usize = 3;
 
 /// Maximum number of rows of the Hankel matrix, for any number of samples.
 pub(crate) const HANKEL_ROWS: usize = 160;
 
-/// Maximum share of the power above half the decimated sampling rate of the Hankel matrix.
+/// Maximum fraction of the power that is above half the decimated sampling rate of the Hankel
+/// matrix.
 pub(crate) const INITIAL_ALIASED: f64 = 0.01;
 
-/// Slowest decay of the matched filters over the record, in nepers.
+/// Decay of the slowest matched filter over the record, in nepers.
 pub(crate) const FIRST_DECAY: f64 = 2.0;
 
-/// Ratio of the decay of a matched filter to the decay of the filter before.
+/// Ratio of the decay of a matched filter to that of the preceding filter.
 pub(crate) const INITIAL_FASTER: f64 = 3.0;
 
-/// Growth of the matched filter of a growing response over the record, in nepers.
+/// Growth, over the record, of the matched filter for a growing response, in nepers.
 pub(crate) const INITIAL_GROWTH: f64 = 6.0;
 
 /// Lowest order of the polynomials of a backbone: linear and quadratic damping.
@@ -112,24 +115,24 @@ pub(crate) const BACKBONE_POINTS: usize = 8;
 /// represent the same nonlinear mode; its harmonics are farther away.
 pub(crate) const NEIGHBOURHOOD: f64 = 0.5;
 
-/// Minimum amplitude, relative to the first, of the data for the initial estimate of a backbone:
-/// noise dominates below it.
+/// Minimum amplitude, relative to the first amplitude, of the data for the initial estimate of a
+/// backbone; below it noise dominates.
 pub(crate) const SMALLEST_AMPLITUDE: f64 = 1e-3;
 
-/// Minimum decay of a response without oscillation over the record, in nepers; a slower one is
-/// drift.
+/// Minimum decay, over the record, of a response without oscillation, in nepers; a slower change
+/// counts as drift.
 pub(crate) const SLOWEST_RETURN: f64 = 1.0;
 
-/// Number of refinements of the rates of decays without oscillation; each step is as large as the
-/// step before, or half as large.
+/// Number of refinements of the rates of decays without oscillation; the size of each step is the
+/// size of the preceding step or half of it.
 pub(crate) const RATE_REFINEMENTS: usize = 40;
 
-/// Number of samples at which a second excitation is tested, over the record and again near the
-/// best of them.
+/// Number of samples at which a second excitation is tested: once over the whole record, and once
+/// near the best of these samples.
 pub(crate) const RESTART_PLACES: usize = 64;
 
 /// Minimum decrease of the Bayesian information criterion at which a backbone replaces linear
 /// modes: very strong evidence according to Kass & Raftery (1995), Journal of the American
-/// Statistical Association 90, 773–795. Close linear modes in one channel may be described equally
-/// well by a backbone.
+/// Statistical Association 90, 773–795. Below the limit a backbone may describe close linear modes
+/// in one channel equally well.
 pub(crate) const STRONG_EVIDENCE: f64 = 10.0;

@@ -31,7 +31,7 @@ use self::select::Search;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct FreeDecay {
-    /// Number of modes; `None`: chosen by the likelihood.
+    /// Number of modes; if `None`, the likelihood chooses it.
     pub modes: Option<usize>,
     /// Maximum number of modes if the number is not given.
     pub max_modes: usize,
@@ -50,11 +50,11 @@ impl Default for FreeDecay {
 /// channels of one quantity in any unit.
 ///
 /// The modes of all channels share their poles; shapes and constants follow linearly from them.
-/// Each channel has its own noise level and, if its residual is coloured, its own autoregression.
-/// Poles, noise levels and autoregressions are maximum-likelihood estimates with the corresponding
-/// standard errors. A further mode must raise the likelihood by more than noise alone does with a
-/// probability of 0.1 %. Searches start from the Hankel matrix of the record and from the strongest
-/// decay in the residual.
+/// Each channel has a separate noise level and, if its residual is coloured, a separate
+/// autoregression. Poles, noise levels and autoregressions are maximum-likelihood estimates with
+/// the corresponding standard errors. A further mode is accepted if it raises the likelihood by
+/// more than a limit; noise alone exceeds this limit with a probability of 0.1 %. Searches start
+/// from poles of the Hankel matrix of the record and from the strongest decay in the residual.
 ///
 /// Modes that do not oscillate (overdamped ones) are not part of the model. The memory needed is a
 /// few times the size of the record.
@@ -81,9 +81,9 @@ impl Default for FreeDecay {
 ///
 /// # Errors
 /// [`FreeDecayError::SilentChannel`] if a channel is constant, [`SignalError::TooShort`],
-/// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than
-/// can be fitted, [`FreeDecayError::NoOscillation`] if decays without oscillation describe the
-/// response better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
+/// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if the requested number of modes
+/// is zero or too large, [`FreeDecayError::NoOscillation`] if decays without oscillation describe
+/// the response better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
 /// [`FreeDecayError::Grows`] if most of the response grows, [`FreeDecayError::NotConverged`] if the
 /// record does not determine the number of modes.
 ///

@@ -11,9 +11,9 @@ use super::limits::{
 /// Pole λ = `growth` + i `turn` of the response exp(λ k) at sample k.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {
-    /// Re λ Δt, negative for a decay, in nepers per sample.
+    /// Growth, the real part of the pole, in nepers per sample; negative for a decay.
     pub growth: f64,
-    /// Im λ Δt, in rad per sample.
+    /// Turn, the imaginary part of the pole, in rad per sample.
     pub turn: f64,
 }
 

@@ -7,8 +7,8 @@ use super::limits::RESTART_PLACES;
 use super::poles::linear_columns;
 
 /// Returns the first sample of a second excitation, counted from 0, and the decrease of the
-/// Bayesian information criterion if the amplitudes before and after it are independent; `None` if
-/// no sample lowers it.
+/// Bayesian information criterion if the amplitudes before and after this sample are independent.
+/// `None` if no sample lowers the criterion.
 ///
 /// # Source
 /// Bai & Perron (1998), Econometrica 66, 47–78 (changes of coefficients at unknown times); Schwarz
@@ -45,7 +45,7 @@ fn best(data: &Data, fit: &Fit, candidates: Vec<usize>) -> Option<(f64, usize)> 
     candidates.iter().enumerate().filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Returns BᵀB and BᵀX for the rows before each candidate; the last entry is for all rows.
+/// Returns BᵀB and BᵀX for the rows before each candidate sample; the last entry is for all rows.
 fn sums(data: &Data, fit: &Fit, candidates: &[usize]) -> Vec<(DMatrix<f64>, DMatrix<f64>)> {
     let linear = linear_columns(&fit.poles, data.constant);
     let mut gram = DMatrix::zeros(linear, linear);

@@ -9,10 +9,12 @@ use super::initial_poles::{Subspace, strongest};
 use super::limits::{COARSE, COLOUR_ROUNDS, FALSE_DECAY, SELECTION_PATIENCE};
 use super::poles::{Pole, linear_columns};
 
-/// Returns the minimum decrease of minus twice the log-likelihood by a further decay.
+/// Returns the minimum decrease of minus twice the log-likelihood for the acceptance of a further
+/// decay.
 ///
-/// A decay has two unknowns, and two more per channel. In noise alone, the best of as many
-/// frequencies as there are samples gains more than this with the probability [`FALSE_DECAY`].
+/// A decay has two unknowns, and two more per channel. In noise alone, with one independent
+/// frequency for each sample, the best frequency exceeds this decrease with the probability
+/// [`FALSE_DECAY`].
 pub(super) fn least_gain(len: usize, channels: usize) -> f64 {
     let level = FALSE_DECAY / len as f64;
     let distribution = ChiSquared::new(2.0 * channels as f64 + 2.0);
@@ -40,8 +42,8 @@ pub(super) struct Candidate {
     pub cost: f64,
 }
 
-/// Fits with the same number of decays, with white and with coloured noise: an autoregression of
-/// high order may absorb decays that are not yet in the model and hide them.
+/// Fits with the same number of decays: one with white noise, one with coloured noise. An
+/// autoregression of high order may hide decays that are not yet in the model.
 #[derive(Debug, Clone)]
 struct Pair {
     white: Candidate,
@@ -72,7 +74,7 @@ pub(super) struct Selected {
     pub best: Candidate,
     /// Best fit with white noise.
     pub white: Candidate,
-    /// Decrease of minus twice the log likelihood by the first decay.
+    /// Decrease of minus twice the log-likelihood due to the first decay.
     pub first_gain: f64,
 }
 
@@ -121,8 +123,8 @@ impl<'a> Search<'a> {
         Some(Selected { best, white, first_gain })
     }
 
-    /// Fits a given number of decays, with the initial poles of the unwhitened record: an
-    /// autoregression must not replace one of them.
+    /// Fits a given number of decays, with initial poles from the unwhitened record: an
+    /// autoregression must not replace one of the decays.
     pub(super) fn exactly(&self, decays: usize) -> Option<Candidate> {
         let raw = |wanted: usize| self.raw.as_ref().map(|raw| raw.poles(wanted));
         let mut fit = self.data.refined(&[], &self.white(), COARSE)?;
@@ -141,9 +143,9 @@ impl<'a> Search<'a> {
         vec![Autoregression::default(); self.data.channels()]
     }
 
-    /// Returns the most likely fits with one more decay. Initial poles are the current poles with
-    /// the strongest decay in the residual, or the poles of the Hankel matrix; the record is used
-    /// as it is, and whitened.
+    /// Returns the most likely fits with one more decay. Initial poles are either the current poles
+    /// and the strongest decay in the residual, or the poles of the Hankel matrix. Each choice is
+    /// tried with the unwhitened record and, if the noise is coloured, with the whitened record.
     fn one_more(&self, last: &Pair) -> Option<Pair> {
         let wanted = last.decays() + 1;
         let raw = self.raw.as_ref().map(|raw| raw.poles(wanted));
@@ -188,7 +190,7 @@ impl<'a> Search<'a> {
         Some(poles)
     }
 
-    /// Returns the fit, or a better one with the autoregression of its residual.
+    /// Returns the fit, or a better fit with the autoregression of its residual.
     fn candidate(&self, mut fit: Fit) -> Candidate {
         let mut best = self.rated(&fit);
         for _ in 0..COLOUR_ROUNDS {

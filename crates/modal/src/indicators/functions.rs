@@ -5,11 +5,11 @@ use nalgebra::{Complex, DMatrix};
 use super::IndicatorError;
 use crate::decomposition;
 
-/// Returns the complex mode indicator function: the singular values of H (outputs × inputs) of each
-/// line, falling; lines × min(outputs, inputs), in the unit of H.
+/// Returns the complex mode indicator function: the singular values of H (outputs × inputs) on each
+/// line, in falling order. The result is lines × min(outputs, inputs), in the unit of H.
 ///
-/// Peaks of the first value are modes; a peak of the second at the same line is a second mode
-/// there.
+/// Peaks of the first singular value are modes; a peak of the second singular value on the same
+/// line is a second mode.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if the responses differ in shape, [`IndicatorError::NotConverged`] also
@@ -31,11 +31,11 @@ pub fn complex_mode_indicator(
 }
 
 /// Returns the multivariate mode indicator function: for each line and each of q combinations of
-/// the forces the ratio of the power of the response in phase with the force to its total power,
-/// rising; lines × q.
+/// the forces, the power of the response in phase with the force, divided by the total power of the
+/// response. The values of a line are in rising order; the result is lines × q.
 ///
-/// It drops from about 1 towards 0 where a real mode is in phase resonance; the responses are
-/// displacements or accelerations over forces.
+/// A value falls from about 1 towards 0 where a real mode is in phase resonance. The responses are
+/// displacements or accelerations per unit force.
 ///
 /// # Errors
 /// As [`complex_mode_indicator`].

@@ -51,7 +51,7 @@ pub enum IndicatorError {
 }
 
 /// Returns the modal assurance criterion |aᴴb|²/(aᴴa bᴴb) of two complex shapes: 1 if they are
-/// multiples of one another, 0 if they are orthogonal. It is 0 where a shape is zero.
+/// multiples of one another, 0 if they are orthogonal. The value is 0 if a shape is zero.
 ///
 /// # Panics
 /// If the shapes differ in length.
@@ -99,8 +99,8 @@ pub fn mac_matrix(
 /// decrease.
 ///
 /// If the shapes agree, the MAC is at its maximum: its gradient is zero, and errors of the shapes
-/// lower it on average by `expected_loss`. Terms of second order are therefore part of the standard
-/// error.
+/// reduce the MAC by `expected_loss` on average. For this reason the standard error includes terms
+/// of second order.
 ///
 /// # Errors
 /// [`IndicatorError::Size`], [`IndicatorError::ZeroShape`].

@@ -13,7 +13,7 @@ pub struct Indicator {
     pub value: f64,
     /// Standard error of the value.
     pub standard_error: f64,
-    /// Expected decrease of the value by errors of the shapes; positive near a maximum.
+    /// Mean decrease of the value due to errors of the shapes; positive near a maximum.
     pub expected_loss: f64,
 }
 

@@ -12,9 +12,9 @@ pub struct ShapeWithCovariance {
 }
 
 impl ShapeWithCovariance {
-    /// Creates a shape from its entries and the 2p × 2p covariance of their parts, the p real parts
-    /// first, in squared units of the shape; zero for entries without error, as in a finite-element
-    /// model.
+    /// Creates a shape from its p entries and the 2p × 2p covariance of their real and imaginary
+    /// parts (the p real parts first), in the squared unit of the shape. The covariance is zero for
+    /// entries without error, as in a finite-element model.
     ///
     /// # Errors
     /// [`IndicatorError::Size`], [`IndicatorError::NotFinite`], [`IndicatorError::ZeroShape`].
@@ -85,8 +85,8 @@ impl ShapeWithCovariance {
         DVector::from_fn(p, |i, _| variance(i).max(0.0).sqrt())
     }
 
-    /// Returns the shape divided by one of its entries, which becomes 1 without error; `None` if
-    /// that entry is zero.
+    /// Returns the shape divided by one of its entries. This entry becomes exactly 1; `None` if it
+    /// is zero.
     pub fn normalised_to(&self, entry: usize) -> Option<Self> {
         let p = self.shape.len();
         let reference = *self.shape.get(entry)?;

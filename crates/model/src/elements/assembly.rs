@@ -175,8 +175,8 @@ impl Assembly {
         self.loads.iter().map(load).collect()
     }
 
-    /// Returns D(ω) (n × n, N/m) with the column D_g of the support as the last one, n × (n + 1),
-    /// summed over the terms that `included` accepts.
+    /// Returns \[D(ω) D_g\], n × (n + 1), in N/m: the dynamic stiffness, then the column of the
+    /// support. Both are sums over the terms that `included` accepts.
     ///
     /// # Source
     /// Bathe (1982), the direct stiffness method.

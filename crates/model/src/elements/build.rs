@@ -153,7 +153,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns the entries of e_i − e_j for two ends i and j. One end may be the support, which
-    /// moves only in its direction.
+    /// moves only in the direction of its prescribed motion.
     pub(super) fn difference(
         &self,
         what: &'static str,

@@ -62,8 +62,8 @@ impl InputColumn {
     }
 }
 
-/// Returns the forces in x and y per kg·m of unbalance on a rotor that turns from x to y; backwards
-/// at a negative speed.
+/// Returns the forces in x and y per kg·m of unbalance on a rotor that turns from x to y; at a
+/// negative speed it turns from y to x.
 pub(super) fn unbalance(
     [x, y]: [usize; 2],
     omega: f64,

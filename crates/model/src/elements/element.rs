@@ -70,7 +70,7 @@ pub struct MatrixElement {
     pub damping: Option<(DMatrix<f64>, Coefficient)>,
     /// K, d × d, in N/m, and its factor.
     pub stiffness: Option<(DMatrix<f64>, Coefficient)>,
-    /// G of the gyroscopic force Ω G ẋ, d × d, in kg·m² (kg), and its factor.
+    /// G of the gyroscopic force Ω G ẋ, d × d, in kg·m² (kg for translations), and its factor.
     pub gyroscopic: Option<(DMatrix<f64>, Coefficient)>,
 }
 

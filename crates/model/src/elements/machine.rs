@@ -22,7 +22,7 @@ pub struct ProportionalDamping {
 }
 
 impl ProportionalDamping {
-    /// Returns whether there is no such damping.
+    /// Returns whether α, β and η are all zero.
     pub fn is_zero(&self) -> bool {
         [&self.alpha, &self.beta, &self.loss_factor].into_iter().all(Coefficient::is_zero)
     }
@@ -44,7 +44,8 @@ pub struct Machine {
     pub damping: ProportionalDamping,
     /// Degrees of freedom in the direction of the motion of the support; by default all.
     pub support_direction: Option<Vec<String>>,
-    /// Degrees of freedom of a part whose receptance was measured: they need no mass here.
+    /// Degrees of freedom of a part whose receptance was measured: they need no mass in this
+    /// machine.
     pub measured: Vec<String>,
 }
 

@@ -214,7 +214,7 @@ impl ElementForm {
         } else if given.iter().any(|field| field.len() == 3) {
             Ok(Kind::Bearing)
         } else {
-            Err(self.error("`kind` is missing: mass, link, bearing, matrices or unbalance"))
+            Err(self.error("`kind` is missing: give mass, link, bearing, matrices or unbalance"))
         }
     }
 
@@ -250,7 +250,7 @@ impl ElementForm {
                 let columns = rows.first().map_or(0, Vec::len);
                 if let Some(row) = rows.iter().position(|row| row.len() != columns) {
                     let problem = format!(
-                        "row {} of `{what}` has {} entries, the first one {columns}",
+                        "row {} of `{what}` has {} entries, but the first row has {columns}",
                         row + 1,
                         rows[row].len()
                     );

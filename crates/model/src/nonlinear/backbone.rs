@@ -28,8 +28,8 @@ impl UncertainNonlinearSystem {
     ///
     /// Modes are those of M and K, counted from 0 in ascending order of frequency. The motion is a
     /// Fourier series of a mean and nine harmonics in balance with the forces; terms of the
-    /// velocities are omitted together with the damping. The list ends early if no such motion is
-    /// found: a softening spring may have none.
+    /// velocities are omitted together with the damping. The list ends early if the search finds
+    /// no such motion: with a softening spring there may be none.
     ///
     /// # Errors
     /// [`ModelError::NoSuchMode`] if fewer modes oscillate without damping,

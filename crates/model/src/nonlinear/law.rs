@@ -30,8 +30,8 @@ pub trait Law: fmt::Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Returns the same law with other constants, one for each of [`Law::constants`] and in its
-    /// unit; `None` if they are out of range.
+    /// Returns the same law with other constants, one for each of [`Law::constants`], in their
+    /// units; `None` if a constant is out of range.
     fn with_constants(&self, _values: &[f64]) -> Option<Arc<dyn Law>> {
         None
     }
@@ -229,7 +229,7 @@ impl Law for Gap {
 }
 
 /// Regularised Coulomb friction tanh(q̇/b); its coefficient is the sliding force. Below the
-/// velocity b it creeps, whereas dry friction sticks.
+/// velocity b the contact creeps, whereas with dry friction it sticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
     velocity: f64,

@@ -52,8 +52,8 @@ impl NonlinearSystem {
     /// Creates a linear system with terms and their coefficients, each in its own unit.
     ///
     /// # Errors
-    /// [`ModelError::Term`] if a term does not belong to the system,
-    /// [`ModelError::Coefficients`] unless there is one finite coefficient for each.
+    /// [`ModelError::Term`] if a term does not belong to the system, [`ModelError::Coefficients`]
+    /// unless there is one finite coefficient for each term.
     pub fn new(
         linear: SecondOrderSystem,
         terms: Terms,
@@ -85,8 +85,8 @@ impl NonlinearSystem {
         self.linear.dof()
     }
 
-    /// Computes C ẋ + K x + Σ θ f(q, q̇), in N, from displacements (m) and velocities (m/s); all
-    /// with one entry per degree of freedom.
+    /// Computes C ẋ + K x + Σ θ f(q, q̇), in N, from displacements (m) and velocities (m/s), and
+    /// writes it into `force`. All three have one entry per degree of freedom.
     ///
     /// # Panics
     /// If one of the three has another length.

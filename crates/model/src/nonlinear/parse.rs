@@ -112,7 +112,8 @@ impl Parser {
         Ok((coordinate, law))
     }
 
-    /// Parses `gap(x1, 0.001)` or `tanh(v1/0.01)`; returns `None` if the text begins otherwise.
+    /// Parses `gap(x1, 0.001)` or `tanh(v1/0.01)`; returns `None` if the text does not begin with a
+    /// function.
     fn function(&mut self) -> Result<Option<Factor>, String> {
         let named = |error: ModelError| error.to_string();
         let factor: Factor = if self.take_word("gap(") {
@@ -169,14 +170,14 @@ impl Parser {
         }
         let exponent = if self.take('^') { self.whole_number()? } else { 1 };
         if product.coordinate.is_some_and(|other| other != coordinate) {
-            return Err("a term depends on one degree of freedom or one difference".to_owned());
+            return Err("a term must depend on one degree of freedom or one difference".to_owned());
         }
         product.coordinate = Some(coordinate);
         let total = match (letter, absolute) {
             ('x', false) => &mut product.displacement,
             ('v', false) => &mut product.velocity,
             (_, true) if letter == 'v' => &mut product.absolute,
-            _ => return Err("|x| is not one of the known laws".to_owned()),
+            _ => return Err("|x| is not one of the supported laws".to_owned()),
         };
         *total = total.saturating_add(exponent);
         self.take('*');
@@ -319,7 +320,7 @@ mod tests {
             ("k3: (x1-x1)^2", "two different degrees of freedom"),
             ("k3: x1^99", "at most 9"),
             ("k3: x1^", "expected a whole number, found the end"),
-            ("c: |x| x", "|x| is not one of the known laws"),
+            ("c: |x| x", "|x| is not one of the supported laws"),
             ("c: |v|", "allowed only in |v| v"),
             ("c: v^2/(1+(v/2)^2)", "only v^3 can be divided"),
             ("c: v^3/(1+(v/a)^2)", "a is not a number"),

@@ -124,8 +124,8 @@ impl Term {
         &*self.law
     }
 
-    /// Returns the same term with other constants in its law, in their units, one for each of
-    /// [`Law::constants`]; `None` if they are out of range.
+    /// Returns the same term with other constants in its law, one for each of [`Law::constants`],
+    /// in their units; `None` if a constant is out of range.
     pub fn with_constants(&self, values: &[f64]) -> Option<Self> {
         Some(Self { law: self.law.with_constants(values)?, ..self.clone() })
     }

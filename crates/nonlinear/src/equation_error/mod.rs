@@ -33,19 +33,20 @@ pub struct EquationErrorOptions {
 /// the lines of steady periods.
 ///
 /// The terms are evaluated on a grid four times finer than the samples, to avoid aliasing, and
-/// transformed to regressors. Lines without force are used, too: on them the nonlinear forces and
-/// the linear response cancel. The rows are weighted by the estimated spectrum of the equation
-/// error ([`Weighting`]); the standard errors follow from the scatter of the periods or of the
-/// scores ([`StandardErrors`](super::StandardErrors)).
+/// transformed to regressors. Lines without force are used, too: on these lines the nonlinear
+/// forces balance the forces of the linear part. The rows are weighted by the estimated spectrum of
+/// the equation error ([`Weighting`]); the standard errors follow from the scatter of the periods
+/// or of the scores ([`StandardErrors`](super::StandardErrors)).
 ///
 /// Shape constants are estimated by Gauss–Newton steps on the residual with optimal linear
-/// parameters (variable projection); the covariance is the joint one of all parameters.
+/// parameters (variable projection). The covariance is that of all parameters together.
 ///
 /// Line 0 is used if a term is a constant force (`x1^0`).
 ///
 /// Noise on the response biases the parameters, as in the linear
-/// [`equation_error`](mechid_estimate::frequency_domain::equation_error): use it on the mean of
-/// several periods, or as the initial estimate of [`output_error`](super::output_error).
+/// [`equation_error`](mechid_estimate::frequency_domain::equation_error). Use this estimator for
+/// the mean of several periods, or as the initial estimate of
+/// [`output_error`](super::output_error).
 ///
 /// # Errors
 /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or [`EstimateError::Model`] if
@@ -259,7 +260,7 @@ fn names(equations: &Equations<'_>, shape: &Shape) -> Vec<String> {
     named(equations, shape).map(|(name, _)| name).collect()
 }
 
-/// Returns names and units of all parameters.
+/// Returns the names and units of all parameters.
 fn named<'a>(
     equations: &'a Equations<'a>,
     shape: &'a Shape,
@@ -269,8 +270,8 @@ fn named<'a>(
     entries.chain(terms).chain(shape.names())
 }
 
-/// Returns the displacement of the linear part under the residual force, relative to the measured
-/// displacement, on the lines of the fit.
+/// Returns, for the lines of the fit, the displacement of the linear part under the residual force,
+/// relative to the measured displacement (RMS).
 fn unexplained(
     equations: &Equations<'_>,
     linear: &Estimate,

@@ -13,10 +13,10 @@ use crate::scatter::{Line, PeriodScatter, Powers};
 use crate::shape::Shape;
 
 impl Fit {
-    /// Returns the covariance of all parameters: from the scatter of the periods if the residual
-    /// does not exceed it, otherwise from blocks of time. For a record too short for blocks, the
-    /// covariance is the scatter increased to the size of the residual or, for a single period, the
-    /// covariance for a white residual.
+    /// Returns the covariance of all parameters. It comes from the scatter of the periods if the
+    /// residual does not exceed this scatter, otherwise from blocks of time. For a record too short
+    /// for blocks, the covariance is the scatter increased to the size of the residual or, for a
+    /// single period, the covariance for a white residual.
     pub(super) fn uncertainty(
         &self,
         equations: &Equations<'_>,
@@ -34,8 +34,8 @@ impl Fit {
     /// residual against the scatter; `None` unless all experiments have several periods.
     ///
     /// The bias comes from the product of the noise in the regressors and in the residual. An
-    /// estimate by instrumental variables, with one period as the instrument for the others, does
-    /// not have it.
+    /// estimate by instrumental variables, with one period as the instrument for the other periods,
+    /// does not have this bias.
     ///
     /// # Source
     /// Söderström (2018), *Errors-in-Variables Methods in System Identification*, chapters 6 and 7.
@@ -91,9 +91,9 @@ impl Fit {
         Some(ByPeriods { scatter, misfit: powers.misfit()?, bias: inverse * products })
     }
 
-    /// Adds the blocks of time of an experiment to the scatter, from the weighted deviations of its
-    /// periods (rows × degrees of freedom). Terms multiply noise and response, which correlates
-    /// lines, but hardly blocks of time.
+    /// Adds the blocks of time of an experiment to the scatter, from the weighted deviations of the
+    /// periods (rows × degrees of freedom). Terms multiply noise and response. This correlates the
+    /// lines, but hardly correlates the blocks of time.
     fn push_blocks(
         &self,
         equations: &Equations<'_>,
@@ -150,7 +150,8 @@ impl Fit {
         regressors
     }
 
-    /// Returns the weighted regressors of all parameters in a row: degrees of freedom × parameters.
+    /// Returns the weighted regressors of all parameters for one row: degrees of freedom ×
+    /// parameters.
     fn sensitivities(
         &self,
         equations: &Equations<'_>,

@@ -1,4 +1,4 @@
-//! Terms that an output-error fit lacks.
+//! Terms that are missing in an output-error fit.
 
 use mechid_estimate::{Estimate, EstimateError, EstimateParts};
 use mechid_model::{ResponseQuantity, Term, Terms};
@@ -16,21 +16,21 @@ use crate::kinds::further_terms_up_to;
 /// Output-error fit with further terms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FurtherFit {
-    /// The fit, whose last terms are the further ones.
+    /// The fit; its last terms are the further terms.
     pub fit: NonlinearFit,
     /// Fraction of the residual power that the further terms explain.
     pub explained: f64,
-    /// Probability that noise alone makes one of the candidates explain as much as the first of the
-    /// further terms.
+    /// Probability that noise alone makes at least one of the candidates explain as much residual
+    /// power as the first of the further terms, or more.
     pub p_value: f64,
 }
 
 /// Adds terms of the usual kinds to an output-error fit, as long as the information criterion
-/// falls; `None` if there are no such terms.
+/// falls; `None` if no term is added.
 ///
-/// The candidates are selected in the fit linearised at its parameters, where an infinitesimal
-/// force of a candidate changes the simulated response by a known amount. The selected terms are
-/// then fitted with all parameters.
+/// The candidates are selected in the fit that is linearised at its parameters: here the change of
+/// the simulated response due to a small force of a candidate is known. Afterwards the selected
+/// terms are fitted together with all parameters.
 ///
 /// # Errors
 /// As [`output_error`].
@@ -59,8 +59,9 @@ struct Linearised<'a> {
     fit: &'a NonlinearFit,
     /// Terms that are tried.
     candidates: Terms,
-    /// Triangular factor of the derivatives of the residual with respect to the parameters of the
-    /// fit, then to the coefficients of the candidates, and of the residual.
+    /// Triangular factor of columns: first the derivatives of the residual with respect to the
+    /// parameters of the fit, next those with respect to the coefficients of the candidates, last
+    /// the residual.
     triangle: DMatrix<f64>,
     /// Number of parameters of the fit.
     parameters: usize,
@@ -108,7 +109,8 @@ impl<'a> Linearised<'a> {
         Ok(Self { fit, candidates, triangle, parameters, samples })
     }
 
-    /// Returns the change of the parameters with some of the candidates, and the residual power.
+    /// Returns the change of the parameters if some of the candidates are added, and the residual
+    /// power.
     fn with(&self, chosen: &[usize]) -> Result<(DVector<f64>, f64), EstimateError> {
         let columns: Vec<usize> =
             (0..self.parameters).chain(chosen.iter().map(|at| self.parameters + at)).collect();
@@ -120,8 +122,9 @@ impl<'a> Linearised<'a> {
         Ok((-change, power))
     }
 
-    /// Returns the start of a fit with the candidates that the information criterion adds, and the
-    /// p-value of the first: an F test, times the number of candidates. `None` if it adds none.
+    /// Returns the initial estimate of a fit with the candidates that the information criterion
+    /// adds, and the p-value of the first candidate (that of an F test, times the number of
+    /// candidates). `None` if the criterion does not add a candidate.
     ///
     /// # Source
     /// Chen & Chen (2008), Biometrika 95, 759–771 (extended Bayesian information criterion).
@@ -154,7 +157,8 @@ impl<'a> Linearised<'a> {
         Ok(Some((self.moved(&chosen, &change)?, p_value)))
     }
 
-    /// Returns the fit with some of the candidates and its parameters moved by a change.
+    /// Returns the fit with some of the candidates added and with its parameters changed by a given
+    /// amount.
     fn moved(
         &self,
         chosen: &[usize],
@@ -187,7 +191,7 @@ impl<'a> Linearised<'a> {
     }
 }
 
-/// Returns the terms that a fit lacks; the simulated velocities scale the friction.
+/// Returns the terms that are missing in a fit; the simulated velocities scale the friction.
 fn candidates(
     records: &[SteppedRecord],
     measured: ResponseQuantity,

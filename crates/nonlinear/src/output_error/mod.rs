@@ -1,4 +1,4 @@
-//! Output error: the simulated response fitted to the measured one.
+//! Output error: a fit of the simulated response to the measured response.
 
 mod further;
 mod open;
@@ -28,7 +28,7 @@ use super::simulate::{Course, Direction, FineForce, Tangent};
 use super::whitening::{Filter, NoisePath};
 use crate::limits::OUTPUT_FORGOTTEN;
 
-/// [`NonlinearEstimate`] by output error, with the initial states and the residuals.
+/// Result of an output-error fit: a [`NonlinearEstimate`], the initial states and the residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearFit {
     /// System with the covariance of its parameters.
@@ -37,8 +37,8 @@ pub struct NonlinearFit {
     pub starts: Vec<InitialState>,
     /// RMS of the residual of each channel over all records, in the unit of the response.
     pub rmse: Vec<f64>,
-    /// Residual of each record, in the unit of the response, made white for the most likely noise
-    /// on force and response if a record has one period.
+    /// Residual of each record, in the unit of the response. If a record has one period, the
+    /// residual is whitened with the most likely noise on force and response.
     pub residuals: Vec<Record>,
     /// Number of Gauss–Newton steps.
     pub steps: usize,
@@ -50,18 +50,18 @@ pub struct NonlinearFit {
 ///
 /// Noise of any spectrum on the response does not bias the estimate. Noise on the force acts, to
 /// first order, as noise on the response; its effect on the derivatives is of second order.
-/// Gauss–Newton steps (damped if needed) begin at `start`, usually from
-/// [`equation_error`](super::equation_error); the delay and the phase of the channels in `start`
-/// are kept. Channels are weighted by the size of their residuals.
+/// Gauss–Newton steps (damped if needed) begin at `start`, which usually comes from
+/// [`equation_error`](super::equation_error). The delay and the phase of the channels in `start` do
+/// not change. Channels are weighted by the size of their residuals.
 ///
 /// The standard errors follow from the noise of force and response in several periods
 /// ([`Periods`](super::StandardErrors::Periods)), propagated through the system, if the residual
-/// does not exceed that noise ([`NonlinearEstimate::misfit`]). For single periods and open records,
-/// the residual shows how much white noise force and response have; the fit is then the most likely
-/// one under this noise ([`Noise`](super::StandardErrors::Noise)), if the residual is consistent
-/// with it. Otherwise the errors allow for the spectrum of the residual
-/// ([`Blocks`](super::StandardErrors::Blocks)): if the damping of a resonance is slightly wrong,
-/// the formula for a white residual gives errors several times too small.
+/// does not exceed this noise ([`NonlinearEstimate::misfit`]). For single periods and open records,
+/// the variances of white noise on force and response are estimated from the residual; the fit is
+/// the most likely one under this noise ([`Noise`](super::StandardErrors::Noise)), if the residual
+/// is consistent with the noise. Otherwise the standard errors include the effect of the spectrum
+/// of the residual ([`Blocks`](super::StandardErrors::Blocks)): if the damping of a resonance is
+/// slightly wrong, the formula for a white residual gives errors several times too small.
 ///
 /// # Errors
 /// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not match the system,
@@ -85,12 +85,13 @@ pub fn output_error(
 /// Weights of the samples after a first search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Weights {
-    /// One for each channel, by the size of its residual.
+    /// One weight for each channel, from the size of the residual of the channel.
     Levels,
-    /// The inverse of the noise on force and response that makes the residual most likely, if a
-    /// record has one period and the residual is consistent with this noise.
+    /// Inverse of the most likely noise on force and response; used if a record has one period and
+    /// the residual is consistent with this noise.
     Noise,
-    /// The same inverse, even if the residual is not consistent with the noise.
+    /// Inverse of the most likely noise on force and response, even if the residual is not
+    /// consistent with this noise.
     AnyNoise,
 }
 
@@ -125,7 +126,8 @@ fn search(
             Ok((theta, more)) if weights == Weights::AnyNoise || problem.is_white() => {
                 return problem.finish(&theta, start, steps + more);
             }
-            // The residual is not this noise: the fit with the smallest residual is then the best.
+            // If this noise does not describe the residual, the fit with the smallest residual is
+            // the best.
             _ => problem.noise = None,
         }
     }
@@ -138,14 +140,14 @@ fn search(
     problem.finish(&first, start, steps)
 }
 
-/// Record with its interpolated force, and the deviations of its periods from their mean.
+/// Record with its interpolated force, and the deviations of the periods from the mean period.
 struct Prepared {
     response: Record,
     force: FineForce,
     /// Force at the samples.
     plain: Record,
-    /// Deviations of the periods from their mean: samples × channels of the response, then of the
-    /// force.
+    /// Deviations of the periods from the mean period, samples × channels; the channels of the
+    /// response come before those of the force.
     deviations: Vec<DMatrix<f64>>,
 }
 
@@ -209,7 +211,7 @@ impl<'a> Problem<'a> {
         self.unknowns.dof()
     }
 
-    /// Returns the root mean square over all records; 1 if it is zero.
+    /// Returns the RMS value of a column over all records, or 1 if this value is zero.
     fn rms(&self, column: impl Fn(usize, &Prepared) -> DVector<f64>) -> f64 {
         let (mut square, mut samples) = (0.0, 0);
         for (at, record) in self.records.iter().enumerate() {
@@ -243,7 +245,7 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// Returns the parameters of a system that begins with the initial states of a fit.
+    /// Returns the parameters of a system together with the initial states of a fit.
     fn parameters_at(&self, fit: &NonlinearFit, system: &NonlinearSystem) -> DVector<f64> {
         let mut theta = self.shared_parameters(system);
         for state in &fit.starts {
@@ -270,8 +272,8 @@ impl<'a> Problem<'a> {
         values
     }
 
-    /// Searches the minimum of the weighted residual from some parameters, and evaluates the
-    /// residual there; also returns the number of steps.
+    /// Searches for the minimum of the weighted residual from some parameters, and evaluates the
+    /// residual at the minimum; also returns the number of steps.
     fn minimum(&mut self, start: DVector<f64>) -> Result<(DVector<f64>, usize), EstimateError> {
         let lost = |steps| EstimateError::NotConverged { searches: 1, steps };
         let minimum = minimise_residuals(self, start, SEARCH_STEPS).ok_or(lost(0))?;
@@ -293,7 +295,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the initial parameters, with the initial states that fit the records best.
+    /// Returns the initial parameters, which include the initial states that fit the records best.
     fn start(&self, system: &NonlinearSystem) -> Result<DVector<f64>, EstimateError> {
         let mut theta = self.shared_parameters(system);
         let rate = slowest_decay(self.unknowns, &theta[..self.free.len()]);
@@ -330,7 +332,8 @@ impl<'a> Problem<'a> {
         NonlinearSystem::new(linear, Terms::new(terms).ok()?, coefficients.to_vec()).ok()
     }
 
-    /// Returns the parameters of a record: shared parameters, then its initial state.
+    /// Returns the parameters of a record: the shared parameters, followed by the initial state of
+    /// the record.
     fn directions(&self) -> Vec<Direction> {
         let starts = (0..2 * self.dof()).map(Direction::Initial);
         self.shared.iter().copied().chain(starts).collect()
@@ -389,7 +392,8 @@ impl<'a> Problem<'a> {
         parameters.collect()
     }
 
-    /// Returns the weighted residuals of each record, with these RMS values of the channels.
+    /// Returns the weighted residuals of each record, scaled so that the channels have the RMS
+    /// values `rmse`.
     fn white_residuals(&self, rmse: &[f64]) -> Result<Vec<Record>, EstimateError> {
         let residuals = self.records.iter().enumerate().map(|(at, record)| {
             let mut residuals = self.weighted(at, self.gaps(at, record));

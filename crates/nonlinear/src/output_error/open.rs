@@ -9,14 +9,15 @@ use super::{NonlinearFit, SteppedRecord, Weights, output_error};
 use crate::estimate::NonlinearEstimate;
 use crate::limits::{OPEN_WINDOWS, OUTPUT_FORGOTTEN};
 
-/// Estimates by [`output_error`] on open records, beginning with a linear fit and terms whose
-/// coefficients are zero.
+/// Estimates a nonlinear system from open records by [`output_error`]. The initial estimate is a
+/// linear fit with terms whose coefficients are zero.
 ///
 /// If a stiffness is slightly wrong, the simulated response loses its phase relation to the
-/// measured one, and the cost of a long record has many minima. Therefore the records are first cut
-/// into windows, each with its own initial state; their estimate is the initial estimate of the fit
-/// to the whole records. If a term has a constant, such as a clearance, the search starts at the
-/// given constant, at half and at twice its value, and the best result is used.
+/// measured response, and the cost of a long record has many minima. Therefore the records are
+/// first cut into windows, each with a separate initial state; the estimate from the windows is the
+/// initial estimate of the fit to the whole records. If a term has a constant, such as a clearance,
+/// the search starts at the given constant, at half and at twice this constant, and the best result
+/// is used.
 ///
 /// # Errors
 /// As [`output_error`]; relations between parameters are refused.
@@ -60,7 +61,8 @@ fn windows(records: &[SteppedRecord]) -> Result<Vec<SteppedRecord>, EstimateErro
     let mut windows = Vec::new();
     for record in records {
         let samples = record.force.len();
-        // An initial state has 2n unknowns: shorter windows contain little further information.
+        // The initial state of a window has 2n unknowns: a window without many more samples has
+        // little information beyond this state.
         let fewest = (OUTPUT_FORGOTTEN as usize) * 16 * record.force.channels();
         let count = (samples / fewest).clamp(1, windows_per_record);
         let len = samples / count;

@@ -13,7 +13,7 @@ pub struct SteppedRecord {
     pub force: Record,
     /// Response, samples × degrees of freedom, in m, m/s or m/s².
     pub response: Record,
-    /// Extent of the record: whole periods of a force that repeats, or open.
+    /// Extent of the record: whole periods of a periodic force, or open.
     pub extent: Extent,
     /// Number of periods, whose mean is fitted; 1 for an open record.
     pub periods: usize,
@@ -21,8 +21,8 @@ pub struct SteppedRecord {
 
 impl SteppedRecord {
     /// Returns the mean period of force and response, corrected for the channels, and the deviation
-    /// of each period from it: samples × channels of the response, then of the force. No deviations
-    /// for a single period.
+    /// of each period from the mean period: samples × channels; the channels of the response come
+    /// before those of the force. A single period has no deviations.
     pub(super) fn prepared(
         &self,
         channels: ChannelPhase,

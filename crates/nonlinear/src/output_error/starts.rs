@@ -10,8 +10,8 @@ use crate::estimate::NonlinearEstimate;
 /// constants inside the laws, such as a clearance, cause several minima.
 ///
 /// # Errors
-/// As [`output_error`](super::output_error()) from the first initial estimate if none leads to a
-/// minimum, and [`EstimateError::NotConverged`] without an initial estimate.
+/// As [`output_error`](super::output_error()) from the first initial estimate if no initial
+/// estimate leads to a minimum, and [`EstimateError::NotConverged`] without an initial estimate.
 ///
 /// # Source
 /// As [`output_error`](super::output_error()).

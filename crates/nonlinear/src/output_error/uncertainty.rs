@@ -44,10 +44,10 @@ impl Problem<'_> {
         Ok(solution.unscaled_covariance)
     }
 
-    /// Returns the covariance of all parameters: from the noise of the periods if the residual does
-    /// not exceed it, otherwise from blocks of time. For a record too short for blocks, the
-    /// covariance is the scatter increased to the size of the residual or, for a single period, the
-    /// covariance for a white residual.
+    /// Returns the covariance of all parameters. It comes from the noise of the periods if the
+    /// residual does not exceed this noise, otherwise from blocks of time. For a record too short
+    /// for blocks, the covariance is the scatter increased to the size of the residual or, for a
+    /// single period, the covariance for a white residual.
     pub(super) fn uncertainty(
         &self,
         theta: &DVector<f64>,
@@ -58,8 +58,8 @@ impl Problem<'_> {
         Uncertainty::new(by_periods, self.shared.len(), || self.by_residual(theta, inverse))
     }
 
-    /// Returns the scatter of the parameters by the noise on force and response, and the test of
-    /// the residual against it; `None` unless all records have several periods.
+    /// Returns the scatter of the parameters due to the noise on force and response, and the test
+    /// of the residual against this noise; `None` if a record has only one period.
     fn by_periods(
         &self,
         theta: &DVector<f64>,
@@ -156,8 +156,8 @@ impl Problem<'_> {
         Some(())
     }
 
-    /// Returns the most likely noise of the records about the motion at these parameters; `None` if
-    /// the periods show the noise, or if the search fails.
+    /// Returns the most likely noise of the records, relative to the simulated motion at these
+    /// parameters; `None` if the noise is known from the periods, or if the search fails.
     pub(super) fn noise(&self, theta: &DVector<f64>) -> Option<Vec<(NoisePath, Filter)>> {
         if self.records.iter().all(|record| !record.deviations.is_empty()) {
             return None;
@@ -237,15 +237,15 @@ impl Problem<'_> {
     }
 }
 
-/// Returns the spectrum of samples on the time axis of a record, lines × channels; `None` if they
-/// are not finite.
+/// Returns the spectrum of samples on the time axis of a record, lines × channels; `None` if a
+/// sample is not finite.
 fn lines_of(record: &Prepared, samples: DMatrix<f64>) -> Option<DMatrix<Complex<f64>>> {
     let record = Record::new(record.response.sampling(), samples).ok()?;
     Some(Spectrum::from_record(&record).lines().clone())
 }
 
-/// Returns the weight of a line in a sum of products over lines that equals the sum over `samples`
-/// samples, and whether the line is real.
+/// Returns the weight of a line, and whether the line is real. With these weights a sum of products
+/// over lines equals the sum over `samples` samples.
 fn product_weight(line: usize, samples: usize) -> (f64, bool) {
     let is_real = line == 0 || 2 * line == samples;
     (samples as f64 * if is_real { 1.0 } else { 0.5 }, is_real)

@@ -21,8 +21,8 @@ pub struct Arnoldi {
 }
 
 impl Arnoldi {
-    /// Creates the space of `start` (n entries) alone, without products with Φ; its maximum
-    /// dimension is `most`.
+    /// Creates the space that contains only `start` (n entries), without products with Φ. The
+    /// maximum dimension of the space is `most`.
     pub fn new(start: DVector<f64>, most: usize) -> Self {
         let hessenberg = DMatrix::zeros(most + 1, most);
         Self { basis: vec![start.normalize()], hessenberg, size: 0 }

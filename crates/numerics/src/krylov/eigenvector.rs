@@ -6,10 +6,10 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::krylov::start_vector::numbered_start_vector;
 
-/// Returns the eigenvector of norm 1 (pure numbers) of a square `matrix` for its eigenvalue
-/// `value`, in the unit of the matrix, by inverse iteration; `None` if numbers overflow. The matrix
-/// has at most `below` diagonals below the main diagonal; for a multiple eigenvalue each `number`
-/// gives another eigenvector.
+/// Computes the eigenvector (norm 1, pure numbers) of a square `matrix` for its eigenvalue `value`
+/// (in the unit of the matrix) by inverse iteration; `None` if numbers overflow. The matrix has at
+/// most `below` diagonals below the main diagonal; for a multiple eigenvalue each `number` gives a
+/// different eigenvector.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.1.

@@ -80,7 +80,7 @@ impl Triangle {
         Self { entries, rotations: Vec::with_capacity(most), right: vec![norm] }
     }
 
-    /// Appends a column; its last entry is below the diagonal.
+    /// Appends a column; the last entry of the column is below the diagonal.
     fn append(&mut self, mut column: Vec<f64>) {
         let j = self.rotations.len();
         for (i, [cos, sin]) in self.rotations.iter().enumerate() {

@@ -2,14 +2,14 @@
 
 use nalgebra::DVector;
 
-/// Returns a pseudo-random vector of `len` entries, pure numbers, and norm 1, the same in every
-/// run.
+/// Returns a pseudo-random vector of norm 1 with `len` entries, pure numbers. The vector is the
+/// same in every run.
 pub fn start_vector(len: usize) -> DVector<f64> {
     numbered_start_vector(len, 0)
 }
 
-/// Returns a pseudo-random vector of norm 1 and `len` entries, pure numbers; each `number` gives
-/// another vector, the same in every run.
+/// Returns a pseudo-random vector of norm 1 with `len` entries, pure numbers. Each `number` gives a
+/// different vector, which is the same in every run.
 pub fn numbered_start_vector(len: usize, number: usize) -> DVector<f64> {
     let vector = DVector::from_iterator(len, pseudo_random(number).take(len));
     vector.normalize()

@@ -17,7 +17,7 @@ fn contraction(len: usize) -> DMatrix<f64> {
     &turned * DMatrix::from_diagonal(&factors) * turned.transpose()
 }
 
-/// Judge: LU factors of the whole matrix.
+/// Reference: LU factors of the whole matrix.
 #[test]
 fn equations_are_solved_in_few_products() {
     let (matrix, len) = (contraction(80), 80);
@@ -34,7 +34,7 @@ fn equations_are_solved_in_few_products() {
     assert!((found.vector - &exact).norm() < 1e-10 * exact.norm());
     assert!(found.products < 50, "{}", found.products);
     assert!(found.residual <= 1e-12 && found.reciprocal_condition > 0.01);
-    // A space that is too small gives a residual as large as reported.
+    // If the space is too small, the residual is as large as the solver reports.
     let found = solve(&right, 1e-12, 5, apply).unwrap();
     let left = &right - (DMatrix::identity(len, len) - &matrix) * found.vector;
     assert!((left.norm() / right.norm() - found.residual).abs() < 1e-12);
@@ -75,7 +75,8 @@ fn the_residual_of_the_largest_eigenvalue_tells_its_error() {
 
 #[test]
 fn the_largest_of_many_eigenvalues_is_found() {
-    // The operator has a block that rotates and grows by 1.2, beside 200 factors below 1.
+    // The operator rotates two components and multiplies them by 1.2; its factors for all other
+    // components are below 1.
     let apply = |x: &[f64], y: &mut [f64]| {
         for (i, (y, x)) in y.iter_mut().zip(x).enumerate() {
             *y = x * (0.9 * (i as f64 * 0.7).cos());

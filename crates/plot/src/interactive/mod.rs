@@ -54,8 +54,8 @@ impl FigureSet {
         &self.members
     }
 
-    /// Draws the set for an HTML document with several sets: its ids begin with `ids`, different
-    /// for each, and `label` is its name for screen readers.
+    /// Draws the set for an HTML document with several sets: its ids begin with `ids`, which must
+    /// be different for each set, and `label` is its name for screen readers.
     ///
     /// # Errors
     /// [`PlotError::NoPanels`] without figures; as [`Figure::to_svg`] for each.

@@ -1074,7 +1074,7 @@ def sweep(
         compared = None if reference is None else machine_of(reference)._inner
     else:
         for name in (*record, *(["reference"] if reference is not None else [])):
-            raise TypeError(f"`{name}` belongs to a record; the experiment described has its own")
+            raise TypeError(f"`{name}` belongs to a record; the description of the experiment states this itself")
         inner, compared = None, None
     found = _mechid.sweep(
         inner, described, json.dumps(settings), compared, progress, threads

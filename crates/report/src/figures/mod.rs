@@ -54,8 +54,9 @@ pub trait ToFigure {
     /// As [`ToFigure::figure`].
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError>;
 
-    /// Returns an HTML page of the figure, which has zoom and cursor and loads no other file. If
-    /// there are several responses, the page shows one large and all small.
+    /// Returns an HTML page of the figure with zoom and cursor; the page loads no other file. If
+    /// there are several responses, it shows the figure of one response large, and those of all
+    /// responses small.
     ///
     /// # Errors
     /// As [`ToFigure::figure`].

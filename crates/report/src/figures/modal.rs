@@ -12,7 +12,7 @@ use super::trace::Trace;
 use crate::ReportError;
 
 /// Maximum number of degrees of freedom for which every pair of response and force is drawn; with
-/// more, only the driving points are.
+/// more degrees of freedom, only the driving points are drawn.
 const PAIRS: usize = 2;
 
 /// Maximum number of driving points that are drawn: the number of colours of curves.
@@ -95,7 +95,7 @@ fn pairs(system: &SecondOrderSystem, names: Names<'_>) -> Vec<(usize, usize, Str
     if dof > PAIRS {
         return (0..dof.min(DRIVING_POINTS)).map(|i| (i, i, name(i, i))).collect();
     }
-    // Response and force can be exchanged by reciprocity.
+    // If the matrices are symmetric, response and force can be interchanged (reciprocity).
     let reciprocal = [system.mass(), system.damping(), system.stiffness()]
         .into_iter()
         .all(|matrix| *matrix == matrix.transpose());

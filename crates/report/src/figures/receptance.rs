@@ -46,10 +46,10 @@ const SAME_LINE: f64 = 1e-9;
 const GRID: usize = 8;
 
 /// Returns magnitude and phase of the response per unit force x_i / F_j, measured and fitted, in
-/// the quantity of the style or, without one, in the measured quantity. The pairs are those of the
-/// degrees of freedom that the records determine: on lines where F_j acts alone, and on lines where
-/// as many records as degrees of freedom have independent forces. `None` if no line separates the
-/// forces.
+/// the quantity of the style or, if the style has none, in the measured quantity. The pairs are
+/// those of the degrees of freedom that the records determine: on lines where F_j acts alone, and
+/// on lines where as many records as degrees of freedom have independent forces. `None` if no line
+/// separates the forces.
 ///
 /// The panels form a matrix, with a row for each response and a column for each force; with more
 /// than eight degrees of freedom all pairs are drawn together.
@@ -98,7 +98,8 @@ pub fn receptance(
 pub const DRAWN_PAIRS: usize = 128;
 
 /// Returns a separate figure for each pair with a response, at most [`DRAWN_PAIRS`] of them, with
-/// the coherence of its response below if there is one. `None` if no line separates the forces.
+/// the coherence of its response below the curves, if it is known. `None` if no line separates the
+/// forces.
 ///
 /// # Errors
 /// As [`receptance`].

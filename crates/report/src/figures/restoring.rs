@@ -118,7 +118,7 @@ fn side(
         .collect::<Result<_, ReportError>>()?;
     let name = format!("{} % interval", compact(100.0 * CONFIDENCE, 3));
     Ok(vec![
-        Curve::points("measured, minus the rest of the model", values, &measured)
+        Curve::points("measured, minus all other terms of the model", values, &measured)
             .color(Color::GREY),
         Curve::band(name, &grid, &bound(0), &bound(1)),
         Curve::line("identified", &grid, &curve).color(Color::VERMILION),

@@ -26,8 +26,8 @@ pub struct FigureStyle {
     pub frequency: Option<FrequencyScale>,
     /// Magnitude axis.
     pub magnitude: MagnitudeScale,
-    /// Response per unit force: receptance, mobility or accelerance; `None`: the measured one, and
-    /// the receptance for a system.
+    /// Response per unit force: receptance, mobility or accelerance; `None`: the measured quantity
+    /// or, for a system, the receptance.
     pub quantity: Option<ResponseQuantity>,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn derivative(quantity: ResponseQuantity, omega: f64) -> Complex<f64>
 /// Branch of the phase of a frequency response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PhaseStyle {
-    /// Phase between −180° and 180°; a line breaks where it jumps.
+    /// Phase between −180° and 180°; the curve is interrupted where the phase jumps.
     #[default]
     Wrapped,
     /// Phase without jumps, unwrapped from the lowest frequency.

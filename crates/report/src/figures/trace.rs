@@ -31,8 +31,9 @@ fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
     }
 }
 
-/// Returns an angle on the branch nearest to another angle, both in degrees. If two are equally
-/// near, as at a resonance of an undamped system, returns the smaller one, and −180° for ±180°.
+/// Returns an angle on the branch nearest to another angle, both in degrees. If two branches are
+/// equally near, as at a resonance of an undamped system, returns the smaller angle, and −180° for
+/// ±180°.
 fn next_to(other: f64, angle: f64) -> f64 {
     let near = angle - 360.0 * ((angle - other) / 360.0).round();
     let beyond = near - (near - other).signum() * 360.0;

@@ -4,8 +4,8 @@ use mechid_analysis::fleet::{TrendAxis, TrendPoint, TrendSeries, Trends};
 use mechid_analysis::text::significant;
 use mechid_plot::{Axis, Color, Curve, Figure, Marker, Panel, Reference};
 
-/// Maximum number of points of a series that are drawn; of a longer one, every k-th, and every
-/// outlier.
+/// Maximum number of points of a series that are drawn; of a longer series, every k-th point and
+/// every outlier are drawn.
 pub const DRAWN: usize = 1000;
 
 /// Returns all series, one below the other.

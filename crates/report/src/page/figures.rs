@@ -21,8 +21,8 @@ use crate::figures::receptance::{self as picture, Names};
 use crate::figures::shapes::ModeShapes;
 use crate::figures::{displacement_name, restoring as surface};
 
-/// Width of a figure, px: a screen shows two in a row, and the numbers of one are legible on a
-/// telephone.
+/// Width of a figure, px: a screen shows two figures in a row, and the numbers of a figure are
+/// legible on a telephone.
 const WIDTH: f64 = 480.0;
 
 /// Width of a figure that fills a row, px.
@@ -238,7 +238,8 @@ pub fn fit(part: &RecordReview<'_>, compared: &Compared) -> Result<Drawn, Report
     let block = part.held();
     let extent = extent(block);
     let caption = format!(
-        "Measured {} and that of the identified machine under the measured force {extent}; below, their difference.",
+        "Measured {}, and the prediction of the identified machine for the measured force {extent}; \
+         below, their difference.",
         compared.kind
     );
     over_time(part.id("fit"), compared, shown(block), caption)
@@ -406,8 +407,8 @@ pub fn correlations(
         }
     }
     let what = if of_lines {
-        "Correlation of the residual, weighted by its noise, from line to line (real and \
-                 imaginary part) and with the force"
+        "Correlation of the noise-weighted residual from line to line (real and imaginary \
+                 part) and with the force"
             .into()
     } else {
         part.buffered_caption("Autocorrelation of the residual, and its correlation with the force")

@@ -71,7 +71,8 @@ const SECTIONS: [(&str, &str); 7] = [
 pub struct PageSettings {
     /// Heading; `None`: the name of the record.
     pub title: Option<String>,
-    /// `true` to reconstruct the force with the identified system and compare it.
+    /// `true` to reconstruct the force with the identified system and compare it with the measured
+    /// force.
     pub reconstruct_force: bool,
     /// Command that writes the page again; `None`: only the saved settings are shown.
     pub command: Option<String>,

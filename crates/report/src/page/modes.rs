@@ -257,7 +257,7 @@ fn data(modes: &SavedModes) -> Option<Markup> {
 }
 
 fn checks(modes: &SavedModes) -> Option<Markup> {
-    // A check of a test that passed has no sentence; the heading names it.
+    // A check that passed has no sentence in the table; the heading names this check.
     let shown: Vec<_> =
         modes.checks.iter().filter_map(|check| Some((check, check.text_to_show()?))).collect();
     if shown.is_empty() && modes.dropped.is_empty() {

@@ -504,6 +504,6 @@ pub fn table_words(identified: &IdentifiedResponses) -> Words {
         warnings,
         merits,
         tables,
-        caption: "Measured response per unit force, and that of the identified machine.".into(),
+        caption: "Response per unit force: measured, and of the identified machine.".into(),
     }
 }

@@ -85,7 +85,7 @@ fn part_held(part: &RecordReview<'_>) -> Option<String> {
     Some(format!(
         "The record is long: levels, time histories and averages over periods or segments are those of \
          all samples used. Results for single samples (the residual in time, its correlations and its checks) \
-         are those of samples {first} to {last}; captions of other figures name these samples, too."
+         are those of samples {first} to {last}; other figures that show only these samples name them in the caption."
     ))
 }
 

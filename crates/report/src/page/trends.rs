@@ -135,7 +135,7 @@ fn changes(trends: &Trends) -> Table<'static> {
     }
 }
 
-/// Returns the table of the values far from the others.
+/// Returns the table of the outliers.
 fn outliers(trends: &Trends) -> Table<'static> {
     let outliers = trends.series.iter().flat_map(|series| {
         series.outliers().map(|point| {

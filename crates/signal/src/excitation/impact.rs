@@ -8,7 +8,8 @@ use crate::sampling::Sampling;
 
 /// An ideal impact of given momentum, in the unit of the signal times seconds: N·s for a force.
 ///
-/// The sampled impact is one sample of momentum / Δt, the one nearest to its instant.
+/// The sampled impact is momentum / Δt at the sample nearest to its instant, and zero at all other
+/// samples.
 ///
 /// # Source
 /// Clough & Penzien, *Dynamics of Structures*, the chapter on impulsive loading.
@@ -83,7 +84,7 @@ impl HalfSine {
         if (0.0..=1.0).contains(&passed) { self.peak * (PI * passed).sin() } else { 0.0 }
     }
 
-    /// Samples the impact, without a part beyond the last sample.
+    /// Samples the impact; a part beyond the last sample is omitted.
     ///
     /// # Errors
     /// None for a valid impact; the signature is the same for all excitations.

@@ -43,7 +43,7 @@ const fn stages(stages: &[u32]) -> u32 {
 }
 
 /// A two-level signal of period 2ⁿ − 1 chips, each held for some samples, with a circular
-/// autocorrelation of A² at lag zero and −A²/(2ⁿ − 1) at every other.
+/// autocorrelation of A² at lag zero and −A²/(2ⁿ − 1) at all other lags of whole chips.
 ///
 /// ```
 /// use mechid_signal::excitation::Prbs;
@@ -63,8 +63,8 @@ pub struct Prbs {
 }
 
 impl Prbs {
-    /// A sequence of `order` stages (2 to 24) with levels ±`amplitude` (N), each chip held for
-    /// `hold` samples.
+    /// A sequence of `order` stages (2 to 24) with levels ±`amplitude` (N); each chip lasts `hold`
+    /// samples.
     ///
     /// # Errors
     /// [`SignalError::Range`] for the order, [`SignalError::Negative`] for the amplitude,

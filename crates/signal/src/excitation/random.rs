@@ -43,7 +43,8 @@ impl Random {
         Ok(Self { band_hz, ..Self::white(standard_deviation, seed)? })
     }
 
-    /// Returns the same noise during the first `fraction` of the record only, zero after it.
+    /// Returns the same noise during the first `fraction` of the record only; the rest of the
+    /// record is zero.
     ///
     /// # Errors
     /// [`SignalError::Range`] unless 0 ≤ `fraction` ≤ 1.

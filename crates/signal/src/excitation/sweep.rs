@@ -97,7 +97,7 @@ impl Sweep {
         }
     }
 
-    /// Samples the sweep, without a part beyond the last sample.
+    /// Samples the sweep; a part beyond the last sample is omitted.
     ///
     /// # Errors
     /// [`SignalError::AboveNyquist`] if either end is at or above half the sampling rate.

@@ -35,18 +35,19 @@ const GAUSSIAN: f64 = 1.482_602;
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct HitRule {
     /// Force that begins a hit, in per cent of the largest force of the record. A smaller force
-    /// does not end the window of the hit before it, although the structure responds to it.
+    /// does not end the window of the previous hit, although the structure responds to this force.
     pub trigger_percent: f64,
     /// Smallest second peak of a double hit, in per cent of the first.
     pub double_percent: f64,
     /// Smallest peak of a hit, in per cent of the median of all peaks of at least a tenth of the
     /// largest.
     pub weak_percent: f64,
-    /// Time after the trigger within which a force belongs to the same hit, in s. The structure
-    /// strikes a bouncing hammer again some milliseconds to some hundredths of a second later; the
-    /// anti-aliasing filters have settled by then.
+    /// Time after the trigger within which a force belongs to the same hit, in s. A bouncing hammer
+    /// touches the structure again some milliseconds to some hundredths of a second after the
+    /// trigger; the anti-aliasing filters also settle within this time.
     pub bounce_s: f64,
-    /// Number of samples of a window before its pulse; `None`: twice those of the pulse.
+    /// Number of samples of a window before its pulse; `None`: twice the number of samples of the
+    /// pulse.
     pub before: Option<usize>,
     /// Number of samples of a window; `None`: up to the window of the next hit.
     pub samples: Option<usize>,
@@ -132,13 +133,13 @@ pub struct Hits {
 /// One hit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hit {
-    /// Samples around the peak where the force is above a tenth of it, counted from 0.
+    /// Samples around the peak where the force is above a tenth of the peak, counted from 0.
     pub pulse: Range<usize>,
     /// Samples around the peak with a force, counted from 0: the pulse, light rebounds of the
     /// hammer, and the ringing of anti-aliasing filters as far as it exceeds the noise.
     pub contact: Range<usize>,
-    /// Largest force without the offset, in its unit; negative if the force of the hits is
-    /// negative.
+    /// Largest force after subtraction of the offset, in its unit; negative if the force of the
+    /// hits is negative.
     pub peak: f64,
     /// Samples that belong to the hit, counted from 0: some before the pulse, and the response
     /// after it.
@@ -157,22 +158,22 @@ pub enum HitFault {
     Double {
         /// Second peak, in per cent of the first.
         percent: f64,
-        /// Time from the first peak to the second, in s; negative if the smaller one is first.
+        /// Time from the first peak to the second, in s; negative if the smaller peak is first.
         after_s: f64,
     },
     /// The force is clipped.
     Overload {
-        /// Level at which it is clipped, in its unit.
+        /// Level at which the force is clipped, in its unit.
         level: f64,
     },
     /// A response is clipped.
     ResponseOverload {
         /// Channel of the response, counted from 0.
         channel: usize,
-        /// Level at which it is clipped, in its unit.
+        /// Level at which the channel is clipped, in its unit.
         level: f64,
     },
-    /// The peak is small compared with the others.
+    /// The peak is small compared with the peaks of the other hits.
     Weak {
         /// Peak, in per cent of the median peak.
         percent: f64,
@@ -235,9 +236,9 @@ impl fmt::Display for HitFault {
 /// Detects the hits of a hammer in its force, sampled every `dt` seconds.
 ///
 /// A hit begins where the force exceeds the trigger level, counted from the median of all samples.
-/// Its window extends to the next hit, however light, or has the length of the rule. A force below
-/// 12 standard deviations of the noise between the hits, or below four steps of the converter, is
-/// noise.
+/// The window of the hit extends to the next hit, even a weak one, or has the length that the rule
+/// states. A force below 12 standard deviations of the noise between the hits, or below four steps
+/// of the converter, is noise.
 ///
 /// # Errors
 /// [`SignalError::NotPositive`], [`SignalError::Negative`], [`SignalError::Range`] and
@@ -306,8 +307,8 @@ impl Hits {
 
     /// Returns the force of consecutive hits, in its unit, one value per sample from the beginning
     /// of the first window to the end of the last: without the offset, and zero away from the
-    /// contacts (a *force window*), where the hammer touches no part and the transducer measures
-    /// only noise. Empty without a hit.
+    /// contacts (a *force window*), where the hammer does not touch the structure and the
+    /// transducer measures only noise. Empty without a hit.
     ///
     /// # Panics
     /// If a window is outside this force.
@@ -335,7 +336,8 @@ impl Hit {
         first..self.contact.end.max(self.pulse.end + margin)
     }
 
-    /// Returns the hit with its peak among some samples of an upward force.
+    /// Returns the hit whose peak is in `range`; `push` is the force times `sign`, positive at a
+    /// hit.
     fn around(push: &[f64], range: Range<usize>, sign: f64) -> Self {
         let at = largest_of(push, range);
         let limit = limits::PULSE_FRACTION * push[at];

@@ -123,7 +123,7 @@ fn light_hits_between_good_ones_end_the_window_and_are_told() {
             let [HitFault::Weak { percent }] = found[1].faults[..] else {
                 panic!("{peak} N: {:?}", found[1].faults)
             };
-            // Samples miss the tip of a pulse by 3 % at most, and a peak of 20 N counts for the
+            // Samples miss the tip of a pulse by at most 3 %, and a peak of 20 N is included in the
             // median.
             let expected = if peak < 14.0 { peak / 1.1 } else { peak };
             assert!((percent - expected).abs() < 0.4 + 0.04 * expected, "{percent} {peak}");
@@ -171,7 +171,8 @@ fn overloads_weak_hits_and_short_windows_are_told() {
         matches!(found[3][..], [HitFault::Weak { percent }] if (15.0..25.0).contains(&percent))
     );
 
-    // 0.3 s to the next hit, 0.1 s to the end of the record, half a pulse at its beginning.
+    // The next hit comes after 0.3 s, the record ends 0.1 s after the last hit, and it begins in
+    // the middle of a pulse.
     let near = [(90.0, -4e-3), (100.0, 2.0), (100.0, 4.0), (120.0, 4.3), (90.0, 8.9)];
     let mut force = record(&near[1..], 9000, 0.1, 6);
     for (k, f) in force.iter_mut().take(5).enumerate() {
@@ -218,8 +219,9 @@ fn noise_is_no_hit_and_wrong_rules_are_refused() {
     assert!(hits(&[f64::NAN], DT, &usual).is_err());
 }
 
-/// Half-sines of 2 ms at 1024 Hz behind a linear filter of finite length that passes 0.4 of the
-/// sampling rate, computed at 32 times the rate, in noise of 0.05 N.
+/// Half-sines of 2 ms, sampled at 1024 Hz after a linear filter of finite length that passes up to
+/// 0.4 of the sampling rate. The filter is computed at 32 times this rate; noise of 0.05 N is
+/// added.
 fn behind_filter(pulses: &[(f64, f64)], samples: usize, seed: u64) -> Vec<f64> {
     const RATE: f64 = 1024.0;
     const OVER: usize = 32;
@@ -266,6 +268,6 @@ fn ringing_of_a_filter_is_no_second_hit() {
         let is_double = |hit: &Hit| matches!(hit.faults[..], [HitFault::Double { .. }]);
         bounces += usize::from(all.len() == 2 && is_double(&all[0]) && all[1].faults.is_empty());
     }
-    // 200 of 200 in a study with SciPy's filters.
+    // A study with SciPy's filters found 200 of 200.
     assert!(bounces >= 38, "{bounces}");
 }

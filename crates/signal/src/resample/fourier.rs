@@ -17,8 +17,8 @@ pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
     lines.iter().rev().fold(Complex::from(0.0), |sum, x| sum * z + x).re
 }
 
-/// Returns the same period with at least as many samples, by a longer inverse transform; `None` if
-/// the new time axis has another duration or fewer samples.
+/// Returns the same period on a time axis with at least as many samples as before, by a longer
+/// inverse transform. `None` if the new time axis has a different duration or fewer samples.
 pub(super) fn same_period(
     spectrum: &Spectrum,
     sampling: Sampling,
@@ -35,7 +35,7 @@ pub(super) fn same_period(
     Some(Spectrum::from_lines(sampling, lines).and_then(|finer| finer.to_record()))
 }
 
-/// Returns the same period begun `part` of a step later.
+/// Returns the same period, begun later by the fraction `part` of a step.
 pub(super) fn later(spectrum: &Spectrum, part: f64) -> Result<Record, SignalError> {
     let sampling = spectrum.sampling();
     let mut lines = spectrum.lines().clone();

@@ -149,7 +149,7 @@ fn hermite((y0, d0): (f64, f64), (y1, d1): (f64, f64), u: f64) -> f64 {
     y0 + u * (d0 + u * (c2 + u * c3))
 }
 
-/// Returns the record at the instants of another time axis, both beginning at t = 0.
+/// Returns the record at the instants of another time axis; both axes begin at t = 0.
 ///
 /// There is no filter: with a longer step, frequencies above the new Nyquist frequency alias, as in
 /// any sampling.
@@ -178,8 +178,8 @@ pub fn resample(
 }
 
 /// Returns the values within the steps, at t = (k + `part`) Δt for every sample k, with `part` a
-/// pure number from 0 to 1: the force for a Runge-Kutta stage. After the last sample, its value is
-/// held, unless the record is interpolated as a period.
+/// pure number from 0 to 1: the force for a Runge-Kutta stage. After the last sample, the value of
+/// this sample is used, except if the record is interpolated as a period.
 ///
 /// ```
 /// use mechid_signal::{Interpolation, Multisine, Phases, Sampling, resample::within_steps};

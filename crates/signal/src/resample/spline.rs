@@ -14,8 +14,8 @@ pub(super) fn natural(y: &[f64]) -> Vec<f64> {
 }
 
 /// Slopes of the spline whose third derivative is continuous at the second and the last but one
-/// sample: d_0 + 2 d_1 = (5 (y_1 − y_0) + (y_2 − y_1)) / 2. Two samples give their line, three
-/// their parabola.
+/// sample: d_0 + 2 d_1 = (5 (y_1 − y_0) + (y_2 − y_1)) / 2. The spline of two samples is a straight
+/// line, that of three samples a parabola.
 pub(super) fn not_a_knot(y: &[f64]) -> Vec<f64> {
     match *y {
         [a, b] => vec![b - a; 2],

@@ -1,5 +1,5 @@
-//! Data derived from other data: without the transients of open records, under a window, with a
-//! delay, or of one load alone.
+//! Data that are derived from other data: without the transients of open records, under a window,
+//! with a delay, or with only one load.
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::check_size;
@@ -50,11 +50,11 @@ impl FrequencyData {
     }
 
     /// Returns the same data without the errors of the pulses of the forces (N), which are the
-    /// `amplitudes` (pure numbers) times the patterns of all [`FrequencyData::pulse_errors`] in
-    /// their order; the forces then count as exact.
+    /// `amplitudes` (pure numbers) times the patterns of all [`FrequencyData::pulse_errors`], in
+    /// their order. The forces of the result count as exact.
     ///
     /// # Errors
-    /// [`SpectraError::Numerics`] for another number of amplitudes than patterns.
+    /// [`SpectraError::Numerics`] if the numbers of amplitudes and patterns differ.
     ///
     /// # Source
     /// As [`PulseErrors::at`](crate::noise::pulse::PulseErrors::at).
@@ -77,10 +77,10 @@ impl FrequencyData {
     }
 
     /// Returns the same data with the same first-order high-pass filter on all channels. The
-    /// `responses` and `forces` listed here, counted from 0, were already filtered during the
-    /// measurement with the `corner` frequency (rad/s); the filter is applied to all others. A
-    /// filter that is equal on all channels does not change the system, and the high-pass amplifies
-    /// no noise. The errors of pulses are not filtered.
+    /// `corner` frequency is in rad/s. The channels in `responses` and `forces`, counted from 0,
+    /// were already filtered during the measurement; the filter is applied to all other channels. A
+    /// filter that is equal on all channels does not change the system, and a high-pass filter does
+    /// not amplify noise. The errors of pulses are not filtered.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 2 (first-order systems).
@@ -133,8 +133,8 @@ impl FrequencyData {
         alone
     }
 
-    /// Returns data of a step between the initial and final values of channel `channel`, without a
-    /// force: its lines decrease as 1/s.
+    /// Returns data without a force, whose response is a step between the initial and final values
+    /// of `channel`: the lines of this step decrease as 1/s.
     pub fn step_data(&self, channel: usize) -> Self {
         let jump = |row: usize, column: usize| {
             let omega = self.omega[row];
@@ -178,8 +178,9 @@ impl FrequencyData {
         }
     }
 
-    /// Returns second differences of neighbouring lines of equal spacing, in which transients have
-    /// little weight: the spectra under a Hann window. Rows at the ends of a band are unchanged.
+    /// Returns second differences of neighbouring lines of equal spacing. These are the spectra
+    /// under a Hann window; transients have little weight in them. Rows at the ends of a band are
+    /// unchanged.
     ///
     /// # Source
     /// Harris (1978), Proceedings of the IEEE 66, 51–83 (windows as convolutions of lines).

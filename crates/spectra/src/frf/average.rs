@@ -31,12 +31,12 @@ pub struct FrfAverage {
 }
 
 impl FrfAverage {
-    /// Creates an average without segments, for this many forces and responses; `lines` are those
-    /// of a segment.
+    /// Creates an average without segments, for this many forces and responses; `lines` are the
+    /// lines of a segment.
     ///
     /// # Errors
-    /// [`SpectraError::Hop`], and [`NumericsError::Size`] if the lines have another length than a
-    /// segment.
+    /// [`SpectraError::Hop`], and [`NumericsError::Size`] if the lines belong to records of another
+    /// length than a segment.
     pub fn new(
         lines: Lines,
         [inputs, outputs]: [usize; 2],
@@ -51,8 +51,8 @@ impl FrfAverage {
     }
 
     /// Adds every whole segment of a part of the records of force (N) and response; the first
-    /// segment begins where the part begins. The next part must begin where the next segment
-    /// begins: [`Segments::hop`] samples after the beginning of the last whole segment.
+    /// segment begins at the first sample of the part. The next part must begin with the next
+    /// segment: [`Segments::hop`] samples after the beginning of the last whole segment.
     ///
     /// # Errors
     /// [`SpectraError::Signal`] if the time axes of the records differ or their time step differs
@@ -89,11 +89,11 @@ impl FrfAverage {
         Ok(())
     }
 
-    /// Adds all segments of another average over the same lines, channels and segments, such as
-    /// from another record of the same system.
+    /// Adds all segments of another average with the same lines, channels and segment settings,
+    /// such as that of another record of the same system.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if it has other channels or lines.
+    /// [`NumericsError::Size`] if the other average has other channels or lines.
     ///
     /// # Source
     /// As [`FrfAverage::push`].
@@ -116,8 +116,8 @@ impl FrfAverage {
 
     /// Returns the force channels, counted from 0, that contain only noise: they are weaker than a
     /// tenth of the strongest force, and coherent with no other force and no response on any line.
-    /// Such channels come from shakers or points without a force; as forces they would seem to have
-    /// no effect, which biases the responses to them towards zero.
+    /// Such channels come from shakers or points without a force; if they were used as forces, they
+    /// would seem to have no effect: the responses to them would be biased towards zero.
     ///
     /// # Source
     /// Goodman (1957), *On the joint estimation of the spectra, cospectrum and quadrature spectrum
@@ -134,10 +134,11 @@ impl FrfAverage {
         (0..self.inputs).filter(is_weak).filter(|input| self.is_idle(*input, averages)).collect()
     }
 
-    /// Returns the force channels that are coherent with a stronger one: their independent part is
-    /// weaker than a tenth of the strongest force, and no response is coherent with it. The records
-    /// cannot separate their effect from the effect of the stronger force; the estimated responses
-    /// to them would be responses to the noise of their channels.
+    /// Returns the force channels that are coherent with a stronger force: the independent part of
+    /// such a channel is weaker than a tenth of the strongest force, and no response is coherent
+    /// with this part. The records cannot separate the effect of such a channel from the effect of
+    /// the stronger force; the estimated responses to it would be responses to the noise of the
+    /// channel.
     ///
     /// # Source
     /// As [`FrfAverage::idle_inputs`].
@@ -153,8 +154,8 @@ impl FrfAverage {
         following
     }
 
-    /// Returns the force with the weakest independent part, if that part is weak and no response is
-    /// coherent with it.
+    /// Returns the force with the weakest independent part, if this part is weak and no response is
+    /// coherent with the part.
     fn weakest_follower(&self) -> Option<usize> {
         let (averages, mut own) = (self.averages(), vec![0.0; self.inputs]);
         for sum in &self.sums {
@@ -197,13 +198,14 @@ impl FrfAverage {
 
     /// Returns the indices of the excited lines, counted from 0.
     ///
-    /// A line is not excited if every force has less than a hundredth of the power of its strongest
-    /// line there, and if no response is coherent with it on eight neighbouring lines: the channel
-    /// contains noise, and the estimated responses would be responses to noise. The whole range of
-    /// weak lines around these eight is excluded, and as many further lines as the peak of a window
-    /// is wide, because leakage reaches them. If no line remained, all are returned.
+    /// A line is not excited if every force has on it less than a hundredth of the power of the
+    /// strongest line of this force, and if no response is coherent with a force on eight
+    /// neighbouring lines. On such lines the force channels contain only noise, and the estimated
+    /// responses would be responses to noise. The whole range of weak lines around these eight
+    /// lines is excluded. On either side, further lines over half the width of the peak of a window
+    /// are excluded because of leakage. If no line would remain, all lines are returned.
     /// # Source
-    /// The coherence is that in [`FrfAverage::idle_inputs`]; the limits are ours.
+    /// The coherence is the same as in [`FrfAverage::idle_inputs`]; the limits are ours.
     pub fn driven(&self) -> Vec<usize> {
         let (count, averages) = (self.sums.len(), self.averages());
         let all_lines = || (0..count).collect();
@@ -270,8 +272,8 @@ impl FrfAverage {
         &self.lines
     }
 
-    /// Returns whether a response is coherent with a force, for this number of independent averages
-    /// (a pure number).
+    /// Returns whether any response is coherent with any force, for this number of independent
+    /// averages (a pure number).
     pub fn response_follows(&self, averages: f64) -> bool {
         let follows = |input: usize| {
             let values =
@@ -337,8 +339,8 @@ impl FrfAverage {
     }
 }
 
-/// Returns whether the mean and the largest of the values −ln p are plausible without coherence,
-/// for which each is exponentially distributed; `false` if a value is unknown.
+/// Returns whether the mean and the largest of the values −ln p are plausible without coherence;
+/// `false` if a value is unknown. Without coherence each value is exponentially distributed.
 fn shows_nothing(evidence: impl Iterator<Item = Option<Vec<f64>>>) -> bool {
     let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0.0);
     for of_line in evidence {

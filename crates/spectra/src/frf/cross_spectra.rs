@@ -19,7 +19,7 @@ pub(super) struct CrossSpectra {
     pub(super) motion: ComplexMatrix,
 }
 
-/// Adds a bᴴ. This runs once per segment and line, so it does not allocate.
+/// Adds a bᴴ. The function runs once per segment and line, so it does not allocate memory.
 fn accumulate(sum: &mut ComplexMatrix, a: &Amplitudes<'_>, b: &Amplitudes<'_>) {
     for (mut column, b) in sum.column_iter_mut().zip(b.iter()) {
         for (entry, a) in column.iter_mut().zip(a.iter()) {
@@ -66,8 +66,8 @@ impl CrossSpectra {
         self.force[(input, input)].re
     }
 
-    /// Returns the amplitude of the coherent part of a force relative to another force; 0 if the
-    /// other one is zero.
+    /// Returns the ratio of the coherent part of a force to another force; 0 if the other force is
+    /// zero.
     pub(super) fn force_ratio(&self, input: usize, driver: usize) -> Complex<f64> {
         let power = self.force_power(driver);
         if power > 0.0 { self.force[(input, driver)] / power } else { Complex::ZERO }
@@ -82,9 +82,9 @@ impl CrossSpectra {
         }
     }
 
-    /// Returns −ln p for each response. Here p is the probability that its partial coherence with a
-    /// force, given the other forces, is as large as observed without any relation, for this many
-    /// independent averages; `None` if the forces are dependent.
+    /// Returns −ln p for each response. If response and force are not related, p is the probability
+    /// of a partial coherence (given the other forces) at least as large as observed, for this many
+    /// independent averages. `None` if the forces are dependent.
     pub(super) fn evidence_of_motion(&self, input: usize, averages: f64) -> Option<Vec<f64>> {
         let inverse = self.inverse_force(0.0).ok()?;
         let h = &self.motion_force * &inverse;
@@ -98,8 +98,9 @@ impl CrossSpectra {
         Some(of_motion.collect())
     }
 
-    /// Returns −ln p for the coherence of a force with the other forces: p is the probability of a
-    /// value as large as observed without any relation, for which 1 − γ² has a beta distribution.
+    /// Returns −ln p for the coherence γ² of a force with the other forces. If the forces are not
+    /// related, p is the probability of a coherence at least as large as observed; 1 − γ² has a
+    /// beta distribution in this case.
     pub(super) fn evidence_of_forces(&self, input: usize, averages: f64) -> Option<f64> {
         let inverse = self.inverse_force(0.0).ok()?;
         let other_forces = inverse.nrows() as f64 - 1.0;
@@ -141,8 +142,8 @@ impl CrossSpectra {
         solution.map(|h| h.transpose()).filter(|h| h.iter().all(|z| z.is_finite()))
     }
 
-    /// Returns the Hv estimate of each response: the ratio of entries in the eigenvector of the
-    /// smallest eigenvalue of the cross-spectra of forces and response.
+    /// Returns the Hv estimate of each response: a ratio of entries of an eigenvector of the
+    /// cross-spectra of forces and response. The eigenvector is that of the smallest eigenvalue.
     pub(super) fn hv(&self) -> Result<ComplexMatrix, SpectraError> {
         let (outputs, inputs) = self.motion_force.shape();
         let mut h = DMatrix::zeros(outputs, inputs);

@@ -1,4 +1,4 @@
-//! Responses to forces on interleaved lines, with crosstalk from the other forces.
+//! Responses to forces on interleaved lines, corrected for the crosstalk of the other forces.
 
 use mechid_numerics::check_size;
 use nalgebra::{Complex, DVector};
@@ -11,7 +11,7 @@ use crate::limits::{INTERLEAVED_CHANCE, INTERLEAVED_ROUNDING, INTERLEAVED_ROUNDS
 /// Frequency responses to forces that are excited on interleaved lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterleavedResponses {
-    /// Responses to each force, responses × 1, on the lines that it excites.
+    /// Responses to each force, responses × 1, on the lines that this force excites.
     pub responses: Vec<Frf>,
     /// Crosstalk that was estimated and subtracted.
     pub crosstalk: Vec<Crosstalk>,
@@ -24,22 +24,23 @@ pub struct Crosstalk {
     pub force: usize,
     /// Force that excites these lines, counted from 0.
     pub driver: usize,
-    /// Root mean square of the ratio of their amplitudes, a pure number.
+    /// RMS over these lines of the ratio of the amplitude of `force` to that of `driver`, a pure
+    /// number.
     pub share: f64,
 }
 
 impl InterleavedResponses {
     /// Estimates the responses from averages of all forces: one average for each force, over the
-    /// lines that it excites.
+    /// lines that this force excites.
     ///
     /// The force that excites the lines is their driver. If another force is more coherent with the
-    /// driver than channel noise can be, it acts on the system on these lines. Its part of the
-    /// response is subtracted, by interpolation of the responses to it between its own lines. The
-    /// possible interpolation error is added to the variance.
+    /// driver than channel noise can be, this force also acts on these lines. The response to it is
+    /// interpolated between the lines that it excites, and subtracted. The possible interpolation
+    /// error is added to the variance.
     ///
     /// # Errors
     /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is one average of
-    /// all forces for each force, and as [`FrfAverage::frf`].
+    /// all forces for each force, and the errors of [`FrfAverage::frf`].
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -77,11 +78,11 @@ impl InterleavedResponses {
     }
 }
 
-/// Crosstalk of a force on the lines of another one.
+/// Crosstalk of a force on the lines of another force.
 struct Coupling {
     force: usize,
     driver: usize,
-    /// Ratio of its amplitude to the amplitude of the driver, on each line.
+    /// Ratio of the amplitude of the force to the amplitude of the driver, on each line.
     ratio: Vec<Complex<f64>>,
 }
 
@@ -100,7 +101,7 @@ impl Coupling {
         }
         let coupling = Self { force, driver, ratio };
         let (lines, spare) = (average.sums.len() as f64, average.pieces.saturating_sub(1) as f64);
-        // For noise, the coherent fraction has a beta distribution.
+        // If there is only noise, the coherent fraction has a beta distribution.
         let by_chance = Beta::new(lines, lines * spare).ok()?.sf(common / (common + left));
         (by_chance < INTERLEAVED_CHANCE && coupling.share() > INTERLEAVED_ROUNDING)
             .then_some(coupling)
@@ -130,14 +131,16 @@ impl Coupling {
 struct Between {
     response: DVector<Complex<f64>>,
     variance: DVector<f64>,
-    /// Possible interpolation error: the error of an interpolation over twice the distance, between
-    /// the neighbours of the two lines. This error has the same size as the actual one if there is
-    /// a resonance between the two lines, and is four times as large otherwise.
+    /// Possible interpolation error: each of the two lines is interpolated between its neighbours,
+    /// over twice the distance, and the larger error is used. If there is a resonance between the
+    /// two lines, this error has the size of the actual interpolation error; otherwise it is four
+    /// times the actual error.
     missed: DVector<f64>,
 }
 
 impl Between {
-    /// Interpolates linearly between the neighbours; outside, takes the nearest line.
+    /// Interpolates linearly between the neighbouring lines; outside their range, uses the nearest
+    /// line.
     fn at(frf: &Frf, line: usize) -> Self {
         let (lines, value) = (&frf.lines, |at: usize| frf.response[at].column(0));
         let last = lines.len() - 1;

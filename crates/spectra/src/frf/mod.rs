@@ -24,15 +24,17 @@ use crate::lines::Lines;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
-/// Estimator of a frequency response; the name says which signal is assumed free of noise.
+/// Estimator of a frequency response. The estimators differ in the signals that they assume to be
+/// free of noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum FrfEstimator {
-    /// S_XF S_FF⁻¹: unbiased if only the response is noisy; noise on the force makes it too small.
+    /// S_XF S_FF⁻¹: unbiased if only the response is noisy; noise on the force makes the estimate
+    /// too small.
     H1,
-    /// S_XX S_FX⁻¹: unbiased if only the force is noisy; noise on the response makes it too large.
-    /// It needs as many responses as forces if there are several forces.
+    /// S_XX S_FX⁻¹: unbiased if only the force is noisy; noise on the response makes the estimate
+    /// too large. With several forces, the numbers of responses and forces must be equal.
     H2,
     /// Total least squares, with force and response scaled to equal power; for one force, the
     /// geometric mean of H1 and H2.
@@ -43,9 +45,9 @@ pub enum FrfEstimator {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frf {
     omega: Vec<f64>,
-    /// Numbers of the lines of a segment.
+    /// Number of the line of each frequency among the lines of a segment.
     lines: Vec<usize>,
-    /// Correlation of the errors of two lines, by their distance: see
+    /// Correlation of the errors of two lines as a function of the distance of the lines: see
     /// [`Segments::line_correlation`].
     line_correlation: Vec<f64>,
     measured: ResponseQuantity,
@@ -53,15 +55,15 @@ pub struct Frf {
     coherence: DMatrix<f64>,
     variance: Vec<DMatrix<f64>>,
     averages: f64,
-    /// Covariances of the errors in addition to the variances; `None` for measured frequency
-    /// responses from elsewhere.
+    /// Covariances of the errors, in addition to the variances; `None` for responses from
+    /// [`Frf::new`] and after the subtraction of crosstalk.
     scatter: Option<Scatter>,
 }
 
 impl Frf {
     /// Estimates frequency responses at some lines, from all segments of the records.
     ///
-    /// Every force channel must have a force; select the channels that do.
+    /// Every force channel must contain a force; leave out the other channels.
     ///
     /// # Errors
     /// [`SpectraError::TooFewAverages`] unless there are more segments than forces,
@@ -86,11 +88,11 @@ impl Frf {
         average.frf(estimator)
     }
 
-    /// Creates responses that were measured elsewhere: a matrix responses × forces for each
-    /// frequency, and the coherence of every response (frequencies × responses), from this many
-    /// independent averages.
+    /// Creates responses that another program or instrument measured: a matrix responses × forces
+    /// for each frequency, and the coherence of every response (frequencies × responses). Both come
+    /// from this many independent averages.
     ///
-    /// With several forces the coherence is the multiple one, and the forces are assumed
+    /// With several forces, the coherence is the multiple coherence; the forces are assumed to be
     /// uncorrelated and of equal size.
     ///
     /// # Errors
@@ -146,10 +148,11 @@ impl Frf {
         })
     }
 
-    /// Creates responses that were measured elsewhere as averages over this many segments: as
-    /// [`Frf::new`], with the lines of a segment, and with the standard errors of real and
-    /// imaginary part (responses × forces, in the unit of the responses) if they are known. Forces,
-    /// and the unexplained parts of the responses, are assumed uncorrelated.
+    /// Creates responses that another program computed as averages over this many segments, in the
+    /// same way as [`Frf::new`]. The arguments also contain the lines of a segment and, if known,
+    /// the standard errors of real and imaginary part (responses × forces, in the unit of the
+    /// responses). The forces are assumed to be uncorrelated with each other, and so are the
+    /// unexplained parts of the responses.
     ///
     /// # Errors
     /// As [`Frf::new`], and [`SpectraError::Hop`].
@@ -248,12 +251,12 @@ impl Frf {
     }
 
     /// Returns data for the estimators: each force channel is one experiment with unit force at its
-    /// degree of freedom (`force_dof`, one per channel, counted from 0). The coherence gives the
-    /// noise of the response, averaged over neighbouring lines if there are few averages.
+    /// degree of freedom (`force_dof`, one per channel, counted from 0). The noise of the response
+    /// comes from the coherence; if there are few averages, it is averaged over neighbouring lines.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if there is not one degree of freedom per force or one of them does
-    /// not exist.
+    /// [`NumericsError::Size`] if there is not one degree of freedom per force, or if a degree of
+    /// freedom does not exist.
     pub fn data(&self, force_dof: &[usize]) -> Result<FrequencyData, SpectraError> {
         let inputs = self.response.first().map_or(0, |h| h.ncols());
         if force_dof.len() != inputs {
@@ -294,7 +297,7 @@ impl Frf {
         }
     }
 
-    /// Returns the number of independent complex deviations behind the variances that weight an
+    /// Returns the number of independent complex deviations in each variance that weights an
     /// estimate.
     pub fn deviations(&self) -> f64 {
         let inputs = self.response.first().map_or(0, |h| h.ncols());
@@ -302,11 +305,11 @@ impl Frf {
         self.scatter.as_ref().map_or(per_line, |scatter| scatter.freedom)
     }
 
-    /// Returns the information of the responses about a system, a pure number. It is the sum over
-    /// lines and responses of γ²/(1 − γ²), the ratio of explained to unexplained power, corrected
-    /// for the bias of a sample coherence, times the number of averages that remain after the
-    /// forces and the weights are estimated. Longer segments have more lines and less leakage, but
-    /// fewer averages.
+    /// Returns the information of the responses about a system, a pure number. It is a sum over
+    /// lines and responses, times a number of averages. The terms of the sum are γ²/(1 − γ²), the
+    /// ratio of explained to unexplained power, corrected for the bias of a sample coherence. The
+    /// number of averages is reduced by the number of forces and by one for the weights. Longer
+    /// segments have more lines and less leakage, but fewer averages.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (variance of a response by its
@@ -326,12 +329,12 @@ impl Frf {
         &self.omega
     }
 
-    /// Returns the line number of each frequency; for responses measured elsewhere, its index.
+    /// Returns the line number of each frequency; for responses from [`Frf::new`], its index.
     pub fn lines(&self) -> &[usize] {
         &self.lines
     }
 
-    /// Returns the correlation of the noise of two lines, by their distance in lines, from 0.
+    /// Returns the correlation of the noise on two lines that are 0, 1, 2 … lines apart.
     pub fn line_correlation(&self) -> &[f64] {
         &self.line_correlation
     }
@@ -349,8 +352,8 @@ impl Frf {
         &self.response[at]
     }
 
-    /// Returns the fraction of the power of a response that depends linearly on the forces,
-    /// frequencies × responses (the multiple coherence γ², between 0 and 1).
+    /// Returns the multiple coherence γ², frequencies × responses: the fraction, from 0 to 1, of
+    /// the power of a response that depends linearly on the forces.
     pub fn coherence(&self) -> &DMatrix<f64> {
         &self.coherence
     }

@@ -1,5 +1,5 @@
-//! Errors of frequency responses: their correlation between lines, and between forces and
-//! responses.
+//! Errors of frequency responses: their correlation between lines, and between the entries (output,
+//! input) of one line.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ pub(super) struct Scatter {
     inverse_force: Vec<ComplexMatrix>,
     /// Variances for weights, averaged over neighbouring lines.
     pub(super) pooled: Vec<DMatrix<f64>>,
-    /// Number of independent complex deviations behind the pooled variances.
+    /// Number of independent complex deviations in each pooled variance.
     pub(super) freedom: f64,
     /// Weights of the smoothing by the window: see [`Segments::smoothing`].
     smoothing: Vec<f64>,
@@ -43,8 +43,8 @@ impl Scatter {
         Self::pooled(frf, unexplained, inverse_force, segments, widest)
     }
 
-    /// Creates the covariances for responses that were measured elsewhere. With few averages over
-    /// periods, neighbouring lines are pooled, too.
+    /// Creates the covariances for responses of a table, in the same way as [`Scatter::new`]. If
+    /// there are few averages over periods, the variances of neighbouring lines are pooled, too.
     pub(super) fn for_table(
         frf: &Frf,
         unexplained: Vec<ComplexMatrix>,
@@ -62,7 +62,7 @@ impl Scatter {
         }
     }
 
-    /// Averages the variances over up to `widest` lines to either side.
+    /// Averages the variances over at most `widest` lines on either side.
     fn pooled(
         frf: &Frf,
         unexplained: Vec<ComplexMatrix>,
@@ -82,7 +82,8 @@ impl Scatter {
             for (output, mut row) in variance.row_iter_mut().enumerate() {
                 let power = |at: usize| unexplained[at][(output, output)].re.max(0.0);
                 let mean = around.clone().map(power).sum::<f64>() / around.len() as f64;
-                // The variance without any power is only rounding and stays unchanged.
+                // If a line has no unexplained power, its variance is only rounding and stays
+                // unchanged.
                 if half > 0 && power(line) > COHERENCE_ROUNDING * mean {
                     row *= mean / power(line);
                 }
@@ -133,8 +134,8 @@ fn independent(lines: usize, correlation: &[f64]) -> f64 {
 
 /// Returns the bias that averaging over segments with these weights ([`Segments::smoothing`])
 /// causes in a frequency response: the window smooths the response and reduces a resonance. The
-/// response is given as a function of ω (rad/s), the lines as numbers, `spacing` (rad/s) apart.
-/// `None` on a line without a finite response.
+/// response is given as a function of ω (rad/s). The lines are given by their numbers: line k is at
+/// k · `spacing` (rad/s). `None` on a line without a finite response.
 /// # Source
 /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral
 /// estimates).
@@ -173,8 +174,8 @@ impl Frf {
     }
 
     /// Returns the responses minus the bias from the window of the segments, which smooths a
-    /// response and reduces a resonance; the bias is computed for the responses of `system`. Forces
-    /// act at the degrees of freedom `force_dof`.
+    /// response and reduces a resonance; the bias is computed from the responses of `system` to
+    /// forces at the degrees of freedom `force_dof`.
     #[must_use]
     pub fn sharpened(&self, system: &SecondOrderSystem, force_dof: &[usize]) -> Self {
         let Some(scatter) = self.scatter.as_ref().filter(|_| self.is_smoothed()) else {
@@ -207,14 +208,14 @@ impl Frf {
     }
 
     /// Returns the covariance of the errors of two responses at a line, each given as (output,
-    /// input), divided by the standard deviations that weight them; `None` for responses measured
-    /// elsewhere.
+    /// input), divided by the standard deviations that weight them; `None` for responses from
+    /// [`Frf::new`] and after the subtraction of crosstalk.
     pub fn error_covariance(&self, line: usize, pair: [(usize, usize); 2]) -> Option<Complex<f64>> {
         Some(self.scatter.as_ref()?.covariance(line, self.averages, pair))
     }
 
-    /// Returns the lines whose errors are correlated with those of a line, including the line
-    /// itself, and the correlations.
+    /// Returns the lines whose errors are correlated with the errors of a given line, including
+    /// this line, and the correlations.
     pub fn correlated_lines(&self, line: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let reach = self.line_correlation.len() - 1;
         let around = line.saturating_sub(reach)..(line + reach + 1).min(self.lines.len());

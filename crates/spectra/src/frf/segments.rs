@@ -13,10 +13,10 @@ use crate::limits::{FARTHEST_LINES, SEGMENT_INDEPENDENT, SMOOTHED_LINES, SMOOTHI
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Segments {
-    /// Whole periods of this many samples, for a periodic excitation in steady state: no window, no
-    /// leakage.
+    /// Whole periods of this many samples, for a periodic excitation in steady state; there is no
+    /// window and no leakage.
     Periods(usize),
-    /// Segments with their means removed and a window, for a random excitation (Welch's method).
+    /// Segments under a window, with their means removed, for a random excitation (Welch's method).
     Windowed {
         /// Number of samples in a segment.
         len: usize,
@@ -33,8 +33,8 @@ impl Segments {
         Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann }
     }
 
-    /// Returns the equivalent number of independent segments (a pure number), which is smaller than
-    /// their number if they overlap.
+    /// Returns the equivalent number of independent segments (a pure number). It is smaller than
+    /// the number of segments if they overlap.
     ///
     /// # Errors
     /// [`SpectraError::Hop`].
@@ -45,7 +45,7 @@ impl Segments {
         Ok(self.averages_under(self.weights()?.as_deref(), pieces))
     }
 
-    /// Returns the same as [`Segments::averages`] for a computed window.
+    /// Returns the same number as [`Segments::averages`], for given samples of the window.
     pub(super) fn averages_under(self, weights: Option<&[f64]>, pieces: usize) -> f64 {
         let loss = weights.map(|weights| overlap_loss(weights, self.hop(), pieces));
         pieces as f64 / loss.unwrap_or(1.0)
@@ -59,13 +59,13 @@ impl Segments {
     }
 
     /// Returns the correlation of the errors of a frequency response on two lines (pure numbers),
-    /// for this many segments. The entries belong to the distances 0, 1 … in lines, up to the last
-    /// noticeable correlation.
+    /// for this many segments. The entries belong to distances of 0, 1 … lines, up to the largest
+    /// distance with a noticeable correlation.
     ///
-    /// The window leaks noise and force in the same way from a line to its neighbours, and
-    /// overlapping segments share samples. The correlation is Σ_j |ρ_j(d)|² over segments j hops
-    /// apart, with ρ_j(d) = Σ w(k) w(k + j hop) exp(−2πi d k/len) for the window w, relative to the
-    /// value at the distance d = 0.
+    /// The correlation has two causes: the window leaks noise and force in the same way from a line
+    /// to its neighbours, and overlapping segments share samples. The correlation is Σ_j |ρ_j(d)|²
+    /// over segments j hops apart, with ρ_j(d) = Σ w(k) w(k + j hop) exp(−2πi d k/len) for the
+    /// window w, relative to the value at the distance d = 0.
     ///
     /// # Source
     /// Welch (1967), IEEE Transactions on Audio and Electroacoustics 15, 70–73 (segments that
@@ -93,8 +93,9 @@ impl Segments {
 
     /// Returns the weights with which averaging over segments smooths a frequency response under a
     /// random force: |W|² of the window (pure numbers), at distances from a line in steps of
-    /// 1/`SMOOTHING_STEPS`, symmetric. The list is empty without smoothing: for periods, and for
-    /// the rectangular window, which is for segments that begin and end at rest.
+    /// 1/`SMOOTHING_STEPS` lines. The weights are symmetric about the line. The list is empty
+    /// without smoothing, that is for periods and for the rectangular window (which is for segments
+    /// that begin and end at rest).
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral
@@ -136,7 +137,8 @@ impl Segments {
     }
 }
 
-/// Writes a segment: with its mean removed and weighted if there is a window, otherwise unchanged.
+/// Writes a segment. If there is a window, the mean is removed and the samples are weighted;
+/// otherwise the segment is unchanged.
 pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) {
     let Some(window) = window else { return weighed.copy_from_slice(piece) };
     let mean = DVectorView::from_slice(piece, piece.len()).mean();
@@ -145,8 +147,9 @@ pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) 
     }
 }
 
-/// Returns the variance of an average of overlapping windowed segments, relative to independent
-/// ones: 1 + 2 Σ (1 − j/count) ρ_j², where ρ_j is the correlation of two segments j hops apart.
+/// Returns the variance of an average of overlapping windowed segments, relative to that of an
+/// average of independent segments: 1 + 2 Σ (1 − j/count) ρ_j², where ρ_j is the correlation of two
+/// segments j hops apart.
 ///
 /// # Source
 /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.

@@ -1,4 +1,5 @@
-//! Noise between the lines of several periods taken as one record; a periodic signal is zero there.
+//! Noise between the lines of several periods that are taken as one record; a periodic signal is
+//! zero on the lines between.
 
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -9,23 +10,23 @@ use crate::limits::{MAX_HELD, MAX_PERIODS, MIN_PERIODS};
 ///
 /// The spectrum of B periods has B − 1 lines between two lines of one period. On these lines, noise
 /// with a long correlation time (an unmeasured force through a resonance) has the same level as on
-/// the lines of the mean. The scatter of single periods is larger, because it also contains their
-/// transients, which nearly cancel in the mean.
+/// the lines of the mean. The scatter of single periods is larger, because it also contains the
+/// transients of the periods; these transients nearly cancel in the mean.
 #[derive(Debug, Clone)]
 pub(crate) struct BetweenLines {
     /// Number of samples in a period.
     period: usize,
-    /// Number of periods taken as one record; with one period there are no lines between.
+    /// Number of periods taken as one record; with one period there are no lines between its lines.
     periods: usize,
     /// Number of buffered periods.
     held: usize,
-    /// Samples × channels; empty without lines between.
+    /// Buffered samples × channels; empty if one period is taken as one record.
     samples: DMatrix<f64>,
 }
 
 /// Returns the number of periods to be taken as one record, if `remaining` are expected.
 ///
-/// The groups have nearly equal sizes, as large as the buffer allows.
+/// The groups have nearly equal sizes; a group is as large as the buffer allows.
 pub(crate) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
     let most = (MAX_HELD / (period * channels).max(1)).min(MAX_PERIODS);
     if most.min(remaining) < MIN_PERIODS {
@@ -62,12 +63,12 @@ impl BetweenLines {
         (self.held == self.periods).then_some(self.periods)
     }
 
-    /// Adds B Σ z zᴴ, where z are the amplitudes between lines of B periods, to the scatter of each
-    /// line of a period: the expectation is the same as for the scatter of B periods about their
-    /// mean.
+    /// Adds B Σ z zᴴ to the scatter of each line of a period, where z are the amplitudes between
+    /// the lines, from B periods. The expected value is that of the scatter of B periods about
+    /// their mean.
     ///
     /// Each line of a period uses the lines that are nearest to it. A line in the middle between
-    /// two lines of a period belongs to the lower one, so that each is used once.
+    /// two lines of a period is used for the lower line, so that each line between is used once.
     pub(crate) fn add_scatter(&self, lines: &[usize], scatter: &mut [DMatrix<Complex<f64>>]) {
         if self.periods == 1 {
             return;

@@ -1,10 +1,12 @@
-//! Levels of noise: white in addition to known noise, and in proportion to a response.
+//! Levels of noise: of white noise in addition to known noise, and of noise in proportion to a
+//! response.
 
 use crate::limits::{LEVEL_LEAST, LEVEL_ROUNDS, LEVEL_SETTLED};
 
 /// Returns the most likely standard deviation s of white noise in residuals e, which are circular
-/// Gaussian numbers of variances s² + g. Each residual is a pair (|e|², g) with its known variance
-/// g, all in one unit. The result is almost zero if g alone explains the residuals.
+/// Gaussian numbers of variances s² + g. Each residual is given as the pair (|e|², g) with the
+/// known variance g; all pairs are in the same unit. The result is almost zero if g alone explains
+/// the residuals.
 ///
 /// # Source
 /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring).
@@ -25,8 +27,8 @@ pub fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
         if !next.is_finite() || (next - variance).abs() <= LEVEL_SETTLED * variance {
             break;
         }
-        // The decrease per step is limited, because after too small a variance a few lines get all
-        // the weight and the search oscillates.
+        // The decrease per step is limited: if the variance is too small, a few lines get all the
+        // weight and the search oscillates.
         variance = next.max(0.1 * variance);
     }
     variance.sqrt().max(f64::MIN_POSITIVE)
@@ -37,15 +39,15 @@ pub fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
 pub struct ResponseNoise {
     /// Variance of the white part, in the square of the unit of the response.
     pub white: f64,
-    /// Ratio of the variance of the other part to the squared magnitude of the response.
+    /// Ratio of the variance of the proportional part to the squared magnitude of the response.
     pub relative: f64,
 }
 
 impl ResponseNoise {
-    /// Chooses the most likely noise of residuals, which are circular Gaussian numbers: white, in
-    /// proportion to the response, or, if Schwarz's criterion accepts its second unknown, the sum
-    /// of both. Each residual is a pair of two squared magnitudes, of the residual and of the
-    /// response.
+    /// Chooses the most likely noise of residuals, which are circular Gaussian numbers: white
+    /// noise, noise in proportion to the response, or the sum of both. The sum is chosen only if
+    /// Schwarz's criterion accepts its second unknown. Each entry is a pair of squared magnitudes:
+    /// that of the residual and that of the response.
     ///
     /// # Source
     /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring);
@@ -75,7 +77,8 @@ impl ResponseNoise {
         self.white + self.relative * response
     }
 
-    /// Returns minus the log likelihood, up to a constant; infinite without a likelihood.
+    /// Returns minus the log-likelihood, up to a constant; infinite if the likelihood does not
+    /// exist.
     fn cost(&self, residuals: &[(f64, f64)]) -> f64 {
         let term = |(power, response): &(f64, f64)| {
             let variance = self.variance(*response);
@@ -85,7 +88,8 @@ impl ResponseNoise {
         if cost.is_finite() { cost } else { f64::INFINITY }
     }
 
-    /// Returns the most likely two parts; `None` if one of them is not positive.
+    /// Returns the sum of a white and a proportional part with the most likely variances; `None` if
+    /// one of the variances is not positive.
     fn scored(mut self, residuals: &[(f64, f64)]) -> Option<Self> {
         for _ in 0..LEVEL_ROUNDS {
             // Weighted normal equations of the powers v = s² + r² |x|².

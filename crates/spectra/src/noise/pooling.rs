@@ -26,19 +26,19 @@ type Covariances = Vec<DMatrix<Complex<f64>>>;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
 pub enum Pooling {
-    /// The choice, among all others, that predicts the samples best.
+    /// The choice among the other variants that predicts the samples best.
     #[default]
     Automatic,
     /// One covariance for all lines: white noise in the measured quantity.
     AllLines,
-    /// A spectrum of each channel whose logarithm is a polynomial in the logarithm of the
-    /// frequency, with other levels in some bands; the correlations of channels are equal on all
-    /// lines. Order and bands are chosen from the samples, so that white noise is recognised.
+    /// A smooth spectrum of each channel: its logarithm is a polynomial in the logarithm of the
+    /// frequency, and some bands may have another level. The correlations of channels are equal on
+    /// all lines. Order and bands are chosen from the samples, so that white noise is recognised.
     Smooth,
-    /// Mean of the covariances over this many chosen lines to either side of a line; at the ends of
-    /// the band, over the same total number of lines.
+    /// Mean of the covariances over a line and this many chosen lines on either side; at the ends
+    /// of the band the total number of lines is the same.
     Neighbours(usize),
-    /// A separate covariance for every line: for many periods.
+    /// A separate covariance for every line; this choice needs many periods.
     PerLine,
 }
 
@@ -96,11 +96,12 @@ pub enum NoiseModel {
     Smooth {
         /// Order of the polynomial of log power in log frequency.
         order: usize,
-        /// Bands with other levels, such as those of a disturbance: lowest and highest line, in Hz.
+        /// Bands with other levels, for example due to a disturbance: lowest and highest line, in
+        /// Hz.
         bands_hz: Vec<[f64; 2]>,
     },
-    /// Response of the system to unmeasured forces with one smooth spectrum, at all degrees of
-    /// freedom.
+    /// Response of the system to unmeasured forces at all degrees of freedom; all forces have the
+    /// same smooth spectrum.
     UnmeasuredForce {
         /// Order of the polynomial of log power of the forces in log frequency.
         order: usize,
@@ -159,14 +160,15 @@ impl fmt::Display for NoiseModel {
 pub(crate) struct Pooled {
     pub(crate) covariance: Covariances,
     pub(crate) model: NoiseModel,
-    /// Number of complex deviations behind each covariance.
+    /// Number of complex deviations of each covariance.
     pub(crate) freedom: f64,
     /// Orthonormal columns that span the log powers of a smooth spectrum, lines × terms.
     pub(crate) basis: Option<DMatrix<f64>>,
 }
 
-/// Pools sample covariances at `omega` (rad/s), each of `nu` complex deviations; a smooth spectrum
-/// may be a smooth factor times `relative` powers (lines × channels), if these are given.
+/// Pools sample covariances at `omega` (rad/s), each of `nu` complex deviations. If `relative`
+/// powers (lines × channels) are given, a smooth spectrum may be a smooth factor times these
+/// powers.
 pub(crate) fn pooled(
     omega: &[f64],
     covariance: Covariances,
@@ -238,7 +240,8 @@ struct Candidate {
     /// Channels with noise.
     noisy: Vec<usize>,
     smooth: Option<Smooth>,
-    /// `true` if the ratio to the relative powers is smooth, not the power itself.
+    /// `true` if the smooth quantity is the ratio of the power to the relative powers; `false` if
+    /// it is the power.
     is_relative: bool,
 }
 
@@ -365,8 +368,8 @@ impl Candidate {
 /// Returns the number of complex deviations at which a sample covariance of n displacements has the
 /// same relative uncertainty as a smooth spectrum, on average over the lines.
 ///
-/// A level from `terms` fitted to `lines` has the leverage `terms/lines`; correlations are
-/// estimated from all lines.
+/// A level that has `terms` unknowns and is fitted to `lines` lines has the leverage `terms/lines`;
+/// correlations are estimated from all lines.
 pub(crate) fn freedom(form: &Form, nu: f64, lines: usize, n: usize) -> f64 {
     (n * lines) as f64 * nu / (form.terms() + n - 1) as f64
 }
@@ -389,15 +392,16 @@ fn mean(covariance: &[DMatrix<Complex<f64>>], range: Range<usize>) -> DMatrix<Co
     sum.unscale(count)
 }
 
-/// Returns the `2 half_width + 1` lines around a line, or all if there are fewer. The width is
-/// equal for all lines, so that one number of degrees of freedom holds for all.
+/// Returns the `2 half_width + 1` lines around a line, or all lines if there are fewer. The width
+/// is the same for all lines, so that all averages have the same number of degrees of freedom.
 fn window(line: usize, half_width: usize, lines: usize) -> Range<usize> {
     let width = half_width.saturating_mul(2).saturating_add(1).min(lines);
     let first = line.saturating_sub(half_width).min(lines - width);
     first..first + width
 }
 
-/// Multiplies or divides covariances by the deviations of both their channels, lines × channels.
+/// Multiplies or divides each entry of the covariances by the standard deviations of its two
+/// channels; these are lines × channels.
 fn scaled(
     covariance: &[DMatrix<Complex<f64>>],
     deviations: &DMatrix<f64>,
@@ -411,8 +415,8 @@ fn scaled(
     covariance.iter().enumerate().map(one).collect()
 }
 
-/// Returns log det S + tr(S⁻¹Ŝ): minus the log likelihood of the covariance S for a sample
-/// covariance Ŝ, per complex deviation. `None` for a singular S.
+/// Returns log det S + tr(S⁻¹Ŝ): minus the log-likelihood of the covariance S, per complex
+/// deviation, for a sample covariance Ŝ. `None` for a singular S.
 fn sample_cost(s: &DMatrix<Complex<f64>>, sample: &DMatrix<Complex<f64>>) -> Option<f64> {
     let factor = s.clone().cholesky()?;
     Some(log_determinant(factor.l_dirty())? + factor.solve(sample).trace().re)
@@ -426,9 +430,9 @@ fn log_determinant(lower: &DMatrix<Complex<f64>>) -> Option<f64> {
     diagonal.iter().all(positive).then(|| diagonal.iter().map(|z| 2.0 * z.re.ln()).sum())
 }
 
-/// Returns the sum over lines of the expected [`sample_cost`] when each sample covariance predicts
-/// other samples of the same line. It uses the expectations of the logarithm and of the inverse of
-/// a sample covariance of `nu` complex deviations.
+/// Returns the sum over lines of the mean [`sample_cost`] if each sample covariance predicts other
+/// samples of the same line. The sum uses the means of the logarithm and of the inverse of a sample
+/// covariance of `nu` complex deviations.
 ///
 /// # Source
 /// Goodman (1963), Annals of Mathematical Statistics 34, 152–177 (complex Wishart distribution).

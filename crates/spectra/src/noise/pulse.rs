@@ -9,7 +9,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::SpectraError;
 use crate::limits::{PULSE_PATTERN, PULSE_SAMPLES};
 
-/// Noise on the samples of a pulse; the other samples of its record have none.
+/// Noise on the samples of a pulse; the other samples of the record have no noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PulseNoise {
     /// Rows of the record.
@@ -40,9 +40,9 @@ pub struct PulseErrors {
 
 impl PulseErrors {
     /// Decomposes the noise of pulses on the lines of their records at `omega` (rad/s). The
-    /// amplitude of a line is the sum over the samples of the record times a factor, which `unit`
-    /// returns for the number of samples. Patterns with hardly any power on the lines of a record
-    /// are omitted.
+    /// amplitude of a line is the sum over the samples of the record, multiplied by a factor.
+    /// `unit` returns this factor for a number of samples. Patterns with hardly any power on the
+    /// lines of a record are omitted.
     ///
     /// # Errors
     /// [`SpectraError::Numerics`] if the decomposition fails.
@@ -53,8 +53,8 @@ impl PulseErrors {
     ) -> Result<Vec<Self>, SpectraError> {
         let mut errors = Vec::new();
         for pulse in pulses {
-            // The parts of a pulse have independent noise. Division limits the cost of the
-            // decomposition, which grows with the cube of the length of a part.
+            // The parts of a pulse have independent noise. The division into parts limits the cost
+            // of the decomposition, which grows with the cube of the length of a part.
             for start in pulse.samples.clone().step_by(PULSE_SAMPLES) {
                 let samples = start..pulse.samples.end.min(start + PULSE_SAMPLES);
                 let part = PulseNoise { samples, ..pulse.clone() };
@@ -65,8 +65,8 @@ impl PulseErrors {
         Ok(errors)
     }
 
-    /// Decomposes the noise of a pulse, whose samples have the deviation `scale` on the lines;
-    /// `None` without noise.
+    /// Decomposes the noise of a pulse; `scale` is the standard deviation of the samples, times the
+    /// factor of the amplitudes of the lines. `None` without noise or without lines.
     fn new(noise: &PulseNoise, omega: &[f64], scale: f64) -> Result<Option<Self>, SpectraError> {
         if noise.deviation == 0.0 {
             return Ok(None);
@@ -92,7 +92,7 @@ impl PulseErrors {
         }))
     }
 
-    /// Returns the same errors with the record at other rows.
+    /// Returns the same errors for a record that is at other rows.
     pub(crate) fn with_rows(&self, rows: Range<usize>) -> Self {
         Self { rows, ..self.clone() }
     }

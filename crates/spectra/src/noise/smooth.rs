@@ -27,7 +27,8 @@ pub(crate) struct Form {
 }
 
 impl Form {
-    /// Returns this form with its bumps converted to a line spacing finer by the factor `times`.
+    /// Returns this form for a line spacing that is smaller by the factor `times`; the bumps are
+    /// converted to this spacing.
     fn finer(&self, times: f64) -> Self {
         Self { order: self.order, bumps: self.bumps.iter().map(|bump| bump.finer(times)).collect() }
     }
@@ -74,8 +75,8 @@ impl Form {
     }
 }
 
-/// Raises a spectrum where it is lower than on both sides within this many lines: morphological
-/// closing.
+/// Raises notches of a spectrum: levels that are lower than the levels on both sides within this
+/// many lines (morphological closing).
 fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
     let half = lines / 2;
     let around = |at: usize| at.saturating_sub(half)..(at + half + 1).min(log_power.len());
@@ -88,7 +89,7 @@ fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
     *log_power = closed;
 }
 
-/// Spectrum of a form that was fitted to sample variances.
+/// Parametric spectrum that was fitted to sample variances.
 #[derive(Debug, Clone)]
 pub struct Smooth {
     pub(crate) form: Form,
@@ -100,13 +101,14 @@ pub struct Smooth {
     pub(crate) cost: f64,
 }
 
-/// Returns the spectrum with the highest likelihood of sample variances (lines × channels,
-/// positive), in rising order of `omega` (rad/s), where each variance is the mean of `nu` squared
-/// magnitudes.
+/// Returns the spectrum with the highest likelihood, given sample variances (lines × channels,
+/// positive). The lines are in rising order of `omega` (rad/s); each variance is the mean of `nu`
+/// squared magnitudes.
 ///
-/// Order and bumps minimise the Bayesian information criterion; bumps are added one by one, each
-/// with the largest gain, and their positions count as unknowns, too. With more than 4,096 lines,
-/// the form is chosen from means of neighbours, and then fitted to all lines.
+/// Order and bumps minimise the Bayesian information criterion; bumps are added one by one, the
+/// bump with the largest gain first. The positions of the bumps count as unknowns, too. With more
+/// than 4,096 lines, the form is chosen from means of neighbouring lines, and is afterwards fitted
+/// to all lines.
 ///
 /// # Source
 /// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (variances with a logarithmic
@@ -132,8 +134,9 @@ pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     Smooth { cost: coarse.cost, ..fitted }
 }
 
-/// Returns the better of two spectra: a smooth one, and one whose ratio to the `relative` powers
-/// (lines × channels) is smooth; and `true` if it is the second.
+/// Returns the better of two spectra: a smooth spectrum, and a spectrum whose ratio to the
+/// `relative` powers (lines × channels) is smooth. Also returns `true` if it is the second
+/// spectrum.
 pub(crate) fn choose_beside(
     omega: &[f64],
     variances: &DMatrix<f64>,
@@ -144,8 +147,8 @@ pub(crate) fn choose_beside(
     if !log.iter().all(|log| log.is_finite()) {
         return (choose(omega, variances, nu), false);
     }
-    // A common factor of the relative powers has no effect; without it, the ratios have the size of
-    // the variances.
+    // A common factor of the relative powers has no effect. It is removed, so that the ratios have
+    // the size of the variances.
     let mean = log.row_mean();
     let log = DMatrix::from_fn(log.nrows(), log.ncols(), |line, at| log[(line, at)] - mean[at]);
     let ratios = variances.zip_map(&log, |v, log| v * (-log).exp());
@@ -194,7 +197,7 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     Smooth { cost, ..fit(form, omega, variances, nu) }
 }
 
-/// Form whose cost is compared with that of others.
+/// Form whose cost is compared with the costs of other forms.
 struct Trial {
     form: Form,
     /// Orthonormal columns that span all log powers of the form.
@@ -215,8 +218,8 @@ impl Trial {
         Self::fitted(form, basis, initial, variances)
     }
 
-    /// Returns the fit with one more bump, which begins at this one; `None` if the form already
-    /// contains the bump.
+    /// Returns the fit with one more bump; the search starts at the present fit. `None` if the form
+    /// already contains the bump.
     fn with(&self, bump: Bump, variances: &DMatrix<f64>) -> Option<Self> {
         let mut form = self.form.clone();
         form.bumps.push(bump);
@@ -300,8 +303,8 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
     Smooth { form, basis, log_power, cost: f64::INFINITY }
 }
 
-/// Returns log powers of each channel that lie in the span of the basis and are near the logarithms
-/// of the sample variances.
+/// Returns log powers of each channel that are in the span of the basis and near the logarithms of
+/// the sample variances.
 fn initial_log_powers(basis: &DMatrix<f64>, variances: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let initial = |variances: DVectorView<'_, f64>| {
         let floor = (SMOOTH_FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
@@ -315,8 +318,8 @@ fn initial_log_powers(basis: &DMatrix<f64>, variances: &DMatrix<f64>) -> Vec<DVe
     variances.column_iter().map(initial).collect()
 }
 
-/// Returns the maximum-likelihood log power log p in a basis, to within a `tolerance` (RMS), for
-/// the sample variances v of a channel, and Σ log p + v/p.
+/// Returns two results for the sample variances v of a channel: the maximum-likelihood log power
+/// log p in a basis, and Σ log p + v/p. The search ends if a step is at most `tolerance` (RMS).
 fn most_likely(
     basis: &DMatrix<f64>,
     variances: &DVector<f64>,

@@ -21,16 +21,17 @@ pub struct NoiseSpectrum {
     degrees_of_freedom: f64,
     total_degrees_of_freedom: f64,
     models: Vec<NoiseModel>,
-    /// Functions with which each model was fitted, if it is a smooth spectrum or white.
+    /// Basis functions of the fit of each model; `None` unless the model is a smooth spectrum or
+    /// white.
     parts: Vec<Option<SmoothPart>>,
 }
 
-/// Functions with which the log powers of an experiment were fitted.
+/// Basis functions of the fit to the log powers of an experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothPart {
     /// Orthonormal columns, rows × terms, dimensionless.
     pub basis: DMatrix<f64>,
-    /// Number of complex deviations behind each sample covariance, a pure number.
+    /// Number of complex deviations of each sample covariance, a pure number.
     pub nu: f64,
 }
 
@@ -78,8 +79,8 @@ impl NoiseSpectrum {
     }
 
     /// Returns the covariances of one of every `step` rows, the same rows as in
-    /// [`FrequencyData::thinned`](crate::FrequencyData::thinned). They count as known. `None` for a
-    /// step of 0.
+    /// [`FrequencyData::thinned`](crate::FrequencyData::thinned). The covariances count as known.
+    /// `None` for a step of 0.
     pub fn thinned(&self, step: usize) -> Option<Self> {
         let rows = thinned_rows(self.omega.len(), step);
         let omega = rows.iter().map(|row| self.omega[*row]).collect();
@@ -116,8 +117,8 @@ impl NoiseSpectrum {
     }
 
     /// Estimates the spectrum from sample covariances of the measured quantity, each of
-    /// `degrees_of_freedom`; its ratio to the `relative` powers of the channels (rows × 2n) may be
-    /// smooth instead of the spectrum itself.
+    /// `degrees_of_freedom`. Instead of the spectrum, the ratio of the spectrum to the `relative`
+    /// powers of the channels (rows × 2n) may be smooth.
     ///
     /// # Errors
     /// As [`NoiseSpectrum::new`].
@@ -142,8 +143,8 @@ impl NoiseSpectrum {
         })
     }
 
-    /// Returns the noise plus white noise of these variances on the samples of each channel, 2n:
-    /// responses in the square of the measured unit, forces in N².
+    /// Returns the noise plus white noise on the samples of each channel. There are 2n variances of
+    /// the samples: responses in the square of the measured unit, forces in N².
     ///
     /// # Source
     /// As [`NoiseSpectrum::white`].
@@ -219,14 +220,14 @@ impl NoiseSpectrum {
         &self.covariance[row]
     }
 
-    /// Returns the number of independent complex deviations behind each covariance; infinite for
-    /// known noise.
+    /// Returns the number of independent complex deviations of each covariance; infinite for known
+    /// noise.
     pub fn degrees_of_freedom(&self) -> f64 {
         self.degrees_of_freedom
     }
 
-    /// Returns the total number of independent complex deviations behind all covariances; infinite
-    /// for known noise.
+    /// Returns the total number of independent complex deviations of all covariances; infinite for
+    /// known noise.
     pub fn deviations(&self) -> f64 {
         self.total_degrees_of_freedom
     }
@@ -242,8 +243,8 @@ impl NoiseSpectrum {
         &self.models
     }
 
-    /// Returns the functions with which the log powers were fitted, experiment by experiment;
-    /// `None` unless each is smooth or white, and at least one is not white.
+    /// Returns the basis functions of the fit to the log powers, experiment by experiment. `None`
+    /// if a spectrum is neither smooth nor white, or if all spectra are white.
     pub fn smooth_parts(&self) -> Option<Vec<&SmoothPart>> {
         let parts: Option<Vec<&SmoothPart>> = self.parts.iter().map(Option::as_ref).collect();
         parts.filter(|parts| parts.iter().any(|part| part.basis.ncols() > 1))
@@ -261,14 +262,14 @@ impl NoiseSpectrum {
     }
 
     /// Returns the degrees of freedom of a variance averaged over all rows, for Student's t. For
-    /// known noise it is a large number, so that Student's t is a normal distribution.
+    /// known noise the number is large, so that Student's t is nearly a normal distribution.
     pub fn total_degrees_of_freedom(&self) -> usize {
-        // Real and imaginary deviations both count.
+        // The real and the imaginary part of a deviation each count.
         (2.0 * self.total_degrees_of_freedom).min(1e6) as usize
     }
 
-    /// Returns ν/(ν − n), the factor E[Ŝ⁻¹] S of a sample covariance Ŝ of n = `channels` channels
-    /// from ν complex deviations.
+    /// Returns ν/(ν − n), the ratio of the mean of Ŝ⁻¹ to S⁻¹. Ŝ is a sample covariance of n =
+    /// `channels` channels from ν complex deviations, and S is the true covariance.
     pub fn mean_inverse_ratio(&self, channels: usize) -> f64 {
         let nu = self.degrees_of_freedom;
         if nu.is_infinite() { 1.0 } else { nu / (nu - channels as f64) }

@@ -37,7 +37,7 @@ pub(super) fn tests(
     let test = |&(input, output): &(usize, usize)| {
         let power = derivative(outputs[output].quantity?) as i32;
         let residue = |mode: &IdentifiedMode| turned_residue(mode, output, input, power);
-        // Another check reports a wrong sign, so this test removes it.
+        // This test corrects a wrong sign, because another check reports it.
         let negative = modes.iter().filter(|mode| residue(mode).re < 0.0).count();
         let sign = if 2 * negative > modes.len() { -1.0 } else { 1.0 };
         let phase = |mode: &IdentifiedMode| Phase {
@@ -72,7 +72,7 @@ pub(super) fn tests(
 struct Delay {
     /// Delay, in s.
     seconds: f64,
-    /// Probability of a delay at least as large if there is none.
+    /// Probability of an estimated delay at least as large as this one if there is no delay.
     p_value: f64,
 }
 

@@ -9,8 +9,8 @@ use super::super::sources::Output;
 use super::tested::Tested;
 
 /// Returns, for each driving point, the test of positive modal masses: the residue of a
-/// displacement times 2jω_d has a positive real part. `driving_points` have force and response in
-/// the same direction, then in opposite ones.
+/// displacement times 2jω_d has a positive real part. The first list of driving points has force
+/// and response in the same direction, the second in opposite directions.
 ///
 /// The p-value is the smallest one of all modes, multiplied by the number of modes (Bonferroni).
 ///

@@ -75,7 +75,7 @@ fn several(names: &[String]) -> impl Iterator<Item = (usize, &String)> {
 fn zero_p_value(squares: impl Iterator<Item = f64>) -> Option<f64> {
     let (modes, sum) = squares.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
     let law = ChiSquared::new(2.0 * f64::from(modes)).ok()?;
-    // An entry that scales the shape has no error.
+    // The entry to which the shape is scaled has no error; the sum is then infinite or NaN.
     Some(if sum.is_nan() { 0.0 } else { law.sf(sum.min(f64::MAX)) })
 }
 

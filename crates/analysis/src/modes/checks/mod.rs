@@ -46,7 +46,8 @@ pub(super) fn channel_checks(
 }
 
 /// Returns, for each response, the check of the share of its variance that the modes explain. If
-/// this check fails and the check that some mode moves the response fails, too, returns the latter.
+/// both this check and the check that some mode moves the response fail, returns the second check
+/// instead.
 pub(super) fn output_checks(
     explained: &[f64],
     modes: &[ModalModeRow],
@@ -98,9 +99,9 @@ fn share_checks(
 }
 
 /// Returns the checks of the modes: unexcited inputs, modal masses and delays at driving points,
-/// and reciprocity between driving points unless it is imposed. Outputs with a delay in the model
-/// are not tested for one. Only the modal masses are tested at `opposite` points, where the force
-/// acts against the direction of the response.
+/// and reciprocity between driving points unless it is imposed. Outputs whose delay is part of the
+/// model are not tested for a delay. Only the modal masses are tested at `opposite` points, where
+/// the force acts against the direction of the response.
 pub(super) fn mode_checks(
     modes: &[IdentifiedMode],
     inputs: &[String],

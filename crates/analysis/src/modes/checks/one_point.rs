@@ -6,9 +6,9 @@ use mechid_spectra::LineData;
 use crate::modes::summary::ModalCheck;
 use crate::text::significant;
 
-/// Returns the check that one force in all records explains them as well as one force in the first
-/// record and another one in all others. `apart` has the lines with these two forces; `None` if the
-/// fit to them fails.
+/// Returns the check that the force acts at one point in all records. It fails if a separate force
+/// in the first record explains the records far better. `apart` has the lines with the separate
+/// force; `None` if the fit to these lines fails.
 ///
 /// # Source
 /// Schwarz (1978), Annals of Statistics 6, 461–464 (Bayesian information criterion).

@@ -1,5 +1,5 @@
-//! Reciprocity between driving points: the response at one to a force at the other, and the
-//! reverse.
+//! Reciprocity between driving points: the response at one point to a force at another point is the
+//! same if the two points are exchanged.
 
 use mechid_io::derivative;
 use mechid_modal::IdentifiedMode;

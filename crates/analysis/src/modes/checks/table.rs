@@ -98,7 +98,7 @@ fn leakage(
         }
         None => {
             "the table, which does not state its segments: if the responses are averages under a window, the \
-             damping is that of the window; fit the record itself"
+             damping may be that of the window; fit the record itself"
         }
     };
     Some(ModalCheck {

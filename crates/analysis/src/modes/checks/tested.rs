@@ -4,7 +4,8 @@ use super::super::summary::ModalCheck;
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Test of a property of modes that a structure with constant M, C and K has, or that is imposed.
+/// Test of a property that all modes of a structure with constant M, C and K have, or of an imposed
+/// property.
 pub struct Tested {
     /// Name of the check, in snake case.
     pub code: &'static str,

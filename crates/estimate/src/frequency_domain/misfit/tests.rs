@@ -1,4 +1,4 @@
-//! Derivatives against differences, and the likelihood against its definition.
+//! Comparison of derivatives with finite differences, and of the likelihood with its definition.
 
 use mechid_model::{Matrix, ResponseQuantity};
 use mechid_numerics::linear_algebra::singular_values;
@@ -7,7 +7,8 @@ use nalgebra::dmatrix;
 use super::super::normal_equations::Coordinates;
 use super::*;
 
-/// Two degrees of freedom, nothing symmetric, at ten frequencies, off the truth.
+/// Frequencies, in rad/s, of data of two degrees of freedom; no matrix is symmetric, and the data
+/// do not satisfy the equation of motion.
 const OMEGA: [f64; 10] = [1.0, 1.7, 2.5, 3.1, 4.0, 5.2, 5.9, 6.3, 7.0, 7.6];
 const RESIDUALS: usize = 4 * OMEGA.len();
 
@@ -22,7 +23,7 @@ fn data() -> FrequencyData {
         .unwrap()
 }
 
-/// Positive definite, every entry of it in use.
+/// Returns noise with full, positive definite covariances.
 fn noise() -> NoiseSpectrum {
     let covariance = (0..OMEGA.len()).map(|row| {
         let root = DMatrix::from_fn(4, 4, |i: usize, j: usize| {
@@ -35,7 +36,8 @@ fn noise() -> NoiseSpectrum {
     NoiseSpectrum::new(OMEGA.to_vec(), covariance.collect()).unwrap()
 }
 
-/// One equation with fewer unknowns than the other, and all unknown.
+/// Returns two sets of unknowns: in the first, one equation has fewer unknowns than the other; in
+/// the second, all entries are unknown.
 fn unknowns() -> [(Unknowns, DVector<f64>); 2] {
     let all = Unknowns::unknown_mass(2).unwrap();
     let theta = vec![1.0, -0.2, 0.1, 1.5, 0.4, 0.1, -0.3, 0.6, 9.0, -3.0, -2.0, 7.0];
@@ -44,7 +46,8 @@ fn unknowns() -> [(Unknowns, DVector<f64>); 2] {
     [(all.clone().fix(Matrix::Mass, 0, 1, 0.1).unwrap(), fewer.into()), (all, theta.into())]
 }
 
-/// The same, of periods and of an open record with loads of its ends.
+/// Returns data, unknowns and parameters: each set of unknowns with periods, and with an open
+/// record that has transient loads.
 fn cases() -> Vec<(FrequencyData, Unknowns, DVector<f64>)> {
     let all = unknowns().into_iter().flat_map(|(unknowns, theta)| {
         let loads: Vec<f64> = (0..12).map(|at| 0.1 * (2.3 * f64::from(at)).sin()).collect();
@@ -69,7 +72,7 @@ fn residuals(misfit: &mut Misfit<'_>, theta: &DVector<f64>) -> DVector<f64> {
     DVector::from_iterator(RESIDUALS, pairs.map(|part| std::f64::consts::SQRT_2 * part))
 }
 
-/// dv/dθ, a column for every unknown.
+/// Returns dv/dθ, one column for every unknown.
 fn transformation(coordinates: &Coordinates, unknowns: usize) -> DMatrix<f64> {
     let unit = |at| DVector::from_fn(unknowns, |i, _| f64::from(u8::from(i == at)));
     DMatrix::from_columns(
@@ -171,11 +174,11 @@ fn the_curvature_is_the_second_derivative_along_a_step() {
     }
 }
 
-/// Without noise on the force the two kinds of weighting are one.
+/// Without noise on the force, both kinds of weighting give the same result.
 #[test]
 fn errors_in_variables_contain_output_error() {
     let exact = noise().with_exact_force();
-    // As good as none, but not none.
+    // The noise of the force is negligible, but not zero.
     let next_to_none = NoiseSpectrum::new(
         OMEGA.to_vec(),
         (0..OMEGA.len())
@@ -200,8 +203,9 @@ fn errors_in_variables_contain_output_error() {
     }
 }
 
-/// The sum of squares is the least distance, in the metric of the noise, between the
-/// measured forces and displacements and any that satisfy the equation of motion.
+/// The sum of squares is the smallest distance of the measured forces and displacements from forces
+/// and displacements that satisfy the equation of motion. The covariance of the noise defines the
+/// metric of this distance.
 #[test]
 fn the_true_force_is_eliminated() {
     let (data, noise) = (data(), noise());

@@ -19,12 +19,14 @@ pub struct PartsComparison {
     pub ratio: f64,
     /// Number of independent differences.
     pub degrees_of_freedom: usize,
-    /// Probability that noise alone makes the parts differ as much.
+    /// Probability that noise alone makes the parts differ by at least as much.
     pub p_value: f64,
-    /// Ratio of standard errors from the scatter of the parts to those from the noise: the larger
-    /// of the largest ratio of a single parameter and the ratio of all parameters together.
+    /// Ratio of standard errors from the scatter of the parts to those from the noise. It is the
+    /// larger of two values: the largest ratio of a single parameter, and the ratio of all
+    /// parameters together.
     pub error_scale: f64,
-    /// The largest difference of a part from the others in units of its standard error.
+    /// Largest difference of a part from the other parts, compared in units of the standard error
+    /// of the difference.
     pub largest: Option<Difference>,
 }
 
@@ -45,7 +47,8 @@ pub struct Difference {
 
 /// Scores of the parts of a linearised fit, and their covariance in units of the noise.
 pub(crate) struct Scores<'a> {
-    /// Change of every parameter per unit of each column, parameters × columns.
+    /// Change of every parameter per unit change of the coefficient of each column of Q, parameters
+    /// × columns.
     pub(crate) root: &'a DMatrix<f64>,
     /// Values of the parameters, each in its unit.
     pub(crate) values: &'a DVector<f64>,
@@ -62,7 +65,7 @@ pub(crate) enum Level {
     /// Variance of the stated noise, times an `inflation` for sampled weights, with its degrees of
     /// freedom.
     Known { inflation: f64, degrees_of_freedom: f64 },
-    /// Variance of a residual from its sum of squares and its number of free values, times an
+    /// Variance of a residual, from its sum of squares and its degrees of freedom, times an
     /// `inflation` for sampled weights.
     Residual { inflation: f64, cost: f64, free: f64 },
 }
@@ -152,8 +155,8 @@ impl Scores<'_> {
         (0..self.root.nrows()).filter_map(of_row).max_by(f64::total_cmp)
     }
 
-    /// Returns the difference of one part from the others that is largest in units of its standard
-    /// error.
+    /// Returns the largest difference of one part from the other parts, compared in units of the
+    /// standard error of the difference.
     fn largest_difference(&self, level: f64) -> Option<PartDifference> {
         let of_part = |part: usize| {
             let (inverse, _) = pseudo_inverse(&self.covariance_of(part))?;
@@ -192,7 +195,7 @@ impl PartsOfFit<'_> {
     /// parts or too few residuals for an estimate of the noise.
     ///
     /// For scores s with a covariance V of rank d, sᵀV⁺s/d divided by the noise level follows
-    /// Fisher's distribution with d degrees of freedom and those of the noise level.
+    /// Fisher's distribution. Its degrees of freedom are d and those of the noise level.
     ///
     /// # Source
     /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40,
@@ -205,7 +208,7 @@ impl PartsOfFit<'_> {
         self.scores(&cuts).compare(&self.noise_level(), &parts, &parameters)
     }
 
-    /// Returns how the variance of the residual is known.
+    /// Returns the source of the variance of the residual: the stated noise or the residual.
     fn noise_level(&self) -> Level {
         match self.known {
             Some(known) => Level::Known { inflation: self.inflation, degrees_of_freedom: known },

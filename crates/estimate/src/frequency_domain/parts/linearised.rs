@@ -1,4 +1,4 @@
-//! Weighted residual of a fit and its sensitivities, without what transients explain.
+//! Weighted residual of a fit and its sensitivities, without the part that transients explain.
 
 use mechid_numerics::products::transposed_product;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
@@ -30,7 +30,7 @@ pub(super) struct Linearised {
 }
 
 impl Linearised {
-    /// Linearises a fit of `data`, also given without its transients (`closed`). `None` if a
+    /// Linearises a fit of `data`; `closed` are the same data without their transients. `None` if a
     /// receptance does not exist, a covariance is singular, or the sensitivities are linearly
     /// dependent.
     pub(super) fn new(
@@ -108,8 +108,9 @@ impl Linearised {
     }
 
     /// Returns the covariance of the products of columns with the residual, in units of the noise.
-    /// The most likely errors of pulses are subtracted from the residual e, whose covariance is
-    /// therefore V⁻¹ − V⁻¹Q(QᵀV⁻¹Q)⁻¹QᵀV⁻¹ with the covariance V of lines and pulses.
+    /// The most likely errors of pulses are subtracted from the residual. The covariance of this
+    /// residual is therefore V⁻¹ − V⁻¹Q(QᵀV⁻¹Q)⁻¹QᵀV⁻¹, where V is the covariance of lines and
+    /// pulses.
     pub(super) fn covariance_of_products(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         if self.pulses.is_empty() {
             return transposed_product(columns.as_view(), columns.as_view());
@@ -120,8 +121,8 @@ impl Linearised {
             - information.tr_mul(&self.effect_of(columns))
     }
 
-    /// Returns the change of the coefficients of the basis columns for a change of the residual by
-    /// each of these columns: (QᵀV⁻¹Q)⁻¹QᵀV⁻¹ times the columns.
+    /// Returns the change of the coefficients of the basis columns if the residual changes by each
+    /// of the given `columns`: (QᵀV⁻¹Q)⁻¹QᵀV⁻¹ times these columns.
     pub(super) fn effect_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.information {
             Some(information) => {

@@ -31,8 +31,8 @@ pub use terms::{OmittedTerm, Power, SampledRows};
 ///
 /// The residual e and its orthonormal sensitivities Q are weighted by the noise, without the
 /// components that the transients of open records explain. D_p selects part p, with Σ D_p = I; the
-/// part contributes the score Qᵀ D_p e to the estimate. The scores have the sum zero and, if the
-/// parts differ by noise alone, a covariance that follows from the columns (I − QQᵀ) D_p Q.
+/// part contributes the score Qᵀ D_p e to the estimate. The sum of the scores is zero. If the parts
+/// differ by noise alone, the covariance of the scores follows from the columns (I − QQᵀ) D_p Q.
 pub struct PartsOfFit<'a> {
     data: &'a FrequencyData,
     /// Data without the transient loads of open records.
@@ -44,8 +44,8 @@ pub struct PartsOfFit<'a> {
     values: DVector<f64>,
     /// Linearisation at the most likely values.
     linear: Linearised,
-    /// Averaged responses, with correlated errors of neighbouring lines, if the data come from
-    /// them.
+    /// Averaged responses, whose neighbouring lines have correlated errors; `None` if the data come
+    /// from another source.
     responses: Option<&'a [(Frf, Vec<usize>)]>,
     /// Ratio of the variance of a score to its value for exact weights, due to sampled weights.
     inflation: f64,
@@ -55,9 +55,9 @@ pub struct PartsOfFit<'a> {
 
 impl<'a> PartsOfFit<'a> {
     /// Linearises a fit of `data`, with the transient loads `ends` of its open records, at the most
-    /// likely parameters near the `estimate`. The noise is the one that the data state; otherwise
-    /// it has the shape of `spectrum`, or is white, with a level from the residual. `None` for
-    /// large fits, for data without noise, and for linearly dependent sensitivities.
+    /// likely parameters near the `estimate`. If the data state a noise, it is used. Otherwise the
+    /// noise has the shape of `spectrum`, or is white, and its level comes from the residual.
+    /// `None` for large fits, for data without noise, and for linearly dependent sensitivities.
     pub fn new(
         data: &'a FrequencyData,
         estimate: &Estimate,
@@ -119,8 +119,8 @@ impl<'a> PartsOfFit<'a> {
         })
     }
 
-    /// Returns the same fit with errors whose correlation from line to line multiplies the variance
-    /// of the parameters by `ratio`, a pure number.
+    /// Returns the same fit with errors that are correlated from line to line; this correlation
+    /// multiplies the variance of the parameters by `ratio`, a pure number.
     #[must_use]
     pub fn with_variance_ratio(self, ratio: f64) -> Self {
         Self { inflation: self.inflation * ratio, ..self }

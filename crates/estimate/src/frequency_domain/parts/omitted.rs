@@ -11,32 +11,33 @@ use crate::frequency_domain::force_responses::remove;
 use crate::frequency_responses::covariance_of_errors;
 use crate::limits::PART_INFORMS;
 
-/// Terms that a model leaves out: the most likely one, and the effect of all together on the
-/// parameters.
+/// Terms that a model leaves out: the most likely one, and the effect of all these terms together
+/// on the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OmittedTerms {
     /// Term that is most likely.
     pub term: OmittedTerm,
     /// Fraction of the residual power that the most likely term explains (pure number).
     pub explained: f64,
-    /// Probability that noise alone makes one of the terms explain as much.
+    /// Probability that noise alone makes at least one of the terms explain this fraction or more.
     pub p_value: f64,
     /// Change of each parameter with the most likely term, in the order and the unit of the
     /// parameters.
     pub changes: DVector<f64>,
     /// Standard errors of `changes`, one for each parameter, in its unit.
     pub errors: DVector<f64>,
-    /// Mean square error that the terms add to the covariance of the parameters (parameters ×
-    /// parameters), each weighted by its likelihood: the squares of the changes plus their
-    /// covariance, in the product of the units of two parameters.
+    /// Mean square error that the terms add to the covariance of the parameters: the squares of the
+    /// changes plus their covariance. Each term is weighted by its likelihood. The matrix is
+    /// parameters × parameters, each entry in the product of the units of its two parameters.
     pub mean_square: DMatrix<f64>,
 }
 
 /// Test of one term.
 struct Explained {
     term: OmittedTerm,
-    /// Probability that noise alone makes the term explain as much, by Fisher's distribution of
-    /// sᵀV⁺s, with the scores s of its columns and their covariance V.
+    /// Probability that noise alone makes the term explain this fraction or more. It comes from
+    /// Fisher's distribution of sᵀV⁺s, with the scores s of the columns of the term and the
+    /// covariance V of s.
     p_value: f64,
     /// Fraction of the residual power that the term explains.
     part: f64,
@@ -53,9 +54,9 @@ impl PartsOfFit<'_> {
     /// C has the weighted changes of the response by a term as columns, and Z is C without the part
     /// that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and the
     /// parameters change by −(QR)⁺C a, where QR are their sensitivities and e is the residual.
-    /// Around the estimate of the smaller model, the mean square error of the larger one is the
-    /// covariance of these changes plus their square. Terms that explain the residual equally well
-    /// are weighted by their likelihoods, as in an average of models.
+    /// Around the estimate of the model without the term, the mean square error of the model with
+    /// the term is the covariance of these changes plus their square. The terms are weighted by
+    /// their likelihoods, as in an average of models.
     ///
     /// # Source
     /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for
@@ -115,7 +116,8 @@ impl PartsOfFit<'_> {
         let squares = scores.dot(&(&inverse * &scores));
         let (level, of_level) = self.level(squares, rank)?;
         let law = FisherSnedecor::new(rank as f64, of_level).ok()?;
-        // The residual without the errors of pulses is that of generalised least squares.
+        // After the subtraction of the errors of pulses, the residual is that of generalised least
+        // squares.
         let solve = if self.linear.is_without_pulses() {
             inverse
         } else {
@@ -135,7 +137,8 @@ impl PartsOfFit<'_> {
 }
 
 impl Explained {
-    /// Returns half of Schwarz's criterion minus that of the model without the term.
+    /// Returns half of the difference in Schwarz's criterion: the model with the term minus the
+    /// model without it.
     fn evidence(&self, fit: &PartsOfFit<'_>) -> f64 {
         let (count, left) = (fit.linear.residual.len() as f64, (1.0 - self.part).max(f64::EPSILON));
         0.5 * (count * left.ln() + self.columns as f64 * count.ln())

@@ -56,7 +56,7 @@ enum Cut {
 pub(super) struct Cuts(Vec<(Part, Cut)>);
 
 impl Cuts {
-    /// Cuts the data into parts; `None` where there are fewer than two.
+    /// Cuts the data into parts; `None` if there are fewer than two parts.
     pub(super) fn new(fit: &PartsOfFit<'_>, split: &Split) -> Option<Self> {
         let cuts = match split {
             Split::Rows(parts) => {
@@ -148,8 +148,8 @@ pub(crate) fn equal_bands(
     bands.into_iter().filter(|rows| !rows.is_empty()).map(band).collect()
 }
 
-/// Restricts columns over the lines of a record to some of its samples: transforms them to the time
-/// domain, sets all other samples to zero, and transforms them back.
+/// Restricts columns over the lines of a record to some samples of the record: transforms the
+/// columns to the time domain, sets all other samples to zero, and transforms the columns back.
 fn stretch(
     data: &FrequencyData,
     columns: &DMatrix<f64>,

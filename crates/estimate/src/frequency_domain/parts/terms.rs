@@ -19,18 +19,18 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 #[cfg_attr(feature = "serde", serde(tag = "term", rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum OmittedTerm {
-    /// Displacement in phase with the forces and equally large at every frequency: modes above the
-    /// band.
+    /// Displacement in phase with the forces; its ratio to the forces does not depend on the
+    /// frequency: modes above the band.
     ResidualFlexibility,
-    /// Force that grows with the fourth power of the frequency: masses on springs, with modes above
-    /// the band.
+    /// Force that grows with the fourth power of the frequency: masses on springs that have modes
+    /// above the band.
     HiddenMass,
     /// Displacement that falls with the square of the frequency: modes below the band.
     ResidualMass,
-    /// Damping force in phase with the velocity, whose size relative to the displacement does not
-    /// grow with the frequency.
+    /// Damping force in phase with the velocity; its ratio to the displacement does not grow with
+    /// the frequency.
     StructuralDamping,
-    /// Another value of an entry of M, C or K that is known, such as a zero of the structure.
+    /// Change of an entry of M, C or K that is stated as known, such as a zero of the structure.
     KnownEntry {
         /// The entry.
         #[cfg_attr(feature = "serde", serde(serialize_with = "as_text"))]
@@ -128,7 +128,7 @@ impl<'a> LikelyMotion<'a> {
         Some(Self { fit, system, displacement, force, records })
     }
 
-    /// Returns the terms that can be tested, as many as the size of the fit allows.
+    /// Returns the terms that can be tested; their number is limited by the size of the fit.
     pub(super) fn terms(&self) -> Vec<OmittedTerm> {
         let (n, rows) = (self.fit.data.dof(), self.fit.data.len());
         let mut all = vec![OmittedTerm::ResidualFlexibility, OmittedTerm::ResidualMass];
@@ -248,8 +248,8 @@ impl<'a> LikelyMotion<'a> {
         Change { force, displacement }
     }
 
-    /// Returns a power of the motion on every row, computed from sample to sample over whole
-    /// records; the effect of their ends is that of a transient.
+    /// Returns a power of the motion on every row. The power is computed sample by sample over
+    /// whole records; the effect of the ends of a record is that of a transient.
     fn power_of(
         &self,
         power: Power,

@@ -3,7 +3,8 @@
 
 use nalgebra::{Complex, DMatrix};
 
-/// Returns an order of rows and columns with the entries of a symmetric pattern near the diagonal.
+/// Returns an order of rows and columns that moves the entries of a symmetric pattern near the
+/// diagonal.
 ///
 /// # Source
 /// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), section 4.3
@@ -37,7 +38,7 @@ pub(super) fn order(neighbours: &[Vec<usize>]) -> Vec<usize> {
     order
 }
 
-/// Returns the largest distance of an entry from the diagonal in an order.
+/// Returns the largest distance of an entry from the diagonal if rows and columns have this order.
 pub(super) fn half_band(neighbours: &[Vec<usize>], order: &[usize]) -> usize {
     let mut index = vec![0; order.len()];
     order.iter().enumerate().for_each(|(at, dof)| index[*dof] = at);

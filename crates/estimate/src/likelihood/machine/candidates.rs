@@ -10,10 +10,11 @@ use crate::likelihood::{LikelihoodError, LineResponse, ResponseModel};
 /// A measurement that could be added.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Candidate {
-    /// An additional sensor in the same test, as noisy as the sensors of its quantity.
+    /// An additional sensor in the same test; its noise is that of the sensors of the same
+    /// quantity.
     Sensor(Sensor),
-    /// A second test with the same sensors, in which this force acts instead of the others and has
-    /// their size.
+    /// A second test with the same sensors. This force acts instead of the forces of the first test
+    /// and has their size.
     Force(Input),
 }
 
@@ -28,12 +29,13 @@ pub struct CandidateGain {
     pub information_gain: f64,
     /// Number of parameters or combinations that become determined.
     pub newly_determined: usize,
-    /// Standard errors with the candidate, one for each parameter in their order and in its unit;
-    /// `None` for a parameter that is still not determined.
+    /// Standard errors with the candidate, in the order of the parameters and each in the unit of
+    /// its parameter; `None` for a parameter that is still undetermined.
     pub standard_errors: Vec<Option<f64>>,
 }
 
-/// Minimum ratio of eigenvalues of the scaled information for a determined combination.
+/// Minimum ratio of an eigenvalue of the scaled information to the largest one if the combination
+/// is determined.
 const RANK: f64 = 1e-13;
 
 impl MachineEstimate {

@@ -15,8 +15,8 @@ use crate::likelihood::residual::PriorRow;
 use crate::likelihood::search::Bounds;
 use crate::likelihood::{LikelihoodError, Settings};
 
-/// Measured receptance of the part of a machine with the degrees of freedom [`Machine::measured`],
-/// in their order.
+/// Measured receptance of a part of a machine: the part with the degrees of freedom
+/// [`Machine::measured`], in the order of this list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredReceptance {
     /// Receptance, d × d, in m/N, one for each line of the data.
@@ -46,7 +46,7 @@ pub struct MachineEstimate {
     pub explained: DMatrix<f64>,
     /// Comparisons of parts of the data: bands of lines, and records if there are several.
     pub parts: Vec<PartsComparison>,
-    /// Delay that explains most of the residual; `None` if the data do not determine any.
+    /// Delay that explains most of the residual; `None` if the data do not determine a delay.
     pub delay: Option<DelayScore>,
     /// Part with a measured receptance.
     pub(super) part: Option<MeasuredPart>,
@@ -54,8 +54,8 @@ pub struct MachineEstimate {
 
 impl MachineEstimate {
     /// Returns the same estimate with all standard errors multiplied by a factor (pure number) that
-    /// is known with some `degrees_of_freedom`. The intervals become wider accordingly, up to the
-    /// bounds of the parameters; `confidence` is their level, a probability.
+    /// has some `degrees_of_freedom`. The intervals become wider accordingly, up to the bounds of
+    /// the parameters; `confidence` is the level of the intervals, a probability.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227; Student's t for a factor from few differences.
@@ -82,9 +82,10 @@ impl MachineEstimate {
         self
     }
 
-    /// Returns the same estimate with the squares of possible errors of the parameters, one for
-    /// each in its unit, added to their covariance. The intervals become wider by the ratio of the
-    /// standard errors, up to the bounds of the parameters.
+    /// Returns the same estimate; the squares of possible errors of the parameters are added to the
+    /// covariance. There is one error for each parameter, in the unit of the parameter. The
+    /// intervals become wider by the ratio of the standard errors, up to the bounds of the
+    /// parameters.
     ///
     /// # Source
     /// Ours: the mean square of an estimate's error is its variance plus the square of its bias.
@@ -161,12 +162,12 @@ pub fn identify_machine(
     identify(data, machine, instruments, None, settings)
 }
 
-/// Identifies a machine with a measured receptance of one part, which has the degrees of freedom
-/// [`Machine::measured`].
+/// Identifies a machine that has a part with a measured receptance. The degrees of freedom of this
+/// part are [`Machine::measured`].
 ///
 /// # Errors
-/// As [`identify_machine`]; [`LikelihoodError::Size`] unless there is one receptance per line with
-/// one row and column per degree of freedom of the part.
+/// As [`identify_machine`]; [`LikelihoodError::Size`] unless `part` has one receptance for each
+/// line, with one row and one column for each degree of freedom of the part.
 ///
 /// # Source
 /// de Klerk, Rixen & Voormeeren (2008), AIAA Journal 46, 1169–1181 (coupling of measured parts).

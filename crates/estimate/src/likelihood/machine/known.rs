@@ -29,23 +29,23 @@ pub struct FreedCoefficient {
     pub value: f64,
     /// Standard error of the value, in this unit.
     pub standard_error: f64,
-    /// Probability that the likelihood rises by more for any of the coefficients as a further
-    /// unknown, if all known values are right.
+    /// Probability that at least one of the tested coefficients raises the likelihood by more than
+    /// this one, if all known values are right.
     pub p_value: f64,
     /// Ratio of the sum of squares in units of the noise to its expectation, with this unknown;
     /// `None` if the noise comes from the residual.
     pub misfit_ratio: Option<f64>,
-    /// Probability of a larger misfit, with this unknown.
+    /// Probability of a larger misfit than the one with this unknown, if the model is correct.
     pub misfit_p_value: Option<f64>,
-    /// Changes of the parameters by this unknown, one for each in its unit.
+    /// Changes of the parameters due to this unknown, each in the unit of its parameter.
     pub changes: Vec<f64>,
 }
 
 impl MachineEstimate {
-    /// Returns the known coefficient of the machine that raises the likelihood most if it is also
-    /// unknown. The choice is made to first order; the numbers are those of a fit with this
-    /// unknown. The arguments are those of the estimate. `None` if there are no known coefficients
-    /// or very many, or the fit fails.
+    /// Returns the known coefficient of the machine that raises the likelihood most if it becomes
+    /// an unknown. It is chosen to first order; the returned numbers come from a fit with this
+    /// unknown. The arguments are the same as for the estimate. `None` if there are no known
+    /// coefficients or very many, or the fit fails.
     ///
     /// # Source
     /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57 (score
@@ -70,7 +70,7 @@ impl MachineEstimate {
     }
 }
 
-/// Model with one unknown more than an estimate, at the values of the estimate.
+/// Model with one unknown more than the model of an estimate, at the values of the estimate.
 struct Freed {
     assembly: Assembly,
     model: MachineModel,
@@ -102,9 +102,9 @@ impl Freed {
         Some(Self { assembly, model, space, further })
     }
 
-    /// Returns the first-order rise of twice the logarithm of the likelihood: the square of the
-    /// residual's component along the part of the sensitivity to the further unknown that is
-    /// orthogonal to all others.
+    /// Returns the first-order rise of twice the logarithm of the likelihood. The part of the
+    /// sensitivity to the further unknown that is orthogonal to all other sensitivities has a
+    /// direction; the rise is the square of the residual's component along this direction.
     fn score(&self, estimate: &MachineEstimate, data: &LineData) -> Option<f64> {
         let outputs = data.outputs().ncols();
         let diagonal = |row: usize| {

@@ -12,8 +12,8 @@ use super::{LikelihoodError, MeasuredPart};
 use crate::elimination::solve_in_place;
 use crate::likelihood::{Dimensions, LineResponse, ResponseModel};
 
-/// A term of the dynamic stiffness between the joints (degrees of freedom of unknown terms); index
-/// j is the support.
+/// A term of the dynamic stiffness between the joints (degrees of freedom of unknown terms). The
+/// joints have the indices 0 to j − 1; index j is the support.
 #[derive(Debug, Clone)]
 struct JointTerm {
     entries: JointPattern,
@@ -30,8 +30,8 @@ enum JointPattern {
     Block { dofs: Vec<usize>, matrix: DMatrix<f64>, support: Vec<f64> },
 }
 
-/// Entries (row, column, value) of a change Δ of the dynamic stiffness at the joints, which may
-/// repeat.
+/// Entries (row, column, value) of a change Δ of the dynamic stiffness at the joints; a position
+/// may occur more than once.
 struct Change(Vec<(usize, usize, Complex<f64>)>);
 
 impl Change {
@@ -54,9 +54,10 @@ const ONE: Complex<f64> = Complex::new(1.0, 0.0);
 /// The [`ResponseModel`] of a machine.
 ///
 /// With the receptance H₀ of the nominal machine and the change Δ of the dynamic stiffness at the
-/// joints, the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹, the nominal
-/// response x₀, the motion x_g of the support and its column Δ_g of the change. The order of this
-/// system is the number of joints, for any number of known degrees of freedom.
+/// joints, the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹. x₀ is the nominal
+/// response, x_g is the motion of the support, and Δ_g is the column of the support in the change.
+/// The order of this system of equations is the number of joints; it does not depend on the number
+/// of known degrees of freedom.
 ///
 /// # Source
 /// Hager (1989), SIAM Review 31, 221–239 (updating an inverse); Gordis, Bielawa & Flannelly (1991),
@@ -98,13 +99,13 @@ pub struct MachineLine<'a> {
     /// Frequency factor of each term between the joints.
     factors: Vec<Complex<f64>>,
     /// Response S (I − H Δ) of the sensors to motions of a measured part, and the forces on this
-    /// part per input.
+    /// part per unit of each input.
     part: Option<[DMatrix<Complex<f64>>; 2]>,
 }
 
 impl MachineModel {
     /// Prepares a machine for lines at `omega` (rad/s). With `open` records, state loads act on the
-    /// machine; they describe the difference between its initial and its final state.
+    /// machine. They describe the difference between the initial and the final state of a record.
     ///
     /// # Errors
     /// [`LikelihoodError::NoResponse`] if the machine has no response at its initial values,
@@ -205,7 +206,7 @@ impl MachineModel {
     }
 
     /// Returns Hᵀ from the joints, j × r, and the response H to each load, r × loads, of the
-    /// machine with the change Δ; `None` if it is singular.
+    /// machine with the change Δ; `None` if this machine is singular.
     fn coupled(
         &self,
         nominal: &NominalLine,
@@ -230,9 +231,10 @@ impl MachineModel {
         Some([from_joints, loads])
     }
 
-    /// Returns the readings of the sensors, with their `factors`, for the motions under `columns`
-    /// loads. `motion` returns the motion of a degree of freedom (its index in `places`, r for the
-    /// support) under a load (its index).
+    /// Returns the readings of the sensors, with their `factors`, for the motions under each of
+    /// `columns` loads. `motion` returns the motion of a degree of freedom under a load. Its
+    /// arguments are the index of the degree of freedom in `places` (r for the support) and the
+    /// index of the load.
     fn read(
         &self,
         factors: &[Complex<f64>],
@@ -247,7 +249,7 @@ impl MachineModel {
     }
 
     /// Returns S (I − H Δ) at the degrees of freedom of a measured part, and the forces f − Δ x on
-    /// this part per input.
+    /// this part per unit of each input.
     fn part(
         &self,
         (omega, readings_of): (f64, &[Complex<f64>]),

@@ -10,8 +10,9 @@ use rayon::prelude::*;
 use super::banded::{Banded, half_band, order};
 use super::{LikelihoodError, MeasuredPart};
 
-/// Loss factor of the unknown terms of the nominal machine: it keeps the response finite at
-/// resonances, and the change of the unknown terms removes it again.
+/// Loss factor of the unknown terms of the nominal machine: it limits the response at resonances.
+/// The change of the unknown terms relative to the nominal machine removes this loss factor from
+/// the result.
 const NOMINAL_LOSS: f64 = 0.05;
 
 /// Response of the nominal machine at one frequency, for the degrees of freedom of [`Places`].
@@ -35,7 +36,8 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Collects the degrees of freedom. Joints are those of unknown terms and of a measured part.
+    /// Collects the degrees of freedom. Joints are the degrees of freedom of unknown terms and of a
+    /// measured part.
     pub(super) fn new(assembly: &Assembly, measured: Option<&MeasuredPart>) -> Self {
         let n = assembly.dof();
         let mut dofs: Vec<usize> = Vec::new();
@@ -76,7 +78,7 @@ pub(super) fn touched(term: &Term) -> impl Iterator<Item = usize> + '_ {
     left.iter().chain(right).map(|(at, _)| *at).chain(block.iter().copied())
 }
 
-/// Returns whether a term is coupled at the joints, and not a part of the known machine.
+/// Returns whether a term is coupled at the joints; the other terms belong to the known machine.
 pub(super) fn is_coupled(term: &Term, measured: Option<&MeasuredPart>) -> bool {
     let of_part = |at: usize| measured.is_some_and(|part| part.dofs.contains(&at));
     !term.is_known() || touched(term).any(of_part)
@@ -113,7 +115,7 @@ pub(super) struct Nominal<'a> {
 }
 
 impl<'a> Nominal<'a> {
-    /// Takes the machine at the initial values of its unknowns.
+    /// Creates the nominal machine, with the initial values of its unknowns.
     pub(super) fn new(
         assembly: &'a Assembly,
         measured: Option<&'a MeasuredPart>,
@@ -172,8 +174,8 @@ impl<'a> Nominal<'a> {
         self.measured.is_some_and(|part| part.dofs.contains(&dof))
     }
 
-    /// Returns the dynamic stiffness at a line without the rows of a measured part, or its
-    /// transpose, and the forces per motion of the support.
+    /// Returns two results at a line: the dynamic stiffness (or its transpose) without the rows of
+    /// a measured part, and the forces per unit motion of the support.
     fn dynamic_stiffness(&self, omega: f64, transposed: bool) -> (Banded, Vec<Complex<f64>>) {
         let (n, speed) = (self.assembly.dof(), self.assembly.speed());
         let mut band = Banded::zeros(n, self.half);

@@ -1,5 +1,4 @@
-//! Comparison of the parameters of a machine that parts of its data give, without a fit to each
-//! part.
+//! Comparison of the parameters of a machine from parts of its data, without a fit to each part.
 
 use std::ops::Range;
 
@@ -28,9 +27,9 @@ struct Linearised<'a> {
     names: Vec<String>,
 }
 
-/// Compares bands of lines with the same information, and the records if there are several, with
-/// the `names` of the parameters; empty for large fits, undetermined parameters, and too few
-/// residuals.
+/// Compares bands of lines with equal information and, if there are several records, the records.
+/// `names` are the names of the parameters. The list is empty for large fits, undetermined
+/// parameters, and too few residuals.
 ///
 /// The score of part p is Qᵀ D_p e with the selection D_p of its rows of the residual e. The
 /// covariance of the scores follows from that of e, which is the identity without the components
@@ -110,7 +109,7 @@ impl Linearised<'_> {
         scores.compare(&self.level(), &named, &self.names)
     }
 
-    /// Returns how the variance of the residual is known.
+    /// Returns the source of the variance of the residual: the stated noise or the residual.
     fn level(&self) -> Level {
         let inflation = self.fit.information.inflation;
         if self.fit.misfit_ratio.is_some() {

@@ -12,10 +12,11 @@ use crate::likelihood::limits::{EACH_STATE_DOFS, MOST_STATES, STATE_LINES, STATE
 /// Returns the state loads, n × s, whose span contains all loads M (s Δx + Δv) + C Δx to which the
 /// sensors respond.
 ///
-/// In a small machine, or one with a measured part, they are unit loads on all degrees of freedom.
-/// In a large one they are those directions of loads to which sensors and joints of the nominal
-/// machine respond on the lines. For any values of the unknowns the response S H of the sensors is
-/// a combination of these responses, because the unknown terms act at the joints.
+/// In a small machine, or in one with a measured part, the state loads are unit loads on all
+/// degrees of freedom. In a large machine they are the directions of loads to which sensors and
+/// joints of the nominal machine respond on the lines. For any values of the unknowns the response
+/// S H of the sensors is a combination of these responses, because the unknown terms act at the
+/// joints.
 ///
 /// # Errors
 /// [`LikelihoodError::NoResponse`] if the nominal machine is singular,
@@ -82,7 +83,8 @@ fn responding(
     Ok(loads)
 }
 
-/// Returns at most [`STATE_LINES`] of the frequencies, rising, with the lowest and the highest.
+/// Returns at most [`STATE_LINES`] of the frequencies, in rising order, including the lowest and
+/// the highest.
 fn spread(omega: &[f64]) -> Vec<f64> {
     let mut rising = omega.to_vec();
     rising.sort_by(f64::total_cmp);

@@ -1,4 +1,5 @@
-//! The coupled response and its derivative beside the dense elimination of all degrees of freedom.
+//! Comparison of the coupled response and its derivative with the dense elimination of all degrees
+//! of freedom.
 
 use mechid_model::ResponseQuantity;
 use mechid_model::elements::{
@@ -26,7 +27,7 @@ fn free(start: f64) -> Coefficient {
     FreeCoefficient::from_start(start).into()
 }
 
-/// Every kind of element, every kind of damping, every kind of input.
+/// Returns an assembly with every kind of element, damping and input.
 fn assembly(factors: bool) -> Assembly {
     let shaft = MatrixElement {
         dofs: ["x2", "y2", "x3", "y3"].map(str::to_owned).to_vec(),
@@ -101,7 +102,8 @@ fn assembly(factors: bool) -> Assembly {
     machine.assembly(&instruments).unwrap()
 }
 
-/// Readings under inputs and own loads, by elimination of all degrees of freedom.
+/// Returns the readings under inputs and loads of the machine, by elimination of all degrees of
+/// freedom.
 fn naive(
     assembly: &Assembly,
     parameters: &[f64],
@@ -142,7 +144,7 @@ fn input() -> DVector<Complex<f64>> {
     ])
 }
 
-/// Values away from the first ones, at which the nominal machine is prepared.
+/// Returns values that differ from the initial values, at which the nominal machine is prepared.
 fn moved(assembly: &Assembly) -> Vec<f64> {
     let start = assembly.start();
     start.iter().enumerate().map(|(at, value)| value * (1.0 + 0.2 * (at as f64).sin())).collect()
@@ -175,8 +177,8 @@ fn the_sensitivity_is_the_derivative_of_the_response() {
             let line = model.at(&parameters, row).unwrap();
             line.sensitivity(&parameters, &input(), &DVector::zeros(0), &mut sensitivity);
             for (at, column) in sensitivity.column_iter().enumerate() {
-                // A millionth of the response: its square is the error, rounding is some 10⁻¹⁰ of
-                // the step.
+                // The step changes the response by a millionth of its size. Relative to this
+                // change, the truncation error is about 10⁻¹² and the rounding error about 10⁻¹⁰.
                 let response = naive(&assembly, &parameters, omega, &input());
                 let step = 1e-6 * response.norm() / column.norm();
                 let at_distance = |by: f64| {
@@ -194,7 +196,7 @@ fn the_sensitivity_is_the_derivative_of_the_response() {
     }
 }
 
-/// The responses of many lines are not kept from the residual to its derivative.
+/// If there are many lines, their responses are not stored between the residual and its derivative.
 #[test]
 fn the_jacobian_does_not_depend_on_what_is_kept() {
     let assembly = assembly(true);
@@ -272,8 +274,8 @@ fn the_gradient_includes_the_errors_of_pulses() {
     }
 }
 
-/// Forces on every other line are all among the lines of the first steps, and a short record
-/// keeps lines beside a long one.
+/// If two forces act on alternate lines, the first steps have lines of both forces. If a short
+/// record is fitted together with a long one, the first steps also have lines of the short record.
 #[test]
 fn first_steps_have_lines_of_every_force_and_record() {
     let assembly = assembly(false);
@@ -302,8 +304,9 @@ fn first_steps_have_lines_of_every_force_and_record() {
     }
 }
 
-/// In a machine with more degrees of freedom than state loads, the sensors respond to every load as
-/// to its component in the space of the state loads, also with unknowns far from the initial values.
+/// In a machine with more degrees of freedom than state loads, every load causes the same sensor
+/// response as its component in the space of the state loads. This is also true for unknowns far
+/// from the initial values.
 #[test]
 fn state_loads_contain_every_load_to_which_a_sensor_responds() {
     let n = 40;

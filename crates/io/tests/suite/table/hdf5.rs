@@ -94,7 +94,7 @@ fn factors_and_offsets_of_attributes_are_applied() {
     assert_eq!(table.to_si(table.find("packed").unwrap(), Quantity::Force).unwrap(), 1e3);
     let volts = table.find("volts").unwrap();
     assert!((table.to_si(volts, Quantity::ACCELERATION).unwrap() - 9.80665).abs() < 1e-12);
-    for (column, what) in [("two_scales", "scale_factor"), ("doubtful_offset", "attribute offset")]
+    for (column, what) in [("two_scales", "scale_factor"), ("doubtful_offset", "the offset offset")]
     {
         let error = table.column(column).unwrap_err().to_string();
         assert!(error.contains(what), "{error}");

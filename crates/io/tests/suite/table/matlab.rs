@@ -219,7 +219,7 @@ fn a_file_cut_short_is_refused_wherever_it_ends() {
         assert!(complete < 14, "{name}: {complete} cuts of 14 variables were not noticed");
     }
     let e = Table::parse("a.mat", &PLAIN[..200]).unwrap_err().to_string();
-    assert_eq!(e, "a.mat, byte 129: an element of 112 bytes has 64: the file is cut short");
+    assert_eq!(e, "a.mat, byte 129: an element of 112 bytes has only 64: the file is cut short");
 }
 
 proptest! {

@@ -54,7 +54,7 @@ fn labels_of_the_abscissa_state_the_unit_of_the_instants() {
     for (unit, dt, remark) in [
         ("s", 0.25, None),
         ("NONE", 0.25, None),
-        ("ms", 0.25e-3, Some("they were multiplied by 0.001")),
+        ("ms", 0.25e-3, Some("the instants were multiplied by 0.001")),
         ("samples", 0.25, Some("the label samples of the instants is not a unit of time")),
     ] {
         let table = with(unit);
@@ -178,8 +178,8 @@ fn broken_files_are_refused_with_the_line() {
         ),
         (
             with("4         8         1", "3         8         1", 0),
-            "a.unv, line 20: data type 3 of the ordinate with spacing 1 cannot be read, only the \
-             types 2, 4, 5 and 6 with spacing 0 or 1",
+            "a.unv, line 20: an ordinate of data type 3 with spacing 1 cannot be read: the \
+             possible types are 2, 4, 5 and 6, with spacing 0 or 1",
         ),
         (
             with("NONE         1  -1       NONE", "NONE         1  -9       NONE", 0),

@@ -23,9 +23,9 @@ impl Neighbours {
         Self { samples, channels }
     }
 
-    /// Returns, for each line, the sum of the `count` consecutive covariances that begin with it.
-    /// The sums are combined from sums of 1, 2, 4 … lines according to the binary digits of
-    /// `count`: subtraction of running sums would lose digits.
+    /// Returns, for each line, the sum of `count` consecutive covariances, beginning with that of
+    /// the line. The sums are combined from sums of 1, 2, 4 … lines according to the binary digits
+    /// of `count`, because the subtraction of running sums would lose digits.
     fn sums(&self, count: usize) -> DMatrix<Complex<f64>> {
         let lines = self.samples.ncols();
         let mut total = DMatrix::zeros(self.samples.nrows(), lines + 1 - count);
@@ -44,8 +44,8 @@ impl Neighbours {
         total
     }
 
-    /// Returns the means over each line and `half_width` lines to either side, in the [`window`] of
-    /// the line.
+    /// Returns, for each line, the mean over the [`window`] of the line, with `half_width` lines on
+    /// either side.
     pub(super) fn means(&self, half_width: usize) -> Covariances {
         let lines = self.samples.ncols();
         let windows = (0..lines).map(|line| window(line, half_width, lines));
@@ -80,8 +80,8 @@ impl Neighbours {
         Some(cost)
     }
 
-    /// Returns two sums for each line of a range: the sum of the covariances of the lines before it
-    /// in the range, and the sum of its own covariance and of those of the lines after it.
+    /// Returns two sums of covariances for each line of a range: over the lines of the range before
+    /// this line, and over this line and the lines after it.
     fn ends(&self, range: Range<usize>) -> [DMatrix<Complex<f64>>; 2] {
         let (count, samples) = (range.len(), self.samples.columns_range(range));
         let [mut before, mut from] = [(); 2].map(|()| DMatrix::zeros(samples.nrows(), count + 1));

@@ -1,4 +1,4 @@
-//! Bumps on a smooth spectrum, and the search for the one with the largest gain.
+//! Bumps on a smooth spectrum, and the search for the bump with the largest gain.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::limits::{
     HEIGHT_STEPS, HEIGHT_TOLERANCE, PEAK_REACH, QUIET_DEVIATIONS, SMOOTH_FLOOR,
 };
 
-/// Shape that, multiplied by an unknown height, is added to the log powers around a line.
+/// Shape of a bump around a line. The shape times an unknown height is added to the log powers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bump {
     shape: Shape,
@@ -26,7 +26,8 @@ enum Shape {
     /// Height that decreases linearly from the middle to both ends.
     Tent,
     /// Height ln(1 + A/(1 + x²)) divided by its maximum ln(1 + A), which is `top`. A is
-    /// `above_floor`, and x is 1 at a distance of `half_width` lines: a resonance on a floor.
+    /// `above_floor`, and x is 1 at a distance of `half_width` lines. This is the shape of a
+    /// resonance on a floor.
     Peak { above_floor: f64, half_width: f64, top: f64 },
 }
 
@@ -46,7 +47,7 @@ impl Bump {
         Self { shape: Shape::Peak { above_floor, half_width, top }, middle, reach }
     }
 
-    /// Returns this bump converted to a line spacing finer by the factor `times`.
+    /// Returns this bump converted to a line spacing that is smaller by the factor `times`.
     pub(super) fn finer(&self, times: f64) -> Self {
         let shape = match self.shape {
             Shape::Peak { above_floor, half_width, top } => {
@@ -68,8 +69,8 @@ impl Bump {
         ]
     }
 
-    /// Returns variations: a little moved, wider, narrower, higher or lower. A flat bump has none,
-    /// because all its positions are tried.
+    /// Returns variations of this bump: moved a little, wider, narrower, higher or lower. A flat
+    /// bump has no variations, because all positions of flat bumps are tried.
     fn varied(&self) -> Vec<Self> {
         let middle = self.middle;
         match self.shape {
@@ -115,7 +116,7 @@ impl Bump {
         let half = match self.shape {
             Shape::Flat => self.reach - 0.5,
             Shape::Tent => 0.5 * self.reach,
-            // The height is half the logarithm of the peak at this distance.
+            // At this distance, the logarithm of the peak has half of its largest value.
             Shape::Peak { above_floor, half_width, .. } => half_width * above_floor.powf(0.25),
         };
         // The band has at least the line nearest to the middle.
@@ -131,8 +132,8 @@ impl Bump {
         first..((self.middle + self.reach).floor() as usize + 1).min(lines)
     }
 
-    /// Returns groups of neighbouring lines on which the bump is not zero, so narrow that its
-    /// height hardly changes within a group.
+    /// Returns groups of neighbouring lines on which the bump is not zero. The groups are so narrow
+    /// that the height of the bump hardly changes within a group.
     fn groups(&self, lines: usize) -> Vec<Range<usize>> {
         let scale = match self.shape {
             Shape::Flat | Shape::Tent => self.reach,
@@ -160,8 +161,8 @@ pub(super) fn widths(lines: usize) -> impl Iterator<Item = usize> {
     all_widths.take_while(move |width| *width <= (lines / 3).max(1))
 }
 
-/// Returns the bump with the highest likelihood of the variances, from all flat bumps and from
-/// other shapes around the best of them.
+/// Returns the bump with the highest likelihood, given the variances. The candidates are all flat
+/// bumps and, around the best flat bumps, other shapes.
 pub(super) fn most_conspicuous(
     variances: &DMatrix<f64>,
     log_power: &DMatrix<f64>,
@@ -199,7 +200,8 @@ pub(super) fn most_conspicuous(
 
 /// Gains of flat bumps, as reductions of Σ log p + v/p with the fitted power p and the variance v.
 struct FlatGains {
-    /// Cumulative sums of the levels v/p, (lines + 1) × channels: they give the mean of any band.
+    /// Cumulative sums of the levels v/p, (lines + 1) × channels. The mean of any band follows from
+    /// them.
     below: DMatrix<f64>,
     nu: f64,
 }
@@ -216,7 +218,7 @@ impl FlatGains {
         Self { below, nu }
     }
 
-    /// Returns the largest gain of the bands of a width, and its band.
+    /// Returns the largest gain of all bands of one width, and the band with this gain.
     fn best_of_width(&self, width: usize) -> Option<(f64, Range<usize>)> {
         let bounds = self.bounds(width);
         let mut best: Option<(f64, usize)> = None;
@@ -231,7 +233,7 @@ impl FlatGains {
         best.map(|(gain, start)| (gain, start..start + width))
     }
 
-    /// Returns an upper bound of the gain of each band of a width: ln x ≤ x − 1.
+    /// Returns an upper bound of the gain of each band of one width; it follows from ln x ≤ x − 1.
     fn bounds(&self, width: usize) -> Vec<f64> {
         let lines = self.below.nrows() - 1;
         let mut bounds = vec![0.0; lines + 1 - width];
@@ -283,8 +285,8 @@ impl Levels {
         }
     }
 
-    /// Returns two ratios: the mean of all lines to the mean of a band with this sum, and the mean
-    /// of all lines to the mean of the other lines. Both are 1 for a quiet band that is too narrow.
+    /// Returns the ratios of the mean of all lines to the mean of a band whose sum is `inside`, and
+    /// to the mean of the other lines. Both ratios are 1 if the band is quiet but too narrow.
     #[inline]
     fn ratios(&self, inside: f64) -> [f64; 2] {
         let other = ((self.total - inside) / self.others).max(SMOOTH_FLOOR);
@@ -324,7 +326,7 @@ impl Gained {
     }
 }
 
-/// Group of lines on which a bump has about the same height.
+/// Group of lines on which the height of a bump is nearly constant.
 struct Part {
     /// Height relative to the middle of the bump.
     height: f64,
@@ -338,8 +340,8 @@ impl Part {
     }
 }
 
-/// Fits the height of a bump of these `parts`, whose levels v/p have the sums `inside`, and returns
-/// the reduction of Σ log p + v/p; the levels of all other lines have the sum `outside`.
+/// Fits the height of a bump that consists of `parts`, and returns the reduction of Σ log p + v/p.
+/// `inside` has the sum of the levels v/p of each part, `outside` is the sum over all other lines.
 fn raised(
     parts: &[Part],
     inside: &[f64],
