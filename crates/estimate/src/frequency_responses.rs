@@ -1,4 +1,5 @@
-//! Maximum likelihood on averaged frequency responses, corrected for the window of their segments.
+//! Maximum likelihood from averaged frequency responses that are corrected for the window of the
+//! segments.
 
 use mechid_model::SecondOrderSystem;
 use mechid_spectra::SpectraError;
@@ -14,25 +15,27 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// An estimate from averaged frequency responses.
 #[derive(Debug, Clone)]
 pub struct ResponseEstimate {
-    /// The fit; its covariance allows for errors that are correlated between neighbouring lines.
+    /// The fit; its covariance includes the correlation of the errors of neighbouring lines.
     pub fit: OutputErrorFit,
-    /// Fitted responses of each record: the measured ones, corrected for the bias of their window.
+    /// Responses of each record that were fitted: the measured responses, corrected for the bias of
+    /// the window.
     pub responses: Vec<Frf>,
     /// Largest change of a parameter due to the correction of the window bias, in standard errors
-    /// of this parameter (pure number); zero if the window has no bias.
+    /// of this parameter (pure number); zero if the window causes no bias.
     pub blunted: f64,
-    /// True if the alternation between the correction and the parameters converged.
+    /// True if the alternation between the correction and the parameters converged, or if the
+    /// window causes no bias.
     pub settled: bool,
 }
 
-/// Fits the frequency responses of one or several records of a machine, each with the degrees of
-/// freedom of its forces, counted from 0.
+/// Fits the frequency responses of one or several records of a machine; each record has the degrees
+/// of freedom of its forces, counted from 0.
 ///
 /// An average over segments smooths a response with |W|², the squared magnitude of the spectrum of
-/// their window. The bias is computed from the identified system and subtracted from the data, and
-/// the fit is repeated, until neither changes. The covariance allows for three things: the window
-/// correlates the errors of neighbouring lines, responses and forces have errors in common, and the
-/// weights are estimated from few segments.
+/// the window. The bias is computed from the identified system and subtracted from the data, and
+/// the fit is repeated, until bias and system no longer change. The covariance includes three
+/// effects: the window correlates the errors of neighbouring lines, responses and forces have
+/// errors in common, and the weights are estimated from few segments.
 ///
 /// # Errors
 /// As [`output_error`] and [`Frf::data`];
@@ -52,7 +55,9 @@ pub fn output_error_of_responses(
     let fit = output_error(&data, unknowns)?;
     let noise = data.noise().cloned().ok_or(SpectraError::NoExcitedLine)?;
     let count = unknowns.independent();
-    let plain = |fit| ResponseEstimate { fit, responses: raw.clone(), blunted: 0.0, settled: true };
+    let is_exact = !raw.iter().any(Frf::is_smoothed);
+    let plain =
+        |fit| ResponseEstimate { fit, responses: raw.clone(), blunted: 0.0, settled: is_exact };
     if records.iter().any(|(frf, _)| !frf.has_error_covariance())
         || 2 * data.dof() * data.len() * count > MAX_SENSITIVITIES
     {
@@ -66,13 +71,8 @@ pub fn output_error_of_responses(
         Some(relations) => relations.unknowns(&values),
     };
     let Some(errors) = model.errors(&raw, &theta) else { return Ok(plain(fit)) };
-    let start = Sharpened {
-        theta,
-        responses: raw.clone(),
-        errors,
-        blunted: 0.0,
-        settled: !raw.iter().any(Frf::is_smoothed),
-    };
+    let start =
+        Sharpened { theta, responses: raw.clone(), errors, blunted: 0.0, settled: is_exact };
     let sharpened = if start.settled { start } else { model.sharpen(start)? };
     let Sharpened { theta, responses, errors, blunted, settled } = sharpened;
     let (covariance, degrees_of_freedom) = errors.covariance(records);
@@ -194,7 +194,8 @@ impl Errors {
         &self.root * self.q.tr_mul(&self.white.residual)
     }
 
-    /// Returns the standard errors of the parameters for independent lines.
+    /// Returns the standard errors that the parameters would have if the lines had independent
+    /// errors.
     fn deviations(&self) -> DVector<f64> {
         DVector::from_iterator(self.root.nrows(), self.root.row_iter().map(|row| row.norm()))
     }

@@ -1,11 +1,11 @@
 //! Limits of this crate, each with what happens on either side.
 
-/// Maximum share of noise in the power of a line whose noise is used as a weight; lines with more
-/// noise have no weight in the linear estimate.
+/// Maximum ratio of noise power to power on a line that is used in the weighted linear estimate;
+/// lines with more noise have zero weight.
 pub(crate) const WEIGHTING_CLEAR: f64 = 0.1;
 
-/// Maximum number of Gauss–Newton steps from one delay of the force to the next in a search for a
-/// delay.
+/// Maximum number of Gauss–Newton steps after each change of the delay in a search for the delay of
+/// the force.
 pub(crate) const DELAY_STEPS: usize = 30;
 
 /// Maximum number of Gauss–Newton steps of the first search by maximum likelihood.
@@ -15,18 +15,20 @@ pub(crate) const SEARCH_STEPS: usize = 200;
 /// the minimum of the first.
 pub(crate) const STEPS_MORE: usize = 60;
 
-/// Maximum number of Gauss–Newton steps in resampled data, where the search need not converge.
+/// Maximum number of Gauss–Newton steps in resampled data, where the search may stop before it
+/// converges.
 pub(crate) const STEPS_RESAMPLED: usize = 15;
 
 /// Minimum number of lines per parameter on which searches after the first one begin.
 pub(crate) const THIN_LINES: usize = 20;
 
-/// Largest ratio of the number of all lines to that on which searches after the first one begin.
+/// Largest ratio of the number of all lines to the number of lines on which searches after the
+/// first one begin.
 pub(crate) const THIN_STEP: usize = 10;
 
 /// Largest ratio of the sum of squares at the end of a search on fewer lines to the sum of squares
 /// of the best minimum on these lines; above it the search does not continue on all lines. The
-/// ratio is above 1 because the minima differ a little on fewer lines.
+/// limit is above 1 because the minima change a little with the number of lines.
 pub(crate) const THIN_NEAR: f64 = 2.0;
 
 /// Largest relative difference of the sums of squares of two searches that count as one minimum.
@@ -35,8 +37,9 @@ pub(crate) const RESTART_SAME: f64 = 1e-6;
 /// Largest sum of squares of a fit, in units of the noise or the response, that counts as rounding.
 pub(crate) const RESTART_EXACT: f64 = 1e-16;
 
-/// Relative difference of the sums of squares of two initial estimates below which the second one
-/// is searched from last, because it probably leads to the same minimum.
+/// Relative difference of the sums of squares of two initial estimates below which the search from
+/// the second one comes last, because it probably ends at the same minimum as the search from the
+/// first one.
 pub(crate) const RESTART_ALIKE: f64 = 0.01;
 
 /// Minimum number of searches if the noise explains the best minimum.
@@ -59,7 +62,7 @@ pub(crate) const RESTARTS_AMONG_MANY: usize = 12;
 /// Maximum number of restarts of a search from its best minima.
 pub(crate) const MAX_RESTARTS: u64 = 60;
 
-/// Number of the best minima that restarts begin from in turn.
+/// Number of best minima at which restarts begin, in turn.
 pub(crate) const RESTART_RESTARTED: usize = 3;
 
 /// Ratio of a diagonal entry of a triangular factor to the length of its column below which the
@@ -73,8 +76,8 @@ pub(crate) const GRAM_RIDGE: f64 = 1e-7;
 /// Number of lines whose products are in memory at a time, on each thread.
 pub(crate) const GRAM_LINES: usize = 256;
 
-/// Number of lines that one thread computes at a time: with fewer, sharing them costs more than it
-/// saves. It also fixes the order of sums over the lines.
+/// Number of lines that one thread computes at a time. With fewer lines the division among threads
+/// costs more time than it saves. The number also fixes the order of sums over the lines.
 pub(crate) const LINES_AT_ONCE: usize = 64;
 
 /// Maximum number of Lanczos steps; after this number, an extreme eigenvalue is accurate to many
@@ -85,28 +88,32 @@ pub(crate) const GRAM_LANCZOS: usize = 80;
 pub(crate) const FIT_PLAUSIBLE: f64 = 6.0;
 
 /// Maximum number of sensitivities (residuals times parameters times parts) of a fit whose parts
-/// are compared and in which omitted terms are sought: 128 MiB of numbers.
+/// are compared and whose omitted terms are tested: 128 MiB of numbers. Larger fits have no such
+/// comparison.
 pub(crate) const MAX_PARTS: usize = 1 << 24;
 
-/// Maximum number of sensitivities (residuals times parameters) for a covariance with correlated
-/// lines; in larger fits the errors of the lines are assumed to be independent.
-pub(crate) const MAX_SENSITIVITIES: usize = 1 << 22;
+/// Maximum number of sensitivities (residuals times parameters) for the correction of the window of
+/// averaged responses, and for a covariance with correlated lines: 128 MiB of numbers. Larger fits
+/// are not corrected and assume independent errors of the lines; they count as not settled if the
+/// window smooths the responses.
+pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
 
 /// Number of partial sums of the products of the effects of pulses. It limits the memory of the
-/// sums. It is the same for any number of threads, so that the result is the same, too.
+/// sums. It does not depend on the number of threads, so that the result does not depend on it,
+/// either.
 pub(crate) const PULSE_SUMS: usize = 8;
 
-/// Maximum number of effects of the errors of pulses on the residuals, and of sensitivities of such
-/// a fit: 128 MiB of numbers each, with some copies in memory at a time. In a larger fit the errors
-/// of the lines are assumed to be independent.
+/// Maximum number of effects of the errors of pulses on the residuals, and maximum number of
+/// sensitivities of a fit with pulse errors: 128 MiB of numbers each; some copies are in memory at
+/// the same time. In a larger fit the errors of the lines are assumed to be independent.
 pub(crate) const MAX_PULSE_EFFECTS: usize = 1 << 24;
 
 /// Maximum number of rounds that alternate between the errors of pulses and the fit to the data
 /// without them; about three suffice.
 pub(crate) const PULSE_ROUNDS: usize = 8;
 
-/// Change of the amplitudes of pulse errors, in standard deviations of the stated noise, that ends
-/// the rounds of the errors of pulses and the fit.
+/// Change of the amplitudes of pulse errors, in standard deviations of the stated noise, below
+/// which the rounds between the errors of pulses and the fit end.
 pub(crate) const PULSE_SETTLED: f64 = 0.02;
 
 /// Relative change of the noise levels that ends the rounds of weighting.
@@ -118,27 +125,27 @@ pub(crate) const RESIDUAL_ROUNDING: f64 = 1e-12;
 /// Maximum number of rounds of weighting by noise levels; three nearly always suffice.
 pub(crate) const MAX_ROUNDS: usize = 10;
 
-/// Maximum number of rounds of weighting by a noise spectrum: the first is already efficient, the
-/// others refine the shape of the spectrum.
+/// Maximum number of rounds of weighting by a noise spectrum: the first one gives an efficient
+/// estimate, the others refine the shape of the spectrum.
 pub(crate) const COLOURED_ROUNDS: usize = 3;
 
 /// Maximum number of sensitivities (residuals times parameters) for the computation of leverages;
-/// larger fits neglect them.
+/// larger fits neglect the leverages.
 pub(crate) const MAX_LEVERAGES: usize = 1 << 20;
 
 /// Maximum number of rounds that alternate between the sinusoids in the residual and the fit to the
 /// data without them.
 pub(crate) const SINUSOID_ROUNDS: usize = 8;
 
-/// Change of the data without sinusoids, relative to the residual, that ends the rounds of fit and
-/// subtraction.
+/// Change of the data without sinusoids, relative to the residual, below which the rounds of fit
+/// and subtraction end.
 pub(crate) const SINUSOID_TOLERANCE: f64 = 1e-3;
 
 /// Minimum power of a residual relative to the noise of the round before; a smaller residual would
 /// have an unbounded weight.
 pub(crate) const NOISE_LEAST: f64 = 1e-12;
 
-/// Minimum share of its noise that a residual is assumed to keep after the fit (1 − leverage).
+/// Minimum assumed fraction of the noise that remains in a residual after the fit (1 − leverage).
 pub(crate) const NOISE_KEPT: f64 = 0.1;
 
 /// Number of rounds of the initial estimates, each weighted by the dynamic stiffness of the round
@@ -148,17 +155,19 @@ pub(crate) const INITIAL_ROUNDS: usize = 4;
 /// Maximum number of corrections of the window bias; each removes most of the remaining bias.
 pub(crate) const SHARPENING_ROUNDS: usize = 20;
 
-/// Step, in standard errors of the parameters, that ends the corrections of the window bias.
+/// Step, in standard errors of the parameters, below which the corrections of the window bias end.
 pub(crate) const SHARPENING_SETTLED: f64 = 0.02;
 
 /// Minimum modal assurance criterion of two real eigenvalues that form an overdamped pair, if there
 /// are several pairs.
 pub(crate) const SAME_SHAPE: f64 = 0.9;
 
-/// Level of the confidence interval of the squared frequency that decides about a rigid-body mode.
+/// Level of the confidence interval of the squared natural frequency: a mode is a rigid-body mode
+/// if this interval contains zero.
 pub(crate) const RIGID_BODY_LEVEL: f64 = 0.99;
 
-/// Relative singular value below which a direction of the initial state is unobservable.
+/// Singular value, relative to the largest one, below which a direction of the initial state is
+/// unobservable.
 pub(crate) const INITIAL_UNSEEN: f64 = 1e-10;
 
 /// Maximum number of steps of the search for proportional damping, the only nonlinear relation.
@@ -170,15 +179,16 @@ pub(crate) const RELATED_SETTLED: f64 = 1e-12;
 /// Largest ratio of residual to force of an equation that counts as rounding.
 pub(crate) const EQUATION_ROUNDING: f64 = 1e-11;
 
-/// Minimum number of rows per equation for a correlation between equations; with fewer rows their
-/// residuals are assumed to be uncorrelated.
+/// Minimum number of rows per equation for an estimate of the correlation between equations; with
+/// fewer rows the residuals of the equations are assumed to be uncorrelated.
 pub(crate) const ROWS_PER_EQUATION: usize = 10;
 
 /// Number of pairs of samples that are reduced to triangular form at a time.
 pub(crate) const TRANSITION_BLOCK: usize = 256;
 
 /// Number of parts that the band of a fit, or the time of a record, is split into for a comparison:
-/// fewer parts average an error of the model, more have too few lines each.
+/// with fewer parts an error of the model averages out within a part, with more parts each part has
+/// too few lines.
 pub(crate) const PARTS: usize = 4;
 
 /// Information of a part about a combination of parameters, relative to the information of all
@@ -189,7 +199,7 @@ pub(crate) const PART_INFORMS: f64 = 1e-9;
 /// usual window of analysers.
 pub(crate) const CORRELATED_DISTANCES: usize = 2;
 
-/// p-value below which the errors of neighbouring lines of a table are correlated.
+/// p-value below which the errors of neighbouring lines of a table are treated as correlated.
 pub(crate) const CORRELATED_LINES: f64 = 0.01;
 
 /// Largest deviation of the distance between two lines from a multiple of the smallest distance, in
