@@ -83,8 +83,11 @@ fn an_orbit_that_no_machine_stays_on_is_refused() {
     assert!(refused.to_string().contains("a disturbance by 2.7183 "), "{refused}");
     // The roots of λ² + 1.5 λ + 1 = 0 have modulus 1 and real part −3/4; the period is 2 s.
     let stable = simulated(1.0).unwrap();
-    let Multiplier { value, error } = stable.multiplier.unwrap();
-    assert!((value.norm() - (-1.5_f64).exp()).abs() < 1e-6 && error < 1e-6, "{value}");
+    let Multiplier { value, error, scheme_error } = stable.multiplier.unwrap();
+    let missed = (value.norm() - (-1.5_f64).exp()).abs();
+    assert!(missed < 1e-6 && error < 1e-6, "{value}");
+    let by_step = scheme_error.unwrap();
+    assert!(missed <= by_step && by_step < 1e-4, "{missed:e} {by_step:e}");
     let told = stable.summary().unwrap().to_string();
     assert!(told.contains("multiplies a disturbance of the response by 0.2231 ± "), "{told}");
     assert!(told.contains("it is stable"), "{told}");

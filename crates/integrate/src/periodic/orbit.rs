@@ -22,6 +22,7 @@ pub struct PeriodicOrbit {
     response: Response,
     multipliers: Vec<Complex<f64>>,
     multiplier_error: f64,
+    scheme_error: Option<f64>,
 }
 
 impl PeriodicOrbit {
@@ -31,19 +32,29 @@ impl PeriodicOrbit {
     }
 
     /// Returns the 2n Floquet multipliers, largest first: the pure numbers that multiply
-    /// disturbances of the orbit in each period, with an error of about 1e-9 of the largest.
-    /// Multipliers of the memory of a scheme are omitted if they are smaller. For more than 64
-    /// degrees of freedom the list contains only the largest multiplier, by Arnoldi's iteration; it
-    /// is empty if numbers overflow.
+    /// disturbances of the orbit in each period, with an error of about 1e-9 of the largest. A
+    /// scheme with a memory has further multipliers; only the 2n largest are returned. For more
+    /// than 64 degrees of freedom the list contains only the largest multiplier, by Arnoldi's
+    /// iteration; it is empty if numbers overflow.
     pub fn multipliers(&self) -> &[Complex<f64>] {
         &self.multipliers
     }
 
-    /// Returns the error of the largest multiplier (pure number). For more than 64 degrees of
-    /// freedom it is the norm of its residual, which is large if many multipliers have about the
-    /// same modulus.
+    /// Returns the error of the largest multiplier as one of the steps of the scheme (pure number).
+    /// For more than 64 degrees of freedom, the error is the norm of the residual of this
+    /// multiplier. It is large if many multipliers have about the same modulus.
     pub fn multiplier_error(&self) -> f64 {
         self.multiplier_error
+    }
+
+    /// Returns the error of the largest multiplier by the time step of the scheme (pure number):
+    /// its change with twice the step, which for a scheme of order p is about 2ᵖ − 1 times the
+    /// error. `None` if the number of samples is odd, or if there is no orbit with twice the step.
+    ///
+    /// # Source
+    /// Richardson (1911), Philosophical Transactions of the Royal Society A 210, 307–357.
+    pub fn scheme_error(&self) -> Option<f64> {
+        self.scheme_error
     }
 
     /// Returns whether small disturbances decay: all multipliers are inside the unit circle, and
@@ -59,9 +70,9 @@ impl PeriodicOrbit {
 ///
 /// From `guess` the system first moves freely for `settling` periods, which leads to a stable orbit
 /// nearby; Newton's method on the state at the first sample then closes the orbit, stable or not. A
-/// nonlinear system may have several orbits, and some that repeat only after two or more periods:
-/// give several periods of the force for them. Nonlinear forces that depend on time must repeat
-/// with the force.
+/// nonlinear system may have several orbits. Some may repeat only after two or more periods of the
+/// force; to find them, give as many periods of the force. Nonlinear forces that depend on time
+/// must repeat with the force.
 ///
 /// Up to 64 degrees of freedom a Newton step costs two passes over the period for each number of
 /// the state. For more degrees of freedom, the derivative of the state over a period is not formed.
@@ -108,9 +119,11 @@ pub fn periodic_orbit<'a>(
     guess: &InitialState,
     settling: usize,
 ) -> Result<PeriodicOrbit, IntegrateError> {
-    let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
-    let motion = Motion::zeros(table.sampling().len(), system.dof());
-    closed(scheme, system, table, motion, guess, settling)
+    with_scheme_error(force.into(), |force| {
+        let table = ForceTable::periodic(scheme, system.dof(), force)?;
+        let motion = Motion::zeros(table.sampling().len(), system.dof());
+        closed(scheme, system, table, motion, guess, settling)
+    })
 }
 
 /// Finds a periodic response as [`periodic_orbit`] does, but for selected degrees of freedom: the
@@ -128,10 +141,29 @@ pub fn periodic_orbit_selected<'a>(
     settling: usize,
 ) -> Result<PeriodicOrbit, IntegrateError> {
     dofs.check(system.dof())?;
-    let table = ForceTable::periodic(scheme, dofs.forced.len(), force.into())?;
-    let table = table.acting_on(dofs.forced, system.dof());
-    let motion = Motion::observed(table.sampling().len(), system.dof(), dofs.observed);
-    closed(scheme, system, table, motion, guess, settling)
+    with_scheme_error(force.into(), |force| {
+        let table = ForceTable::periodic(scheme, dofs.forced.len(), force)?;
+        let table = table.acting_on(dofs.forced, system.dof());
+        let motion = Motion::observed(table.sampling().len(), system.dof(), dofs.observed);
+        closed(scheme, system, table, motion, guess, settling)
+    })
+}
+
+/// Finds an orbit, and its largest multiplier again with twice the step.
+fn with_scheme_error(
+    force: SampledForce<'_>,
+    find: impl Fn(SampledForce<'_>) -> Result<PeriodicOrbit, IntegrateError>,
+) -> Result<PeriodicOrbit, IntegrateError> {
+    let mut orbit = find(force)?;
+    let twice = force.with_twice_the_step();
+    let coarse = twice
+        .and_then(|[samples, middle]| find(SampledForce::with_mid_step(&samples, &middle)).ok());
+    let largest = orbit.multipliers.first().copied();
+    orbit.scheme_error = coarse.zip(largest).and_then(|(coarse, largest)| {
+        let change = |m: &Complex<f64>| (m - largest).norm().min((m.conj() - largest).norm());
+        coarse.multipliers.iter().map(change).min_by(f64::total_cmp)
+    });
+    Ok(orbit)
 }
 
 fn closed(
@@ -160,7 +192,7 @@ fn closed(
         (state, multipliers, error)
     };
     let response = shooting.response(&state, motion)?;
-    Ok(PeriodicOrbit { response, multipliers, multiplier_error })
+    Ok(PeriodicOrbit { response, multipliers, multiplier_error, scheme_error: None })
 }
 
 /// Returns the periodic state near `state` and the multipliers, largest first.
@@ -272,7 +304,7 @@ fn by_products(
                 shooting.derivative(&state, direction, derivative)
             })?;
         log::debug!(
-            "a gap of {missed:.1e}: after {} products {:.1e} remains",
+            "a gap of {missed:.1e}: after {} products {:.1e} of it remains",
             step.products,
             step.residual
         );

@@ -1,6 +1,7 @@
 //! The force of a simulation: samples, and the values after and between them.
 
 use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
 
 use crate::error::IntegrateError;
 use crate::schemes::scheme::Scheme;
@@ -29,6 +30,21 @@ impl<'a> SampledForce<'a> {
     pub fn with_mid_step(samples: &'a Record, mid_step: &'a Record) -> Self {
         Self { samples, mid_step: Some(mid_step) }
     }
+
+    /// Returns the samples of a force with twice the step, and its values within these steps;
+    /// `None` for an odd number of samples.
+    pub(crate) fn with_twice_the_step(self) -> Option<[Record; 2]> {
+        let Self { samples, .. } = self;
+        let sampling = samples.sampling();
+        let half = (sampling.len() / 2).max(1);
+        let twice = Sampling::new(2.0 * sampling.dt(), half).ok()?;
+        let every_second = |first: usize| {
+            let value = |row: usize, channel: usize| samples.data()[(2 * row + first, channel)];
+            Record::new(twice, DMatrix::from_fn(half, samples.channels(), value)).ok()
+        };
+        let is_even = sampling.len().is_multiple_of(2);
+        is_even.then(|| Some([every_second(0)?, every_second(1)?])).flatten()
+    }
 }
 
 /// Every value of the force that a simulation may need, without copying the samples.
@@ -56,9 +72,9 @@ impl<'a> ForceTable<'a> {
         Ok(Self { samples: force.samples, mid_step: force.mid_step, after, forced: None, dof })
     }
 
-    /// Creates a force that ends with its last sample. The row after it extrapolates the line
-    /// through the last two samples, so that a load interpolated across the end equals one
-    /// projected from the last step.
+    /// Creates a force that ends with its last sample. The value after the last sample extrapolates
+    /// the line through the last two samples, so that a load interpolated across the end is equal
+    /// to a load projected from the last step.
     pub(crate) fn ending(
         scheme: &dyn Scheme,
         dof: usize,
@@ -77,7 +93,7 @@ impl<'a> ForceTable<'a> {
         Self { forced: Some(forced), dof, ..self }
     }
 
-    /// Returns the same force with a known row after the last sample.
+    /// Returns the same force with given values after the last sample.
     pub(crate) fn continued(mut self, next: Vec<f64>) -> Self {
         self.after[0] = next;
         self

@@ -53,6 +53,12 @@ fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
             };
             let found: f64 = orbit.multipliers().iter().map(|m| m.norm()).product();
             assert_eq!((orbit.multipliers().len(), orbit.is_stable()), (2, true), "{name}");
+            // The two are conjugate, so that the modulus of each is the root of their product.
+            let multiplier = orbit.multipliers()[0];
+            let missed = (multiplier.norm() - product.sqrt()).abs();
+            let stated = orbit.scheme_error().unwrap();
+            assert!(multiplier.im != 0.0 && missed <= stated, "{name}: {missed:e} {stated:e}");
+            assert!(len < 120 || stated < 0.3, "{name}: {stated}");
             [
                 largest(x, &|t| (omega * t).cos()),
                 largest(v, &|t| -omega * (omega * t).sin()),

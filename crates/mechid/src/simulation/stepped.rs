@@ -15,14 +15,16 @@ use super::machine::Described;
 use super::schemes::has_given_start;
 use super::{SimulateError, SimulatedSystem};
 
-/// Ratio of a disturbance of a periodic response after and before one period: a complex number
-/// without unit.
+/// Ratio of a disturbance of a periodic response after one period to the disturbance before it: a
+/// complex number without unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Multiplier {
     /// The factor.
     pub value: Complex<f64>,
-    /// Error bound (pure number).
+    /// Error of the factor for the steps of the scheme (pure number).
     pub error: f64,
+    /// Error of the factor by the time step of the scheme (pure number); `None` if it is not known.
+    pub scheme_error: Option<f64>,
 }
 
 /// Maximum excess over 1 of a Floquet multiplier that counts as rounding of a double one, as for an
@@ -90,9 +92,13 @@ pub(super) fn stepped(
 /// unstable.
 fn stayed_on(orbit: &PeriodicOrbit) -> Result<Stepped, SimulateError> {
     let multiplier = match orbit.multipliers().first() {
-        Some(value) => Multiplier { value: *value, error: orbit.multiplier_error() },
+        Some(value) => Multiplier {
+            value: *value,
+            error: orbit.multiplier_error(),
+            scheme_error: orbit.scheme_error(),
+        },
         // The multiplier overflows.
-        None => Multiplier { value: f64::INFINITY.into(), error: 0.0 },
+        None => Multiplier { value: f64::INFINITY.into(), error: 0.0, scheme_error: None },
     };
     if multiplier.value.norm() > 1.0 + MULTIPLIER_ROUNDING + multiplier.error {
         return Err(SimulateError::UnstableOrbit { multiplier: multiplier.value });

@@ -91,15 +91,18 @@ pub struct FreeGrowth {
     pub text: String,
 }
 
-/// Largest ratio of a disturbance of a periodic response after and before one period.
+/// Largest ratio of a disturbance of a periodic response after one period to the disturbance before
+/// it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LargestMultiplier {
     /// Real and imaginary part of the factor, pure numbers.
     pub value: [f64; 2],
     /// Modulus of the factor: below 1 disturbances decay (pure number).
     pub modulus: f64,
-    /// Error bound (pure number).
+    /// Error of the factor, with that by the time step if it is known (pure number).
     pub error: f64,
+    /// Error of the factor by the time step of the scheme (pure number); `None` if it is not known.
+    pub scheme_error: Option<f64>,
     /// Text with these numbers.
     pub text: String,
 }
@@ -239,8 +242,13 @@ impl FreeGrowth {
 
 impl LargestMultiplier {
     fn from_multiplier(multiplier: Multiplier) -> Self {
-        let Multiplier { value, error } = multiplier;
+        let Multiplier { value, error: of_steps, scheme_error } = multiplier;
         let modulus = value.norm();
+        let error = of_steps + scheme_error.unwrap_or(0.0);
+        let lacking = match scheme_error {
+            Some(_) => "",
+            None => "; the error by the time step is not known and not included",
+        };
         let becomes = match modulus {
             _ if modulus + error < 1.0 => "it is stable",
             _ if modulus - error > 1.0 => "it lies at the limit of stability",
@@ -248,11 +256,11 @@ impl LargestMultiplier {
         };
         let text = format!(
             "each period multiplies a disturbance of the response by {} ± {} at most (the largest Floquet \
-             multiplier): {becomes}",
+             multiplier): {becomes}{lacking}",
             significant(modulus, 4),
             significant(error, 1),
         );
-        Self { value: [value.re, value.im], modulus, error, text }
+        Self { value: [value.re, value.im], modulus, error, scheme_error, text }
     }
 }
 
