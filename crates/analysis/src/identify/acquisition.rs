@@ -76,7 +76,8 @@ impl Acquisition {
     ) -> Result<FrequencyData, AnalysisError> {
         if self.between_samples == Some(Discretisation::Euler) {
             let why =
-                "euler belongs to `domain` time; for spectra choose held or linear".to_owned();
+                "euler is available only with `domain` time; for spectra choose held or linear"
+                    .to_owned();
             return Err(AnalysisError::Setting { setting: "between_samples", why });
         }
         let (names, kind) = (&held.names, held.response().1);
@@ -125,7 +126,7 @@ impl Acquisition {
                 return Err(AnalysisError::Setting { setting: "between_samples", why });
             };
             let data = joined(&equivalent)?;
-            // White noise suffices until the equivalent force hardly changes.
+            // The fits assume white noise until the equivalent force hardly changes.
             let is_last = round + 1 == ACQUISITION_ROUNDS;
             let of_round = if settled || is_last { pooling } else { Pooling::AllLines };
             // The first round searches anew, because the band-limited force may have led to a wrong
@@ -164,47 +165,86 @@ impl BetweenSamples {
     }
 }
 
-/// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best instead of the
-/// band-limited force of a `fit`. Long records are fitted on a part of their lines. `None` without
-/// kinds, or if no fit succeeds.
-///
-/// # Source
-/// Maximum likelihood with the levels of the channels eliminated.
-pub(super) fn between_samples(
-    records: &[FrequencyData],
-    kinds: &[Discretisation],
-    dt: f64,
-    fit: &OutputErrorFit,
+/// Fit of open records with a band-limited force, with which the fits of other explanations are
+/// compared. Long records are fitted on a part of their lines.
+pub(super) struct BandLimitedFit<'a> {
+    records: Vec<FrequencyData>,
+    fit: OutputErrorFit,
+    /// Mean over the channels of the logarithms of their residual powers.
+    level: f64,
+    unknowns: &'a Unknowns,
     pooling: Pooling,
-) -> Option<BetweenSamples> {
-    let unknowns = fit.estimate.unknowns();
-    let lines: usize = records.iter().map(FrequencyData::len).sum();
-    let step = (lines / (LINES_PER_UNKNOWN * unknowns.independent()).max(1)).max(1);
-    let thinned: Option<Vec<_>> = records.iter().map(|record| record.thinned(step)).collect();
-    let thinned = thinned.filter(|_| !kinds.is_empty())?;
-    let closed = |fit: &OutputErrorFit, records: &[FrequencyData]| {
-        fit.ends.as_ref()?.without_transients(records).ok()
-    };
-    let level = |fit: &OutputErrorFit, records: &[FrequencyData]| -> Option<f64> {
-        let system = fit.estimate.system().ok()?;
-        let powers = closed(fit, records)?.into_iter();
-        let sum = powers
-            .map(|record| residual_powers(&record, &system))
-            .reduce(|sum, powers| sum + powers)?;
-        Some(sum.map(f64::ln).mean())
-    };
-    let usual = output_error_from(&joined(&thinned).ok()?, unknowns, fit, pooling).ok()?;
-    let before = level(&usual, &thinned)?;
-    let refitted = kinds.iter().filter_map(|kind| {
-        let acquisition = Acquisition { between_samples: Some(*kind), ..Acquisition::default() };
-        let (fit, equivalent) =
-            acquisition.refitted(usual.clone(), &thinned, dt, unknowns, pooling).ok()?;
-        Some((*kind, (level(&fit, &equivalent)? - before).exp(), fit, equivalent))
-    });
-    let (kind, remaining, fit, equivalent) = refitted.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let after = after_spectral_fit(&closed(&fit, &equivalent)?, &fit.estimate, Extent::Open);
-    let leaves_noise = remaining < 1.0 && after.is_ok_and(|after| is_noise(&after.records));
-    Some(BetweenSamples { kind, remaining, leaves_noise })
+}
+
+impl<'a> BandLimitedFit<'a> {
+    /// Fits the thinned records, from a `fit` to all lines; `None` if that fails.
+    pub(super) fn new(
+        records: &[FrequencyData],
+        fit: &'a OutputErrorFit,
+        pooling: Pooling,
+    ) -> Option<Self> {
+        let unknowns = fit.estimate.unknowns();
+        let lines: usize = records.iter().map(FrequencyData::len).sum();
+        let step = (lines / (LINES_PER_UNKNOWN * unknowns.independent()).max(1)).max(1);
+        let thinned: Option<Vec<_>> = records.iter().map(|record| record.thinned(step)).collect();
+        let records = thinned?;
+        let fit = output_error_from(&joined(&records).ok()?, unknowns, fit, pooling).ok()?;
+        let level = level(&fit, &records)?;
+        Some(Self { records, fit, level, unknowns, pooling })
+    }
+
+    /// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best instead of
+    /// the band-limited force. `None` without kinds, or if no fit succeeds.
+    ///
+    /// # Source
+    /// Maximum likelihood with the levels of the channels eliminated.
+    pub(super) fn between_samples(
+        &self,
+        kinds: &[Discretisation],
+        dt: f64,
+    ) -> Option<BetweenSamples> {
+        let Self { records, unknowns, pooling, .. } = self;
+        let refitted = kinds.iter().filter_map(|kind| {
+            let acquisition =
+                Acquisition { between_samples: Some(*kind), ..Acquisition::default() };
+            let (fit, equivalent) =
+                acquisition.refitted(self.fit.clone(), records, dt, unknowns, *pooling).ok()?;
+            Some((*kind, self.remaining(&fit, &equivalent)?, fit, equivalent))
+        });
+        let (kind, remaining, fit, equivalent) = refitted.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let after = after_spectral_fit(&closed(&fit, &equivalent)?, &fit.estimate, Extent::Open);
+        let leaves_noise = remaining < 1.0 && after.is_ok_and(|after| is_noise(&after.records));
+        Some(BetweenSamples { kind, remaining, leaves_noise })
+    }
+
+    /// Returns the fraction of the residual power that remains after a new search with changed
+    /// records; `None` if the fit fails.
+    pub(super) fn after(&self, change: impl Fn(&FrequencyData) -> FrequencyData) -> Option<f64> {
+        let changed: Vec<FrequencyData> = self.records.iter().map(change).collect();
+        let fit = output_error_pooling(&joined(&changed).ok()?, self.unknowns, self.pooling);
+        self.remaining(&fit.ok()?, &changed)
+    }
+
+    /// Returns the residual power of a fit to `records`, relative to that with the band-limited
+    /// force.
+    fn remaining(&self, fit: &OutputErrorFit, records: &[FrequencyData]) -> Option<f64> {
+        Some((level(fit, records)? - self.level).exp())
+    }
+}
+
+/// Returns the records without the transients of a fit.
+fn closed(fit: &OutputErrorFit, records: &[FrequencyData]) -> Option<Vec<FrequencyData>> {
+    fit.ends.as_ref()?.without_transients(records).ok()
+}
+
+/// Returns the mean over the channels of the logarithms of their residual powers.
+fn level(fit: &OutputErrorFit, records: &[FrequencyData]) -> Option<f64> {
+    let system = fit.estimate.system().ok()?;
+    let powers = closed(fit, records)?.into_iter();
+    let sum = powers
+        .map(|record| residual_powers(&record, &system))
+        .reduce(|sum, powers| sum + powers)?;
+    Some(sum.map(f64::ln).mean())
 }
 
 /// Returns the power of the residual of each channel, in the squared unit of the measured quantity.

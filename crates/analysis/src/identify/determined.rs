@@ -17,10 +17,10 @@ const NAMED: usize = 6;
 /// Refuses a fit of a linear system that is singular to rounding, that explains no more of the
 /// response than chance does, or in which the interval of every parameter contains zero.
 ///
-/// A fit is not refused if a fault of the channels or another model explains the failure. If all
-/// intervals contain zero, the modes of several degrees of freedom may still be determined; with
-/// one degree of freedom, response and mode are indistinguishable from noise. An estimate that
-/// noise biases may explain none of a response that is mostly signal.
+/// A fit that is not singular is not refused if a fault of the channels or another model explains
+/// the failure. If all intervals contain zero, the modes of several degrees of freedom may still be
+/// determined; with one degree of freedom, response and mode are indistinguishable from noise. An
+/// estimate that noise biases may explain none of a response that is mostly signal.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -32,23 +32,23 @@ pub(super) fn check(
 ) -> Result<(), AnalysisError> {
     let refused = |why: String| Err(AnalysisError::NothingDetermined { why });
     let is_unrelated = |check: &&CheckRow| matches!(check.finding, Finding::Unrelated(_));
-    // A fault of the channels, or a delay, explains the failure.
-    let explains =
-        |check: &CheckRow| check.is_bad() && check.when == When::Before || check.is_explanation();
-    if checks.iter().any(explains) {
+    let condition = estimate.condition();
+    if condition * f64::EPSILON >= 1.0 {
+        let number = significant(condition, 2);
+        let causes = checks.iter().filter(|check| explains_failure(check));
+        let causes: String = causes.map(|check| format!(". {}", check.sentence())).collect();
+        let singular = format!(
+            "the condition number of the fit is {number}: the equations are singular within rounding errors"
+        );
+        return refused(singular + &causes);
+    }
+    if checks.iter().any(explains_failure) {
         return Ok(());
     }
     if let Some(check) = checks.iter().find(is_unrelated)
         && !is_biased
     {
         return refused(check.sentence());
-    }
-    let condition = estimate.condition();
-    if condition * f64::EPSILON >= 1.0 {
-        let number = significant(condition, 2);
-        return refused(format!(
-            "the condition number of the fit is {number}: the equations are singular to rounding"
-        ));
     }
     let frequencies = determined(modes);
     if is_open(estimate) && (estimate.dof() == 1 || frequencies.is_empty()) {
@@ -60,6 +60,12 @@ pub(super) fn check(
         return refused(format!("{} contain zero, {modes}", intervals(estimate)));
     }
     Ok(())
+}
+
+/// Returns whether a check finds a fault of the channels, a delay or another model, which may
+/// explain that a fit fails.
+fn explains_failure(check: &CheckRow) -> bool {
+    check.is_bad() && check.when == When::Before || check.is_explanation()
 }
 
 /// Refuses a fit with nonlinear terms that explains no more of the force, or by output error of the
@@ -77,7 +83,7 @@ pub(super) fn check_nonlinear(fit: &NonlinearEstimate) -> Result<(), AnalysisErr
     {
         let percent = significant(100.0 * unrelated.explained, 3);
         let why = format!(
-            "the model explains {percent} % of what is fitted, as it would by chance; if noise biases least \
+            "the model explains {percent} % of the fitted data, no more than by chance; if noise biases least \
              squares, use several periods or maximum likelihood (`method`)"
         );
         return Err(AnalysisError::NothingDetermined { why });

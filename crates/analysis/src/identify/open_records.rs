@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use mechid_checks::limits::DELAY_REMAINING;
 use mechid_checks::{
-    AfterSpectralFit, Cause, Finding, Quantity, RowParts, SpectralResidual, after_spectral_fit,
-    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition,
-    fault_of_hits, fitted_band, forces_between_samples, linearity_of_open_record,
+    AfterSpectralFit, Alternative, Cause, Finding, Quantity, RowParts, SpectralResidual,
+    after_spectral_fit, before_spectral_fit, delay_of_lines, delay_of_open_records,
+    fault_of_acquisition, fault_of_hits, fitted_band, forces_between_samples,
+    linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
@@ -16,7 +17,7 @@ use mechid_model::{Discretisation, ResponseQuantity};
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
 
-use super::acquisition::{Acquisition, BetweenSamples, between_samples};
+use super::acquisition::{Acquisition, BandLimitedFit, BetweenSamples};
 use super::compared::{Compared, rows_of};
 use super::disagreement::{Disagreement, squared_change};
 use super::fitted::{Fitted, Residual};
@@ -35,17 +36,18 @@ use crate::measurement::{Block, Windowed};
 /// Significance level of the test for transients; a record of whole periods is called open with
 /// this probability.
 const LEVEL: f64 = 1e-3;
-/// Ratio of transient power to force power that counts as rounding; a larger one is a transient.
+/// Ratio of transient power to force power that counts as rounding; a larger ratio shows a
+/// transient.
 const ROUNDING: f64 = 1e-20;
 
-/// Maximum number of lines for which a record without settings is tried as an open record. With two
-/// forces, an eighth of [`SENSITIVITIES`] takes ten seconds of one processor.
+/// Maximum number of lines for which a record without settings is tried as an open record. A fit
+/// with two forces and an eighth of [`SENSITIVITIES`] takes ten seconds on one processor.
 const LINES: usize = 1 << 19;
 /// Maximum number of unknown parameters for which a record without settings is tried as an open
-/// one.
+/// record.
 const PARAMETERS: usize = 100;
 /// Maximum product of lines and unknown parameters for which a record without settings is tried as
-/// an open one.
+/// an open record.
 const SENSITIVITIES: usize = 100 << 17;
 
 /// Ratio of sampling rate to the highest frequency that an anti-aliasing filter passes: the upper
@@ -192,8 +194,8 @@ pub(super) fn fit(
     Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
 }
 
-/// Returns the data without the transients of forces and responses, and those with the responses to
-/// the forces alone.
+/// Returns the data without the transients of forces and responses, and the data with the measured
+/// forces and only the responses to them.
 fn without_transients(
     fit: &OutputErrorFit,
     data: &[FrequencyData],
@@ -245,7 +247,7 @@ fn agreement(
 /// Open records with their fit.
 struct Tested<'a> {
     records: &'a [FrequencyData],
-    /// The records without transients and errors of pulses.
+    /// The records without their transients and without the errors of pulses.
     closed: &'a [FrequencyData],
     fit: &'a OutputErrorFit,
     residuals: &'a [SpectralResidual],
@@ -266,22 +268,23 @@ impl Tested<'_> {
             return Ok(likelier(late, fault_of_hits(records, closed, dt, fit, residuals)));
         }
         let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
-        let between = between_samples(records, &kinds, dt, fit, pooling);
-        // If a force held or linear between samples leaves only noise, AC coupling cannot explain
-        // more.
-        let leaves_noise = between.as_ref().is_some_and(|between| between.leaves_noise);
-        let fault = if leaves_noise {
-            None
-        } else {
-            fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?
-        };
-        let between = between.filter(|between| leaves_noise || between.remaining < DELAY_REMAINING);
+        let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
+        let compared =
+            if kinds.is_empty() { None } else { BandLimitedFit::new(records, fit, pooling) };
+        let Some(compared) = compared else { return Ok(likelier(late, fault)) };
+        let between = compared.between_samples(&kinds, dt);
+        // The fit may be at a wrong minimum, so that both explanations need a new search.
+        let again = |fault: &Finding| compared.after(uncoupled(fault, closed[0].measured())?);
+        let remaining = fault.as_ref().and_then(again);
+        let fault = fault.map(|fault| with_remaining(fault, remaining));
+        let explains = |b: &BetweenSamples| b.leaves_noise || b.remaining < DELAY_REMAINING;
+        let between = between.filter(explains);
         let between = between.as_ref().map(BetweenSamples::finding);
         Ok(likelier(likelier(late, fault), between))
     }
 }
 
-/// Returns the explanation of a residual that reduces its power most.
+/// Returns the explanation that reduces the power of a residual most.
 fn likelier(one: Option<Finding>, other: Option<Finding>) -> Option<Finding> {
     one.into_iter().chain(other).min_by(|a, b| remaining(a).total_cmp(&remaining(b)))
 }
@@ -293,6 +296,38 @@ fn remaining(finding: &Finding) -> f64 {
         Finding::Alternative(alternative) => alternative.remaining,
         _ => 1.0,
     }
+}
+
+/// Returns the finding with the fraction of the residual power that remains after a new search, if
+/// it is known.
+fn with_remaining(finding: Finding, remaining: Option<f64>) -> Finding {
+    match (finding, remaining) {
+        (Finding::Alternative(alternative), Some(remaining)) => {
+            Finding::Alternative(Alternative { remaining, ..alternative })
+        }
+        (finding, _) => finding,
+    }
+}
+
+/// Returns the change of a record with responses of a `quantity` that gives all channels the same
+/// AC coupling; `None` unless the finding names AC coupling.
+fn uncoupled(
+    finding: &Finding,
+    quantity: ResponseQuantity,
+) -> Option<impl Fn(&FrequencyData) -> FrequencyData> {
+    let Finding::Alternative(Alternative {
+        cause: Cause::AcCoupling { channels, corner_hz }, ..
+    }) = finding
+    else {
+        return None;
+    };
+    let of = |wanted: Quantity| -> Vec<usize> {
+        let channels = channels.iter().filter(|channel| channel.quantity == wanted);
+        channels.map(|channel| channel.index).collect()
+    };
+    let (responses, forces) = (of(Quantity::Response(quantity)), of(Quantity::Force));
+    let corner = TAU * corner_hz;
+    Some(move |data: &FrequencyData| data.with_high_pass_alike(&responses, &forces, corner))
 }
 
 /// Returns the estimate with the delay or the fault of the acquisition that a finding names; `None`
@@ -318,15 +353,7 @@ fn refitted_with(
     };
     let refitted = match cause {
         Cause::Delay { seconds } => fit(&changed(&|data| data.with_later_force(*seconds)))?,
-        Cause::AcCoupling { channels, corner_hz } => {
-            let of = |wanted: Quantity| -> Vec<usize> {
-                let channels = channels.iter().filter(|channel| channel.quantity == wanted);
-                channels.map(|channel| channel.index).collect()
-            };
-            let (responses, forces) = (of(Quantity::Response(quantity)), of(Quantity::Force));
-            let corner = TAU * corner_hz;
-            fit(&changed(&|data| data.with_high_pass_alike(&responses, &forces, corner)))?
-        }
+        Cause::AcCoupling { .. } => fit(&changed(&uncoupled(finding, quantity)?))?,
         Cause::BetweenSamples { between_samples } => {
             let acquisition =
                 Acquisition { between_samples: Some(*between_samples), ..Acquisition::default() };
@@ -338,7 +365,7 @@ fn refitted_with(
     Some(refitted.estimate)
 }
 
-/// Returns the failure of a search, with a delay of the responses as its reason if there is one.
+/// Returns the failure of a search. If the responses are delayed, the delay is added as a reason.
 fn with_delay(
     error: EstimateError,
     data: &FrequencyData,
@@ -365,7 +392,8 @@ fn after(
         let mut checks = Vec::from_iter(fitted_band(estimate, lines)?);
         if matches!(excitation, Excitation::Lasting) {
             match linearity_of_open_record(estimate, &held.force, closed, lines) {
-                // A free machine has no displacement to take powers of.
+                // The displacement of a free machine cannot be computed, so there are no powers of
+                // it to test.
                 Err(EstimateError::Model(_)) => {}
                 looked => checks.push(looked?),
             }
@@ -393,8 +421,8 @@ fn remarks(
         force_noise.iter().any(|noise| noise.levels_n.iter().flatten().any(|n| *n > 0.0));
     let are_apart = matches!(excitation, Excitation::Hits(_)) && is_noisy;
     let of_pulses = (are_apart && fit.pulse_amplitudes.is_empty()).then(|| {
-        "the noise of the force was taken as independent from line to line, because its pulses could not be \
-         fitted (they may be too many): the checks of the residual may warn of this noise"
+        "the noise of the force was taken as independent from line to line, because the pulses could not be \
+         fitted (there may be too many): the checks of the residual may warn of this noise"
             .into()
     });
     one_motion_of(&records[0].held)

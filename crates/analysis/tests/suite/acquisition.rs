@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use mechid_analysis::identify::{Acquisition, Form, OpenFit, Source, Structure};
 use mechid_analysis::{Identified, Identify, Measurement, ResponseQuantity, identify};
-use mechid_checks::{Alternative, Cause, Finding};
+use mechid_checks::{Alternative, Cause, Channel, Finding, Quantity};
 use mechid_model::{Discretisation, Sdof};
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_problems::RandomTest;
@@ -86,7 +86,7 @@ fn a_simulated_force_is_named_and_allowed_for() {
         // The fit with the wrong force is off by many of its own errors; the intervals include
         // that.
         assert_eq!(held(&usual, truth), 3, "{usual}");
-        let note = "include the change of the parameters by the model that explains the residual";
+        let note = "to those of the model that explains the residual";
         assert!(usual.to_string().contains(note), "{usual}");
         let expected = Some(Cause::BetweenSamples { between_samples: between });
         assert_eq!(cause(&usual), expected, "{}", usual.summary().all_checks());
@@ -205,4 +205,20 @@ fn an_ac_coupled_response_is_allowed_for() {
     }
     let wrong = identify(&[random_test(None, None, 0)], &open(None, &["a9=0.5"])).unwrap_err();
     assert!(wrong.to_string().contains("no channel a9"), "{wrong}");
+}
+
+/// The response is behind a high-pass of 3 Hz: every record names it, with the corner frequency. An
+/// earlier version named a force held or linear between its samples in some of them.
+#[test]
+fn an_ac_coupled_response_is_named() {
+    (0..4_u64).into_par_iter().for_each(|seed| {
+        let test = random_test(Some(3.0), None, seed);
+        let found = identify(&[test], &Identify::default()).unwrap();
+        let Some(Cause::AcCoupling { channels, corner_hz }) = cause(&found) else {
+            panic!("{seed}: {}", found.summary().all_checks());
+        };
+        let quantity = Quantity::Response(ResponseQuantity::Acceleration);
+        assert_eq!(channels, [Channel { quantity, index: 0 }], "{seed}");
+        assert!((corner_hz - 3.0).abs() < 0.3, "{seed}: {corner_hz} Hz");
+    });
 }
