@@ -10,6 +10,11 @@ pub(crate) const NUMBER_BYTES: usize = 16;
 /// analysers are shorter.
 pub(crate) const DETAILS_BYTES: u64 = 64 << 10;
 
+/// Memory of a record in the lists of the records of a file, in bytes, without the texts of its
+/// identifier: two texts, its rows, and its part of a tree and of growing lists.
+#[cfg(feature = "parquet")]
+pub(crate) const RECORD_BYTES: usize = 256;
+
 /// Size, in bytes, that the text in a gzip file may have even if the file is very small.
 const TEXT_BYTES: usize = 64 << 20;
 

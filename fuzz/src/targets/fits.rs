@@ -8,12 +8,12 @@ use mechid_analysis::fleet::{Fleet, TrendAxis, Trends};
 use mechid_analysis::identify::{Method, Nonlinear};
 use mechid_analysis::modes::{ModalTest, ModesSettings, modes, modes_of_responses};
 use mechid_analysis::{
-    AnalysisError, BearingData, Channels, DecaySettings, FrfSettings, Identify, IdentifyBearing,
-    IdentifyResponses, InspectSettings, Machine, Measurement, ModalSummary, Predict, Reading,
-    ResponseQuantity, SavedAnalysis, Window, decay, frf, identify, identify_bearing,
-    identify_responses, inspect, predict,
+    AnalysisError, BearingData, Channels, DecaySettings, ElementData, FrfSettings, Identify,
+    IdentifyBearing, IdentifyElements, IdentifyResponses, InspectSettings, Machine, Measurement,
+    ModalSummary, Predict, Reading, ResponseQuantity, SavedAnalysis, Window, decay, frf, identify,
+    identify_bearing, identify_elements, identify_responses, inspect, predict,
 };
-use mechid_io::{FrequencyResponses, RecordFile, escaped};
+use mechid_io::{FrequencyResponses, RecordFile, escaped, read_machine};
 
 use crate::depth::{Depth, reached};
 use crate::{Input, Target};
@@ -64,7 +64,22 @@ const TABLES: &[&str] = &[
     "         4",
 ];
 
-pub const TARGETS: [Target; 10] = [
+/// Words that occur in machines of named elements.
+const MACHINES: &[&str] = &[
+    "{\"start\": 1, \"min\": 0}",
+    "\"between\": [\"x1\", \"x2\"]",
+    "\"at\": \"x1\"",
+    "\"relative_to\": \"x2\"",
+    "\"delay\": 0.01",
+    "\"gain\": {\"start\": 1}",
+    "\"ties\": []",
+    "0",
+    "-1",
+    "1e308",
+    "null",
+];
+
+pub const TARGETS: [Target; 11] = [
     fit("identify", identified),
     fit("decay", decayed),
     fit("bearing", bearings),
@@ -87,6 +102,13 @@ pub const TARGETS: [Target; 10] = [
         run: terms,
     },
     fit("fleet", fleet),
+    Target {
+        name: "machine",
+        corpus: "machines",
+        input: Input::Few(MACHINES),
+        memory: [64 << 20, 4000],
+        run: machine,
+    },
 ];
 
 /// Returns a target whose input is a record with few changed bytes, so that most cases reach the
@@ -311,14 +333,47 @@ fn tables(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
+/// Returns the record of the example, cut into periods or open.
+fn example(channels: &Channels, is_open: bool) -> Result<Measurement, String> {
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/records/machine.csv");
+    let period = (!is_open).then_some(128);
+    let window = Window { period, ..Window::default() };
+    let opened = Measurement::open(rig, channels).and_then(|record| record.window(window));
+    opened.map_err(|error| error.to_string())
+}
+
+/// Reads a machine of named elements and fits it to the record of the example.
+fn machine(bytes: &[u8]) -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let path = folder.path().join("a.json");
+    fs::write(&path, bytes).map_err(|error| error.to_string())?;
+    let described = match read_machine(&path) {
+        Ok(described) => described,
+        Err(error) if escaped(&error.to_string()) == error.to_string() => return Ok(()),
+        Err(error) => return Err(format!("a message is not escaped: {:?}", error.to_string())),
+    };
+    reached(Depth::Read);
+    let how = IdentifyElements { starts: 2, ..IdentifyElements::new(described) };
+    let choice: usize = bytes.iter().map(|byte| usize::from(*byte)).sum();
+    let Some(channels) = passed(how.channels())? else { return Ok(()) };
+    let Ok(measurement) = example(&channels, choice.is_multiple_of(2)) else { return Ok(()) };
+    let Some(data) = passed(ElementData::from_records(&[measurement], &how))? else {
+        return Ok(());
+    };
+    reached(Depth::Reached);
+    match passed(identify_elements(&data, &how))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
 /// Parses nonlinear terms and fits them to the record of the example.
 fn terms(bytes: &[u8]) -> Result<(), String> {
     let Ok(terms) = String::from_utf8_lossy(bytes).parse::<Nonlinear>() else { return Ok(()) };
     reached(Depth::Read);
-    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/records/machine.csv");
     let channels = Channels::new("force", ResponseQuantity::Displacement, "displacement");
-    let opened = Measurement::open(rig, &channels).and_then(|record| record.period(128));
-    let measurement = opened.map_err(|error| error.to_string())?;
+    let choice: usize = bytes.iter().map(|byte| usize::from(*byte)).sum();
+    let measurement = example(&channels, choice.is_multiple_of(4))?;
     reached(Depth::Reached);
     match passed(identify(&[measurement], &Identify::nonlinear(terms)))? {
         Some(found) => printed(&found),

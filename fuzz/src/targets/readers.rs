@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use mechid_io::{
-    Experiment, IoError, Limits, LineSpec, Quantity, ReadOptions, RecordFile, Table, TimeAxis,
-    escaped, parse_matrix_market, read_covariance, read_system,
+    Experiment, IoError, Limits, LineSpec, ParquetFile, Quantity, ReadOptions, RecordFile, Table,
+    TimeAxis, escaped, parse_matrix_market, read_covariance, read_system,
 };
 use mechid_signal::Sampling;
 
@@ -130,7 +130,7 @@ const LABVIEW: &[&str] = &[
     "1e308",
 ];
 
-pub const TARGETS: [Target; 10] = [
+pub const TARGETS: [Target; 11] = [
     Target {
         name: "text",
         corpus: "text",
@@ -210,6 +210,14 @@ pub const TARGETS: [Target; 10] = [
         ]),
         memory: [4 << 20, 200],
         run: matrix,
+    },
+    Target {
+        name: "identifiers",
+        corpus: "parquet",
+        input: Input::Mutations(&["PAR1", "\x15\0", "\x19\x2c", "\u{7f}\u{7f}"]),
+        // The list of the records may use the memory of a small file.
+        memory: [300 << 20, 600],
+        run: identifiers,
     },
     Target {
         name: "lines",
@@ -310,6 +318,29 @@ fn record(bytes: &[u8]) -> Result<(), String> {
     }
     told(table.common_length(&good))?;
     shown(&table.position(0).to_string())
+}
+
+/// Takes every column of a Parquet file as the identifiers of its records.
+fn identifiers(bytes: &[u8]) -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let path = folder.path().join("a.parquet");
+    fs::write(&path, bytes).map_err(|e| e.to_string())?;
+    let Some(file) = told(ParquetFile::open(&path, &OPTIONS.limits))? else { return Ok(()) };
+    reached(Depth::Read);
+    for column in 0..file.head().width() {
+        let Some(records) = told(file.records(&(column + 1).to_string()))? else { continue };
+        reached(Depth::Reached);
+        let ends = records.iter().scan(0, |end, record| {
+            let follows = record.rows.start == *end && record.rows.end > *end;
+            *end = record.rows.end;
+            Some(follows)
+        });
+        ensure(ends.into_iter().all(|follows| follows), "the records leave rows out")?;
+        if told(file.tables(None, &records[..records.len().min(3)]))?.is_some() {
+            reached(Depth::Fitted);
+        }
+    }
+    Ok(())
 }
 
 /// Checks that a text read in chunks gives the same numbers as one held in memory.

@@ -140,10 +140,12 @@ fn a_matrix_of_comments_in_gzip_is_refused() {
     (0..60).for_each(|_| packed.write_all(&comments).unwrap());
     fs::write(home.path().join("k.mtx.gz"), packed.finish().unwrap()).unwrap();
     let machine = r#"{"system": {"mass": "k.mtx.gz", "damping": "k.mtx.gz", "stiffness": "k.mtx.gz"},
-        "sampling": {"rate": 100, "samples": 10}, "excitation": {"kind": "zero"}}"#;
+        "sampling": {"rate_hz": 100, "samples": 10}, "excitation": {"lines": "1:4", "amplitude": 2}}"#;
     fs::write(home.path().join("m.json"), machine).unwrap();
     let output = limited(home.path(), "simulate m.json --output a.csv");
-    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("k.mtx.gz") && message.contains("bytes"), "{message}");
 }
 
 #[test]

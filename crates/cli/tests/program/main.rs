@@ -1,6 +1,7 @@
 //! Behaviour common to all subcommands: the records that they read, and their messages.
 
 mod bearing;
+mod care;
 mod checks;
 mod elements;
 mod fleet;

@@ -12,7 +12,7 @@ use ::parquet::data_type::{AsBytes as _, DataType};
 use ::parquet::file::reader::Length as _;
 
 use super::read::{CHUNK_ROWS, Columns, Trouble, guarded, usable};
-use crate::limits::{Budget, Limit, Limits};
+use crate::limits::{Budget, Limit, Limits, RECORD_BYTES};
 use crate::standard::input_name;
 use crate::{IoError, Table, escaped};
 
@@ -86,7 +86,9 @@ impl ParquetFile {
     /// [`IoError::Parquet`].
     pub fn records(&self, column: &str) -> Result<Vec<RecordRows>, IoError> {
         let at = self.head.find(column)?;
-        let mut ids = Ids { name_bytes: self.limits.name_bytes, ..Ids::default() };
+        let (name_bytes, budget) = (self.limits.name_bytes, self.budget());
+        let (records, known) = (Vec::new(), BTreeSet::new());
+        let mut ids = Ids { records, known, rows: 0, refusal: None, name_bytes, budget };
         let trouble = guarded(|| {
             let whole = 0..self.columns.rows()?;
             let (groups, spans) = (self.columns.groups(), slice::from_ref(&whole));
@@ -137,7 +139,6 @@ impl ParquetFile {
 }
 
 /// Identifiers read so far.
-#[derive(Default)]
 struct Ids {
     records: Vec<RecordRows>,
     known: BTreeSet<String>,
@@ -145,10 +146,12 @@ struct Ids {
     refusal: Option<Refusal>,
     /// Limit on the bytes of a name.
     name_bytes: usize,
+    /// Memory that the list of records may use.
+    budget: Budget,
 }
 
-/// Reason why the rows cannot be divided into records; it applies to the row after the last one
-/// read.
+/// Reason why the rows cannot be divided into records; it applies to the row after the last row
+/// that was read.
 enum Refusal {
     NoId,
     /// The rows of this record are not consecutive.
@@ -211,6 +214,8 @@ impl Ids {
         match self.records.last_mut().filter(|record| record.id == id) {
             Some(record) => record.rows.end += count,
             None if self.known.insert(id.clone()) => {
+                let taken = self.budget.take_bytes(RECORD_BYTES + 2 * id.len());
+                taken.map_err(|limit| Trouble::TooLarge(self.rows, limit))?;
                 self.records.push(RecordRows { id, rows: self.rows..self.rows + count });
             }
             None => return self.refused(Refusal::Apart(id)),

@@ -262,6 +262,46 @@ fn memory_has_a_limit_by_the_size_of_the_file() {
     }
 }
 
+/// Differences of identifiers that are all the same take hardly any space, so that a small file can
+/// name millions of records; an earlier version listed them in 5 GB.
+#[test]
+fn the_list_of_the_records_has_a_limit() {
+    use parquet::basic::Encoding;
+    use parquet::data_type::Int64Type;
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
+
+    let schema = parse_message_type("message m { required int64 id; }").unwrap();
+    let properties = WriterProperties::builder()
+        .set_dictionary_enabled(false)
+        .set_encoding(Encoding::DELTA_BINARY_PACKED)
+        .build();
+    let mut file = Vec::new();
+    let mut writer =
+        SerializedFileWriter::new(&mut file, schema.into(), properties.into()).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    for part in 0..4 {
+        let ids: Vec<i64> = (0..1 << 19).map(|id| id + (part << 19)).collect();
+        column.typed::<Int64Type>().write_batch(&ids, None, None).unwrap();
+    }
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    assert!(file.len() < 100_000, "{} bytes", file.len());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ids.parquet");
+    std::fs::write(&path, &file).unwrap();
+    let opened = ParquetFile::open(&path, &Limits::DEFAULT).unwrap();
+    match opened.records("id") {
+        Err(IoError::TooLarge { limit: Limit::Memory(bytes), .. }) => {
+            assert_eq!(bytes, Limits::DEFAULT.memory(file.len()));
+        }
+        other => panic!("{:?}", other.map(|records| records.len())),
+    }
+}
+
 /// An earlier version read sixty thousand columns in a time that grew with the square of their
 /// number: 18 s.
 #[test]
