@@ -123,7 +123,7 @@ fn two() -> SecondOrderSystem {
     SecondOrderSystem::new(mass, damping, stiffness).expect("an invertible mass")
 }
 
-/// Chain of eight masses with modes from 17 to 99 Hz and damping ratios from 1.2 to 4.8 %.
+/// Chain of eight masses with modes from 17 to 99 Hz and damping ratios from 1.2 to 4.7 %.
 fn eight() -> SecondOrderSystem {
     let stiffness = DMatrix::from_fn(8, 8, |i, j| match i.abs_diff(j) {
         0 => 4e5,

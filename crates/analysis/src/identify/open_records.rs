@@ -277,6 +277,7 @@ impl Tested<'_> {
         let again = |fault: &Finding| compared.after(uncoupled(fault, closed[0].measured())?);
         let remaining = fault.as_ref().and_then(again);
         let fault = fault.map(|fault| with_remaining(fault, remaining));
+        let fault = fault.filter(|fault| self::remaining(fault) < 1.0);
         let explains = |b: &BetweenSamples| b.leaves_noise || b.remaining < DELAY_REMAINING;
         let between = between.filter(explains);
         let between = between.as_ref().map(BetweenSamples::finding);

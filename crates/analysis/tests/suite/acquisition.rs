@@ -207,8 +207,7 @@ fn an_ac_coupled_response_is_allowed_for() {
     assert!(wrong.to_string().contains("no channel a9"), "{wrong}");
 }
 
-/// The response is behind a high-pass of 3 Hz: every record names it, with the corner frequency. An
-/// earlier version named a force held or linear between its samples in some of them.
+/// The response is behind a high-pass of 3 Hz: every record names it, with the corner frequency.
 #[test]
 fn an_ac_coupled_response_is_named() {
     (0..4_u64).into_par_iter().for_each(|seed| {

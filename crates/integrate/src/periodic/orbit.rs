@@ -74,6 +74,9 @@ impl PeriodicOrbit {
 /// force; to find them, give as many periods of the force. Nonlinear forces that depend on time
 /// must repeat with the force.
 ///
+/// If the number of samples is even, the orbit is found again with twice the step, which shows the
+/// error of its multipliers by the step and takes half as long again.
+///
 /// Up to 64 degrees of freedom a Newton step costs two passes over the period for each number of
 /// the state. For more degrees of freedom, the derivative of the state over a period is not formed.
 /// The step is then found in the Krylov space of products with this derivative (GMRES), at two
