@@ -116,6 +116,22 @@ fn cases() -> Vec<Case> {
         with_pole("the same, noise that rises with frequency", -0.5),
         with_pole("the same, noise that falls steeply", 0.9),
         case("bridge, accelerations, 300 s", &bridge, Quantity::Acceleration, 20.0, 300.0, 0.1),
+        case(
+            "tower, accelerations, noise 0.2 %",
+            &tower,
+            Quantity::Acceleration,
+            20.0,
+            300.0,
+            0.002,
+        ),
+        case(
+            "bridge, accelerations, noise 0.2 %",
+            &bridge,
+            Quantity::Acceleration,
+            20.0,
+            300.0,
+            0.002,
+        ),
         Case {
             mean: 12,
             ..case("one sensor, coloured forces", &single, Quantity::Velocity, 30.0, 200.0, 0.05)

@@ -9,6 +9,7 @@ use super::lines::PooledLines;
 use super::parameters::Span;
 use super::search::{Fit, full_step, scaled};
 use super::spectrum::{Coefficients, hermitian_sum};
+use super::transient::TransientResponse;
 use crate::decomposition::hermitian_eigen;
 
 /// Step of the second differences of the spectrum, in standard errors of a combination of
@@ -52,10 +53,11 @@ impl Fit {
         let endless = Span { duration: f64::INFINITY, ..span };
         let excess = self.excess()?;
         let centre = &excess.centre;
-        let prior = centre.transient_covariance(span).map(Complex::from);
+        let response = TransientResponse::new(centre.clone(), span)?;
+        let prior = response.prior.map(Complex::from);
         let one = |line: &PooledLines| {
             let variances = noise(&self.parameters, &line.terms);
-            let gains = centre.transient_gains(line.omega, span);
+            let gains = response.gains(line.omega);
             let transient = &gains * &prior * gains.adjoint();
             let whole = centre.spectrum(&centre.kernels(line.omega, span), &variances);
             let periodogram = whole - transient - excess.at(line, &variances, endless);

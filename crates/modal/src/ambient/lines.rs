@@ -59,7 +59,9 @@ impl BandLines {
         terms
     }
 
-    /// Pools lines over the fraction `part` of their distance to the nearest of the `poles`.
+    /// Pools lines over the fraction `part` of their distance to the nearest of the `poles`, or to
+    /// zero frequency: there the spectrum of an acceleration has a zero, so that with little noise
+    /// it changes by orders of magnitude from line to line.
     pub fn pooled(
         &self,
         poles: &[Complex<f64>],
@@ -69,7 +71,7 @@ impl BandLines {
         let whole = self.omega[self.omega.len() - 1] - self.omega[0];
         let distance = |omega: f64| {
             let to = |pole: &Complex<f64>| (Complex::new(0.0, omega) - pole).norm();
-            poles.iter().map(to).fold(whole, f64::min)
+            poles.iter().map(to).fold(omega.min(whole), f64::min)
         };
         let mut pooled = Vec::new();
         let mut first = 0;

@@ -62,7 +62,8 @@ pub(super) fn choose(
         .and_then(|known| match with_more_noise_terms(&known.fit, &known.lines) {
             Some(fit) => search_with_transient(fit, band),
             None => Some(known),
-        });
+        })
+        .and_then(|known| choice.confirmed(known));
     let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
     (chosen, choice.dropped)
 }
@@ -173,6 +174,19 @@ impl Choice<'_> {
             let gain = gain(&next);
             (gain < needed).then_some((next, mode, DropReason::SmallGain { gain, needed }))
         })
+    }
+
+    /// Removes modes that are insignificant in the lines without the transient. A chance peak can
+    /// be significant beside leakage that the expected periodogram does not describe exactly.
+    fn confirmed(&mut self, known: FitWithTransient) -> Option<FitWithTransient> {
+        let dropped = std::mem::take(&mut self.dropped);
+        let mut choice = Choice { band: &known.lines, wanted: self.wanted, dropped };
+        let fit = choice.pruned(known.fit.clone());
+        self.dropped = choice.dropped;
+        if fit.parameters.layout.modes == known.fit.parameters.layout.modes {
+            return Some(known);
+        }
+        search_with_transient(fit, self.band)
     }
 
     fn broken_rule(&self, fit: &Fit, mode: usize) -> Option<DropReason> {

@@ -197,6 +197,17 @@ impl Parameters {
         Self { kernel: self.kernel, layout, values }
     }
 
+    /// Returns the parameters with noise of the same variance at all lines.
+    pub fn with_constant_noise(&self, variances: &[f64]) -> Self {
+        let mut result = self.clone();
+        let noise = self.layout.noise(0, 0)..self.layout.noise(self.layout.noise_terms, 0);
+        result.values.as_mut_slice()[noise].fill(0.0);
+        for (output, variance) in variances.iter().enumerate() {
+            result.values[self.layout.noise(0, output)] = variance.ln();
+        }
+        result
+    }
+
     /// Returns the parameters for outputs in the units `to` instead of the present units `from`.
     pub fn with_units(&self, from: &[f64], to: &[f64]) -> Self {
         let mut result = self.clone();

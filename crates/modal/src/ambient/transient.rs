@@ -7,35 +7,41 @@
 //! damping. Here t is a random effect: it is predicted from all lines together, and the lines
 //! without the transient are nearly independent.
 //!
-//! For samples at intervals Δ, L = Δ/(1 − exp(−aΔ)) with a = jω − λ. The mean of W for a known t is
-//! tα/a* with α = −Re λ, so the response to t is −L (1 − α/a*). This response is exact if the
-//! forces on the modes are independent. Correlated forces of close modes change the response, but
-//! hardly change the estimates.
+//! For samples at intervals Δ, L = Δ/(1 − exp(−aΔ)) with a = jω − λ. The forces W also depend on t:
+//! the covariance of W of mode s with t* of mode r is Q_sr/(T a_r*), with t it is Q_sr/(T ā_r),
+//! where ā_r belongs to the conjugate pole. The mean of W for a known t follows from these
+//! covariances and from the covariance of t; for one mode it is nearly tα/a* with α = −Re λ.
 
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::likelihood::{TASK, log_determinant, noise, positive_factor};
-use super::limits::{POOLING, TRANSIENT_ROUNDS};
+use super::limits::{DETERMINED_SHARE, POOLING, TRANSIENT_ROUNDS};
 use super::lines::BandLines;
 use super::misfit::{SpectrumMisfit, misfit};
 use super::parameters::{Parameters, Span};
 use super::search::{Effort, Fit, search_pooled};
 use super::spectrum::Coefficients;
+use crate::decomposition::hermitian_eigen;
+
+/// Number of groups of lines; the weakest group limits the initial noise of a sensor from above.
+const NOISE_GROUPS: usize = 50;
+
+/// Levels of constant initial noise, as shares of the power of the weakest group of lines.
+const NOISE_SHARES: [f64; 4] = [1.0, 1e-1, 1e-2, 1e-3];
 
 /// Remaining uncertainty of the transient, after its prediction.
 #[derive(Debug, Clone)]
 pub(super) struct Transient {
-    coefficients: Coefficients,
+    response: TransientResponse,
     /// Covariance of the real parts and then the imaginary parts of t, 2 modes × 2 modes.
     covariance: DMatrix<f64>,
-    span: Span,
 }
 
 impl Transient {
     /// Returns the power of the remaining transient at a line, outputs × outputs.
     pub fn power(&self, omega: f64) -> DMatrix<Complex<f64>> {
-        let gain = self.coefficients.transient_gains(omega, self.span);
+        let gain = self.response.gains(omega);
         &gain * self.covariance.map(Complex::from) * gain.adjoint()
     }
 }
@@ -76,8 +82,8 @@ impl FitWithTransient {
 /// # Source
 /// After Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.
 pub(super) fn search_with_transient(fit: Fit, band: &BandLines) -> Option<FitWithTransient> {
-    let mut predicted = predicted(&fit.parameters, band)?;
-    let mut parameters = fit.parameters;
+    let mut parameters = with_likely_noise(fit.parameters, band);
+    let mut predicted = predicted(&parameters, band)?;
     let mut best: Option<FitWithTransient> = None;
     for round in 1..=TRANSIENT_ROUNDS {
         let lines = band.without_transient(&predicted);
@@ -97,18 +103,48 @@ pub(super) fn search_with_transient(fit: Fit, band: &BandLines) -> Option<FitWit
     best
 }
 
+/// Returns the parameters with the noise under which the lines are most likely once the transient
+/// is known: that of `parameters`, or constant noise at or below the weakest lines.
+///
+/// The expected periodogram does not determine noise below the leakage of the resonances. With
+/// noise that is too small, a few lines of pure noise would determine the transient.
+fn with_likely_noise(parameters: Parameters, band: &BandLines) -> Parameters {
+    let weakest = weakest_power(band);
+    let constant = |share: &f64| {
+        let power: Vec<f64> = weakest.iter().map(|power| power * share).collect();
+        parameters.with_constant_noise(&power)
+    };
+    let mut candidates: Vec<Parameters> = NOISE_SHARES.iter().map(constant).collect();
+    candidates.push(parameters.clone());
+    let cost = |candidate: &Parameters| predicted(candidate, band).map(|found| found.cost);
+    let costs = candidates.into_iter().map(|one| (cost(&one).unwrap_or(f64::INFINITY), one));
+    costs.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(parameters, |(_, likely)| likely)
+}
+
+/// Returns the mean power of each output in the weakest group of neighbouring lines.
+fn weakest_power(band: &BandLines) -> Vec<f64> {
+    let count = (band.omega.len() / NOISE_GROUPS).max(1);
+    let power = |output: usize| {
+        let column = band.amplitudes.column(output);
+        let groups = column.as_slice().chunks_exact(count);
+        let mean = |group: &[Complex<f64>]| group.iter().map(|z| z.norm_sqr()).sum::<f64>();
+        groups.map(mean).fold(f64::INFINITY, f64::min) / count as f64
+    };
+    (0..band.outputs()).map(|output| power(output).max(f64::MIN_POSITIVE)).collect()
+}
+
 /// Predicts the transient from all lines.
 ///
 /// # Source
 /// Harville (1977), Journal of the American Statistical Association 72, 320–338 (best linear
 /// unbiased prediction and the likelihood without the random effects).
 fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
-    let coefficients = Coefficients::new(parameters);
+    let response = TransientResponse::new(Coefficients::new(parameters), band.span)?;
     let unknowns = 2 * parameters.layout.modes;
     let indices: Vec<usize> = (0..band.omega.len()).collect();
     let chunk = |indices: &[usize]| {
         let mut sums = TransientSums::zero(unknowns);
-        indices.iter().try_for_each(|at| sums.add_line(parameters, &coefficients, band, *at))?;
+        indices.iter().try_for_each(|at| sums.add_line(parameters, &response, band, *at))?;
         Some(sums)
     };
     let parts: Option<Vec<_>> = indices.par_chunks(TASK).map(chunk).collect();
@@ -117,18 +153,18 @@ fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
         sums.add(&part);
     }
     let TransientSums { information, score, mut cost } = sums;
-    let prior = coefficients.transient_covariance(band.span);
-    let matrix = DMatrix::identity(unknowns, unknowns) + &prior * information;
+    let prior = &response.prior;
+    let matrix = DMatrix::identity(unknowns, unknowns) + prior * information;
     if !matrix.iter().all(|entry| entry.is_finite()) {
         return None;
     }
     let factor = matrix.lu();
-    let covariance = factor.solve(&prior)?;
+    let covariance = factor.solve(prior)?;
     let mean = &covariance * &score;
     let log_determinant: f64 = factor.u().diagonal().iter().map(|pivot| pivot.abs().ln()).sum();
     cost += 0.5 * (log_determinant - score.dot(&mean));
     let sound = cost.is_finite() && mean.iter().all(|value| value.is_finite());
-    let transient = Transient { coefficients, covariance, span: band.span };
+    let transient = Transient { response, covariance };
     sound.then_some(Prediction { mean, transient, cost })
 }
 
@@ -158,18 +194,18 @@ impl TransientSums {
     fn add_line(
         &mut self,
         parameters: &Parameters,
-        coefficients: &Coefficients,
+        response: &TransientResponse,
         band: &BandLines,
         index: usize,
     ) -> Option<()> {
         let omega = band.omega[index];
         let endless = Span { duration: f64::INFINITY, ..band.span };
         let terms = band.noise_terms(omega, parameters.layout.noise_terms);
-        let kernels = coefficients.kernels(omega, endless);
-        let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &terms));
+        let kernels = response.coefficients.kernels(omega, endless);
+        let spectrum = response.coefficients.spectrum(&kernels, &noise(parameters, &terms));
         let factor = positive_factor(spectrum)?;
         let line = band.amplitudes.row(index).transpose();
-        let gain = coefficients.transient_gains(omega, band.span);
+        let gain = response.gains(omega);
         let (whole, of_gain) = (factor.solve(&line), factor.solve(&gain));
         self.cost += log_determinant(&factor) + line.dotc(&whole).re;
         self.information += gain.ad_mul(&of_gain).map(|z| 2.0 * z.re);
@@ -184,8 +220,7 @@ impl BandLines {
         let mean = predicted.mean.map(Complex::from);
         let mut amplitudes = self.amplitudes.clone();
         for (mut line, omega) in amplitudes.row_iter_mut().zip(&self.omega) {
-            let transient =
-                predicted.transient.coefficients.transient_gains(*omega, self.span) * &mean;
+            let transient = predicted.transient.response.gains(*omega) * &mean;
             line -= transient.transpose();
         }
         Self {
@@ -197,32 +232,96 @@ impl BandLines {
     }
 }
 
-impl Coefficients {
-    /// Returns the lines due to unit changes of each mode over the record, outputs × 2 modes: the
-    /// real changes first, the imaginary changes after them.
-    pub fn transient_gains(&self, omega: f64, span: Span) -> DMatrix<Complex<f64>> {
-        let (outputs, modes) = self.shapes.shape();
-        let mut gains = DMatrix::zeros(outputs, 2 * modes);
-        for (r, pole) in self.poles.iter().enumerate() {
-            let gain = |pole: Complex<f64>| {
-                let (inverse, _) = self.inverse(omega, pole, span);
-                let turn = (Complex::new(0.0, omega) - pole) * -span.sample_interval;
-                let leakage = (Complex::from(1.0) - turn.exp()).inv() * span.sample_interval;
-                -leakage * (Complex::from(1.0) + inverse.conj() * pole.re)
-            };
-            let (gain, mirrored) = (gain(*pole), gain(pole.conj()));
-            for (i, shape) in self.shapes.column(r).iter().enumerate() {
-                let (own, other) = (shape * gain, shape.conj() * mirrored);
-                gains[(i, r)] = own + other;
-                gains[(i, modes + r)] = Complex::<f64>::i() * (own - other);
-            }
+/// Response of the lines to the transient.
+#[derive(Debug, Clone)]
+pub(super) struct TransientResponse {
+    coefficients: Coefficients,
+    /// Covariance of the real parts and then the imaginary parts of t before the prediction,
+    /// 2 modes × 2 modes.
+    pub prior: DMatrix<f64>,
+    /// Inverse of `prior`.
+    precision: DMatrix<Complex<f64>>,
+    span: Span,
+}
+
+impl TransientResponse {
+    /// Computes the covariance of the transient; `None` if it cannot be inverted.
+    pub fn new(coefficients: Coefficients, span: Span) -> Option<Self> {
+        let prior = coefficients.transient_covariance(span);
+        let mut root = hermitian_eigen(prior.clone())?;
+        let least = DETERMINED_SHARE * root.eigenvalues.max();
+        for (mut column, power) in root.eigenvectors.column_iter_mut().zip(&root.eigenvalues) {
+            // Forces that drive two modes alike determine no difference of their transients.
+            column.scale_mut(if *power > least { 1.0 / power.sqrt() } else { 0.0 });
         }
-        gains
+        let precision = (&root.eigenvectors * root.eigenvectors.transpose()).map(Complex::from);
+        Some(Self { coefficients, prior, precision, span })
     }
 
+    /// Returns the lines for unit changes of each mode over the record, outputs × 2 modes: the real
+    /// changes first, the imaginary changes after them.
+    pub fn gains(&self, omega: f64) -> DMatrix<Complex<f64>> {
+        let [of_changes, of_forces] = self.parts(omega);
+        of_changes + of_forces
+    }
+
+    /// Returns the two parts of the lines for unit changes: the leakage, and the response to the
+    /// mean of the forces.
+    pub fn parts(&self, omega: f64) -> [DMatrix<Complex<f64>>; 2] {
+        let Coefficients { poles, shapes, direct, .. } = &self.coefficients;
+        let (outputs, modes) = shapes.shape();
+        let mut of_changes = DMatrix::zeros(outputs, 2 * modes);
+        let mut transfer = direct.map(Complex::from);
+        for (r, pole) in poles.iter().enumerate() {
+            let [own, mirrored] = [*pole, pole.conj()].map(|pole| self.kernel(omega, pole));
+            for (i, shape) in shapes.column(r).iter().enumerate() {
+                let [leak, other_leak] = [shape * own.leakage, shape.conj() * mirrored.leakage];
+                of_changes[(i, r)] = -(leak + other_leak);
+                of_changes[(i, modes + r)] = -Complex::<f64>::i() * (leak - other_leak);
+                transfer[(i, r)] += shape * own.inverse + shape.conj() * mirrored.inverse;
+            }
+        }
+        [of_changes, transfer * self.mean_forces(omega)]
+    }
+
+    /// Returns the mean of the forces W on the modes for unit changes, modes × 2 modes.
+    fn mean_forces(&self, omega: f64) -> DMatrix<Complex<f64>> {
+        let Coefficients { poles, correlation, .. } = &self.coefficients;
+        let modes = poles.len();
+        let mut covariance = DMatrix::zeros(modes, 2 * modes);
+        for (r, pole) in poles.iter().enumerate() {
+            let [with_conjugate, plain] =
+                [*pole, pole.conj()].map(|pole| self.kernel(omega, pole).inverse.conj());
+            let real = (plain + with_conjugate) * (0.5 / self.span.duration);
+            let imaginary = (plain - with_conjugate) * Complex::new(0.0, -0.5 / self.span.duration);
+            for s in 0..modes {
+                covariance[(s, r)] = real * correlation[(s, r)];
+                covariance[(s, modes + r)] = imaginary * correlation[(s, r)];
+            }
+        }
+        covariance * &self.precision
+    }
+
+    fn kernel(&self, omega: f64, pole: Complex<f64>) -> TransientKernel {
+        let (inverse, _) = self.coefficients.inverse(omega, pole, self.span);
+        let turn = (Complex::new(0.0, omega) - pole) * -self.span.sample_interval;
+        let leakage = (Complex::from(1.0) - turn.exp()).inv() * self.span.sample_interval;
+        TransientKernel { inverse, leakage }
+    }
+}
+
+/// Responses of a mode at one line.
+struct TransientKernel {
+    /// Response to a force.
+    inverse: Complex<f64>,
+    /// Factor L of the change over the record.
+    leakage: Complex<f64>,
+}
+
+impl Coefficients {
     /// Returns the covariance of the real and then the imaginary parts of the changes of the modes
     /// over the record, 2 modes × 2 modes.
-    pub fn transient_covariance(&self, span: Span) -> DMatrix<f64> {
+    fn transient_covariance(&self, span: Span) -> DMatrix<f64> {
         let modes = self.poles.len();
         let lost = |pole: Complex<f64>| Complex::from(1.0) - (pole * span.duration).exp();
         let mut covariance = DMatrix::zeros(2 * modes, 2 * modes);

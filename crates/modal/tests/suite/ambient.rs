@@ -69,6 +69,30 @@ fn all_modes_of_each_quantity_are_found_and_no_other() {
     }
 }
 
+/// With little noise the lines between the modes and zero frequency weigh as much as the resonances:
+/// the leakage there is larger than the noise, and the spectrum of an acceleration falls to zero.
+#[test]
+fn good_accelerometers_lose_no_mode() {
+    let frame = Structure {
+        frequencies_hz: vec![6.2, 17.0],
+        dampings: vec![0.02, 0.012],
+        shapes: dmatrix![0.5, 1.0; 1.0, -0.6].map(Complex::from),
+        forces: dmatrix![1.0, 0.5; 1.0, -0.6],
+    };
+    for (truth, rate_hz, len) in [(frame, 64.0, 2048), (tower(), 20.0, 6000)] {
+        for seed in 20..23 {
+            let record = truth.accelerations(rate_hz, len, 0.002, seed);
+            let estimate = identified(&record, AmbientSettings::default());
+            let found: Vec<_> =
+                estimate.modes.iter().map(|mode| mode.natural_frequency_hz.value).collect();
+            let number = truth.frequencies_hz.len();
+            assert_eq!((found.len(), is_right(&estimate, &truth)), (number, number), "{found:?}");
+            let misfit = estimate.misfit.unwrap();
+            assert!(misfit.p_value > 0.001, "{misfit:?}");
+        }
+    }
+}
+
 /// Three modes at one sensor.
 fn mast() -> Structure {
     Structure {
