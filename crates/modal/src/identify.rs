@@ -492,7 +492,7 @@ impl<'a> Identification<'a> {
     /// only add variance. Each unknown beyond the current number has the given `penalty` instead of
     /// Akaike's.
     fn choose_powers(&mut self, penalty: f64) {
-        if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
+        if self.settings.residual_powers.is_some() {
             return;
         }
         let unknowns =
@@ -500,14 +500,14 @@ impl<'a> Identification<'a> {
         let current = unknowns(&self.fit.model);
         let mut best = (f64::INFINITY, self.fit.model.powers.clone());
         self.has_chosen_powers = true;
-        for powers in power_sets() {
+        for powers in power_sets(self.lines.inputs()) {
             let mut trial = self.fit.clone();
             trial.model.powers = powers.clone();
             trial.refresh();
             let count = unknowns(&trial.model);
             let criterion =
                 trial.cost() + AKAIKE * count.min(current) + penalty * (count - current).max(0.0);
-            log::debug!("residual powers {:?}: {criterion:.1}", powers.forces);
+            log::debug!("residual powers {powers:?}: {criterion:.1}");
             if criterion < best.0 {
                 best = (criterion, powers);
             }
@@ -630,8 +630,18 @@ fn weigh(fit: &mut Fit<'_>, noise: &Noise) {
 /// Penalty of one unknown in −2 log L by Akaike's criterion.
 const AKAIKE: f64 = 2.0;
 
-/// Returns the sets of residual powers that are compared.
-fn power_sets() -> Vec<ResidualPowers> {
+/// Returns the sets of residual powers that are compared. In free decays the modes outside the band
+/// act by their transients only.
+fn power_sets(inputs: usize) -> Vec<ResidualPowers> {
+    if inputs == 0 {
+        let largest = [None, Some(0), Some(1), Some(2), Some(4), Some(6)];
+        let transients = |largest: i32| (-largest..=largest).collect();
+        let set = |largest: Option<i32>| ResidualPowers {
+            forces: Vec::new(),
+            transients: largest.map_or_else(Vec::new, transients),
+        };
+        return largest.into_iter().map(set).collect();
+    }
     let forces = [
         vec![-2, 0, 2],
         vec![-4, -2, 0, 2, 4],

@@ -43,6 +43,19 @@ fn free_decay_without_forces() {
     assert!(estimate.modes().iter().all(|mode| mode.driven_share.is_none()));
 }
 
+/// The modes outside the band are much stronger than the noise in the band.
+#[test]
+fn free_decays_in_a_band_have_residual_terms() {
+    let pair = pair(4);
+    let case = Case { samples: 4096, noise: 0.002, band_hz: [70.0, 160.0], ..pair };
+    for seed in 0..4 {
+        let data = case.decay(seed).followed_by(&case.decay(10 + seed)).unwrap();
+        let estimate = identify_modes(&data, &ModalSettings::default()).unwrap();
+        let deviation = largest_deviation(&case, &estimate);
+        assert!(deviation < BOUND, "{seed}: {deviation}");
+    }
+}
+
 #[test]
 fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
     let case = roving(5);
