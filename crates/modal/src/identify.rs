@@ -27,7 +27,8 @@ use crate::search::Fit;
 /// Settings of an identification of modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalSettings {
-    /// Number of modes; `None` chooses it by the likelihood.
+    /// Number of modes to report: those that explain most, even if they are weak. Other significant
+    /// modes are part of the model, but are not reported. `None` reports all significant modes.
     pub modes: Option<usize>,
     /// Frequencies (Hz) of modes to report (within 2 %), even if they are weak. Other modes are
     /// part of the model, but are not reported. If the list is empty, all modes are reported.
@@ -259,9 +260,10 @@ impl<'a> Identification<'a> {
         let required = required_gain(self.lines);
         self.remove_impossible();
         self.remove_insignificant(required);
-        let most = self.settings.modes.unwrap_or(self.settings.max_modes);
+        let most = self.settings.max_modes.max(self.settings.modes.unwrap_or(0));
         while self.modes_in_band() < most {
-            let least = if self.settings.modes.is_some() { 0.0 } else { required };
+            let is_stated = self.settings.modes.is_some_and(|least| self.modes_in_band() < least);
+            let least = if is_stated { 0.0 } else { required };
             let before = self.fit.model.modes();
             match add_best(&mut self.fit, least) {
                 Ok(()) => {
@@ -286,9 +288,6 @@ impl<'a> Identification<'a> {
             }
         }
         self.add_hidden(required, most);
-        if let Some(most) = self.settings.modes {
-            self.remove_beyond(most);
-        }
     }
 
     /// Adds modes whose response the fit attributes to the unmeasured force of a mode nearby. A
@@ -355,7 +354,7 @@ impl<'a> Identification<'a> {
     /// until all remaining modes are significant; returns whether it removed any.
     fn remove_insignificant(&mut self, required: f64) -> bool {
         let mut removed = false;
-        while self.settings.modes.is_none() {
+        loop {
             let losses = removal_losses(&self.fit);
             let protected = self.protected();
             let reason = |mode: usize| {
@@ -384,7 +383,7 @@ impl<'a> Identification<'a> {
         let required = required_gain(self.lines);
         let mut removed = false;
         let mut tried = 0;
-        while self.settings.modes.is_none() && tried < MAX_TRIES {
+        while tried < MAX_TRIES {
             let losses = removal_losses(&self.fit);
             let protected = self.protected();
             let mut order: Vec<usize> = (0..losses.len())
@@ -431,26 +430,32 @@ impl<'a> Identification<'a> {
         -pole.re / pole.norm() <= MAX_DAMPING && self.lines.reaches(pole)
     }
 
-    /// Returns which modes were requested by frequency: no rule removes them.
+    /// Returns which modes were requested by frequency or number: no rule removes them.
     fn protected(&self) -> Vec<bool> {
-        if self.settings.near_hz.is_empty() {
-            return vec![false; self.fit.model.modes()];
+        let ModalSettings { modes, near_hz, .. } = self.settings;
+        match modes {
+            None if near_hz.is_empty() => vec![false; self.fit.model.modes()],
+            None => stated_modes(&self.fit.model.poles, near_hz),
+            Some(_) => self.requested(),
         }
-        stated_modes(&self.fit.model.poles, &self.settings.near_hz)
     }
 
-    /// Removes modes beyond a stated number; the modes with the largest gains remain.
-    fn remove_beyond(&mut self, most: usize) {
-        while self.modes_in_band() > most {
-            let losses = removal_losses(&self.fit);
-            let inside = |mode: &usize| self.lines.contains(self.fit.model.poles[*mode]);
-            let least =
-                (0..losses.len()).filter(inside).min_by(|a, b| losses[*a].total_cmp(&losses[*b]));
-            let Some(mode) = least else { return };
-            let mut reasons = vec![None; losses.len()];
-            reasons[mode] = Some(DropReason::BeyondNumber { gain: losses[mode] });
-            self.remove(&reasons);
+    /// Returns the modes in the band that were requested: those nearest to the stated frequencies,
+    /// and of these as many as stated, those with the largest gains. Without a request these are
+    /// all modes in the band.
+    fn requested(&self) -> Vec<bool> {
+        let poles = &self.fit.model.poles;
+        let mut requested = stated_modes(poles, &self.settings.near_hz);
+        for (requested, pole) in requested.iter_mut().zip(poles) {
+            *requested &= self.lines.contains(*pole);
         }
+        if let Some(number) = self.settings.modes {
+            let losses = removal_losses(&self.fit);
+            let mut order: Vec<usize> = (0..poles.len()).filter(|mode| requested[*mode]).collect();
+            order.sort_by(|a, b| losses[*b].total_cmp(&losses[*a]));
+            order.into_iter().skip(number).for_each(|mode| requested[mode] = false);
+        }
+        requested
     }
 
     /// Removes the modes for which there is a reason in `reasons`, and searches again.
@@ -522,7 +527,7 @@ impl<'a> Identification<'a> {
 
     /// Removes modes that are significant but are not resonances of the structure.
     fn apply_rules(&mut self) {
-        while self.settings.modes.is_none() && self.fit.model.modes() > 0 {
+        while self.fit.model.modes() > 0 {
             let Some(covariance) = self.covariance_of_all() else { return };
             let mut reasons = drop_reasons(&self.fit, &self.noise, &covariance);
             for (reason, protected) in reasons.iter_mut().zip(self.protected()) {
@@ -576,20 +581,14 @@ impl<'a> Identification<'a> {
         let size = self.fit.model.parameters(self.lines);
         let failed = ModalError::Decomposition { what: "the curvature of the likelihood", size };
         let covariance = self.covariance_of_all().ok_or(failed)?;
-        let poles = &self.fit.model.poles;
-        let mut stated = stated_modes(poles, &self.settings.near_hz);
-        stated
-            .iter_mut()
-            .zip(poles)
-            .for_each(|(stated, pole)| *stated &= self.lines.contains(*pole));
+        let stated = self.requested();
         if !stated.contains(&true) {
             return Err(self.no_mode());
         }
-        let unlisted = poles.iter().zip(&stated).filter(|(pole, stated)| {
-            !**stated && !self.settings.near_hz.is_empty() && self.lines.contains(**pole)
-        });
+        let unlisted = self.fit.model.poles.iter().zip(&stated);
+        let unlisted = unlisted.filter(|(pole, stated)| !**stated && self.lines.contains(**pole));
         let unlisted =
-            unlisted.map(|(pole, _)| DroppedCandidate::new(*pole, DropReason::NotStated));
+            unlisted.map(|(pole, _)| DroppedCandidate::new(*pole, DropReason::NotRequested));
         self.dropped.extend(unlisted);
         let constraints = &self.settings.constraints;
         let (fit, noise) = (&self.fit, &self.noise);

@@ -101,14 +101,9 @@ pub enum DropReason {
         /// Ratio of unmeasured to measured force.
         ratio: f64,
     },
-    /// The number of modes was stated, and other modes have larger gains.
-    BeyondNumber {
-        /// Decrease of −2 log L.
-        gain: f64,
-    },
-    /// The mode is part of the model, but it is not near any of the stated frequencies, or another
-    /// mode is nearer.
-    NotStated,
+    /// The mode is part of the model, but was not requested: other modes are nearer to the stated
+    /// frequencies or, of the stated number of modes, explain more.
+    NotRequested,
 }
 
 /// Rejected candidate.

@@ -129,11 +129,8 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             "unmeasured forces drive it {} times as strongly as the measured ones",
             significant(ratio, 2)
         ),
-        DropReason::NotStated => {
-            "it is part of the model, but not near a stated frequency (`near_hz`)".into()
-        }
-        DropReason::BeyondNumber { .. } => {
-            "`modes` asks for fewer modes, and the modes in the result explain more".into()
+        DropReason::NotRequested => {
+            "it is part of the model, but `modes` or `near_hz` asks for other modes".into()
         }
         _ => "it is not a mode of the record".into(),
     };

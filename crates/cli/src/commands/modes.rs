@@ -82,7 +82,8 @@ pub struct ModesArgs {
     /// Frequencies to use, in Hz [default: the band that the forces excite]
     #[arg(long, value_name = "LOW:HIGH")]
     band_hz: Option<Band>,
-    /// Number of modes [default: as many as the record shows; for a machine, all]
+    /// Number of modes to report: those that explain most [default: as many as the record shows;
+    /// for a machine, all]
     #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     modes: Option<usize>,
     /// Maximum number of modes

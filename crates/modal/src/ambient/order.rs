@@ -48,7 +48,7 @@ pub(super) fn choose(
     wanted: Wanted,
 ) -> (Option<Chosen>, Vec<DroppedCandidate>) {
     let mut choice = Choice { band, wanted, dropped: Vec::new() };
-    let limit = wanted.exactly.unwrap_or(wanted.most);
+    let limit = wanted.most.max(wanted.exactly.unwrap_or(0));
     for pole in candidates.iter().skip(limit) {
         choice.drop_pole(pole, DropReason::NumberReached { number: limit });
     }
@@ -229,16 +229,15 @@ impl Choice<'_> {
             let Some(candidate) = fresh else { break };
             // The scan only estimates the gain, for one direction at an approximate pole.
             let promising = candidate.gain > 0.5 * self.penalty();
-            if !promising && self.wanted.exactly.is_none() {
+            let is_stated = self.wanted.exactly.is_some_and(|n| self.sound_modes(&fit) < n);
+            if !promising && !is_stated {
                 break;
             }
             if full {
-                if self.wanted.exactly.is_none() {
-                    self.drop_pole(&candidate.pole, DropReason::NumberReached { number: limit });
-                }
+                self.drop_pole(&candidate.pole, DropReason::NumberReached { number: limit });
                 break;
             }
-            match self.with(&fit, &candidate.pole) {
+            match self.with(&fit, &candidate.pole, is_stated) {
                 Ok(next) => {
                     // A pole that is not a mode may explain a background; only few such poles are
                     // useful.
@@ -256,8 +255,9 @@ impl Choice<'_> {
         if fit.parameters.layout.modes > before { self.pruned(fit) } else { fit }
     }
 
-    /// Returns the fit with one more mode, or the reason for which it was rejected.
-    fn with(&self, fit: &Fit, pole: &Pole) -> Result<Fit, DropReason> {
+    /// Returns the fit with one more mode, or the reason for which it was rejected. A mode that is
+    /// stated may be insignificant.
+    fn with(&self, fit: &Fit, pole: &Pole, is_stated: bool) -> Result<Fit, DropReason> {
         let shape = &pole.vector * nalgebra::Complex::from(-pole.pole.re);
         let mut start = fit.parameters.with_mode(pole.pole, &shape);
         let mut order: Vec<usize> = (0..start.layout.modes).collect();
@@ -270,7 +270,7 @@ impl Choice<'_> {
         start.set_shape(added, &matched.shape(added));
         let next = search_pooled(start, self.band, Effort::TEST).ok_or(DropReason::NoMaximum)?;
         let (gain, needed) = (2.0 * (fit.cost - next.cost), self.penalty());
-        if self.wanted.exactly.is_none() && gain < needed {
+        if !is_stated && gain < needed {
             return Err(DropReason::SmallGain { gain, needed });
         }
         Ok(next)

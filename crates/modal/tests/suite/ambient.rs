@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use mechid_modal::PartsComparison;
 use mechid_modal::ambient::harmonics::harmonics;
 use mechid_modal::ambient::{
-    AmbientError, AmbientEstimate, AmbientSettings, DropReason, Uncertainty, identify_ambient,
+    AmbientError, AmbientEstimate, AmbientMode, AmbientSettings, DropReason, Uncertainty,
+    identify_ambient,
 };
 use mechid_modal::indicators::mac;
 use mechid_signal::{Record, Sampling};
@@ -329,6 +330,14 @@ fn a_stated_number_of_modes_is_kept() {
     assert_eq!(estimate.modes.len(), 2);
     let reached = |reason: &DropReason| matches!(reason, DropReason::NumberReached { number: 2 });
     assert!(estimate.dropped.iter().any(|dropped| reached(&dropped.reason)));
+    // The other two modes remain in the spectrum, so that they do not bias these two.
+    let all = identified(&record, AmbientSettings::default());
+    for mode in &estimate.modes {
+        let is_same = |other: &AmbientMode| {
+            (mode.damping_ratio.value / other.damping_ratio.value - 1.0).abs() < 1e-3
+        };
+        assert!(all.modes.iter().any(is_same), "{:?}", mode.damping_ratio);
+    }
 }
 
 #[test]

@@ -105,8 +105,18 @@ fn delays_between_forces_and_responses_are_part_of_the_model() {
 #[test]
 fn number_and_frequencies_can_be_stated() {
     let data = pair(8).lines(2);
+    let all = identify_modes(&data, &ModalSettings::default()).unwrap();
     let four = ModalSettings { modes: Some(4), ..ModalSettings::default() };
-    assert_eq!(identify_modes(&data, &four).unwrap().modes().len(), 4);
+    let four = identify_modes(&data, &four).unwrap();
+    assert_eq!(four.modes().len(), 4);
+    // The other two modes remain in the model, so that they do not bias the four.
+    for mode in four.modes() {
+        let is_same = |other: &mechid_modal::IdentifiedMode| {
+            let difference = mode.damping_ratio.value - other.damping_ratio.value;
+            difference.abs() < 0.1 * mode.damping_ratio.standard_error
+        };
+        assert!(all.modes().iter().any(is_same), "{mode:?}");
+    }
     let near = ModalSettings { near_hz: vec![87.2, 304.0], ..ModalSettings::default() };
     let modes = identify_modes(&data, &near).unwrap();
     let hz: Vec<f64> = modes.modes().iter().map(|mode| mode.natural_frequency_hz.value).collect();

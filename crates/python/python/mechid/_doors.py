@@ -739,7 +739,8 @@ def modes(
     band_hz : (float, float), optional
         Frequencies to use, in Hz. Default: those that the forces excite.
     modes, max_modes : int, optional
-        Number of modes, or its maximum. Default: as many as the record shows.
+        Number of modes to report (those that explain most), or the maximum. Default: as many as the
+        record shows.
     near_hz : sequence of float
         Frequencies, in Hz: only the mode nearest to each, within 2 %, is reported, even if it is
         weak. Other modes are part of the model, but not reported. Default: all modes.
