@@ -531,7 +531,7 @@ impl<'a> Identification<'a> {
             let Some(covariance) = self.covariance_of_all() else { return };
             let mut reasons = drop_reasons(&self.fit, &self.noise, &covariance);
             for (reason, protected) in reasons.iter_mut().zip(self.protected()) {
-                *reason = reason.filter(|_| !protected);
+                *reason = reason.filter(|reason| !protected && !is_sinusoid(reason));
             }
             let losses = removal_losses(&self.fit);
             let reasons = weakest_of_neighbours(&self.fit.model.poles, &losses, reasons);
@@ -581,19 +581,29 @@ impl<'a> Identification<'a> {
         let size = self.fit.model.parameters(self.lines);
         let failed = ModalError::Decomposition { what: "the curvature of the likelihood", size };
         let covariance = self.covariance_of_all().ok_or(failed)?;
-        let stated = self.requested();
+        let mut stated = self.requested();
+        let reasons = drop_reasons(&self.fit, &self.noise, &covariance);
+        for (mode, pole) in self.fit.model.poles.iter().enumerate() {
+            let sinusoid = reasons[mode].filter(is_sinusoid);
+            stated[mode] &= sinusoid.is_none();
+            if !stated[mode] && self.lines.contains(*pole) {
+                let reason = sinusoid.unwrap_or(DropReason::NotRequested);
+                self.dropped.push(DroppedCandidate::new(*pole, reason));
+            }
+        }
         if !stated.contains(&true) {
             return Err(self.no_mode());
         }
-        let unlisted = self.fit.model.poles.iter().zip(&stated);
-        let unlisted = unlisted.filter(|(pole, stated)| !**stated && self.lines.contains(**pole));
-        let unlisted =
-            unlisted.map(|(pole, _)| DroppedCandidate::new(*pole, DropReason::NotRequested));
-        self.dropped.extend(unlisted);
         let constraints = &self.settings.constraints;
         let (fit, noise) = (&self.fit, &self.noise);
         Ok(ModalEstimate::new(fit, noise, &covariance, self.dropped, &stated, constraints))
     }
+}
+
+/// Returns whether the mode has no measurable damping, as a sinusoid such as mains hum. It stays in
+/// the model, so that it does not count as noise near it, but it is not reported.
+fn is_sinusoid(reason: &DropReason) -> bool {
+    matches!(reason, DropReason::UndeterminedDamping { .. })
 }
 
 /// Returns the reasons, without those of modes near a weaker mode that is removed, too.

@@ -82,7 +82,8 @@ pub enum DropReason {
         /// Required decrease.
         required: f64,
     },
-    /// The damping ratio is not significantly larger than zero.
+    /// The damping ratio is not significantly larger than zero, as of a sinusoid such as mains hum.
+    /// The mode is part of the model.
     UndeterminedDamping {
         /// Standard error of the damping ratio.
         standard_error: f64,

@@ -114,7 +114,7 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(required, 3)
         ),
         DropReason::UndeterminedDamping { standard_error } => format!(
-            "its damping ratio is not above zero: ± {} %",
+            "its damping ratio is not above zero (± {} %), as of a sinusoid: it stays in the model",
             significant(100.0 * standard_error, 2)
         ),
         DropReason::TooDamped => {

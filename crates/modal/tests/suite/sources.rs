@@ -1,7 +1,12 @@
 //! Data other than a record with forces: tables, free decays, roving hammers, and common properties
 //! of all.
 
+use std::f64::consts::TAU;
+
 use mechid_modal::{DrivingPoint, ModalEstimate, ModalSettings, identify_modes};
+use mechid_signal::Record;
+use mechid_spectra::LineData;
+use nalgebra::DMatrix;
 
 use crate::generator::{Case, pair, roving};
 
@@ -122,6 +127,27 @@ fn number_and_frequencies_can_be_stated() {
     let hz: Vec<f64> = modes.modes().iter().map(|mode| mode.natural_frequency_hz.value).collect();
     assert_eq!(hz.len(), 2);
     assert!((hz[0] - 87.0).abs() < 0.01 && (hz[1] - 305.0).abs() < 0.02, "{hz:?}");
+}
+
+/// Mains hum that the forces do not cause. Without it in the model, the standard error of the mode
+/// next to it is fifty times as large.
+#[test]
+fn hum_is_no_mode_and_does_not_widen_the_errors_of_modes() {
+    let case = pair(8);
+    let (force, motion) = case.record(2);
+    let hum = |row: usize| (TAU * 85.3 * motion.sampling().time(row)).sin();
+    let level = motion.data().column(0).variance().sqrt();
+    let data = DMatrix::from_fn(motion.len(), 8, |row, column| {
+        motion.data()[(row, column)] + 0.5 * level * hum(row)
+    });
+    let with_hum = Record::new(motion.sampling(), data).unwrap();
+    let estimates = [&motion, &with_hum].map(|motion| {
+        let data = LineData::from_open_record(Some(&force), motion, case.band_hz).unwrap();
+        identify_modes(&data, &ModalSettings::default()).unwrap()
+    });
+    assert!(largest_deviation(&case, &estimates[1]) < BOUND);
+    let [clean, hum] = estimates.map(|estimate| estimate.modes()[1].natural_frequency_hz);
+    assert!((hum.standard_error / clean.standard_error - 1.0).abs() < 0.3, "{hum:?} {clean:?}");
 }
 
 #[test]
