@@ -1,9 +1,17 @@
 //! Periodograms of the lines of a band, pooled where the spectrum hardly changes from line to line.
 
-use nalgebra::{Complex, DMatrix};
+use std::ops::Range;
 
-use super::parameters::Span;
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+use super::likelihood::{noise, positive_factor};
+use super::parameters::{Parameters, Span};
+use super::spectrum::Coefficients;
 use super::transient::Transient;
+
+/// Maximum relative difference between the mean spectrum of pooled lines and that of their centre.
+const EVEN: f64 = 0.01;
 
 /// Maximum width of pooled lines, as a fraction of the band. Far from the poles this limit is
 /// needed because the noise varies with frequency.
@@ -68,27 +76,85 @@ impl BandLines {
         part: f64,
         noise_terms: usize,
     ) -> Vec<PooledLines> {
+        let ranges = self.ranges(poles, part).into_iter();
+        ranges.map(|range| self.pool(range, noise_terms)).collect()
+    }
+
+    /// Pools lines as [`Self::pooled`] does, but divides a group in halves while the spectrum of
+    /// the parameters changes too much in it.
+    ///
+    /// A change that is small relative to the resonances can be large relative to the noise.
+    pub fn pooled_evenly(&self, parameters: &Parameters, part: f64) -> Vec<PooledLines> {
+        let coefficients = Coefficients::new(parameters);
+        let terms = parameters.layout.noise_terms;
+        let divided = |range: Range<usize>| {
+            let mut open = vec![range];
+            let mut even = Vec::new();
+            while let Some(range) = open.pop() {
+                if range.len() == 1 || self.is_even(&range, parameters, &coefficients) {
+                    even.push(range);
+                } else {
+                    let middle = range.start + range.len() / 2;
+                    open.push(middle..range.end);
+                    open.push(range.start..middle);
+                }
+            }
+            even.into_iter().map(|range| self.pool(range, terms)).collect::<Vec<_>>()
+        };
+        self.ranges(&parameters.poles(), part).into_par_iter().flat_map_iter(divided).collect()
+    }
+
+    /// Returns whether the mean spectrum of a group of lines is nearly that of its centre, also in
+    /// the directions in which the spectrum is smallest.
+    fn is_even(
+        &self,
+        range: &Range<usize>,
+        parameters: &Parameters,
+        coefficients: &Coefficients,
+    ) -> bool {
+        let [first, last] = [self.omega[range.start], self.omega[range.end - 1]];
+        let [first, centre, last] = [first, 0.5 * (first + last), last].map(|omega| {
+            let terms = self.noise_terms(omega, parameters.layout.noise_terms);
+            let kernels = coefficients.kernels(omega, self.span);
+            coefficients.spectrum(&kernels, &noise(parameters, &terms))
+        });
+        // The mean of a parabola at n points, relative to its change from the centre to the ends.
+        let count = range.len() as f64;
+        let share = (count + 1.0) / (3.0 * (count - 1.0));
+        let change = ((first + last) * Complex::from(0.5) - &centre) * Complex::from(share);
+        let Some(lower) = positive_factor(centre).map(|factor| factor.unpack()) else {
+            return false;
+        };
+        let whitened = lower
+            .solve_lower_triangular(&change)
+            .and_then(|half| lower.solve_lower_triangular(&half.adjoint()));
+        whitened.is_some_and(|whitened| whitened.norm() < EVEN)
+    }
+
+    /// Returns groups of neighbouring lines, see [`Self::pooled`].
+    fn ranges(&self, poles: &[Complex<f64>], part: f64) -> Vec<Range<usize>> {
         let whole = self.omega[self.omega.len() - 1] - self.omega[0];
         let distance = |omega: f64| {
             let to = |pole: &Complex<f64>| (Complex::new(0.0, omega) - pole).norm();
             poles.iter().map(to).fold(omega.min(whole), f64::min)
         };
-        let mut pooled = Vec::new();
+        let mut ranges = Vec::new();
         let mut first = 0;
         while first < self.omega.len() {
             let width = (part * distance(self.omega[first])).min(WIDEST * whole);
             let ahead = self.omega[first..].iter().take_while(|w| **w - self.omega[first] < width);
             let count = ahead.count().max(1);
-            pooled.push(self.pool(first, count, noise_terms));
+            ranges.push(first..first + count);
             first += count;
         }
-        pooled
+        ranges
     }
 
-    fn pool(&self, first: usize, count: usize, noise_terms: usize) -> PooledLines {
-        let rows = self.amplitudes.rows(first, count);
+    fn pool(&self, range: Range<usize>, noise_terms: usize) -> PooledLines {
+        let count = range.len();
+        let rows = self.amplitudes.rows(range.start, count);
         let total = rows.transpose() * rows.conjugate();
-        let omega = self.omega[first..first + count].iter().sum::<f64>() / count as f64;
+        let omega = self.omega[range].iter().sum::<f64>() / count as f64;
         let mut periodogram = total / Complex::from(count as f64);
         if let Some(transient) = &self.transient {
             periodogram += transient.power(omega);

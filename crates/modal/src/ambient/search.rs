@@ -50,21 +50,26 @@ pub(super) struct Effort {
     pub slow: f64,
     /// If true, frequencies and damping ratios stay as they are.
     pub holds_poles: bool,
+    /// If true, lines are pooled only where the spectrum changes little relative to the noise.
+    pub even_pools: bool,
 }
 
 impl Effort {
     /// Effort to compare quantities at initial estimates. The initial poles are more accurate than
     /// the initial amplitudes. With wrong amplitudes, a search with free poles would move a damping
     /// ratio to nearly zero, as of a sinusoid, and no later search would increase it again.
-    pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true };
+    pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true, even_pools: false };
     /// Effort to approach the maximum with coarse lines.
-    pub const SHORT: Self = Self { iterations: 6, slow: 0.5, holds_poles: false };
+    pub const SHORT: Self =
+        Self { iterations: 6, slow: 0.5, holds_poles: false, even_pools: false };
     /// Effort to test a mode: steps with a gain below `slow` are not needed, because the gain of a
     /// mode is compared with a penalty of several tens.
-    pub const TEST: Self = Self { iterations: 40, slow: 0.5, holds_poles: false };
+    pub const TEST: Self =
+        Self { iterations: 40, slow: 0.5, holds_poles: false, even_pools: false };
     /// Effort of the final search: further steps would move parameters by less than a tenth of
     /// their standard errors.
-    pub const FULL: Self = Self { iterations: 60, slow: 0.005, holds_poles: false };
+    pub const FULL: Self =
+        Self { iterations: 60, slow: 0.005, holds_poles: false, even_pools: true };
 }
 
 /// Maximum of the likelihood.
@@ -232,7 +237,12 @@ pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort)
     let (terms, span) = (start.layout.noise_terms, band.span);
     let around = |parameters: &Parameters| {
         let poles = parameters.poles();
-        [POOLING, COARSE_POOLING].map(|part| band.pooled(&poles, part, terms))
+        let pooled = if effort.even_pools {
+            band.pooled_evenly(parameters, POOLING)
+        } else {
+            band.pooled(&poles, POOLING, terms)
+        };
+        [pooled, band.pooled(&poles, COARSE_POOLING, terms)]
     };
     let [pooled, coarse] = around(&start);
     let first = search(start, SearchLines { pooled: &pooled, coarse: &coarse, span }, effort)?;

@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::information::information;
-use super::likelihood::{cost, gradient, noise};
+use super::likelihood::{cost, gradient, noise, positive_factor};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
 use super::search::Fit;
@@ -156,6 +156,55 @@ fn without_poles_every_line_stands_alone() {
     let amplitudes = DMatrix::zeros(omega.len(), 1);
     let band = BandLines { omega, amplitudes, scale: vec![1.0], span: SPAN, transient: None };
     assert_eq!(band.pooled(&[], 0.0, 1).len(), 360);
+}
+
+/// The largest of Yᴴ S⁻¹ Y, relative to its mean, over groups of lines with the expected power.
+fn largest_excess(pooled: &[PooledLines], band: &BandLines, parameters: &Parameters) -> f64 {
+    let coefficients = Coefficients::new(parameters);
+    let spectrum = |omega: f64, terms: &[f64]| {
+        coefficients.spectrum(&coefficients.kernels(omega, band.span), &noise(parameters, terms))
+    };
+    let mut first = 0;
+    let mut largest: f64 = 0.0;
+    for line in pooled {
+        let inverse = positive_factor(spectrum(line.omega, &line.terms)).unwrap().inverse();
+        let lines = &band.omega[first..first + line.count as usize];
+        first += lines.len();
+        let powers = lines.iter().map(|omega| {
+            let power = spectrum(*omega, &band.noise_terms(*omega, 3));
+            (&inverse * power).trace().re / parameters.layout.outputs as f64
+        });
+        largest = largest.max(powers.sum::<f64>() / line.count - 1.0);
+    }
+    largest
+}
+
+/// One force drives three modes: the outputs move along one direction, which turns from line to
+/// line, and all other directions have only noise.
+#[test]
+fn pooled_lines_are_even_also_in_the_noise() {
+    let mut parameters = parameters(Kernel::Static, 4);
+    for output in 0..4 {
+        parameters.values[parameters.layout.noise(0, output)] = f64::ln(1e-6);
+        parameters.values[parameters.layout.noise(1, output)] = 0.0;
+        parameters.values[parameters.layout.noise(2, output)] = 0.0;
+    }
+    for (pair, correlation) in [1e6, 1e6, 0.0].into_iter().enumerate() {
+        parameters.values[parameters.layout.correlation(pair)] = correlation;
+    }
+    let omega: Vec<f64> =
+        (40..400).map(|k| std::f64::consts::TAU * f64::from(k) / DURATION).collect();
+    let amplitudes = DMatrix::zeros(omega.len(), 4);
+    // The leakage of a short record would fill all directions.
+    let span = Span { duration: f64::INFINITY, ..SPAN };
+    let band = BandLines { omega, amplitudes, scale: vec![1.0; 4], span, transient: None };
+    let even = band.pooled_evenly(&parameters, 0.1);
+    assert!(even.len() < band.omega.len(), "{}", even.len());
+    let excess = largest_excess(&even, &band, &parameters);
+    assert!(excess < 0.01, "{excess}");
+    let by_distance = band.pooled(&parameters.poles(), 0.1, 3);
+    let excess = largest_excess(&by_distance, &band, &parameters);
+    assert!(excess > 0.2, "{excess} {} {}", even.len(), by_distance.len());
 }
 
 #[test]

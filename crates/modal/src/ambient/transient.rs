@@ -68,7 +68,7 @@ impl FitWithTransient {
     /// Compares the power of the lines with the fitted spectrum.
     pub fn misfit(&self) -> Option<SpectrumMisfit> {
         let parameters = &self.fit.parameters;
-        let pooled = self.lines.pooled(&self.fit.poles(), POOLING, parameters.layout.noise_terms);
+        let pooled = self.lines.pooled_evenly(parameters, POOLING);
         misfit(parameters, &pooled, self.lines.span)
     }
 }

@@ -310,7 +310,7 @@ fn resonances_are_not_taken_for_harmonics() {
 
 #[test]
 fn a_short_record_gives_values_without_intervals() {
-    let record = mast().record(Quantity::Displacement, 30.0, 1500, 0.02, 5);
+    let record = mast().record(Quantity::Displacement, 30.0, 1050, 0.02, 5);
     let settings = AmbientSettings { modes: Some(3), ..AmbientSettings::default() };
     let estimate = identified(&record, settings);
     let slow = estimate.modes[0].damping_ratio;
@@ -318,7 +318,7 @@ fn a_short_record_gives_values_without_intervals() {
     let Uncertainty::RecordTooShort { decay_times, needed } = slow.uncertainty else {
         panic!("{slow:?}")
     };
-    assert!((decay_times / (slow.value * 2.0 * TAU * 50.0) - 1.0).abs() < 0.05, "{decay_times}");
+    assert!((decay_times / (slow.value * 2.0 * TAU * 35.0) - 1.0).abs() < 0.05, "{decay_times}");
     assert_eq!(needed, 15.0);
 }
 
@@ -334,7 +334,7 @@ fn a_stated_number_of_modes_is_kept() {
     let all = identified(&record, AmbientSettings::default());
     for mode in &estimate.modes {
         let is_same = |other: &AmbientMode| {
-            (mode.damping_ratio.value / other.damping_ratio.value - 1.0).abs() < 1e-3
+            (mode.damping_ratio.value / other.damping_ratio.value - 1.0).abs() < 3e-3
         };
         assert!(all.modes.iter().any(is_same), "{:?}", mode.damping_ratio);
     }
