@@ -213,7 +213,7 @@ pub enum AnalysisError {
         file: String,
     },
     /// The modes in a JSON file are not modes of a result.
-    #[error("{file}: its `modes` cannot be used: {why}")]
+    #[error("{file} is not a result with modes: {why}")]
     SavedModes {
         /// The file.
         file: String,

@@ -71,10 +71,17 @@ impl HitRow {
     }
 }
 
+impl HitRow {
+    /// Returns number, peak and time in words.
+    fn brief(&self) -> String {
+        let (peak, time) = (significant(self.peak, 3), significant(self.time_s, 4));
+        format!("hit {}, {peak} N at {time} s", self.number)
+    }
+}
+
 impl fmt::Display for HitRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (peak, time) = (significant(self.peak, 3), significant(self.time_s, 4));
-        write!(f, "hit {}, {peak} N at {time} s", self.number)?;
+        f.write_str(&self.brief())?;
         if self.used {
             return Ok(());
         }
@@ -82,7 +89,8 @@ impl fmt::Display for HitRow {
     }
 }
 
-/// Returns a line for every record with its number of hits, and a line for every excluded hit.
+/// Returns a line for every record with its number of hits, and a line for every excluded hit; of
+/// more than [`LISTED`] hits with one kind of fault, a line names the first ones.
 pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
     let mut text = String::new();
     for of_record in rows.chunk_by(|a, b| a.record == b.record && a.number < b.number) {
@@ -92,11 +100,39 @@ pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
         text += &format!(
             "{file}: {used} of {all} hits on degree of freedom {dof} used, {sample_rate_hz} Hz\n"
         );
-        for hit in of_record.iter().filter(|hit| !hit.used) {
-            text += &format!("  {hit}\n");
+        for line in excluded(of_record) {
+            text += &format!("  {line}\n");
         }
     }
     text
+}
+
+/// Maximum number of excluded hits with the same kind of fault in a message; of more hits, the
+/// message names the kind, the number, and the first ones.
+const LISTED: usize = 3;
+
+/// Returns a text for every excluded hit, or one for many hits with the same kind of fault, in the
+/// order of the first hit of each text.
+fn excluded(hits: &[HitRow]) -> Vec<String> {
+    let kind = |hit: &HitRow| hit.faults.first().map_or("left out", HitFault::kind);
+    let bad: Vec<&HitRow> = hits.iter().filter(|hit| !hit.used).collect();
+    let mut texts = Vec::new();
+    for (at, hit) in bad.iter().enumerate() {
+        let is_alike = |other: &&&HitRow| kind(other) == kind(hit);
+        let alike: Vec<&&HitRow> = bad.iter().filter(is_alike).collect();
+        if alike.len() <= LISTED {
+            texts.push(hit.to_string());
+        } else if !bad[..at].iter().any(|other| kind(other) == kind(hit)) {
+            let first = message::list(alike.iter().map(|hit| hit.brief()), "; ", LISTED);
+            let reason = hit.reasons.first().map_or("", String::as_str);
+            texts.push(format!(
+                "{} left out, {}: {first}; the first: {reason}",
+                message::count(alike.len(), "hit"),
+                kind(hit),
+            ));
+        }
+    }
+    texts
 }
 
 /// Returns a remark on a record that looks like a hammer test but is not divided into hits.
@@ -245,7 +281,7 @@ pub(crate) fn cut(
             let reasons = if rows.is_empty() {
                 "the force does not rise above its noise".into()
             } else {
-                rows.iter().map(HitRow::to_string).collect::<Vec<_>>().join("; ")
+                excluded(&rows).join("; ")
             };
             return Err(AnalysisError::NoHit { file: buffered.file.clone(), reasons });
         }
@@ -304,4 +340,41 @@ fn pieces(all: &[Hit], windows: Windows) -> Vec<Range<usize>> {
         range
     });
     chunks.filter(|range| all[range.start].faults.is_empty()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(number: usize, fault: Option<HitFault>) -> HitRow {
+        HitRow {
+            record: "beam.csv".into(),
+            number,
+            force: 1,
+            first_sample: 100 * number,
+            last_sample: 100 * number + 99,
+            time_s: number as f64,
+            duration_s: 0.01,
+            peak: 400.0,
+            used: fault.is_none(),
+            reasons: fault.iter().map(HitFault::to_string).collect(),
+            faults: fault.into_iter().collect(),
+        }
+    }
+
+    /// Sixty hits with one fault are one line, and few hits a line each.
+    #[test]
+    fn many_bad_hits_of_one_kind_are_one_line() {
+        let overload = Some(HitFault::Overload { level: 390.0 });
+        let mut rows: Vec<HitRow> = (1..=60).map(|number| row(number, overload.clone())).collect();
+        rows.push(row(61, Some(HitFault::Cut)));
+        rows.push(row(62, None));
+        let text = heading(&rows, "512");
+        assert_eq!(text.lines().count(), 3, "{text}");
+        assert!(text.len() < 400, "{text}");
+        let many = "60 hits left out, overload of the force: hit 1, 400 N at 1.000 s; hit 2, ";
+        assert!(text.contains(many) && text.contains("… (57 more)"), "{text}");
+        assert!(text.contains("clipped at 390") && text.contains("hit 61, 400 N at"), "{text}");
+        assert_eq!(excluded(&rows[57..]).len(), 4);
+    }
 }

@@ -63,7 +63,7 @@ pub(crate) fn apparent_delays(lines: &Lines, poles: &[C]) -> Option<Vec<f64>> {
         effective_count(after) * (square(before) / square(after)).ln()
     };
     let gain: f64 = before.iter().zip(&after).map(gain).sum();
-    log::debug!("delays {delays:?} s, gain {gain:.0}");
+    log::debug!("delays of {outputs} responses, gain {gain:.0}");
     (gain > outputs as f64 * lines.schwarz()).then_some(delays)
 }
 
@@ -100,7 +100,7 @@ pub(crate) fn determined_delays(
     let seconds: Vec<f64> = delays.iter().map(|delay| delay.seconds).collect();
     let sum = |delays: &[f64]| -> f64 { trial.costs(delays).iter().sum() };
     let gain = sum(&vec![0.0; outputs]) - sum(&seconds);
-    log::debug!("{count} delays, {seconds:?} s, gain {gain:.0} with the final modes");
+    log::debug!("delays of {count} responses, gain {gain:.0} with the final modes");
     (count > 0 && gain > count as f64 * lines.schwarz()).then_some(delays)
 }
 

@@ -93,7 +93,7 @@ pub fn identify_modes(
     let lines = lines.advanced(determined);
     let search = search.on(&lines);
     let (without, with) = (plain.criterion(), search.criterion());
-    log::debug!("criterion {without:.0}, after delays {with:.0}");
+    log::debug!("information criterion {without:.0}, with delays {with:.0}");
     if with < without { search.finish() } else { plain.finish() }
 }
 
@@ -480,7 +480,7 @@ impl<'a> Identification<'a> {
     fn reject(&mut self, reasons: &[Option<DropReason>]) -> Vec<usize> {
         for (pole, reason) in self.fit.model.poles.iter().zip(reasons) {
             if let Some(reason) = reason {
-                log::debug!("{:.3} Hz removed: {reason:?}", pole.im / TAU);
+                log::debug!("{:.3} Hz removed: {}", pole.im / TAU, reason.words());
                 self.dropped.push(DroppedCandidate::new(*pole, *reason));
             }
         }
@@ -512,7 +512,11 @@ impl<'a> Identification<'a> {
             let count = unknowns(&trial.model);
             let criterion =
                 trial.cost() + AKAIKE * count.min(current) + penalty * (count - current).max(0.0);
-            log::debug!("residual powers {powers:?}: {criterion:.1}");
+            log::debug!(
+                "{} and {} residual terms of forces and transients, criterion {criterion:.1}",
+                powers.forces.len(),
+                powers.transients.len()
+            );
             if criterion < best.0 {
                 best = (criterion, powers);
             }

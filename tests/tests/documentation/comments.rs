@@ -25,12 +25,18 @@ pub struct Comment {
 
 /// Returns the comments of the sources below a folder, except those of tests.
 pub fn below(folder: &Path) -> Vec<Comment> {
-    let mut files = Vec::new();
-    sources(folder, &mut files);
-    files.sort();
+    let files = sources_below(folder);
     let read =
         |file: &PathBuf| read(&fs::read_to_string(file).unwrap(), &file.display().to_string());
     files.iter().flat_map(read).collect()
+}
+
+/// Returns the sources below a folder, except tests, in the order of their names.
+pub fn sources_below(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    sources(folder, &mut files);
+    files.sort();
+    files
 }
 
 fn sources(folder: &Path, files: &mut Vec<PathBuf>) {

@@ -135,6 +135,24 @@ fn comments_have_plain_words() {
     none(&faults, "comments with a phrase of `phrases.txt`");
 }
 
+/// The program shows the messages of the log as its progress.
+#[test]
+fn progress_is_reported_in_words() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut found = Vec::new();
+    let folders = CLEAN.iter().map(|name| root.join(name).join("src"));
+    for file in folders.flat_map(|folder| comments::sources_below(&folder)) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for (at, _) in text.match_indices("log::debug!").chain(text.match_indices("log::trace!")) {
+            let call = text[at..].split_inclusive(';').next().unwrap_or_default();
+            if call.contains(":?}") {
+                found.push(format!("{}: {call}", file.display()));
+            }
+        }
+    }
+    none(&found, "messages of progress that print values of the program");
+}
+
 /// The rules find each fault in comments of each kind, and none in good comments.
 #[test]
 fn faults_of_comments_are_found() {

@@ -9,6 +9,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use serde::Deserialize;
 
 use super::SavedModes;
+use super::saved::from_json_with_modes;
 use super::summary::ModesSummary;
 use crate::modal::{ModalSummary, ShapedMode};
 use crate::{AnalysisError, Machine};
@@ -94,9 +95,7 @@ impl ModeSet {
             let (modes, points) = SavedModes::from_json(name, json)?.shapes();
             return Self::from_shaped(name, points, &modes);
         }
-        let plain: PlainModes = serde_json::from_value(json).map_err(|error| {
-            AnalysisError::SavedModes { file: name.into(), why: error.to_string() }
-        })?;
+        let plain: PlainModes = from_json_with_modes(name, json)?;
         let modes = plain.modes.into_iter().map(|mode| {
             let damping_ratio = mode.damping_ratio.map(PlainValue::measured);
             (mode.natural_frequency_hz.measured(), damping_ratio, mode.shape)

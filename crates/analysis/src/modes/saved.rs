@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use mechid_io::{input_name, read_json};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::Diagrams;
@@ -167,6 +168,28 @@ struct SavedPlaces {
     responses: Vec<String>,
 }
 
+/// Takes a value from the JSON of a result with modes.
+///
+/// # Errors
+/// [`AnalysisError::SavedModes`] if `modes` is not a list, as in the settings of an analysis, or if
+/// a field is absent, unknown or of another kind.
+pub(super) fn from_json_with_modes<T: DeserializeOwned>(
+    name: &str,
+    json: serde_json::Value,
+) -> Result<T, AnalysisError> {
+    let refused = |why: String| AnalysisError::SavedModes { file: name.into(), why };
+    if !json["modes"].is_array() {
+        let why = "its modes are not a list; if it has the settings of an analysis, name the result, \
+                   which `mechid modes --json` prints";
+        return Err(refused(why.into()));
+    }
+    // A field between backticks would look like a setting.
+    let why = |error: serde_json::Error| {
+        error.to_string().replace("missing field", "it lacks the field").replace('`', "\"")
+    };
+    serde_json::from_value(json).map_err(|error| refused(why(error)))
+}
+
 impl SavedModes {
     /// Reads a result, or computes the modes of a described machine.
     ///
@@ -188,11 +211,7 @@ impl SavedModes {
     /// # Errors
     /// [`AnalysisError::SavedModes`] if it has none.
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
-        let refused = |error: serde_json::Error| AnalysisError::SavedModes {
-            file: name.into(),
-            why: error.to_string(),
-        };
-        let mut saved: Self = serde_json::from_value(json).map_err(refused)?;
+        let mut saved: Self = from_json_with_modes(name, json)?;
         if saved.records.is_empty() {
             saved.records.extend(saved.record.take());
         }

@@ -11,6 +11,7 @@ use nalgebra::{Complex, DMatrix};
 use serde::Deserialize;
 
 use super::Modes;
+use super::saved::from_json_with_modes;
 use crate::AnalysisError;
 use crate::measurement::Channels;
 use crate::measurement::channels::ABSENT;
@@ -36,7 +37,8 @@ pub struct ModalSystem {
 pub(crate) type MeasuredChannel = (ResponseQuantity, usize, usize);
 
 /// A saved result of modes, as far as a system needs it.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
 struct Saved {
     inputs: Vec<String>,
     outputs: Vec<SavedOutput>,
@@ -70,8 +72,7 @@ impl ModalSystem {
     /// [`AnalysisError::SavedModes`] if they have no frequency responses.
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
         let refused = |why: String| AnalysisError::SavedModes { file: name.into(), why };
-        let saved: Saved =
-            serde_json::from_value(json).map_err(|error| refused(error.to_string()))?;
+        let saved: Saved = from_json_with_modes(name, json)?;
         let Some(model) = saved.model else {
             return Err(refused(
                 "the modes have no frequency responses: `mechid modes` computes frequency responses from \

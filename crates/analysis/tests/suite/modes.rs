@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use mechid_analysis::modes::{ModalCheck, ModalModeRow, ModalTest, Properties};
 use mechid_analysis::{
-    Channels, HitRule, Measurement, ModeSet, Modes, ModesSettings, SavedAnalysis, compare_modes,
-    modes_of_responses,
+    Channels, HitRule, Measurement, ModalSystem, ModeSet, Modes, ModesSettings, SavedAnalysis,
+    compare_modes, modes_of_responses,
 };
 use mechid_io::{AveragedSegments, FrequencyResponses, NodalModes, ResponseFunction};
 use mechid_model::ResponseQuantity::{self, Acceleration, Displacement};
@@ -414,13 +414,17 @@ fn frequencies_and_shapes_alone_are_read_strictly() {
     assert_eq!(right.points, ["a", "b"]);
     assert_eq!(set(&format!(r#"{{"modes": [{mode}]}}"#)).unwrap().points, ["1", "2"]);
     for (wrong, word) in [
-        (format!(r#"{{"modes": [{mode}], "points": ["a", "b"]}}"#), "`points`"),
+        (format!(r#"{{"modes": [{mode}], "points": ["a", "b"]}}"#), "\"points\""),
         (format!(r#"{{"modes": [{mode}], "response_names": ["a"]}}"#), "1 names"),
-        (r#"{"modes": [{"frequency_hz": {"value": 12}, "shape": []}]}"#.into(), "`frequency_hz`"),
+        (r#"{"modes": [{"frequency_hz": {"value": 12}, "shape": []}]}"#.into(), "\"frequency_hz\""),
+        (r#"{"modes": {"test": {"forced": {}}}}"#.into(), "its modes are not a list"),
     ] {
         let error = set(&wrong).unwrap_err();
         assert_eq!(error.code(), "analysis.saved-modes");
         assert!(error.to_string().contains(word), "{error}");
+        let as_system = ModalSystem::from_json("model", serde_json::from_str(&wrong).unwrap());
+        let error = as_system.unwrap_err().to_string();
+        assert!(!error.contains("missing field") && !error.contains("`modes`"), "{error}");
     }
 }
 

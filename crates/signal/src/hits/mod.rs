@@ -196,6 +196,21 @@ pub enum HitFault {
     },
 }
 
+impl HitFault {
+    /// Returns the kind of the fault in words, without its numbers.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Double { .. } => "double hit",
+            Self::Overload { .. } => "overload of the force",
+            Self::ResponseOverload { .. } => "overload of a response",
+            Self::Weak { .. } => "weak hit",
+            Self::Cut => "the record begins or ends within the pulse",
+            Self::RecordEnds { .. } => "the record ends too soon",
+            Self::NextHit { .. } => "the next hit comes too soon",
+        }
+    }
+}
+
 impl fmt::Display for HitFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
