@@ -30,7 +30,7 @@ pub struct GeometryPoint {
 pub struct Direction<'a> {
     /// Name of the point.
     pub point: &'a str,
-    /// Axis: 0, 1, 2 for x, y, z.
+    /// Axis: 0, 1, 2 for translations along x, y, z, and 3, 4, 5 for rotations about them.
     pub axis: usize,
     /// `true` for the direction against the axis.
     pub is_negative: bool,
@@ -98,17 +98,59 @@ impl NodalModes {
     }
 }
 
+/// Names of the axes, in the order of [`Direction::axis`].
+const AXES: [&str; 6] = ["X", "Y", "Z", "RX", "RY", "RZ"];
+
 impl<'a> Direction<'a> {
-    /// Splits a name such as `12+Z` or `bracket-X`; `None` if it does not end with a sign and an
-    /// axis.
+    /// Splits a name such as `12+Z`, `12-z` or `bracket+RX`; `None` if it does not end with a sign
+    /// and an axis. Capital and small letters of the axis are the same.
     pub fn parse(name: &'a str) -> Option<Self> {
         let at = name.rfind(['+', '-'])?;
-        let axis =
-            ["X", "Y", "Z"].iter().position(|axis| axis.eq_ignore_ascii_case(&name[at + 1..]))?;
+        let axis = AXES.iter().position(|axis| axis.eq_ignore_ascii_case(&name[at + 1..]))?;
         let point = &name[..at];
         let is_negative = name[at..].starts_with('-');
         (!point.is_empty()).then_some(Self { point, axis, is_negative })
     }
+
+    /// Returns the number of the node if the point is a node of a universal file.
+    pub fn node(&self) -> Option<u32> {
+        self.point.parse().ok()
+    }
+
+    /// Returns 1 if two names are the same point in the same direction, and −1 if they are the same
+    /// point in opposite directions; `None` for other names. A name without a direction is only
+    /// equal to itself.
+    ///
+    /// ```
+    /// use mechid_io::Direction;
+    ///
+    /// assert_eq!(Direction::relative_sign("1-z", "1-Z"), Some(1.0));
+    /// assert_eq!(Direction::relative_sign("1-z", "1+Z"), Some(-1.0));
+    /// assert_eq!(Direction::relative_sign("1", "1+Z"), None);
+    /// ```
+    pub fn relative_sign(one: &str, other: &str) -> Option<f64> {
+        if one == other {
+            return Some(1.0);
+        }
+        let (a, b) = (Direction::parse(one)?, Direction::parse(other)?);
+        let is_same = a.point == b.point && a.axis == b.axis;
+        is_same.then_some(if a.is_negative == b.is_negative { 1.0 } else { -1.0 })
+    }
+
+    /// Returns the name of the point in the positive direction, with a capital axis: `12+Z`.
+    pub fn positive_name(&self) -> String {
+        format!("{}+{}", self.point, AXES[self.axis])
+    }
+}
+
+/// Returns whether a name is a node with a direction, as universal files name their channels:
+/// `12+Z`, `3-RX`.
+///
+/// # Source
+/// Structural Dynamics Research Laboratory, University of Cincinnati, *Universal File Formats*,
+/// dataset 58 (nodes and directions).
+pub fn is_directed_point(name: &str) -> bool {
+    Direction::parse(name).is_some_and(|direction| direction.node().is_some())
 }
 
 impl Geometry {
@@ -237,7 +279,8 @@ impl Geometry {
 
     /// Returns the displacement along x, y, z of each point of a shape (real and imaginary parts,
     /// pure numbers) whose entries have these names, such as `1+Z`; an entry whose name has no axis
-    /// is a displacement of its point along z. `None` if an entry has no point.
+    /// is a displacement of its point along z. Rotations (`1+RZ`) do not displace their point.
+    /// `None` if an entry has no point.
     ///
     /// # Source
     /// Ours.
@@ -250,7 +293,10 @@ impl Geometry {
                 None => Direction::parse(name)?,
             };
             let sign = if direction.is_negative { -1.0 } else { 1.0 };
-            moved[self.index(direction.point)?][direction.axis] = [sign * re, sign * im];
+            let point = self.index(direction.point)?;
+            if let Some(displacement) = moved[point].get_mut(direction.axis) {
+                *displacement = [sign * re, sign * im];
+            }
         }
         Some(moved)
     }
@@ -281,6 +327,16 @@ mod tests {
     }
 
     #[test]
+    fn letters_of_an_axis_may_be_small() {
+        let direction = Direction { point: "12", axis: 5, is_negative: true };
+        assert_eq!([Direction::parse("12-RZ"), Direction::parse("12-rz")], [Some(direction); 2]);
+        assert_eq!((direction.node(), direction.positive_name().as_str()), (Some(12), "12+RZ"));
+        assert!(is_directed_point("1-z") && !is_directed_point("a-z") && !is_directed_point("1"));
+        assert_eq!(Direction::relative_sign("arm", "arm"), Some(1.0));
+        assert_eq!(Direction::relative_sign("1+Z", "2+Z"), None);
+    }
+
+    #[test]
     fn a_table_has_points_and_lines_and_names_what_is_wrong() {
         let text =
             "point,x,y,z\n# corners\n1, 0, 0, 0\n2, 1.5, 0, 0\n3, 1.5, 1, 0\nline, 1, 2, 3\n";
@@ -307,6 +363,8 @@ mod tests {
         assert_eq!(moved[0], [[0.0; 2], [0.0; 2], [-1.0, -2.0]]);
         assert_eq!(moved[1], [[3.0, 0.0], [0.0; 2], [5.0, 0.0]]);
         assert!(geometry.displacement(&["9+X".to_owned()], &[[1.0, 0.0]]).is_none());
+        let rotation = geometry.displacement(&["1+RZ".to_owned()], &[[1.0, 0.0]]).unwrap();
+        assert_eq!(rotation, [[[0.0; 2]; 3]; 3]);
     }
 
     /// Judge: reading back what was written, and the field widths of the format.

@@ -63,7 +63,9 @@ pub use experiment::{
     StudyField, StudyRuns, SubStepLoad,
 };
 pub use folder::{FileStamp, create_folder, files_of, special_kind};
-pub use geometry::{Direction, Geometry, GeometryPoint, NodalMode, NodalModes, PointShape};
+pub use geometry::{
+    Direction, Geometry, GeometryPoint, NodalMode, NodalModes, PointShape, is_directed_point,
+};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
@@ -87,5 +89,4 @@ pub use system::{
     read_system,
 };
 pub use table::{Inventory, RecordFile, Survey, Table, Tally, TimeAxis};
-pub use uff::{is_directed_point, opposite_point};
 pub use units::{Evidence, Quantity, StatedUnit, Unit, name_without_unit, stated_unit};

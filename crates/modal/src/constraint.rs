@@ -18,13 +18,28 @@ use crate::ModalError;
 use crate::limits::{CONSTRAINT_STEPS, DEPENDENT_EQUATION};
 use crate::mode_parameters::ModeParameters;
 
-/// Sensor at the point and in the direction of a force.
+/// Sensor at the point of a force, in its direction or against it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DrivingPoint {
     /// Index of the output.
     pub output: usize,
     /// Index of the input.
     pub input: usize,
+    /// `true` if the sensor is positive against the direction of the force.
+    pub is_opposite: bool,
+}
+
+impl DrivingPoint {
+    /// Creates a driving point whose sensor and force have the same direction, from the indices of
+    /// output and input.
+    pub fn new(output: usize, input: usize) -> Self {
+        Self { output, input, is_opposite: false }
+    }
+
+    /// Returns the response in the direction of the force per output: 1 or −1.
+    pub fn sign(&self) -> f64 {
+        if self.is_opposite { -1.0 } else { 1.0 }
+    }
 }
 
 /// Known property of a structure that its modes must satisfy.
@@ -121,12 +136,12 @@ impl ModalConstraint {
                 let strength = |point: &&DrivingPoint| mode.participation(point.input).norm();
                 let strongest = points.iter().max_by(|a, b| strength(a).total_cmp(&strength(b)));
                 let Some(reference) = strongest else { return Vec::new() };
-                let (shape, participation) =
-                    (mode.shape(reference.output), mode.participation(reference.input));
+                let shape = |point: &DrivingPoint| mode.shape(point.output) * point.sign();
+                let participation = mode.participation(reference.input);
                 let partners = points.iter().filter(|point| *point != reference);
                 let difference = |point: &DrivingPoint| {
-                    mode.shape(point.output) * participation
-                        - shape * mode.participation(point.input)
+                    shape(point) * participation
+                        - shape(reference) * mode.participation(point.input)
                 };
                 partners
                     .map(difference)
@@ -247,8 +262,7 @@ mod tests {
     fn reciprocity_of_known_participations_is_a_weighted_mean() {
         let (a, b) = (C::new(1.0, 0.2), C::new(1.3, -0.1));
         let (u, v) = (0.04, 0.01);
-        let points =
-            vec![DrivingPoint { output: 0, input: 0 }, DrivingPoint { output: 1, input: 1 }];
+        let points = vec![DrivingPoint::new(0, 0), DrivingPoint::new(1, 1)];
         let reciprocity = ModalConstraint::Reciprocity { points };
         let (statistic, freedom, result) = impose(&[reciprocity], &mode([a, b], [u, v])).unwrap();
         let mean = (a / u + b / v) / (1.0 / u + 1.0 / v);
@@ -257,6 +271,22 @@ mod tests {
         assert_eq!(freedom, 2);
         let variance = 1.0 / (1.0 / u + 1.0 / v);
         assert!((result.covariance[(2, 2)] - variance).abs() < 1e-9);
+    }
+
+    /// A sensor against the direction of its force measures the negative entry.
+    #[test]
+    fn reciprocity_counts_the_direction_of_a_sensor() {
+        let (a, b) = (C::new(1.0, 0.2), C::new(1.3, -0.1));
+        let opposite = DrivingPoint { is_opposite: true, ..DrivingPoint::new(1, 1) };
+        let constraint =
+            |point| ModalConstraint::Reciprocity { points: vec![DrivingPoint::new(0, 0), point] };
+        let imposed =
+            |point, entry| impose(&[constraint(point)], &mode([a, entry], [0.04, 0.01])).unwrap();
+        let (same, _, plain) = imposed(DrivingPoint::new(1, 1), b);
+        let (turned, _, result) = imposed(opposite, -b);
+        assert!((same - turned).abs() < 1e-9 * same, "{same} {turned}");
+        assert!((plain.shape(1) + result.shape(1)).norm() < 1e-12);
+        assert!((plain.shape(0) - result.shape(0)).norm() < 1e-12);
     }
 
     /// With a known pole the entries lose what is across the phase of a real residue: accelerations
@@ -271,10 +301,7 @@ mod tests {
             real.clone(),
             // The participations are real already; these equations follow from nothing else.
             ModalConstraint::Reciprocity {
-                points: vec![
-                    DrivingPoint { output: 0, input: 0 },
-                    DrivingPoint { output: 1, input: 1 },
-                ],
+                points: vec![DrivingPoint::new(0, 0), DrivingPoint::new(1, 1)],
             },
         ];
         let estimate = mode(entries, [0.01, 0.01]);
@@ -299,7 +326,7 @@ mod tests {
 
     #[test]
     fn constraints_name_what_exists() {
-        let point = |output, input| DrivingPoint { output, input };
+        let point = DrivingPoint::new;
         let reciprocity = |points| ModalConstraint::Reciprocity { points };
         assert!(ModalConstraint::RealShapes { derivative: 2 }.check(3, 1).is_ok());
         assert!(ModalConstraint::RealShapes { derivative: 3 }.check(3, 1).is_err());

@@ -123,7 +123,7 @@ impl ModeParameters {
         let [entry, scale] = [point.output, largest].map(|output| self.shape(output));
         let participation = self.participation(point.input);
         let squared = participation / pole.powi(derivative) * C::new(0.0, 2.0 * pole.im);
-        let mass = entry / (scale * scale * squared);
+        let mass = entry * point.sign() / (scale * scale * squared);
         // Derivatives of the logarithm of the complex mass with respect to each complex parameter.
         let terms = [
             (Self::shape_index(point.output), 1.0 / entry),

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use mechid_checks::{Finding, after_response_fit, after_table_fit, coherence, leakage};
 use mechid_estimate::Estimate;
-use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use mechid_io::{CoherenceFunction, Direction, FrequencyResponses, ResponseFunction};
 use mechid_model::ResponseQuantity;
 use mechid_signal::Sampling;
 use mechid_spectra::frf::{Frf, Segments};
@@ -351,11 +351,7 @@ pub(crate) fn with_positive_directions<'a>(
     points: &[String],
 ) -> Cow<'a, FrequencyResponses> {
     let is_negative = |point: &String| {
-        let direction =
-            point.rsplit_once('-').map(|(node, direction)| (node.parse::<u64>(), direction));
-        direction.is_some_and(|(node, direction)| {
-            node.is_ok() && ["X", "Y", "Z", "RX", "RY", "RZ"].contains(&direction)
-        })
+        Direction::parse(point).is_some_and(|one| one.is_negative && one.node().is_some())
     };
     let mut directions = table.functions.iter().flat_map(|f| [&f.response, &f.reference]);
     if !directions.any(is_negative) || points.iter().any(is_negative) {
@@ -363,10 +359,10 @@ pub(crate) fn with_positive_directions<'a>(
     }
     let mut positive = table.clone();
     let turn = |point: &mut String| {
-        let is_turned = is_negative(point);
-        if is_turned {
-            *point = point.replacen('-', "+", 1);
-        }
+        let positive = Direction::parse(point).filter(|_| is_negative(point));
+        let positive = positive.map(|direction| direction.positive_name());
+        let is_turned = positive.is_some();
+        *point = positive.unwrap_or_else(|| std::mem::take(point));
         is_turned
     };
     for function in &mut positive.functions {

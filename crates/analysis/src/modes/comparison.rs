@@ -172,14 +172,13 @@ const LISTED: usize = 6;
 
 /// Returns the relative sign of two names if they can be the same point and direction.
 fn same_direction(one: &str, other: &str) -> Option<f64> {
-    match (Direction::parse(one), Direction::parse(other)) {
-        (Some(a), Some(b)) if a.point == b.point && a.axis == b.axis => {
-            Some(if a.is_negative == b.is_negative { 1.0 } else { -1.0 })
-        }
-        (Some(a), None) if a.point == other => Some(if a.is_negative { -1.0 } else { 1.0 }),
-        (None, Some(b)) if b.point == one => Some(if b.is_negative { -1.0 } else { 1.0 }),
-        _ => None,
-    }
+    let undirected = |directed: &str, point: &str| {
+        let direction = Direction::parse(directed).filter(|one| one.point == point)?;
+        Some(if direction.is_negative { -1.0 } else { 1.0 })
+    };
+    Direction::relative_sign(one, other)
+        .or_else(|| undirected(one, other))
+        .or_else(|| undirected(other, one))
 }
 
 impl DifferenceRow {

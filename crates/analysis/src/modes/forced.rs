@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use mechid_modal::{IdentifiedMode, ModalError, ModalEstimate, ModalSettings, identify_modes};
+use mechid_modal::{
+    DrivingPoint, IdentifiedMode, ModalError, ModalEstimate, ModalSettings, identify_modes,
+};
 use mechid_signal::message;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
@@ -40,8 +42,7 @@ struct Context {
     hits: Vec<HitRow>,
     inputs: Vec<String>,
     outputs: Vec<Output>,
-    driving_points: Vec<(usize, usize)>,
-    opposite_points: Vec<(usize, usize)>,
+    driving_points: Vec<DrivingPoint>,
     band_hz: [f64; 2],
     checks: Vec<ModalCheck>,
     notes: Vec<String>,
@@ -89,7 +90,7 @@ impl Test {
             0.0 => None,
             share => Some(predicted(&recorded, band_hz, share, &engine)?),
         };
-        let Recorded { inputs, outputs, driving_points, opposite_points, hits, .. } = recorded;
+        let Recorded { inputs, outputs, driving_points, hits, .. } = recorded;
         let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
         checks.extend(prediction_checks(predicted.as_deref().unwrap_or(&[]), &names));
         let context = Context {
@@ -98,7 +99,6 @@ impl Test {
             inputs,
             outputs,
             driving_points,
-            opposite_points,
             band_hz,
             checks,
             notes: halves.note.into_iter().collect(),
@@ -150,7 +150,6 @@ pub(super) fn modes_of_tables(
         hits: Vec::new(),
         inputs: tables.forces.clone(),
         driving_points,
-        opposite_points: Vec::new(),
         outputs,
         band_hz,
         checks: of_tables.into_iter().chain(of_properties).collect(),
@@ -260,7 +259,7 @@ impl Context {
             &reported,
             &self.inputs,
             &self.outputs,
-            [&self.driving_points, &self.opposite_points],
+            &self.driving_points,
             estimate.delays(),
             settings.properties.reciprocal,
         ));

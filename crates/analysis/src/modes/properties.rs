@@ -29,13 +29,12 @@ impl Properties {
         *self == Self::default()
     }
 
-    /// Returns the properties as constraints; `driving_points` has the indices of pairs of a force
-    /// and a response.
+    /// Returns the properties as constraints.
     fn constraints(
         self,
         settings: &ModesSettings,
         outputs: &[Output],
-        driving_points: &[(usize, usize)],
+        driving_points: &[DrivingPoint],
     ) -> Result<Vec<ModalConstraint>, AnalysisError> {
         let mut constraints = Vec::new();
         let mut quantities = outputs.iter().map(|output| output.quantity);
@@ -49,16 +48,21 @@ impl Properties {
             constraints.push(ModalConstraint::RealShapes { derivative });
         }
         if self.reciprocal {
-            if driving_points.len() < 2 || first.is_none() {
+            // Forces in both directions of a point have the same sensor, which counts once.
+            let mut points: Vec<DrivingPoint> = Vec::new();
+            for point in driving_points {
+                if points.iter().all(|other| other.output != point.output) {
+                    points.push(*point);
+                }
+            }
+            if points.len() < 2 || first.is_none() {
                 let why = format!(
                     "it needs responses of one kind, and at least two driving points (a force and a response at one \
                      point; there are {}): state the points (`force_at`, `response_at`)",
-                    driving_points.len()
+                    points.len()
                 );
                 return Err(settings.refused("reciprocal", why));
             }
-            let point = |&(input, output): &(usize, usize)| DrivingPoint { output, input };
-            let points = driving_points.iter().map(point).collect();
             constraints.push(ModalConstraint::Reciprocity { points });
         }
         Ok(constraints)
@@ -70,7 +74,7 @@ impl Properties {
     pub(super) fn imposed<T>(
         self,
         settings: &ModesSettings,
-        (outputs, driving_points): (&[Output], &[(usize, usize)]),
+        (outputs, driving_points): (&[Output], &[DrivingPoint]),
         engine: ModalSettings,
         fit: impl Fn(&ModalSettings) -> Result<T, AnalysisError>,
         estimate: impl Fn(&T) -> &ModalEstimate,

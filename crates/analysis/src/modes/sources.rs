@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use mechid_io::{is_directed_point, opposite_point};
+use mechid_io::{Direction, is_directed_point};
+use mechid_modal::DrivingPoint;
 use mechid_model::ResponseQuantity;
 use mechid_signal::{HitRule, Record, Spectrum, message};
 use mechid_spectra::LineData;
@@ -24,10 +25,8 @@ pub(super) struct Recorded {
     pub inputs: Vec<String>,
     /// Responses.
     pub outputs: Vec<Output>,
-    /// Input and output at the same point, counted from 0.
-    pub driving_points: Vec<(usize, usize)>,
-    /// Input and output at the same point in opposite directions, counted from 0.
-    pub opposite_points: Vec<(usize, usize)>,
+    /// Inputs and outputs at the same point.
+    pub driving_points: Vec<DrivingPoint>,
     /// Hits, if the records were cut.
     pub hits: Vec<HitRow>,
 }
@@ -96,9 +95,9 @@ impl Recorded {
             }
         }
         let responses = places.response_places(&outputs)?;
-        let [driving_points, opposite_points] = columns.driving_points(&responses);
+        let driving_points = driving_points(&columns.places, &responses);
         let inputs = columns.names;
-        Ok(Self { parts, inputs, outputs, driving_points, opposite_points, hits })
+        Ok(Self { parts, inputs, outputs, driving_points, hits })
     }
 
     /// Reads records like [`Recorded::from_forced`], with one force in the first record and another
@@ -120,7 +119,6 @@ impl Recorded {
             inputs: Vec::new(),
             outputs: outputs_of(channels),
             driving_points: Vec::new(),
-            opposite_points: Vec::new(),
             hits: Vec::new(),
         })
     }
@@ -196,7 +194,6 @@ impl Recorded {
             inputs: self.inputs.clone(),
             outputs: self.outputs.clone(),
             driving_points: Vec::new(),
-            opposite_points: Vec::new(),
             hits: Vec::new(),
         }
     }
@@ -263,7 +260,8 @@ impl Columns {
         if roves {
             let mut names: Vec<String> = Vec::new();
             let index = |place: &String| {
-                names.iter().position(|name| name == place).unwrap_or_else(|| {
+                let is_same = |name: &String| Direction::relative_sign(name, place) == Some(1.0);
+                names.iter().position(is_same).unwrap_or_else(|| {
                     names.push(place.clone());
                     names.len() - 1
                 })
@@ -301,23 +299,23 @@ impl Columns {
         let force = self.input[record].get(hit.force - 1).map_or(hit.force, |input| input + 1);
         HitRow { force, ..hit }
     }
+}
 
-    /// Returns the pairs of an input and an output at the same point: first those with the same
-    /// direction, then, for other inputs, those with opposite directions.
-    fn driving_points(&self, responses: &[Option<String>]) -> [Vec<(usize, usize)>; 2] {
-        let mut pairs = [Vec::new(), Vec::new()];
-        for (input, place) in self.places.iter().enumerate() {
-            let Some(place) = place else { continue };
-            let at = |place: &String| responses.iter().position(|r| r.as_ref() == Some(place));
-            let opposite = || opposite_point(place).as_ref().and_then(at);
-            if let Some(output) = at(place) {
-                pairs[0].push((input, output));
-            } else if let Some(output) = opposite() {
-                pairs[1].push((input, output));
-            }
-        }
-        pairs
-    }
+/// Returns, for each input, the output at its point: in its direction if there is one, otherwise
+/// against it. An input or output without a stated point is `None`.
+pub(super) fn driving_points(
+    inputs: &[Option<String>],
+    outputs: &[Option<String>],
+) -> Vec<DrivingPoint> {
+    let point = |(input, place): (usize, &Option<String>)| {
+        let place = place.as_ref()?;
+        let sign = |other: &Option<String>| Direction::relative_sign(place, other.as_ref()?);
+        let find = |wanted: f64| outputs.iter().position(|other| sign(other) == Some(wanted));
+        let (output, is_opposite) =
+            find(1.0).map(|at| (at, false)).or_else(|| find(-1.0).map(|at| (at, true)))?;
+        Some(DrivingPoint { is_opposite, ..DrivingPoint::new(output, input) })
+    };
+    inputs.iter().enumerate().filter_map(point).collect()
 }
 
 impl Places {

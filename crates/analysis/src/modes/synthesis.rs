@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid_io::{FrequencyResponses, ResponseFunction};
+use mechid_io::{FrequencyResponses, ResponseFunction, is_directed_point};
 
 use super::Modes;
 use super::diagrams::{DiagramData, Forced};
@@ -52,12 +52,7 @@ impl Modes {
 
 /// Returns the names if all are nodes with directions, otherwise numbers that begin at `first`.
 fn nodes(names: &[String], first: usize) -> Vec<String> {
-    let is_node = |name: &String| {
-        let (node, direction) = name.split_at(name.find(['+', '-']).unwrap_or(name.len()));
-        node.parse::<u32>().is_ok()
-            && (direction.is_empty()
-                || ["X", "Y", "Z", "RX", "RY", "RZ"].contains(&&direction[1..]))
-    };
+    let is_node = |name: &String| name.parse::<u32>().is_ok() || is_directed_point(name);
     if names.iter().all(is_node) {
         return names.to_vec();
     }

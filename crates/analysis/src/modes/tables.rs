@@ -3,13 +3,13 @@
 use std::f64::consts::TAU;
 
 use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
-use mechid_modal::IdentifiedMode;
+use mechid_modal::{DrivingPoint, IdentifiedMode};
 use mechid_model::ResponseQuantity;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix};
 
 use super::averaged::Averaged;
-use super::sources::Output;
+use super::sources::{Output, driving_points};
 use crate::AnalysisError;
 use crate::identify::added_decay;
 use crate::identify::tabulated::with_positive_directions;
@@ -84,11 +84,10 @@ impl Tables {
         self.responses.iter().map(output).collect()
     }
 
-    /// Returns the pairs of input and output at the same point, counted from 0.
-    pub fn driving_points(&self) -> Vec<(usize, usize)> {
-        let output = |point| self.responses.iter().position(|other| other == point);
-        let inputs = self.forces.iter().enumerate();
-        inputs.filter_map(|(input, point)| Some((input, output(point)?))).collect()
+    /// Returns the inputs and outputs at the same point.
+    pub fn driving_points(&self) -> Vec<DrivingPoint> {
+        let stated = |points: &[String]| points.iter().cloned().map(Some).collect::<Vec<_>>();
+        driving_points(&stated(&self.forces), &stated(&self.responses))
     }
 
     /// Returns whether a window smooths the responses of a table.

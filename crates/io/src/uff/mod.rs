@@ -27,7 +27,6 @@ pub(crate) use self::modes::read_modes;
 pub(crate) use self::responses::read as read_responses;
 pub(crate) use self::shapes::write_shapes;
 pub(crate) use self::write::write_responses;
-pub use self::write::{is_directed_point, opposite_point};
 
 /// Reads the functions of a file as columns.
 pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents, IoError> {

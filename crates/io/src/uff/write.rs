@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use mechid_model::ResponseQuantity;
 
 use super::header::{ADDED_DECAY, SEGMENTS};
+use crate::geometry::Direction;
 use crate::responses::{FrequencyResponses, ResponseFunction};
 
 /// Maximum relative deviation of evenly spaced frequencies from a constant step.
@@ -173,33 +174,13 @@ fn point(label: &str) -> Result<(u32, i32), String> {
     node_and_direction(label).ok_or_else(|| label.to_owned())
 }
 
-/// Returns whether a name is a node with a direction, as universal files name their channels:
-/// `12+Z`, `3-RX`.
-///
-/// # Source
-/// Structural Dynamics Research Laboratory, University of Cincinnati, *Universal File Formats*,
-/// dataset 58 (nodes and directions).
-pub fn is_directed_point(name: &str) -> bool {
-    name.contains(['+', '-']) && node_and_direction(name).is_some()
-}
-
-/// Returns the name of the same point in the opposite direction: `12-Z` for `12+Z`; `None` for a
-/// name without a direction.
-///
-/// # Source
-/// As [`is_directed_point`].
-pub fn opposite_point(name: &str) -> Option<String> {
-    let turned = if name.contains('+') { name.replace('+', "-") } else { name.replace('-', "+") };
-    is_directed_point(name).then_some(turned)
-}
-
 fn node_and_direction(label: &str) -> Option<(u32, i32)> {
-    let Some(at) = label.find(['+', '-']) else { return Some((label.parse().ok()?, 0)) };
-    let (node, direction) = label.split_at(at);
-    let sign = if direction.starts_with('-') { -1 } else { 1 };
-    let axes = ["X", "Y", "Z", "RX", "RY", "RZ"];
-    let axis = axes.iter().position(|axis| *axis == &direction[1..])?;
-    Some((node.parse().ok()?, sign * (axis as i32 + 1)))
+    if let Ok(node) = label.parse() {
+        return Some((node, 0));
+    }
+    let direction = Direction::parse(label)?;
+    let sign = if direction.is_negative { -1 } else { 1 };
+    Some((direction.node()?, sign * (direction.axis as i32 + 1)))
 }
 
 /// Returns a line of at most 80 printable characters.
@@ -218,6 +199,7 @@ mod tests {
     fn points_and_numbers_keep_to_their_columns() {
         assert_eq!(point("12+Z"), Ok((12, 3)));
         assert_eq!(point("3-RX"), Ok((3, -4)));
+        assert_eq!(point("3-rx"), Ok((3, -4)));
         assert_eq!(point("7"), Ok((7, 0)));
         assert!(["x", "1+Q", "+X", "1-"].iter().all(|label| point(label).is_err()));
         for number in [0.0, 1.0, -0.390625, 78.125, 0.596_046_447_753_906_2, -1.0e-300, 1.5e300] {

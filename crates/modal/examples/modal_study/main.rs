@@ -30,7 +30,7 @@ fn main() {
         "| Test | Records | f hold | ζ hold | Shapes hold | Masses hold | f over bound | ζ over bound | Bias | Modes found | False modes |\n|---|---|---|---|---|---|---|---|---|---|---|"
     );
     let all = ModalSettings::default();
-    let points = [(0, 0), (3, 1)].map(|(output, input)| DrivingPoint { output, input });
+    let points = [(0, 0), (3, 1)].map(|(output, input)| DrivingPoint::new(output, input));
     let known = ModalSettings {
         constraints: vec![
             ModalConstraint::RealShapes { derivative: 2 },

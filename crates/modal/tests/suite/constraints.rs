@@ -8,7 +8,7 @@ use crate::generator::{Case, pair, reciprocal};
 use crate::score::Score;
 
 fn points() -> Vec<DrivingPoint> {
-    vec![DrivingPoint { output: 0, input: 0 }, DrivingPoint { output: 3, input: 1 }]
+    vec![DrivingPoint::new(0, 0), DrivingPoint::new(3, 1)]
 }
 
 fn settings(constraint: ModalConstraint) -> ModalSettings {
@@ -51,7 +51,7 @@ fn false_constraints_are_rejected() {
 
 #[test]
 fn constraints_that_name_no_channel_are_refused() {
-    let points = vec![DrivingPoint { output: 0, input: 0 }, DrivingPoint { output: 9, input: 1 }];
+    let points = vec![DrivingPoint::new(0, 0), DrivingPoint::new(9, 1)];
     let wrong = settings(ModalConstraint::Reciprocity { points });
     let message = identify_modes(&pair(8).lines(0), &wrong).unwrap_err().to_string();
     assert_eq!(message, "`constraints`: expected an output of the data, got 9");

@@ -152,7 +152,7 @@ impl Score {
         let shape = &case.shape[truth];
         let true_mass =
             shape[0].norm() / (shape[largest].norm_sqr() * case.participation[truth][0]);
-        let point = DrivingPoint { output: 0, input: 0 };
+        let point = DrivingPoint::new(0, 0);
         if let Some(mass) = estimate.modal_mass(index, point, 2) {
             let relative =
                 (mass.value.abs() / true_mass.abs() - 1.0, mass.standard_error / mass.value.abs());

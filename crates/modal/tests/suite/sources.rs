@@ -67,7 +67,7 @@ fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
     let estimate = identify_modes(&case.lines(1), &ModalSettings::default()).unwrap();
     let deviation = largest_deviation(&case, &estimate);
     assert!(deviation < BOUND, "{deviation}");
-    let point = DrivingPoint { output: 0, input: 0 };
+    let point = DrivingPoint::new(0, 0);
     for (index, (mode, truth)) in estimate.modes().iter().zip(&case.participation).enumerate() {
         let largest = truth.iter().copied().fold(0.0, f64::max);
         for (value, truth) in mode.shape_at_inputs().iter().zip(truth) {
@@ -79,7 +79,7 @@ fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
         assert!(error.abs() < 3.5 * mass.standard_error, "{mass:?} {error}");
         assert!(mass.standard_error < 0.02 * mass.value, "{mass:?}");
     }
-    let outside = DrivingPoint { output: 1, input: 0 };
+    let outside = DrivingPoint::new(1, 0);
     assert!(estimate.modal_mass(0, outside, 2).is_none());
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::SQRT_2;
 
 use mechid_io::derivative;
-use mechid_modal::IdentifiedMode;
+use mechid_modal::{DrivingPoint, IdentifiedMode};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::super::sources::Output;
@@ -32,9 +32,9 @@ pub(super) fn tests(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
-    driving_points: &[(usize, usize)],
+    driving_points: &[DrivingPoint],
 ) -> Vec<Tested> {
-    let test = |&(input, output): &(usize, usize)| {
+    let test = |&DrivingPoint { output, input, .. }: &DrivingPoint| {
         let power = derivative(outputs[output].quantity?) as i32;
         let residue = |mode: &IdentifiedMode| turned_residue(mode, output, input, power);
         // This test corrects a wrong sign, because another check reports it.

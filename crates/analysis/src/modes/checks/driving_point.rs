@@ -1,7 +1,7 @@
 //! Test of driving points: for force and response at one point, every modal mass is positive.
 
 use mechid_io::derivative;
-use mechid_modal::IdentifiedMode;
+use mechid_modal::{DrivingPoint, IdentifiedMode};
 use nalgebra::Complex;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -9,8 +9,7 @@ use super::super::sources::Output;
 use super::tested::Tested;
 
 /// Returns, for each driving point, the test of positive modal masses: the residue of a
-/// displacement times 2jω_d has a positive real part. The first list of driving points has force
-/// and response in the same direction, the second in opposite directions.
+/// displacement in the direction of the force times 2jω_d has a positive real part.
 ///
 /// The p-value is the smallest one of all modes, multiplied by the number of modes (Bonferroni).
 ///
@@ -21,14 +20,15 @@ pub(super) fn tests(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
-    [same, opposite]: [&[(usize, usize)]; 2],
+    driving_points: &[DrivingPoint],
 ) -> Vec<Tested> {
-    let test = |(sign, &(input, output)): (f64, &(usize, usize))| {
+    let test = |point: &DrivingPoint| {
+        let DrivingPoint { output, input, .. } = *point;
         let power = derivative(outputs[output].quantity?) as i32;
         let worst = (1..).zip(modes).map(|(number, mode)| {
             let turned = turned_residue(mode, output, input, power);
             let deviation = relative_error(mode, output, input) * turned.norm() / 2f64.sqrt();
-            (number, sign * turned.re / deviation)
+            (number, point.sign() * turned.re / deviation)
         });
         let (number, ratio) = worst.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let p_value = (modes.len() as f64 * Normal::standard().cdf(ratio)).min(1.0);
@@ -47,8 +47,7 @@ pub(super) fn tests(
             ),
         })
     };
-    let points = same.iter().map(|point| (1.0, point));
-    points.chain(opposite.iter().map(|point| (-1.0, point))).filter_map(test).collect()
+    driving_points.iter().filter_map(test).collect()
 }
 
 /// Returns the residue of the displacement times 2jω_d: positive for proportional damping and a

@@ -11,7 +11,7 @@ mod table;
 mod tested;
 
 use mechid_checks::Verdict;
-use mechid_modal::{IdentifiedMode, OutputDelay};
+use mechid_modal::{DrivingPoint, IdentifiedMode, OutputDelay};
 
 pub(super) use self::force_peak::force_peak_check;
 pub(super) use self::idle::response_checks;
@@ -100,22 +100,20 @@ fn share_checks(
 
 /// Returns the checks of the modes: unexcited inputs, modal masses and delays at driving points,
 /// and reciprocity between driving points unless it is imposed. Outputs whose delay is part of the
-/// model are not tested for a delay. Only the modal masses are tested at `opposite` points, where
-/// the force acts against the direction of the response.
+/// model are not tested for a delay.
 pub(super) fn mode_checks(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
-    [driving_points, opposite]: [&[(usize, usize)]; 2],
+    driving_points: &[DrivingPoint],
     delays: &[OutputDelay],
     is_reciprocal: bool,
 ) -> Vec<ModalCheck> {
     let mut rows = idle::force_checks(modes, inputs);
-    let points = [driving_points, opposite];
-    let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, points);
+    let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, driving_points);
     let has_delay = |output: usize| delays.get(output).is_some_and(|delay| delay.seconds != 0.0);
     let others: Vec<_> =
-        driving_points.iter().copied().filter(|(_, output)| !has_delay(*output)).collect();
+        driving_points.iter().copied().filter(|point| !has_delay(point.output)).collect();
     tests.extend(delay::tests(modes, inputs, outputs, &others));
     if !is_reciprocal {
         tests.extend(reciprocity::tests(modes, inputs, outputs, driving_points));

@@ -2,7 +2,7 @@
 //! same if the two points are exchanged.
 
 use mechid_io::derivative;
-use mechid_modal::IdentifiedMode;
+use mechid_modal::{DrivingPoint, IdentifiedMode};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::super::sources::Output;
@@ -21,12 +21,12 @@ pub(super) fn tests(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
-    driving_points: &[(usize, usize)],
+    driving_points: &[DrivingPoint],
 ) -> Vec<Tested> {
     let mut tests = Vec::new();
     for (at, one) in driving_points.iter().enumerate() {
         for two in &driving_points[at + 1..] {
-            tests.extend(test(modes, inputs, outputs, [*one, *two]));
+            tests.extend(test(modes, inputs, outputs, [one, two]));
         }
     }
     tests
@@ -36,14 +36,16 @@ fn test(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],
-    [(force, point), (other_force, other_point)]: [(usize, usize); 2],
+    points: [&DrivingPoint; 2],
 ) -> Option<Tested> {
+    let [(force, point), (other_force, other_point)] = points.map(|p| (p.input, p.output));
+    let [sign, other_sign] = points.map(DrivingPoint::sign);
     let power = |output: usize| Some(derivative(outputs[output].quantity?) as i32);
     let (first_power, second_power) = (power(point)?, power(other_point)?);
     let (mut statistic, mut worst) = (0.0, (0.0, 0.0, 0.0));
     for mode in modes {
-        let first = receptance_residue(mode, point, other_force, first_power);
-        let second = receptance_residue(mode, other_point, force, second_power);
+        let first = receptance_residue(mode, point, other_force, first_power) * sign;
+        let second = receptance_residue(mode, other_point, force, second_power) * other_sign;
         let variance = (first.norm() * relative_error(mode, point, other_force)).powi(2)
             + (second.norm() * relative_error(mode, other_point, force)).powi(2);
         let square = 2.0 * (first - second).norm_sqr() / variance;
