@@ -22,7 +22,7 @@ use crate::AnalysisError;
 use crate::identify::checks;
 use crate::identify::prediction::Compared;
 use crate::measurement::{Block, Measurement, Window};
-use crate::modes::all_responses;
+use crate::modes::{all_responses, other_places};
 use crate::text::significant;
 
 /// Settings of an analysis of a free decay.
@@ -223,6 +223,20 @@ impl DecaySettings {
 }
 
 impl Decayed {
+    /// Returns the same result with the points of its channels, such as `12+Z`: they name the entries
+    /// of the shapes in comparisons and in files.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] if their number is not that of the channels.
+    pub fn with_points(mut self, points: Vec<String>) -> Result<Self, AnalysisError> {
+        let channels = self.summary.channels.len();
+        if points.len() != channels {
+            return Err(other_places(points.len(), channels));
+        }
+        self.summary.response_names = points;
+        Ok(self)
+    }
+
     /// Returns the numbers and remarks.
     pub fn summary(&self) -> &DecaySummary {
         &self.summary

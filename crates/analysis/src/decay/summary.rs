@@ -58,6 +58,9 @@ pub struct DecaySummary {
     pub excited_again_s: Option<f64>,
     /// Fit of each channel.
     pub channels: Vec<DecayChannelRow>,
+    /// Point of each channel, such as `12+Z`; empty if they are not stated.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub response_names: Vec<String>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
     /// Settings of the analysis; with them it can be repeated.
@@ -106,6 +109,15 @@ pub struct DecayChannelRow {
 }
 
 impl DecaySummary {
+    /// Returns the names of the entries of the shapes: the stated points, otherwise the columns.
+    pub fn points(&self) -> Vec<String> {
+        if self.response_names.is_empty() {
+            self.channels.iter().map(|channel| channel.column.clone()).collect()
+        } else {
+            self.response_names.clone()
+        }
+    }
+
     /// Summarises an estimate that begins at `first_sample` of the record, counted from 1.
     pub(super) fn new(
         measurement: &Measurement,
@@ -147,6 +159,7 @@ impl DecaySummary {
                     + how.from_s.unwrap_or(0.0)
             }),
             channels: channel_rows(columns, estimate.channels()),
+            response_names: Vec::new(),
             remarks: whole.unit_notes(),
             analysis: *how,
         };

@@ -40,12 +40,13 @@ pub(super) fn modes(
     };
     settings.refuse(
         "an ambient record",
-        &["near_hz", "force_at", "response_at", "validate_percent", "real_shapes", "reciprocal"],
+        &["near_hz", "force_at", "validate_percent", "real_shapes", "reciprocal"],
     )?;
     let outputs = outputs_of(&measurement.source().names);
     if outputs.is_empty() {
         return Err(AnalysisError::NoMotion);
     }
+    settings.places.response_places(&outputs)?;
     let block = measurement.whole_block()?;
     let record = all_responses(&block)?;
     let engine = engine_settings(settings, without_hz, without_harmonics);

@@ -19,7 +19,7 @@ pub(super) fn modes(
     settings: &ModesSettings,
     [from_s, to_s]: [Option<f64>; 2],
 ) -> Result<Modes, AnalysisError> {
-    let refused = ["force_at", "response_at", "validate_percent", "real_shapes", "reciprocal"];
+    let refused = ["force_at", "validate_percent", "real_shapes", "reciprocal"];
     settings.refuse("free decays", &refused)?;
     check_distinct(measurements)?;
     let how = DecaySettings { from_s, to_s, ..DecaySettings::default() };
@@ -32,6 +32,7 @@ pub(super) fn modes(
         return Err(AnalysisError::NoDecay { file: block.file.clone() });
     }
     let recorded = Recorded::from_decays(&blocks, &first.source().names)?;
+    settings.places.response_places(&recorded.outputs)?;
     let nyquist_hz = 0.5 / first.sampling().dt();
     let band_hz = settings.band_hz.unwrap_or([0.0, nyquist_hz]);
     let records = blocks.iter().map(RecordRow::from_block).collect();

@@ -42,7 +42,7 @@ pub use self::saved::{
 pub(crate) use self::saved::{SavedValue, saved_errors};
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
-pub(crate) use self::sources::{all_responses, driven_band};
+pub(crate) use self::sources::{all_responses, driven_band, other_places};
 pub use self::summary::{
     DroppedRow, HarmonicRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
     SegmentsRow, TableRow,

@@ -277,10 +277,10 @@ impl SavedModes {
             self.inputs.clone()
         } else if !stated.is_empty() {
             stated.clone()
-        } else if !self.responses().is_empty() {
-            self.columns()
         } else if !self.response_names.is_empty() {
             self.response_names.clone()
+        } else if !self.responses().is_empty() {
+            self.columns()
         } else if let SavedChannels::Names(names) = &self.channels
             && let Some(kind) = names.first_response()
         {

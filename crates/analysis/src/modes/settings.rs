@@ -28,7 +28,7 @@ pub struct ModesSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quantity: Option<ResponseQuantity>,
     /// Points of the forces (one per record for a roving hammer) and of the responses, which define
-    /// the driving points; empty: not stated.
+    /// the driving points and name the entries of the shapes in comparisons; empty: not stated.
     pub places: Places,
     /// Known properties of the structure; none by default.
     #[serde(skip_serializing_if = "Properties::is_empty")]

@@ -336,7 +336,13 @@ impl Places {
 
     /// Returns the points of the responses; if none are stated, the names of the responses that are
     /// points.
-    fn response_places(&self, outputs: &[Output]) -> Result<Vec<Option<String>>, AnalysisError> {
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] if the number of stated points is not that of the responses.
+    pub(super) fn response_places(
+        &self,
+        outputs: &[Output],
+    ) -> Result<Vec<Option<String>>, AnalysisError> {
         if self.responses.is_empty() {
             let names = outputs.iter().map(|output| output.name.clone());
             return Ok(names
@@ -344,12 +350,17 @@ impl Places {
                 .collect());
         }
         if self.responses.len() != outputs.len() {
-            let (places, outputs) = (self.responses.len(), outputs.len());
-            let why = format!("{places} places for {outputs} responses");
-            return Err(AnalysisError::Setting { setting: "response_at", why });
+            return Err(other_places(self.responses.len(), outputs.len()));
         }
         Ok(self.responses.iter().cloned().map(Some).collect())
     }
+}
+
+/// Returns the error of a number of places that is not the number of responses.
+pub(crate) fn other_places(places: usize, responses: usize) -> AnalysisError {
+    let responses = message::count(responses, "response");
+    let why = format!("{} for {responses}", message::count(places, "place"));
+    AnalysisError::Setting { setting: "response_at", why }
 }
 
 /// Returns the responses of all quantities, in the order of [`all_responses`].

@@ -59,6 +59,7 @@ use crate::{options, repeat};
   mechid modes table.unv --plot modes.html
   mechid modes before.json --compare after.json
   mechid modes frame.csv --force f1,f2 --acceleration a1,a2 --response-at 1+Z,2+Z --compare model.unv
+  mechid modes tower.csv --acceleration a1,a2 --ambient --response-at 1+X,2+X --compare model.unv
   mechid modes examples/machine.json --plot modes.svg
   mechid modes found.json --geometry frame.csv --plot modes.html --shapes modes.unv
   mechid modes casing.json --modes 4 --near-hz 50")]
@@ -75,8 +76,8 @@ pub struct ModesArgs {
     /// struck point of each record
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     force_at: Vec<String>,
-    /// Point of each response column, such as 3 or 12+Z; the report has modal masses if a force
-    /// acts at the point of a response
+    /// Point of each response column, such as 3 or 12+Z: the entries of shapes are compared at these
+    /// points, and the report has modal masses if a force acts at one of them
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     response_at: Vec<String>,
     /// Frequencies to use, in Hz [default: the band that the forces excite]
@@ -249,11 +250,16 @@ impl ModesArgs {
 
     /// Identifies the modes of one free decay.
     fn decay_modes(&self, channels: &Channels, words: &[OsString]) -> Result<Outcome, CliError> {
-        self.refuse("a free decay", &self.force_options())?;
-        let decayed = mechid::decay(&self.input.open(channels)?, &self.decay())?;
+        let mut refused = self.force_options();
+        refused.retain(|(name, _)| *name != "response_at");
+        self.refuse("a free decay", &refused)?;
+        let mut decayed = mechid::decay(&self.input.open(channels)?, &self.decay())?;
+        if !self.response_at.is_empty() {
+            decayed = decayed.with_points(self.response_at.clone())?;
+        }
         let summary = decayed.summary();
         let modes: Vec<ShapedMode> = summary.modes.iter().map(|m| m.mode.clone()).collect();
-        let names: Vec<String> = summary.channels.iter().map(|c| c.column.clone()).collect();
+        let names = summary.points();
         if self.compare.is_some() {
             let set = ModeSet::from_shaped(&summary.file, names, &modes)?;
             return self.compared(&set, words);
@@ -399,6 +405,7 @@ impl ModesArgs {
     /// Returns the options that several free decays do not have, and whether each was given.
     fn decay_refusals(&self) -> Vec<(&'static str, bool)> {
         let mut options = self.record_options();
+        options.retain(|(name, _)| *name != "response_at");
         options.extend([
             ("quantity", self.quantity.is_some()),
             ("synthesis", self.synthesis.is_some()),
