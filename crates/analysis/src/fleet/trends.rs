@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::changes::{self, Change, ChangeKind};
 use super::failures::FailureCount;
 use super::results::{Results, read_results};
+use crate::modes::normal_interval;
 use crate::text::{significant, text_table};
 use crate::{AnalysisError, ResultRow};
 
@@ -56,6 +57,9 @@ pub struct Trends {
     /// Number of different analyses and versions among the rows; if it is above 1, the rows are not
     /// comparable.
     pub analyses: usize,
+    /// Number of values without a standard error and an interval, such as a mode of an ambient
+    /// record that is too short for them.
+    pub without_interval: usize,
     /// One series for each parameter, natural frequency and damping ratio.
     pub series: Vec<TrendSeries>,
 }
@@ -145,7 +149,7 @@ impl Trends {
         placed.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut series: Vec<TrendSeries> = Vec::new();
         for (at, row) in placed {
-            for (name, unit, value) in quantities(row) {
+            for Quantity { name, unit, value, interval } in quantities(row) {
                 let known = series.iter().position(|one| one.name == name && one.unit == unit);
                 let one = known.unwrap_or_else(|| {
                     let (median, spread, points) = (f64::NAN, f64::NAN, Vec::new());
@@ -160,13 +164,12 @@ impl Trends {
                     });
                     series.len() - 1
                 });
-                let is_uncertain = value.standard_error.is_finite();
                 series[one].points.push(TrendPoint {
                     record: name_of(row),
                     at,
                     value: value.value,
-                    standard_error: is_uncertain.then_some(value.standard_error),
-                    interval: value.interval(0.95).ok().filter(|_| is_uncertain),
+                    standard_error: Some(value.standard_error).filter(|error| error.is_finite()),
+                    interval,
                     is_outlier: false,
                 });
             }
@@ -183,6 +186,7 @@ impl Trends {
             superseded: 0,
             without_number,
             analyses: analyses.len(),
+            without_interval: series.iter().map(TrendSeries::without_interval).sum(),
             series,
         }
     }
@@ -233,6 +237,12 @@ impl TrendSeries {
             .unwrap_or_else(|| {
                 self.name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '_' || c == ',')
             })
+    }
+
+    /// Returns the number of values without an interval; 0 for a series of known values.
+    fn without_interval(&self) -> usize {
+        let with = self.points.iter().filter(|point| point.interval.is_some()).count();
+        if self.standard_error.is_none() { 0 } else { self.points.len() - with }
     }
 
     /// Returns the outliers.
@@ -311,28 +321,54 @@ impl Trends {
     }
 }
 
-/// Returns names, units and values of the parameters and modes of a row.
-fn quantities(row: &ResultRow) -> Vec<(String, String, Uncertain)> {
-    let degrees_of_freedom = row.covariance.as_ref().map_or(0, |c| c.degrees_of_freedom);
-    let uncertain = |value: f64, standard_error: Option<f64>| Uncertain {
-        value,
-        standard_error: standard_error.unwrap_or(f64::INFINITY),
-        degrees_of_freedom,
+/// Parameter, natural frequency or damping ratio of a row.
+struct Quantity {
+    name: String,
+    unit: String,
+    value: Uncertain,
+    /// Limits of the 95 % interval, both finite.
+    interval: Option<[f64; 2]>,
+}
+
+/// Returns the parameters and modes of a row.
+///
+/// The intervals have the degrees of freedom of the covariance of the parameters. A modal test has
+/// no parameters, and normal intervals. Parameters without a covariance have no intervals, because
+/// their degrees of freedom are unknown.
+fn quantities(row: &ResultRow) -> Vec<Quantity> {
+    let degrees_of_freedom = row.covariance.as_ref().map(|c| c.degrees_of_freedom);
+    let quantity = |name: String, unit: &str, value: f64, standard_error: Option<f64>| {
+        let standard_error = standard_error.unwrap_or(f64::INFINITY);
+        let freedom = degrees_of_freedom.unwrap_or(0);
+        let value = Uncertain { value, standard_error, degrees_of_freedom: freedom };
+        let interval = if row.parameters.is_empty() && degrees_of_freedom.is_none() {
+            normal_interval(value.value, standard_error)
+        } else {
+            value.interval(0.95).unwrap_or([f64::NAN; 2])
+        };
+        let interval = Some(interval).filter(|ends| ends.iter().all(|end| end.is_finite()));
+        Quantity { name, unit: unit.to_owned(), value, interval }
     };
-    let of_parameters = row.parameters.iter().map(|cell| {
-        (cell.name.clone(), cell.unit.clone(), uncertain(cell.value, cell.standard_error))
-    });
+    let of_parameters = row
+        .parameters
+        .iter()
+        .map(|cell| quantity(cell.name.clone(), &cell.unit, cell.value, cell.standard_error));
     let of_modes = (1..).zip(&row.modes).flat_map(|(number, mode)| {
-        let hz = uncertain(mode.natural_frequency_hz, mode.natural_frequency_standard_error_hz);
-        let error = mode.damping_ratio_standard_error.map(|error| 100.0 * error);
-        let ratio = uncertain(100.0 * mode.damping_ratio, error);
+        let hz_error = mode.natural_frequency_standard_error_hz;
+        let ratio_error = mode.damping_ratio_standard_error.map(|error| 100.0 * error);
+        let hz = mode.natural_frequency_hz;
         [
-            (format!("frequency {number}"), "Hz".to_owned(), hz),
-            (format!("damping ratio {number}"), "%".into(), ratio),
+            quantity(format!("frequency {number}"), "Hz", hz, hz_error),
+            quantity(
+                format!("damping ratio {number}"),
+                "%",
+                100.0 * mode.damping_ratio,
+                ratio_error,
+            ),
         ]
     });
     let quantities = of_parameters.chain(of_modes);
-    quantities.filter(|(.., value)| value.value.is_finite()).collect()
+    quantities.filter(|quantity| quantity.value.value.is_finite()).collect()
 }
 
 /// Returns the name of a record for messages.
@@ -411,6 +447,13 @@ impl fmt::Display for Trends {
                 f,
                 "note: the results come from {} different analyses or versions, which may not be comparable",
                 self.analyses
+            )?;
+        }
+        if self.without_interval > 0 {
+            let count = message::count(self.without_interval, "value");
+            writeln!(
+                f,
+                "note: {count} without an interval, because the record states no standard error: drawn as points alone"
             )?;
         }
         write!(f, "\n{}", self.table())?;

@@ -36,6 +36,7 @@ use self::forced::Test;
 pub use self::mode_set::ModeSet;
 pub use self::prediction::predict_with_modes;
 pub use self::properties::Properties;
+pub(crate) use self::rows::normal_interval;
 pub use self::saved::{
     SavedBackbone, SavedCandidate, SavedCheck, SavedMode, SavedModes, SavedRecord, SavedResponse,
 };

@@ -89,8 +89,13 @@ fn uncertain(value: &mechid_modal::Uncertain) -> Uncertain {
 }
 
 fn normal(value: f64, standard_error: f64) -> Uncertain {
+    Uncertain::new(value, standard_error, normal_interval(value, standard_error))
+}
+
+/// Returns the 95 % interval of a normally distributed value, in its unit.
+pub(crate) fn normal_interval(value: f64, standard_error: f64) -> [f64; 2] {
     let half = NORMAL_95 * standard_error;
-    Uncertain::new(value, standard_error, [value - half, value + half])
+    [value - half, value + half]
 }
 
 /// Half width of the 95 % interval of a normal distribution, in standard deviations.

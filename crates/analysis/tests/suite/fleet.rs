@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use mechid_analysis::batch::ParameterCell;
+use mechid_analysis::batch::{ModeCell, ParameterCell};
 use mechid_analysis::fleet::{Fleet, FleetSummary, TrendAxis, Trends, read_results};
 use mechid_analysis::identify::Method;
 use mechid_analysis::measurement::Reading;
 use mechid_analysis::{
-    AnalysisError, Channels, Identify, ResponseQuantity, SavedAnalysis, Window, identify,
+    AnalysisError, Channels, Identify, ResponseQuantity, ResultRow, SavedAnalysis, Window, identify,
 };
 use mechid_io::{ParquetColumn, ParquetValues, Table, TimeAxis, write_parquet};
 use mechid_signal::{Sampling, noise};
@@ -261,6 +261,34 @@ fn a_folder_of_results_is_read_back_as_it_was_computed() {
         assert_eq!(*row, analysis().row(&row.record, || analysis().open(&row.record)));
     }
     assert!(matches!(read_results(home.path()), Err(AnalysisError::NoRecord)));
+}
+
+/// Rows of a modal test have no covariance: their intervals are normal. A mode of an ambient record
+/// that is too short has no standard error.
+#[test]
+fn intervals_of_modes_are_normal_or_absent() {
+    let row = |number: usize, error: Option<f64>| {
+        let rejected = analysis().row(&format!("r{number}.csv"), || Err(AnalysisError::NoRecord));
+        let mode = ModeCell {
+            natural_frequency_hz: 10.0 + 0.1 * number as f64,
+            natural_frequency_standard_error_hz: error,
+            damping_ratio: 0.01,
+            damping_ratio_standard_error: error.map(|error| 0.01 * error),
+        };
+        ResultRow { error: None, modes: vec![mode], ..rejected }
+    };
+    let trends =
+        Trends::from_rows(&[row(0, Some(0.1)), row(1, None), row(2, Some(0.2))], TrendAxis::Order);
+    let [low, high] = trends.series[0].points[0].interval.unwrap();
+    assert!((low - 10.0 + 0.195_996).abs() < 1e-6 && (high - 10.0 - 0.195_996).abs() < 1e-6);
+    for series in &trends.series {
+        let known: Vec<bool> = series.points.iter().map(|point| point.interval.is_some()).collect();
+        assert_eq!(known, [true, false, true]);
+    }
+    assert_eq!(trends.without_interval, 2);
+    assert!(trends.to_string().contains("note: 2 values without an interval"), "{trends}");
+    let all = Trends::from_rows(&[row(0, Some(0.1))], TrendAxis::Order);
+    assert!(!all.to_string().contains("without an interval"), "{all}");
 }
 
 #[test]

@@ -65,17 +65,19 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
     panel.y(axis)
 }
 
-/// Returns the 95 % intervals as bands, which a step interrupts.
+/// Returns the 95 % intervals as bands, which a step interrupts; a value without an interval is
+/// not part of a band.
 fn bands(series: &TrendSeries, usual: &[&TrendPoint]) -> Vec<Curve> {
     let is_same = |a: &&TrendPoint, b: &&TrendPoint| {
         series.changes.iter().all(|change| (a.at < change.at) == (b.at < change.at))
     };
     let mut bands: Vec<Curve> = Vec::new();
     for run in usual.chunk_by(is_same) {
-        let Some(ends) = run.iter().map(|point| point.interval).collect::<Option<Vec<_>>>() else {
+        let with = run.iter().filter_map(|point| Some((point.at, point.interval?)));
+        let (x, ends): (Vec<f64>, Vec<[f64; 2]>) = with.unzip();
+        if x.is_empty() {
             continue;
-        };
-        let x: Vec<f64> = run.iter().map(|point| point.at).collect();
+        }
         let edge = |which: usize| -> Vec<f64> { ends.iter().map(|ends| ends[which]).collect() };
         let label = if bands.is_empty() { "95 % interval" } else { "" };
         bands.push(Curve::band(label, &x, &edge(0), &edge(1)).slot(0));
@@ -114,4 +116,35 @@ fn range(series: &TrendSeries, usual: &[&TrendPoint]) -> (f64, f64) {
 /// Returns record and value of a point as text.
 fn note(series: &TrendSeries, point: &TrendPoint) -> String {
     format!("{}: {} {}", point.record, significant(point.value, 6), series.unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_analysis::batch::ModeCell;
+    use mechid_analysis::{AnalysisError, ResultRow, SavedAnalysis};
+
+    use super::*;
+
+    /// Values without a standard error do not prevent the figure.
+    #[test]
+    fn values_without_an_interval_are_drawn_as_points() {
+        let row = |number: usize| {
+            let mode = ModeCell {
+                natural_frequency_hz: 10.0 + 0.1 * number as f64,
+                natural_frequency_standard_error_hz: (number != 1).then_some(0.1),
+                damping_ratio: 0.01,
+                damping_ratio_standard_error: (number > 3).then_some(0.001),
+            };
+            let refused = || Err(AnalysisError::NoRecord);
+            let rejected = SavedAnalysis::default().row(&format!("r{number}.csv"), refused);
+            ResultRow { error: None, modes: vec![mode], ..rejected }
+        };
+        let rows: Vec<ResultRow> = (0..4).map(row).collect();
+        let trends = Trends::from_rows(&rows, TrendAxis::Order);
+        let drawn = |series: &TrendSeries| bands(series, &series.points.iter().collect::<Vec<_>>());
+        assert_eq!(drawn(&trends.series[0]).len(), 1);
+        assert_eq!(drawn(&trends.series[1]).len(), 0);
+        let svg = figure(&trends).to_svg().unwrap();
+        assert!(svg.contains("95 % interval"));
+    }
 }
