@@ -379,14 +379,73 @@ fn noise_ratios(fit: &Fit<'_>, noise: &Noise, mean: &[f64], block: &Block) -> Ve
     noise.sensor.iter().zip(&fit.weights.level).map(ratio).collect()
 }
 
+/// Returns the factors that scale a symmetric matrix to a unit diagonal, and the scaled matrix.
+/// Factors of entries that are not positive are not finite.
+fn with_unit_diagonal(matrix: &[f64], size: usize) -> (Vec<f64>, DMatrix<f64>) {
+    let scale: Vec<f64> = (0..size).map(|k| 1.0 / matrix[k * size + k].sqrt()).collect();
+    let scaled = DMatrix::from_fn(size, size, |a, b| matrix[b * size + a] * scale[a] * scale[b]);
+    (scale, scaled)
+}
+
 /// Returns the inverse of a symmetric positive definite matrix, scaled to a unit diagonal.
 fn symmetric_inverse(matrix: &[f64], size: usize) -> Option<DMatrix<f64>> {
-    let scale: Vec<f64> = (0..size).map(|k| 1.0 / matrix[k * size + k].sqrt()).collect();
+    let (scale, scaled) = with_unit_diagonal(matrix, size);
     if scale.iter().any(|value| !value.is_finite()) {
         return None;
     }
-    let scaled = DMatrix::from_fn(size, size, |a, b| matrix[b * size + a] * scale[a] * scale[b]);
     let factor = scaled.cholesky()?;
     let inverse = factor.solve(&DMatrix::identity(size, size));
     Some(DMatrix::from_fn(size, size, |a, b| inverse[(a, b)] * scale[a] * scale[b]))
+}
+
+/// Returns the mode that the data determine least: the one with the largest part in the direction of
+/// the scaled parameters along which the likelihood changes least.
+///
+/// # Source
+/// Belsley, Kuh & Welsch, *Regression Diagnostics* (1980), section 3.2 (decomposition of the
+/// variance by the directions of a scaled matrix).
+pub(crate) fn least_determined_mode(fit: &Fit<'_>) -> Option<usize> {
+    let normal = NormalEquations::new(fit.lines, &fit.model, &fit.projection);
+    let pairs = fit.model.pairs(fit.lines.loads.len());
+    least_determined(&normal.curvature, &pairs)
+}
+
+/// Returns the least determined mode, given the curvature (column-major) and the mode of each pair of
+/// parameters.
+fn least_determined(curvature: &[f64], pairs: &[(usize, Option<usize>)]) -> Option<usize> {
+    let (scale, scaled) = with_unit_diagonal(curvature, 2 * pairs.len());
+    if let Some(index) = scale.iter().position(|value| !value.is_finite()) {
+        return Some(pairs[index / 2].0);
+    }
+    let eigen = crate::decomposition::hermitian_eigen(scaled)?;
+    let direction = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    let part = |mode: &usize| -> f64 {
+        let of_mode = pairs.iter().enumerate().filter(|(_, (other, _))| other == mode);
+        of_mode.map(|(pair, _)| direction.rows(2 * pair, 2).norm_squared()).sum()
+    };
+    pairs.iter().map(|(mode, _)| *mode).max_by(|a, b| part(a).total_cmp(&part(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three modes with one pole each and one participation; the curvature is almost singular in a
+    /// direction of the second mode, or has a parameter without any effect.
+    #[test]
+    fn the_mode_of_a_singular_direction_is_named() {
+        let pairs = [(0, None), (1, None), (2, None), (0, Some(1)), (1, Some(1)), (2, Some(1))];
+        let size = 2 * pairs.len();
+        let mut curvature = DMatrix::<f64>::identity(size, size);
+        // Parameters of different sizes, of which two of the second mode act alike.
+        curvature[(2, 8)] = 1.0 - 1e-15;
+        curvature[(8, 2)] = 1.0 - 1e-15;
+        let sizes = DVector::from_fn(size, |k, _| 10f64.powi(k as i32 % 5 - 2));
+        let curvature = DMatrix::from_diagonal(&sizes) * curvature * DMatrix::from_diagonal(&sizes);
+        assert_eq!(least_determined(curvature.as_slice(), &pairs), Some(1));
+        let mut without_effect = curvature;
+        without_effect.fill_row(5, 0.0);
+        without_effect.fill_column(5, 0.0);
+        assert_eq!(least_determined(without_effect.as_slice(), &pairs), Some(2));
+    }
 }

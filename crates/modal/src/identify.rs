@@ -7,7 +7,7 @@ use nalgebra::Complex;
 
 use crate::ModalError;
 use crate::constraint::ModalConstraint;
-use crate::covariance::Covariance;
+use crate::covariance::{Covariance, least_determined_mode};
 use crate::delays::{OutputDelay, apparent_delays, determined_delays};
 use crate::estimate::{ModalEstimate, log_likelihood};
 use crate::initial_poles::initial_poles;
@@ -548,19 +548,28 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Returns the covariance of the fit; removes modes outside the band that make it singular,
-    /// because the band does not determine them.
+    /// Returns the covariance of the last fit; `None` if the curvature of the last mode is singular.
+    /// While the curvature is singular, the modes outside the band are removed, and then, one after
+    /// another, those that the data determine least.
     fn covariance_of_all(&mut self) -> Option<Covariance> {
-        let covariance = Covariance::new(&self.fit, &self.noise);
-        if covariance.is_some() || self.modes_in_band() == self.fit.model.modes() {
-            return covariance;
+        loop {
+            let covariance = Covariance::new(&self.fit, &self.noise);
+            let modes = self.fit.model.modes();
+            if covariance.is_some() || modes < 2 {
+                return covariance;
+            }
+            let mut reasons = vec![None; modes];
+            if self.modes_in_band() < modes {
+                for (reason, pole) in reasons.iter_mut().zip(&self.fit.model.poles) {
+                    *reason = (!self.lines.contains(*pole)).then_some(DropReason::OutsideBand);
+                }
+            } else {
+                reasons[least_determined_mode(&self.fit)?] = Some(DropReason::Undetermined);
+            }
+            self.remove(&reasons);
+            self.update_noise();
+            self.fit.search();
         }
-        let reason = |pole| (!self.lines.contains(pole)).then_some(DropReason::OutsideBand);
-        let reasons: Vec<_> = self.fit.model.poles.iter().map(|pole| reason(*pole)).collect();
-        self.remove(&reasons);
-        self.update_noise();
-        self.fit.search();
-        Covariance::new(&self.fit, &self.noise)
     }
 
     fn no_mode(&self) -> ModalError {

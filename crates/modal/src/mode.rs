@@ -90,6 +90,9 @@ pub enum DropReason {
     },
     /// The damping is too large for a resonance: the root represents modes outside the band.
     TooDamped,
+    /// The data do not determine it beside the other modes: the likelihood does not change in a
+    /// direction of its parameters.
+    Undetermined,
     /// The root is outside the band: too far from it, insignificant, or not determined.
     OutsideBand,
     /// Another mode within a half-width has the same shape and participations.
@@ -105,6 +108,23 @@ pub enum DropReason {
     /// The mode is part of the model, but was not requested: other modes are nearer to the stated
     /// frequencies or, of the stated number of modes, explain more.
     NotRequested,
+}
+
+impl DropReason {
+    /// Returns the reason in a few words, without its numbers.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Insignificant { .. } => "not significant",
+            Self::UndeterminedDamping { .. } => "damping not above zero",
+            Self::Undetermined => "not determined beside the other modes",
+            Self::TooDamped => "too much damping for a mode",
+            Self::OutsideBand => "outside of the band",
+            Self::Twin { .. } => "the same as another mode",
+            Self::Undriven { .. } => "driven by unmeasured forces",
+            Self::BeyondNumber { .. } => "weaker than the modes asked for",
+            Self::NotStated => "not near a stated frequency",
+        }
+    }
 }
 
 /// Rejected candidate.

@@ -122,6 +122,7 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             "its damping ratio is not above zero (± {} %), as of a sinusoid: it stays in the model",
             significant(100.0 * standard_error, 2)
         ),
+        DropReason::Undetermined => "the data do not determine it beside the other modes".into(),
         DropReason::TooDamped => {
             "its damping is too high for a mode: it represents modes outside of the band".into()
         }

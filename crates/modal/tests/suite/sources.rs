@@ -174,3 +174,21 @@ fn data_without_noise_gives_the_truth() {
         assert!((mode.pole - pole).norm() < 1e-6 * pole.norm(), "{} {pole}", mode.pole);
     }
 }
+
+/// Exact responses of six modes do not determine more modes; the fit of more ends without them.
+#[test]
+fn modes_that_the_data_do_not_determine_are_removed() {
+    for (noise, count) in [(0.0, 9), (1e-12, 12)] {
+        let case = Case { noise, ..pair(2) };
+        let settings = ModalSettings { modes: Some(count), ..ModalSettings::default() };
+        let estimate = identify_modes(&case.table(1, 400), &settings);
+        let estimate = estimate.unwrap_or_else(|error| panic!("{noise} {count}: {error}"));
+        for (truth, hz) in case.in_band().iter().map(|mode| (mode, case.frequency_hz[*mode])) {
+            let found = estimate
+                .modes()
+                .iter()
+                .any(|mode| (mode.natural_frequency_hz.value / hz - 1.0).abs() < 1e-6);
+            assert!(found, "{truth}: {:?}", estimate.modes());
+        }
+    }
+}
