@@ -12,7 +12,7 @@ use crate::compare::{ComparedMode, Comparison, Measured, PairingRule, compare};
 use crate::constraint::{self, ConstraintTest, DrivingPoint, ModalConstraint};
 use crate::covariance::Covariance;
 use crate::delays::OutputDelay;
-use crate::indicators::IndicatorError;
+use crate::indicators::{Indicator, IndicatorError, mac_standard_errors, mpc_with_error};
 use crate::limits::GROUP_HALF_WIDTHS;
 use crate::lines::Lines;
 use crate::modal_model::{ModalGroup, ModalModel, ModalTerm};
@@ -144,6 +144,48 @@ impl ModalEstimate {
         let parameters = self.parameters.get(mode)?;
         let exists = point.output < parameters.outputs && point.input < parameters.inputs;
         if exists { parameters.modal_mass(point, derivative) } else { None }
+    }
+
+    /// Returns the mass-normalised shape of a mode, in kg^(−1/2): its shape with a largest entry of 1,
+    /// divided by the root of its modal mass. Each entry has the standard errors of its real and
+    /// imaginary parts. Arguments are those of [`modal_mass`](Self::modal_mass); `None` if the modal
+    /// mass is not positive.
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.2 (mass-normalised mode shapes); the
+    /// standard errors are to first order.
+    pub fn mass_normalised_shape(
+        &self,
+        mode: usize,
+        point: DrivingPoint,
+        derivative: i32,
+    ) -> Option<Vec<(C, C)>> {
+        let parameters = self.parameters.get(mode)?;
+        let exists = point.output < parameters.outputs && point.input < parameters.inputs;
+        if exists { parameters.mass_normalised_shape(point, derivative) } else { None }
+    }
+
+    /// Returns the modal phase collinearity of each mode with its standard error; `None` if the
+    /// covariance of the shape is not finite.
+    ///
+    /// # Source
+    /// As [`mpc_with_error`].
+    pub fn phase_collinearities(&self) -> Vec<Option<Indicator>> {
+        let indicator = |parameters: &ModeParameters| {
+            Some(mpc_with_error(&parameters.shape_with_covariance()?))
+        };
+        self.parameters.par_iter().map(indicator).collect()
+    }
+
+    /// Returns the standard error of the modal assurance criterion of each pair of modes, modes ×
+    /// modes; NaN if the covariance of a shape is not finite.
+    ///
+    /// # Source
+    /// As [`mac_within_set`](crate::indicators::mac_within_set).
+    pub fn mac_standard_errors(&self) -> DMatrix<f64> {
+        let shapes: Vec<_> =
+            self.parameters.iter().map(ModeParameters::shape_with_covariance).collect();
+        mac_standard_errors(&shapes, |a, b| self.model.cross_covariance(a, b))
     }
 
     /// Returns the modes with the joint covariance of their shapes, for comparisons.

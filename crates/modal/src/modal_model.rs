@@ -166,6 +166,24 @@ impl ModalModel {
             && self.groups.iter().all(grouped)
     }
 
+    /// Returns the covariance of the shapes of two modes, outputs × outputs with real and imaginary
+    /// parts (2p × 2p, real parts first); `None` if their errors are independent.
+    pub(crate) fn cross_covariance(&self, a: usize, b: usize) -> Option<DMatrix<f64>> {
+        let group = self
+            .groups
+            .iter()
+            .find(|group| group.modes.contains(&a) && group.modes.contains(&b))?;
+        let first = |mode: usize| -> usize {
+            let before = group.modes.iter().take_while(|other| **other != mode);
+            before.map(|other| self.terms[*other].parameters()).sum()
+        };
+        let (rows, columns, outputs) = (first(a), first(b), self.outputs());
+        let index = |row: usize| 2 + 2 * (row % outputs) + row / outputs;
+        Some(DMatrix::from_fn(2 * outputs, 2 * outputs, |i, j| {
+            group.entry(rows + index(i), columns + index(j))
+        }))
+    }
+
     /// Multiplies the standard errors of each mode of the groups by the entry of `scales` for this
     /// mode.
     pub(crate) fn scale_errors(&mut self, scales: &[f64]) {

@@ -119,6 +119,20 @@ impl ModeParameters {
     /// this complex quotient with the sign of its real part: a delay between the channels changes
     /// only the phase.
     pub(crate) fn modal_mass(&self, point: DrivingPoint, derivative: i32) -> Option<Uncertain> {
+        let (mass, gradient) = self.complex_mass(point, derivative);
+        let variance = gradient.dot(&(&self.covariance * &gradient));
+        // A mode without motion or force at the point does not determine its mass.
+        let size = mass.norm();
+        (size.is_finite() && variance.is_finite()).then(|| Uncertain {
+            value: size.copysign(mass.re),
+            standard_error: size * variance.max(0.0).sqrt(),
+            degrees_of_freedom: self.degrees_of_freedom,
+        })
+    }
+
+    /// Returns the complex quotient of [`modal_mass`](Self::modal_mass), and the derivatives of the
+    /// logarithm of its modulus.
+    fn complex_mass(&self, point: DrivingPoint, derivative: i32) -> (C, DVector<f64>) {
         let (pole, largest) = (self.pole(), self.largest_output());
         let [entry, scale] = [point.output, largest].map(|output| self.shape(output));
         let participation = self.participation(point.input);
@@ -138,14 +152,39 @@ impl ModeParameters {
         let by_pole = f64::from(derivative) / pole;
         gradient[0] = by_pole.re * pole.re;
         gradient[1] = -by_pole.im * pole.im - 1.0;
-        let variance = gradient.dot(&(&self.covariance * &gradient));
-        // A mode without motion or force at the point does not determine its mass.
-        let size = mass.norm();
-        (size.is_finite() && variance.is_finite()).then(|| Uncertain {
-            value: size.copysign(mass.re),
-            standard_error: size * variance.max(0.0).sqrt(),
-            degrees_of_freedom: self.degrees_of_freedom,
-        })
+        (mass, gradient)
+    }
+
+    /// Returns the shape with a largest entry of 1, divided by the root of the modal mass, and the
+    /// standard errors of the real and imaginary parts of its entries; `None` if the mass is not
+    /// positive or not determined.
+    pub(crate) fn mass_normalised_shape(
+        &self,
+        point: DrivingPoint,
+        derivative: i32,
+    ) -> Option<Vec<(C, C)>> {
+        let mass = self.modal_mass(point, derivative).filter(|mass| mass.value > 0.0)?.value;
+        let (_, by_mass) = self.complex_mass(point, derivative);
+        let largest = self.largest_output();
+        let scale = self.shape(largest);
+        let entry = |output: usize| {
+            let value = self.shape(output) / scale / mass.sqrt();
+            let factor = 1.0 / (scale * mass.sqrt());
+            let mut by_part = [&by_mass * (-0.5 * value.re), &by_mass * (-0.5 * value.im)];
+            let mut add = |index: usize, factor: C| {
+                by_part[0][index] += factor.re;
+                by_part[0][index + 1] -= factor.im;
+                by_part[1][index] += factor.im;
+                by_part[1][index + 1] += factor.re;
+            };
+            if output != largest {
+                add(Self::shape_index(output), factor);
+                add(Self::shape_index(largest), -value / scale);
+            }
+            let [re, im] = by_part.map(|by| by.dot(&(&self.covariance * &by)).max(0.0).sqrt());
+            (value, C::new(re, im))
+        };
+        Some((0..self.outputs).map(entry).collect())
     }
 
     /// Returns the mode with these parameters. Its shape is divided by the largest entry, and its

@@ -12,6 +12,7 @@ use mechid_spectra::LineData;
 use super::checks;
 use super::diagrams::DiagramData;
 use super::halves::Halves;
+use super::rows::rows_of;
 use super::settings::ModesSettings;
 use super::sources::{Output, all_responses, outputs_of};
 use super::summary::{
@@ -61,6 +62,7 @@ pub(super) fn modes(
     let of_fit = of_spectrum.into_iter().chain(halves.check);
     let of_modes = of_fit.chain(ambient_checks(&modes, &outputs));
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
+    let mac_errors = estimate.mac_standard_errors();
     let summary = ModesSummary {
         records: vec![RecordRow::from_block(&block)],
         hits: Vec::new(),
@@ -71,6 +73,7 @@ pub(super) fn modes(
         confidence: LEVEL,
         modes,
         mac: shapes.iter().map(|a| mac(a)).collect(),
+        mac_standard_error: rows_of(&mac_errors),
         dropped: estimate.dropped.iter().map(dropped).collect(),
         harmonics: estimate.harmonics.iter().map(harmonic_row).collect(),
         variance_explained: None,
@@ -147,9 +150,11 @@ fn row(mode: &AmbientMode) -> ModalModeRow {
         mode: ShapedMode::from_pole(eigenvalue, values, entries.collect()),
         participation: Vec::new(),
         phase_collinearity: mode.mpc.value,
+        phase_collinearity_standard_error: Some(mode.mpc.standard_error),
         driven_share: None,
         modal_mass: None,
         modal_mass_standard_error: None,
+        mass_normalised_shape: Vec::new(),
         decay_times: Some(mode.decay_times),
     }
 }

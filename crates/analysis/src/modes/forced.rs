@@ -13,7 +13,7 @@ use super::averaged::{Sharpened, without_decay};
 use super::checks::{self, prediction_checks};
 use super::diagrams::{DiagramData, Forced};
 use super::halves::Halves;
-use super::rows::{dropped, mac, modal_mass, notes, row};
+use super::rows::{dropped, mac, notes, row, rows_of, scaling};
 use super::settings::ModesSettings;
 use super::sources::{Output, Recorded};
 use super::summary::{
@@ -264,10 +264,13 @@ impl Context {
             settings.properties.reciprocal,
         ));
         // The masses are those of the fitted modes, with the decay of an exponential window.
-        let points = [&self.driving_points[..], &self.opposite_points[..]];
-        let mass = |at| modal_mass(&estimate, at, &self.outputs, points);
+        let collinearities = estimate.phase_collinearities().into_iter();
+        let of_mode = |(at, (mode, collinearity)): (usize, (&IdentifiedMode, _))| {
+            let scaling = scaling(&estimate, at, &self.outputs, &self.driving_points);
+            row(mode, collinearity, scaling)
+        };
         let modes: Vec<ModalModeRow> =
-            reported.iter().enumerate().map(|(at, mode)| row(mode, mass(at))).collect();
+            reported.iter().zip(collinearities).enumerate().map(of_mode).collect();
         rows.extend(checks::output_checks(&explained, &modes, &names));
         let mut model = estimate.model().clone();
         for term in &mut model.terms {
@@ -286,6 +289,7 @@ impl Context {
             lines: data.len(),
             confidence: LEVEL,
             mac: mac(&reported),
+            mac_standard_error: rows_of(&estimate.mac_standard_errors()),
             modes,
             dropped: estimate.dropped().iter().map(dropped).collect(),
             harmonics: Vec::new(),

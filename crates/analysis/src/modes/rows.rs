@@ -3,9 +3,9 @@
 use mechid_io::derivative;
 use mechid_modal::{
     DrivingPoint, DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, OutputDelay,
-    indicators,
+    indicators::{self, Indicator},
 };
-use nalgebra::{Complex, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::sources::Output;
 use super::summary::{DroppedRow, ModalModeRow};
@@ -14,20 +14,32 @@ use crate::limits::{LISTED_DELAYS, NOTED_UNMEASURED};
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, significant};
 
+/// Modal mass of a mode, in kg, and its mass-normalised shape with standard errors, in kg^(−1/2);
+/// the shape is empty if the mass is not positive.
+pub(super) struct Scaling {
+    mass: mechid_modal::Uncertain,
+    shape: Vec<(Complex<f64>, Complex<f64>)>,
+}
+
 /// Returns the row of a mode with its modal mass.
 pub(super) fn row(
     mode: &IdentifiedMode,
-    modal_mass: Option<mechid_modal::Uncertain>,
+    collinearity: Option<Indicator>,
+    scaling: Option<Scaling>,
 ) -> ModalModeRow {
+    let part = |z: &Complex<f64>| [z.re, z.im];
     let entries = |values: &[Complex<f64>], errors: &[Complex<f64>], scale: Complex<f64>| {
-        let entry = |(value, error): (&Complex<f64>, &Complex<f64>)| {
-            let value = value / scale;
-            let size = scale.norm();
-            let standard_error = Some([error.re / size, error.im / size]);
-            ShapeEntry { value: [value.re, value.im], standard_error }
+        let entry = |(value, error): (&Complex<f64>, &Complex<f64>)| ShapeEntry {
+            value: part(&(value / scale)),
+            standard_error: Some(part(&(error / scale.norm()))),
         };
         values.iter().zip(errors).map(entry).collect::<Vec<_>>()
     };
+    let (mass, normalised) = scaling.map(|one| (one.mass, one.shape)).unzip();
+    let normalised = normalised.unwrap_or_default().into_iter().map(|(value, error)| ShapeEntry {
+        value: part(&value),
+        standard_error: Some(part(&error)),
+    });
     let largest = mode.participation.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
     let scale = largest.filter(|z| z.norm() > 0.0).unwrap_or(Complex::from(1.0));
     let values = [
@@ -40,32 +52,34 @@ pub(super) fn row(
         mode: ShapedMode::from_pole([mode.pole.re, mode.pole.im], values, shape),
         participation: entries(&mode.participation, &mode.participation_standard_error, scale),
         phase_collinearity: indicators::mpc(&vector(&mode.shape)),
+        phase_collinearity_standard_error: collinearity.map(|mpc| mpc.standard_error),
         driven_share: mode.driven_share,
-        modal_mass: modal_mass.map(|mass| mass.value),
-        modal_mass_standard_error: modal_mass.map(|mass| mass.standard_error),
+        modal_mass: mass.map(|mass| mass.value),
+        modal_mass_standard_error: mass.map(|mass| mass.standard_error),
+        mass_normalised_shape: normalised.collect(),
         decay_times: None,
     }
 }
 
-/// Returns the modal mass of a mode by the driving point that determines it best; `None` if the
-/// entries of its shape have several units. The first list of driving points has force and response
-/// in the same direction, the second in opposite directions.
-pub(super) fn modal_mass(
+/// Returns the modal mass of a mode by the driving point that determines it best, and the shape that
+/// this mass normalises; `None` if the entries of its shape have several units.
+pub(super) fn scaling(
     estimate: &ModalEstimate,
     mode: usize,
     outputs: &[Output],
-    [same, opposite]: [&[(usize, usize)]; 2],
-) -> Option<mechid_modal::Uncertain> {
+    points: &[DrivingPoint],
+) -> Option<Scaling> {
     (!has_several_quantities(outputs)).then_some(())?;
-    let mass = |(sign, &(input, output)): (f64, &(usize, usize))| {
-        let derivative = derivative(outputs[output].quantity?) as i32;
-        let mass = estimate.modal_mass(mode, DrivingPoint { output, input }, derivative)?;
-        Some(mechid_modal::Uncertain { value: sign * mass.value, ..mass })
+    let mass = |point: &DrivingPoint| {
+        let derivative = derivative(outputs[point.output].quantity?) as i32;
+        Some((estimate.modal_mass(mode, *point, derivative)?, *point, derivative))
     };
-    let points = same.iter().map(|point| (1.0, point));
-    let masses = points.chain(opposite.iter().map(|point| (-1.0, point))).filter_map(mass);
     let relative_error = |mass: &mechid_modal::Uncertain| mass.standard_error / mass.value.abs();
-    masses.min_by(|a, b| relative_error(a).total_cmp(&relative_error(b)))
+    let masses = points.iter().filter_map(mass);
+    let (mass, point, derivative) =
+        masses.min_by(|a, b| relative_error(&a.0).total_cmp(&relative_error(&b.0)))?;
+    let shape = estimate.mass_normalised_shape(mode, point, derivative).unwrap_or_default();
+    Some(Scaling { mass, shape })
 }
 
 fn has_several_quantities(outputs: &[Output]) -> bool {
@@ -105,6 +119,11 @@ pub(super) fn mac(modes: &[IdentifiedMode]) -> Vec<Vec<f64>> {
     let shapes: Vec<_> = modes.iter().map(|mode| vector(&mode.shape)).collect();
     let row = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
     shapes.iter().map(row).collect()
+}
+
+/// Returns the rows of a matrix.
+pub(super) fn rows_of(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 fn vector(shape: &[Complex<f64>]) -> DVector<Complex<f64>> {

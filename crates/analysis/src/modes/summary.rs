@@ -45,6 +45,8 @@ pub struct ModesSummary {
     /// Modal assurance criterion of every pair of shapes, a pure number from 0 to 1; one row per
     /// mode.
     pub mac: Vec<Vec<f64>>,
+    /// Standard error of each of these, a pure number; one row per mode.
+    pub mac_standard_error: Vec<Vec<f64>>,
     /// Rejected candidates for modes.
     pub dropped: Vec<DroppedRow>,
     /// Sinusoids of nearby machines in the records of ambient tests.
@@ -180,6 +182,9 @@ pub struct ModalModeRow {
     /// Modal phase collinearity of the shape, a pure number: 1 if all entries have one phase or its
     /// opposite.
     pub phase_collinearity: f64,
+    /// Standard error of the phase collinearity, a pure number; `None` if the errors of the shape
+    /// are not known.
+    pub phase_collinearity_standard_error: Option<f64>,
     /// Share of the motion of this mode due to the measured forces, a ratio; the rest is due to
     /// unmeasured forces. `None` without measured forces.
     pub driven_share: Option<f64>,
@@ -190,6 +195,10 @@ pub struct ModalModeRow {
     /// Standard error of the modal mass, in kg.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_mass_standard_error: Option<f64>,
+    /// Shape with one entry per response, divided by the root of the modal mass, in kg^(−1/2);
+    /// empty without a positive modal mass.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mass_normalised_shape: Vec<ShapeEntry>,
     /// Length of an ambient record in decay times of the mode, ζωT, a pure number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay_times: Option<f64>,

@@ -298,6 +298,32 @@ fn right_tables_rarely_fail_the_tests() {
     }
 }
 
+/// Ratios of error and standard error of the mass-normalised shapes and of the MAC of each pair of
+/// modes, with [`SHAPES`] as reference.
+fn scaled_errors(found: &Modes) -> [Vec<f64>; 2] {
+    let (mut of_shapes, mut of_mac) = (Vec::new(), Vec::new());
+    let norm = |shape: &[f64; 4]| shape.iter().map(|x| x * x).sum::<f64>();
+    for (at, (row, shape)) in found.summary().modes.iter().zip(SHAPES).enumerate() {
+        let larger = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
+        let sign = shape.into_iter().max_by(larger).unwrap().signum();
+        for (entry, truth) in row.mass_normalised_shape.iter().zip(shape) {
+            let [re, im] = entry.standard_error.unwrap();
+            of_shapes.push((entry.value[0] - sign * truth) / re);
+            if im > 0.0 {
+                of_shapes.push(entry.value[1] / im);
+            }
+        }
+        for (other, another) in SHAPES[..at].iter().enumerate() {
+            let product: f64 = shape.iter().zip(another).map(|(a, b)| a * b).sum();
+            let truth = product * product / (norm(&shape) * norm(another));
+            let error = found.summary().mac_standard_error[at][other];
+            of_mac.push((found.summary().mac[at][other] - truth) / error);
+        }
+        assert!(row.phase_collinearity_standard_error.unwrap() < 0.05);
+    }
+    [of_shapes, of_mac]
+}
+
 /// Returns the modes of a table with the properties imposed.
 fn with_properties(table: &FrequencyResponses) -> Modes {
     let properties = Properties { real_shapes: true, reciprocal: true };
@@ -306,8 +332,9 @@ fn with_properties(table: &FrequencyResponses) -> Modes {
 }
 
 /// Reference: the masses of [`SHAPES`], whose damping is proportional. On right tables both
-/// properties agree, the intervals of the masses hold, and the errors are smaller; a phase of one
-/// sensor contradicts real shapes, a wrong gain reciprocity, and neither is imposed then.
+/// properties agree, the intervals of the masses hold, the errors are smaller, and the standard
+/// errors of scaled shapes and of the MAC are the scatter; a phase of one sensor contradicts real
+/// shapes, a wrong gain reciprocity, and neither is imposed then.
 #[test]
 fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them() {
     let noisy = |seed: u64, change: &dyn Fn(usize) -> C| {
@@ -321,6 +348,7 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
         table
     };
     let (mut failed_checks, mut inside, mut ratios) = (0, 0, Vec::new());
+    let (mut of_shapes, mut of_mac) = (Vec::new(), Vec::new());
     for seed in 0..20 {
         let table = noisy(seed, &|_| C::from(1.0));
         let (free, imposed) = (modes(&table), with_properties(&table));
@@ -328,6 +356,9 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
             .into_iter()
             .filter(|code| !check(&imposed, code).passed)
             .count();
+        let [shapes, mac] = scaled_errors(&free);
+        of_shapes.extend(shapes);
+        of_mac.extend(mac);
         let rows = free.summary().modes.iter().zip(&imposed.summary().modes);
         for ((free, imposed), shape) in rows.zip(SHAPES) {
             let largest = shape.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -340,6 +371,11 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
     assert!(failed_checks <= 1, "{failed_checks} of 40");
     // Three standard deviations of the share of 60.
     assert!(inside >= 52, "{inside} of 60");
+    let rms =
+        |ratios: &[f64]| (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
+    // Three standard deviations of the RMS of 420 and of 60 ratios.
+    assert!(of_shapes.len() == 420 && (0.9..1.1).contains(&rms(&of_shapes)), "{of_shapes:?}");
+    assert!(of_mac.len() == 60 && (0.73..1.27).contains(&rms(&of_mac)), "{of_mac:?}");
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     assert!(mean < 0.95 && ratios.iter().all(|ratio| *ratio < 1.02), "{mean}, {ratios:?}");
 

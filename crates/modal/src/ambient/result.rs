@@ -8,7 +8,7 @@ use super::limits::{MAX_BIAS, MIN_DECAY_TIMES};
 use super::parameters::{Parameters, Span};
 use super::search::Fit;
 use crate::compare::{ComparedMode, Measured};
-use crate::indicators::{Indicator, ShapeWithCovariance, mpc_with_error};
+use crate::indicators::{Indicator, ShapeWithCovariance, mac_standard_errors, mpc_with_error};
 use crate::stabilisation::Stabilisation;
 
 /// Standard normal quantile of a two-sided interval of 95 %.
@@ -195,6 +195,16 @@ pub(super) struct FittedSpectrum {
 }
 
 impl AmbientEstimate {
+    /// Returns the standard error of the modal assurance criterion of each pair of modes, modes ×
+    /// modes. Errors of different modes are assumed to be independent.
+    ///
+    /// # Source
+    /// As [`mac_within_set`](crate::indicators::mac_within_set).
+    pub fn mac_standard_errors(&self) -> DMatrix<f64> {
+        let shapes: Vec<_> = self.modes.iter().map(|mode| Some(mode.shape.clone())).collect();
+        mac_standard_errors(&shapes, |_, _| None)
+    }
+
     /// Returns the same estimate; the standard errors of each mode are multiplied by the entry of
     /// `scales` for this mode (a pure number). Use it if the halves of a record give modes that
     /// differ by more than their standard errors.

@@ -4,10 +4,13 @@
 mod functions;
 mod propagation;
 mod shape;
+mod within_set;
 
 pub use functions::{complex_mode_indicator, multivariate_mode_indicator};
 pub use propagation::Indicator;
 pub use shape::ShapeWithCovariance;
+pub(crate) use within_set::mac_standard_errors;
+pub use within_set::mac_within_set;
 
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use thiserror::Error;

@@ -50,9 +50,11 @@ mod tests {
             mode: ShapedMode::from_pole(pole, [exact(hz), exact(hz), exact(zeta)], Vec::new()),
             participation: Vec::new(),
             phase_collinearity: 1.0,
+            phase_collinearity_standard_error: None,
             driven_share: None,
             modal_mass: None,
             modal_mass_standard_error: None,
+            mass_normalised_shape: Vec::new(),
             decay_times: None,
         }
     }
