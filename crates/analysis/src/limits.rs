@@ -160,3 +160,14 @@ pub const ACQUISITION_SETTLED: f64 = 0.02;
 /// more, every hit is a record with its own transient, which costs up to half of the information
 /// about light damping.
 pub(crate) const PULSE_EFFECTS: usize = 1 << 25;
+
+/// Number of periods of the slowest mode, at each end of a record, that decide whether the record
+/// begins and ends at rest.
+pub(crate) const REST_PERIODS: f64 = 2.0;
+
+/// Maximum number of these samples; more take more time, and the faster modes already show a motion.
+pub(crate) const REST_SAMPLES: usize = 4096;
+
+/// Ratio of the RMS of a channel at an end of a record to its largest value, at or below which the
+/// channel is at rest: the rest is rounding.
+pub(crate) const REST_DIGITS: f64 = 1e-9;

@@ -103,7 +103,7 @@ impl FreeMotion {
 }
 
 /// Returns Re and −Im of φ exp λt at an output, of one mode after the other.
-fn basis(system: &ModalSystem, output: usize, time: f64) -> Vec<f64> {
+pub(crate) fn basis(system: &ModalSystem, output: usize, time: f64) -> Vec<f64> {
     let delay = system.model.delays.get(output).copied().unwrap_or(0.0);
     let part = |term: &mechid_modal::ModalTerm| {
         let [pole, shape] = [term.pole, term.shape[output]].map(|[re, im]| Complex::new(re, im));

@@ -33,6 +33,7 @@ pub use self::comparison::{DifferenceRow, LoneRow, ModeComparison, PairRow, comp
 use self::diagrams::DiagramData;
 pub use self::diagrams::{Diagrams, ModeIndicator, StabilisationRows};
 use self::forced::Test;
+pub(crate) use self::initial_motion::basis as free_motion_basis;
 pub use self::mode_set::ModeSet;
 pub use self::prediction::predict_with_modes;
 pub use self::properties::Properties;

@@ -6,6 +6,7 @@
 //! | `motion` | the measured responses |
 //! | `method` | the choice of the method, and its result |
 //! | `modal` | the force by the modes of a test |
+//! | `rest` | the test of rest at the ends of a record |
 //! | `chunks` | the reconstruction of a record that is not in memory |
 //! | `shown` | the band in which responses without a displacement show a force |
 //! | `unexplained`, `periods`, `kinematics` | warnings about the result |
@@ -20,6 +21,7 @@ mod motion;
 pub mod options;
 mod peak_line;
 mod periods;
+mod rest;
 mod scatter;
 mod shown;
 pub mod summary;

@@ -5,6 +5,7 @@ use mechid_force::{Noise, frequency_domain};
 use super::method::{How, Request};
 use super::motion::Recorded;
 use super::options::{Method, Reconstruct};
+use super::rest::begins_and_ends_at_rest;
 use super::tally::Tally;
 use super::{Reconstructed, System, Take, Task, periods};
 use crate::AnalysisError;
@@ -17,12 +18,13 @@ use crate::text::significant;
 ///
 /// Forces and responses are those of the test: columns are matched by name, or in order, and
 /// `forced` counts the forces of the test from 1. The window holds whole periods, or an open record
-/// that begins and ends at rest (`at_rest`), such as a hit with its whole decay. The standard error
-/// includes the uncertainty of the modes, not that of the residual terms.
+/// that begins and ends at rest, such as a hit with its whole decay; rest is detected, or stated
+/// (`at_rest`). The standard error includes the uncertainty of the modes, not that of the residual
+/// terms.
 ///
 /// # Errors
-/// [`AnalysisError::ForceNeedsPeriods`] for another open record, [`AnalysisError::Setting`] for
-/// another method or for columns that are not those of the modes, [`AnalysisError::Forced`],
+/// [`AnalysisError::Setting`] for an open record that moves at its ends, for another method, or for
+/// columns that are not those of the modes, [`AnalysisError::Forced`],
 /// [`AnalysisError::NoiseCount`], and the errors of
 /// [`frequency_domain`](mechid_force::frequency_domain).
 pub fn reconstruct_with_modes(
@@ -31,11 +33,18 @@ pub fn reconstruct_with_modes(
     how: &Reconstruct,
     take: &mut Take<'_>,
 ) -> Result<Reconstructed, AnalysisError> {
-    check_settings(run, how)?;
+    if !matches!(how.method, Method::Auto | Method::FrequencyDomain) {
+        let why = "modes give the force line by line: choose frequency-domain".into();
+        return Err(AnalysisError::Setting { setting: "method", why });
+    }
     let recorded = Recorded::with_columns(run, &system.outputs_of(&run.source().names)?, true)?;
     let places = system.inputs.len();
     let request = Request::new(how, &recorded, places, true)?;
     let window = recorded.hold()?;
+    let is_open = run.window_settings().period.is_none();
+    if is_open && how.lines.is_none() && !how.at_rest {
+        check_rest(system, &window.motion)?;
+    }
     let band_hz = band(system, &request)?;
     let motion = window.motion.clone().in_band(band_hz)?;
     let lines = match &request.lines {
@@ -48,7 +57,7 @@ pub fn reconstruct_with_modes(
     };
     let force = frequency_domain(system, &motion, &request.forced, &lines, &noise)?;
     let mut remarks: Vec<String> = periods::remark(&recorded, &window).into_iter().collect();
-    if run.window_settings().period.is_none() && how.at_rest {
+    if is_open && how.at_rest {
         remarks.push(
             "the record is assumed to begin and end at rest: motion at its ends is attributed to the forces, and the standard errors do not include this"
                 .into(),
@@ -57,7 +66,12 @@ pub fn reconstruct_with_modes(
     let used = force.spectrum().lines().row_iter().filter(|row| row.camax() > 0.0).count();
     let how_found = How {
         method: "frequency responses of the modes, line by line",
-        why: "the system is the result of a modal test".into(),
+        why: if is_open && how.lines.is_none() && !how.at_rest {
+            "the system is the result of a modal test, and the record begins and ends at rest"
+                .into()
+        } else {
+            "the system is the result of a modal test".into()
+        },
         counts_noise: noise != Noise::Unknown,
         chosen: vec![("lines used".into(), used as f64, "")],
         unexplained: force.unexplained().map(<[_]>::to_vec),
@@ -74,19 +88,22 @@ pub fn reconstruct_with_modes(
     Ok(Reconstructed { summary, force, forced, lines })
 }
 
-/// Checks that modes can give the force with these settings.
-fn check_settings(run: &Measurement, how: &Reconstruct) -> Result<(), AnalysisError> {
-    if !matches!(how.method, Method::Auto | Method::FrequencyDomain) {
-        let why = "modes give the force line by line: choose frequency-domain".into();
-        return Err(AnalysisError::Setting { setting: "method", why });
+/// Checks that an open record begins and ends at rest.
+///
+/// # Errors
+/// [`AnalysisError::Setting`].
+fn check_rest(
+    system: &ModalSystem,
+    motion: &mechid_force::Measurement,
+) -> Result<(), AnalysisError> {
+    if begins_and_ends_at_rest(system, motion) {
+        return Ok(());
     }
-    if run.window_settings().period.is_none() && how.lines.is_none() && !how.at_rest {
-        let why = "modes give the force of whole periods (`period`), or of a record that begins \
-                   and ends at rest"
+    let why =
+        "modes give the force of whole periods (`period`), or of a record that begins and ends \
+               at rest; this record is too short, or moves at its beginning or end"
             .into();
-        return Err(AnalysisError::Setting { setting: "at_rest", why });
-    }
-    Ok(())
+    Err(AnalysisError::Setting { setting: "at_rest", why })
 }
 
 /// Returns the band of the modes, or the requested part of it.

@@ -29,7 +29,7 @@ use crate::outcome::{Files, Outcome};
 /// The system may also be the result of `mechid modes --json`. Forces and responses are then those
 /// of the modal test, by name or in order, and --forced gives the numbers of its forces. The force
 /// is found line by line in the band of the test; the record must contain whole periods, or begin
-/// and end at rest (--at-rest).
+/// and end at rest (detected, or stated with --at-rest).
 ///
 /// A long text is read in chunks. The methods continuous and discretised do not keep an open record
 /// in memory; every other method, --spectrum and --plot keep the columns used. For whole periods
@@ -69,7 +69,8 @@ pub struct ForceArgs {
     /// without a displacement the frequencies at which the responses show a force]
     #[arg(long, value_name = "LOW:HIGH", conflicts_with = "lines")]
     band_hz: Option<Band>,
-    /// Assume that an open record begins at rest
+    /// Assume that an open record begins at rest (with the modes of a test, begins and ends at rest)
+    /// [default: detected]
     #[arg(long)]
     at_rest: bool,
     /// Standard deviation of the noise in each measured column, in its unit, before periods are

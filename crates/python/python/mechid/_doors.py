@@ -920,7 +920,8 @@ def reconstruct(
         Frequencies between which the force is estimated, in Hz. Default: all, or, without a
         displacement, those at which the responses show a force.
     at_rest : bool
-        Whether an open record begins at rest.
+        Whether an open record begins at rest; with the modes of a test, whether it begins and ends
+        at rest. Default: detected.
     noise : sequence of float
         Standard deviation of the noise in each measured column, in its unit. Default: estimated.
     rule, parameter : optional
