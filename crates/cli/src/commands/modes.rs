@@ -91,7 +91,7 @@ pub struct ModesArgs {
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
     max_modes: Option<usize>,
     /// Frequencies, in Hz: only the mode nearest to each, within 2 %, is reported, even if it is
-    /// weak. For a machine with --modes: one frequency; the modes nearest to it are computed
+    /// weak (not for an ambient record). For a machine with --modes: one frequency; the modes nearest to it are computed
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
@@ -210,7 +210,9 @@ impl ModesArgs {
         }
         self.refuse("a record", &[("quantity", self.quantity.is_some())])?;
         let is_decay = channels.force.is_empty() && !self.unmeasured.ambient;
-        if is_decay && !self.more.is_empty() {
+        // The fit of several decays also searches from stated frequencies.
+        let is_common = !(self.more.is_empty() && self.near_hz.is_empty());
+        if is_decay && is_common {
             self.refuse("free decays", &self.decay_refusals())?;
         } else if is_decay {
             return self.decay_modes(&channels, words);

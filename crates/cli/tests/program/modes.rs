@@ -280,6 +280,69 @@ fn a_table_gives_the_modes_of_the_record() {
     assert!(message.contains("name the columns of a record"), "{message}");
 }
 
+/// Reference: the shapes that the decay has without points. The points of the sensors name them in
+/// the result and in comparisons; without forces, too.
+#[test]
+fn results_without_forces_are_compared_at_the_points_of_their_sensors() {
+    let folder = examples();
+    let path = folder.path();
+    let columns = "decay.csv --acceleration a1,a2,a3";
+    let plain = modes(path, columns);
+    let modes_of = |order: [usize; 3], signs: [f64; 3]| -> Vec<Value> {
+        let mode = |mode: &Value| {
+            let entry = |at: usize| {
+                let value = &mode["shape"][order[at]]["value"];
+                let part = |k: usize| signs[at] * value[k].as_f64().unwrap();
+                serde_json::json!({ "value": [part(0), part(1)] })
+            };
+            let hz = mode["natural_frequency_hz"]["value"].clone();
+            let shape: Vec<Value> = (0..3).map(entry).collect();
+            serde_json::json!({ "natural_frequency_hz": { "value": hz }, "shape": shape })
+        };
+        plain["modes"].as_array().unwrap().iter().map(mode).collect()
+    };
+    let names = ["9+X", "7-Z", "8+Y"];
+    let model = modes_of([2, 0, 1], [1.0, -1.0, 1.0]);
+    let model = serde_json::json!({ "modes": model, "response_names": names });
+    std::fs::write(path.join("model.json"), model.to_string()).unwrap();
+    let at = "--response-at 7+Z,8+Y,9+X";
+    let same = |report: &Value| {
+        let pairs = report["pairs"].as_array().unwrap();
+        assert_eq!(
+            (pairs.len(), &report["points"]),
+            (3, &serde_json::json!(["7+Z", "8+Y", "9+X"]))
+        );
+        assert!(pairs.iter().all(|pair| pair["mac"].as_f64().unwrap() > 0.999), "{report}");
+    };
+    same(&modes(path, &format!("{columns} {at} --compare model.json")));
+    std::fs::write(path.join("decay.json"), modes(path, &format!("{columns} {at}")).to_string())
+        .unwrap();
+    same(&modes(path, "decay.json --compare model.json"));
+    let message = refused(path, &format!("modes {columns} --response-at 1,2"));
+    assert!(message.contains("--response-at: 2 places for 3 responses"), "{message}");
+    let ambient = format!("modes {columns} --ambient");
+    let message = refused(path, &format!("{ambient} --response-at 1,2"));
+    assert!(message.contains("--response-at: 2 places for 3 responses"), "{message}");
+    let compared = modes(path, &format!("{columns} --ambient {at} --compare model.json"));
+    assert_eq!(compared["points"], serde_json::json!(["7+Z", "8+Y", "9+X"]), "{compared}");
+}
+
+/// Reference: the fit of all modes of the same decay.
+#[test]
+fn a_decay_is_searched_from_a_stated_frequency() {
+    let folder = examples();
+    let columns = "decay.csv --acceleration a1,a2,a3";
+    let all = modes(folder.path(), columns);
+    let number = |mode: &Value, part: &str| mode["natural_frequency_hz"][part].as_f64().unwrap();
+    let second = &all["modes"][1];
+    let hz = number(second, "value");
+    let near = modes(folder.path(), &format!("{columns} --near-hz {:.2}", 1.005 * hz));
+    let found = near["modes"].as_array().unwrap();
+    assert_eq!(found.len(), 1, "{near}");
+    let error = number(second, "standard_error").hypot(number(&found[0], "standard_error"));
+    assert!((number(&found[0], "value") - hz).abs() < 4.0 * error, "{near}");
+}
+
 /// Reference: two records of the same machine, and its description.
 #[test]
 fn two_results_are_compared() {
