@@ -165,7 +165,8 @@ pub(crate) const PULSE_EFFECTS: usize = 1 << 25;
 /// begins and ends at rest.
 pub(crate) const REST_PERIODS: f64 = 2.0;
 
-/// Maximum number of these samples; more take more time, and the faster modes already show a motion.
+/// Maximum number of these samples; more take more time, and the faster modes already show a
+/// motion.
 pub(crate) const REST_SAMPLES: usize = 4096;
 
 /// Ratio of the RMS of a channel at an end of a record to its largest value, at or below which the

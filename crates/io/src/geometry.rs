@@ -117,9 +117,9 @@ impl<'a> Direction<'a> {
         self.point.parse().ok()
     }
 
-    /// Returns 1 if two names are the same point in the same direction, and −1 if they are the same
-    /// point in opposite directions; `None` for other names. A name without a direction is only
-    /// equal to itself.
+    /// Returns a pure number: 1 if two names are the same point in the same direction, and −1 if
+    /// they are the same point in opposite directions; `None` for other names. A name without a
+    /// direction is only equal to itself.
     ///
     /// ```
     /// use mechid_io::Direction;

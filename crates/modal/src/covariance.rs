@@ -398,8 +398,8 @@ fn symmetric_inverse(matrix: &[f64], size: usize) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(size, size, |a, b| inverse[(a, b)] * scale[a] * scale[b]))
 }
 
-/// Returns the mode that the data determine least: the one with the largest part in the direction of
-/// the scaled parameters along which the likelihood changes least.
+/// Returns the mode that the data determine least: the one with the largest part in the direction
+/// of the scaled parameters along which the likelihood changes least.
 ///
 /// # Source
 /// Belsley, Kuh & Welsch, *Regression Diagnostics* (1980), section 3.2 (decomposition of the
@@ -410,8 +410,8 @@ pub(crate) fn least_determined_mode(fit: &Fit<'_>) -> Option<usize> {
     least_determined(&normal.curvature, &pairs)
 }
 
-/// Returns the least determined mode, given the curvature (column-major) and the mode of each pair of
-/// parameters.
+/// Returns the least determined mode, given the curvature (column-major) and the mode of each pair
+/// of parameters.
 fn least_determined(curvature: &[f64], pairs: &[(usize, Option<usize>)]) -> Option<usize> {
     let (scale, scaled) = with_unit_diagonal(curvature, 2 * pairs.len());
     if let Some(index) = scale.iter().position(|value| !value.is_finite()) {

@@ -146,10 +146,10 @@ impl ModalEstimate {
         if exists { parameters.modal_mass(point, derivative) } else { None }
     }
 
-    /// Returns the mass-normalised shape of a mode, in kg^(−1/2): its shape with a largest entry of 1,
-    /// divided by the root of its modal mass. Each entry has the standard errors of its real and
-    /// imaginary parts. Arguments are those of [`modal_mass`](Self::modal_mass); `None` if the modal
-    /// mass is not positive.
+    /// Returns the mass-normalised shape of a mode, in kg^(−1/2): its shape with a largest entry of
+    /// 1, divided by the root of its modal mass. Each entry has the standard errors of its real and
+    /// imaginary parts. Arguments are those of [`modal_mass`](Self::modal_mass); `None` if the
+    /// modal mass is not positive.
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.2 (mass-normalised mode shapes); the

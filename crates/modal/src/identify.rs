@@ -548,9 +548,9 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Returns the covariance of the last fit; `None` if the curvature of the last mode is singular.
-    /// While the curvature is singular, the modes outside the band are removed, and then, one after
-    /// another, those that the data determine least.
+    /// Returns the covariance of the last fit; `None` if the curvature of the last mode is
+    /// singular. While the curvature is singular, the modes outside the band are removed, and then,
+    /// one after another, those that the data determine least.
     fn covariance_of_all(&mut self) -> Option<Covariance> {
         loop {
             let covariance = Covariance::new(&self.fit, &self.noise);

@@ -223,8 +223,8 @@ impl DecaySettings {
 }
 
 impl Decayed {
-    /// Returns the same result with the points of its channels, such as `12+Z`: they name the entries
-    /// of the shapes in comparisons and in files.
+    /// Returns the same result with the points of its channels, such as `12+Z`: they name the
+    /// entries of the shapes in comparisons and in files.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if their number is not that of the channels.

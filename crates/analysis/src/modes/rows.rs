@@ -61,8 +61,8 @@ pub(super) fn row(
     }
 }
 
-/// Returns the modal mass of a mode by the driving point that determines it best, and the shape that
-/// this mass normalises; `None` if the entries of its shape have several units.
+/// Returns the modal mass of a mode by the driving point that determines it best, and the shape
+/// that this mass normalises; `None` if the entries of its shape have several units.
 pub(super) fn scaling(
     estimate: &ModalEstimate,
     mode: usize,

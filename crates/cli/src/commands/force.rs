@@ -69,8 +69,8 @@ pub struct ForceArgs {
     /// without a displacement the frequencies at which the responses show a force]
     #[arg(long, value_name = "LOW:HIGH", conflicts_with = "lines")]
     band_hz: Option<Band>,
-    /// Assume that an open record begins at rest (with the modes of a test, begins and ends at rest)
-    /// [default: detected]
+    /// Assume that an open record begins at rest (with the modes of a test, begins and ends at
+    /// rest) [default: detected]
     #[arg(long)]
     at_rest: bool,
     /// Standard deviation of the noise in each measured column, in its unit, before periods are

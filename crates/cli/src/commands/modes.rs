@@ -76,8 +76,8 @@ pub struct ModesArgs {
     /// struck point of each record
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     force_at: Vec<String>,
-    /// Point of each response column, such as 3 or 12+Z: the entries of shapes are compared at these
-    /// points, and the report has modal masses if a force acts at one of them
+    /// Point of each response column, such as 3 or 12+Z: the entries of shapes are compared at
+    /// these points, and the report has modal masses if a force acts at one of them
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     response_at: Vec<String>,
     /// Frequencies to use, in Hz [default: the band that the forces excite]
@@ -91,7 +91,8 @@ pub struct ModesArgs {
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
     max_modes: Option<usize>,
     /// Frequencies, in Hz: only the mode nearest to each, within 2 %, is reported, even if it is
-    /// weak (not for an ambient record). For a machine with --modes: one frequency; the modes nearest to it are computed
+    /// weak (not for an ambient record). For a machine with --modes: one frequency; the modes
+    /// nearest to it are computed
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,

@@ -8,8 +8,8 @@ use super::{Indicator, IndicatorError, ShapeWithCovariance, check_size};
 /// the parts of `a` with those of `b` (2p × 2p, the p real parts first), in the product of their
 /// units; `None` if their errors are independent.
 ///
-/// The MAC is |z|² with z = aᴴb/(|a||b|). The covariance of z is to first order, and the variance of
-/// |z|² follows from it exactly; therefore the result is also right for orthogonal shapes, where the
+/// The MAC is |z|² with z = aᴴb/(|a||b|). The covariance of z is to first order. The variance of
+/// |z|² follows from it exactly, so that the result is also right for orthogonal shapes, where the
 /// gradient of the MAC is zero. It is too small for equal shapes: use
 /// [`mac_with_error`](super::mac_with_error) for one mode in two results.
 ///
@@ -54,9 +54,9 @@ pub fn mac_within_set(
     })
 }
 
-/// Returns the standard error of the MAC of each pair of shapes, in a square matrix with zeros on its
-/// diagonal; NaN for a shape that is `None`. `cross` returns the covariance of two shapes, as for
-/// [`mac_within_set`].
+/// Returns the standard error of the MAC of each pair of shapes, in a square matrix with zeros on
+/// its diagonal; NaN for a shape that is `None`. `cross` returns the covariance of two shapes, as
+/// for [`mac_within_set`].
 pub(crate) fn mac_standard_errors(
     shapes: &[Option<ShapeWithCovariance>],
     cross: impl Fn(usize, usize) -> Option<DMatrix<f64>>,
