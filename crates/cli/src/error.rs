@@ -3,6 +3,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
+use mechid::SimulateError;
 use mechid::analysis::AnalysisError;
 use mechid::io::{IoError, output_name};
 use mechid::signal::message;
@@ -118,6 +119,9 @@ impl CliError {
                     }
                     (false, _) => format!("{file}, {at}: {limit}, which this command cannot raise"),
                 }
+            }
+            Self::Simulate(error @ SimulateError::Io(IoError::SimulationMemory { .. })) => {
+                spelled(&error.to_string())
             }
             // Text from a file is not changed.
             Self::Analysis(AnalysisError::Io(error)) => error.to_string(),

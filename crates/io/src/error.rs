@@ -112,6 +112,19 @@ pub enum IoError {
         /// The limit, see [`Limits`](crate::Limits).
         limit: Limit,
     },
+    /// The simulation of a description needs more memory than its limit.
+    #[error("{}", Message(format_args!("{file}: {numbers} numbers (samples × periods × degrees of freedom) take about {needed_gb:.1} GB \
+        of memory, and {allowed_gb:.1} GB is the limit; if the memory is available, set `memory_gb`: {}", needed_gb.ceil())))]
+    SimulationMemory {
+        /// The description.
+        file: String,
+        /// Number of samples, times the number of degrees of freedom of the record.
+        numbers: usize,
+        /// Estimate of the required memory, in units of GB.
+        needed_gb: f64,
+        /// The limit, in units of GB.
+        allowed_gb: f64,
+    },
     /// The file is JSON, which contains descriptions and reports but no record.
     #[error("{}", Message(format_args!("{file} is JSON, not a table of samples; simulate, sweep and stability \
          read the description of an experiment; modes, predict and force (as `system`) read a machine or a \

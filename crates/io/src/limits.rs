@@ -6,6 +6,14 @@ use std::fmt;
 /// that each number is in memory twice.
 pub(crate) const NUMBER_BYTES: usize = 16;
 
+/// Memory for each number of a simulated record, in bytes: force, displacement, velocity and
+/// acceleration, with and without noise, and the arrays of the scheme. The largest use that was
+/// measured is 103 bytes.
+pub(crate) const SIMULATED_BYTES: usize = 128;
+
+/// Memory that the simulation of a description may use by default, in bytes.
+pub(crate) const SIMULATION_MEMORY: usize = 1 << 30;
+
 /// Number of bytes at the beginning of a record that are searched for its details: headers of
 /// analysers are shorter.
 pub(crate) const DETAILS_BYTES: u64 = 64 << 10;

@@ -35,13 +35,14 @@ pub fn described(file: &Path, text: Option<&str>) -> Result<Experiment, IoError>
 
 /// Simulates a described experiment: a JSON file, or a name and a JSON text.
 #[pyfunction]
-#[pyo3(signature = (file, text))]
+#[pyo3(signature = (file, text, memory_gb))]
 pub fn simulate<'py>(
     py: Python<'py>,
     file: PathBuf,
     text: Option<&str>,
+    memory_gb: Option<f64>,
 ) -> PyResult<Simulated<'py>> {
-    let experiment = work::brief(py, || described(&file, text))?;
+    let experiment = work::brief(py, || described(&file, text))?.with_memory_gb(memory_gb);
     let run = work::watched(py, None, || Ok(()), move || mechid::simulate(&experiment))?;
     let fs = run.force.sampling().rate_hz();
     let machine = run.system.dense().map(|s| Machine(mechid::Machine::known(s.clone())));

@@ -3,11 +3,13 @@
 use mechid_estimate::Unknowns;
 use mechid_numerics::NumericsError;
 
+use super::open_records;
 use super::options::{Identify, Source};
 use crate::AnalysisError;
 use crate::measurement::Windowed;
 
-/// Refuses a fit with fewer equations than unknowns, and a fit whose spectra need too much memory.
+/// Refuses a fit with fewer equations than unknowns, and a fit whose spectra or transients need too
+/// much memory.
 ///
 /// # Errors
 /// [`NumericsError::TooFewRows`] and [`AnalysisError::Memory`].
@@ -39,5 +41,13 @@ pub(super) fn check(
         _ if period_given => record.held.period / 2,
         _ => record.held.force.len() / 2,
     };
+    let is_open = match &how.source {
+        Source::Open(_) | Source::Hits(_) => true,
+        Source::Spectra(_) => !period_given && open_records::suit(records, unknowns),
+        _ => false,
+    };
+    if is_open {
+        records.iter().try_for_each(|record| record.check_transients(records))?;
+    }
     records.iter().try_for_each(|record| record.check_spectra(lines(record)))
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::channels::ABSENT;
 use super::{Block, CHUNK_SAMPLES, IN_MEMORY_SAMPLES, Measurement, RecordSource};
 use crate::AnalysisError;
-use crate::limits::{STRETCH_BYTES, WHOLE_BYTES};
+use crate::limits::{OPEN_BYTES, OPEN_DOF, OPEN_DOF_BYTES, STRETCH_BYTES, WHOLE_BYTES};
 
 /// Part of a record to use.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -144,6 +144,18 @@ impl Windowed {
     /// [`AnalysisError::Memory`].
     pub(crate) fn check_spectra(&self, lines: usize) -> Result<(), AnalysisError> {
         self.source.check_spectra(lines)
+    }
+
+    /// Refuses the fit of the transients of all `records` of the same file that needs too much
+    /// memory.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Memory`].
+    pub(crate) fn check_transients(&self, records: &[Self]) -> Result<(), AnalysisError> {
+        let same = records.iter().filter(|record| Arc::ptr_eq(&record.source, &self.source));
+        let samples = same.map(|record| record.held.force.len()).sum();
+        let dof = self.held.force.channels().min(OPEN_DOF);
+        self.source.check_memory(samples, OPEN_BYTES.max(OPEN_DOF_BYTES * dof))
     }
 
     /// Returns the buffered samples and drops the rest.

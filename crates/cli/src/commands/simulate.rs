@@ -10,7 +10,7 @@ use mechid::io::{
 use mechid::{RunsSummary, SimulationSummary};
 use serde::Serialize;
 
-use crate::args::{PlotArgs, ReportArgs, at_least_one};
+use crate::args::{PlotArgs, ReportArgs, at_least_one, positive};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -92,6 +92,9 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "RUNS.csv", conflicts_with_all = ["plot", "runs"],
           help_heading = "Many runs")]
     study: Option<PathBuf>,
+    /// Maximum memory of a simulation, in GB [default: 1.07]
+    #[arg(long, value_name = "GB", value_parser = positive)]
+    memory_gb: Option<f64>,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -137,7 +140,7 @@ impl SimulateArgs {
 
     /// Reads the experiment; refuses an output that would replace a file that it names.
     fn experiment(&self) -> Result<Experiment, CliError> {
-        let experiment = Experiment::read(&self.experiment)?;
+        let experiment = Experiment::read(&self.experiment)?.with_memory_gb(self.memory_gb);
         let outputs: Vec<_> = std::iter::once(&self.output).chain(&self.plot.plot).collect();
         refuse_replaced_inputs(experiment.files(), &outputs)?;
         Ok(experiment)
@@ -151,6 +154,7 @@ impl SimulateArgs {
         }
         self.experiment()?;
         let study = ExperimentStudy::read(&self.experiment, runs)?;
+        let study = study.with_memory_gb(self.memory_gb);
         let mut progress = |done| log::trace!(target: "mechid", "run {done} of {}", study.runs());
         let (file, summary) = mechid::simulate_runs(&study, &self.output, &mut progress)?;
         let report: Report<RunsSummary> = self.report(summary);

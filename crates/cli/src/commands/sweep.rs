@@ -156,6 +156,7 @@ impl SweepArgs {
             }
         }
         let experiment = Experiment::read(&self.input.record)?;
+        let experiment = experiment.with_memory_gb(self.input.memory_gb);
         Ok(mechid::sweep(&experiment, how, &|| bar.inc(1))?)
     }
 

@@ -114,6 +114,40 @@ fn more_unknowns_than_equations_are_refused_before_any_work() {
         assert!(message.contains("equations do not determine 1500 unknowns"), "{more}: {message}");
     }
     refused(home.path(), &format!("frf a.csv {columns}"));
+    // 300,000 numbers of a fit of transients, in a small file: 1100 bytes each.
+    let mut packed = GzEncoder::new(Vec::new(), Compression::best());
+    packed.write_all(b"force,displacement\n").unwrap();
+    (0..150_000).for_each(|row| writeln!(packed, "{},{}", row % 7, row % 5).unwrap());
+    fs::write(home.path().join("b.csv.gz"), packed.finish().unwrap()).unwrap();
+    for more in ["", "--extent open"] {
+        let columns = "--force force --displacement displacement --sample-rate 1000";
+        refused(home.path(), &format!("identify b.csv.gz {columns} {more}"));
+    }
+}
+
+#[test]
+fn a_description_of_a_long_record_is_refused_before_any_work() {
+    let home = tempfile::tempdir().unwrap();
+    for (samples, periods, response) in
+        [(100_000_000, 1, "from-rest"), (1000, 20_000, "periodic"), (10, 1_u64 << 50, "from-rest")]
+    {
+        let description = format!(
+            r#"{{"system": {{"mass": 25, "damping": 188.5, "stiffness": 142122}},
+                "sampling": {{"samples": {samples}, "rate_hz": 128}}, "periods": {periods},
+                "excitation": {{"kind": "harmonic", "amplitude": 1, "frequency_hz": 12.8}},
+                "scheme": {{"name": "newmark"}}, "response": "{response}"}}"#
+        );
+        fs::write(home.path().join("long.json"), description).unwrap();
+        refused(home.path(), "simulate long.json --output a.csv");
+    }
+    let simulate = "simulate long.json --output a.csv --quiet --memory-gb";
+    let description = fs::read_to_string(home.path().join("long.json")).unwrap();
+    let shorter = description.replace(&(1_u64 << 50).to_string(), "100");
+    fs::write(home.path().join("long.json"), shorter).unwrap();
+    // 1000 numbers of 128 bytes.
+    refused(home.path(), &format!("{simulate} 0.00012"));
+    let allowed = limited(home.path(), &format!("{simulate} 0.00013"));
+    assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
 }
 
 #[test]

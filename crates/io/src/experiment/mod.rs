@@ -22,6 +22,7 @@ pub use self::scheme::{
     SchemeChoice, SubStepLoad,
 };
 pub use self::study::{ExperimentStudy, StudyField, StudyRuns};
+use crate::limits::{SIMULATED_BYTES, SIMULATION_MEMORY};
 use crate::system::{LoadedSystem, NonlinearDescription, SystemSource, too_many};
 use crate::{IoError, escaped, json};
 
@@ -75,10 +76,10 @@ pub struct Experiment {
     /// Degrees of freedom whose response is recorded, counted from 1; see [`Experiment::outputs`].
     #[serde(default)]
     outputs: Option<Vec<usize>>,
+    /// Memory of a simulation, in units of GB; `None` for the default limit.
+    #[serde(skip)]
+    memory_gb: Option<f64>,
 }
-
-/// Maximum number of values in a force record: 800 MB.
-const LARGEST: usize = 100_000_000;
 
 fn one() -> usize {
     1
@@ -139,6 +140,13 @@ impl Experiment {
     /// period stays the same.
     pub fn with_rate_hz(mut self, rate_hz: f64) -> Self {
         self.sampling.rate_hz = rate_hz;
+        self
+    }
+
+    /// Returns the same experiment with another limit of the memory of its simulation, in units of
+    /// GB; `None` means the default limit of 1.07 GB.
+    pub fn with_memory_gb(mut self, memory_gb: Option<f64>) -> Self {
+        self.memory_gb = memory_gb;
         self
     }
 
@@ -247,7 +255,7 @@ impl Experiment {
     /// in N.
     ///
     /// # Errors
-    /// [`IoError::Description`] for a degree of freedom that the system does not have,
+    /// [`IoError::SimulationMemory`], [`IoError::Description`] for a degree of freedom that the system does not have,
     /// [`IoError::LineOutside`], [`IoError::Signal`], and the errors of [`Experiment::system`].
     pub fn force(&self) -> Result<Record, IoError> {
         self.sampled(None)
@@ -309,13 +317,7 @@ impl Experiment {
         }
         let channels = forced.len().max(outputs.len());
         let numbers = samples.saturating_mul(channels).saturating_mul(self.periods);
-        if numbers > LARGEST {
-            return Err(self.wrong(format!(
-                "{samples} samples × {} periods × {channels} degrees of freedom are {numbers} numbers, \
-                 the limit is {LARGEST}",
-                self.periods
-            )));
-        }
+        self.check_memory(numbers)?;
         let sampling = Sampling::from_rate_hz(rate_hz, samples).map_err(signal)?;
         let mut force = DMatrix::zeros(samples, forced.len());
         for excitation in &self.excitation {
@@ -325,6 +327,17 @@ impl Experiment {
             force.column_mut(channel).iter_mut().zip(part).for_each(|(f, p)| *f += p);
         }
         Record::new(sampling, force).map_err(signal)
+    }
+
+    /// Refuses a simulation of `numbers` numbers that needs too much memory.
+    fn check_memory(&self, numbers: usize) -> Result<(), IoError> {
+        let needed_gb = numbers as f64 * SIMULATED_BYTES as f64 / 1e9;
+        let allowed_gb = self.memory_gb.unwrap_or(SIMULATION_MEMORY as f64 / 1e9);
+        if needed_gb <= allowed_gb {
+            return Ok(());
+        }
+        let file = self.file.clone();
+        Err(IoError::SimulationMemory { file, numbers, needed_gb, allowed_gb })
     }
 
     fn wrong(&self, what: String) -> IoError {

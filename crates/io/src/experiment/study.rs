@@ -38,6 +38,8 @@ pub struct ExperimentStudy {
     description: Value,
     fields: Vec<StudyField>,
     runs: usize,
+    /// Memory of the simulation of a run, in units of GB; `None` for the default limit.
+    memory_gb: Option<f64>,
 }
 
 /// Choice of the runs of a study.
@@ -117,10 +119,18 @@ impl ExperimentStudy {
         if runs == 0 {
             return Err(refused("a study needs at least one run".into()));
         }
-        let study = Self { file, folder: folder.into(), description, fields, runs };
+        let folder = folder.into();
+        let study = Self { file, folder, description, fields, runs, memory_gb: None };
         // A wrong name is wrong in every run, so the first run is read at once.
         study.experiment(1)?;
         Ok(study)
+    }
+
+    /// Returns the same study with another limit of the memory of each run, in units of GB; `None`
+    /// means the default limit ([`Experiment::with_memory_gb`]).
+    pub fn with_memory_gb(mut self, memory_gb: Option<f64>) -> Self {
+        self.memory_gb = memory_gb;
+        self
     }
 
     /// Number of runs.
@@ -155,7 +165,8 @@ impl ExperimentStudy {
             *place = number(values[run - 1]);
         }
         let file = format!("{}, run {run} of {}", self.file, self.runs);
-        json::deserialized::<Experiment>(&file, description)?.loaded(file, &self.folder)
+        let experiment = json::deserialized::<Experiment>(&file, description)?;
+        Ok(experiment.loaded(file, &self.folder)?.with_memory_gb(self.memory_gb))
     }
 }
 

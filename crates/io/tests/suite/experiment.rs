@@ -232,7 +232,15 @@ fn wrong_sparse_matrices_say_what_is_wrong() {
 #[test]
 fn a_record_too_large_for_memory_is_refused() {
     let text = description(SDOF, FORCE, r#", "periods": 1000000000000"#);
-    assert!(matches!(parse(&text).unwrap().force(), Err(IoError::Description { .. })));
+    let refused = |experiment: Experiment| experiment.force().unwrap_err();
+    let error = refused(parse(&text).unwrap());
+    assert!(matches!(error, IoError::SimulationMemory { .. }), "{error}");
+    // 32 samples, 128 bytes each: 4.1e-6 GB.
+    let small = || parse(&description(SDOF, FORCE, "")).unwrap();
+    assert!(small().force().is_ok());
+    assert!(small().with_memory_gb(Some(4.1e-6)).force().is_ok());
+    let error = refused(small().with_memory_gb(Some(4.0e-6)));
+    assert!(matches!(error, IoError::SimulationMemory { numbers: 32, .. }), "{error}");
 }
 
 #[test]

@@ -1085,7 +1085,9 @@ def sweep(
 
 
 @careful
-def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulation:
+def simulate(
+    experiment: Mapping[str, Any] | str | os.PathLike[str], *, memory_gb: float | None = None
+) -> Simulation:
     """Simulate a described experiment: the record that it would give.
 
     Parameters
@@ -1095,6 +1097,8 @@ def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulati
         ``noise``, as in the JSON for ``mechid simulate``, or the path of such a file. The matrices
         of a ``system`` may be NumPy arrays, or sparse matrices of SciPy; with more than 64 degrees
         of freedom the record has only the columns that ``outputs`` and ``excitation`` name.
+    memory_gb : float, optional
+        Maximum memory of the simulation, in GB. Default: 1.07.
 
     Returns
     -------
@@ -1108,7 +1112,7 @@ def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulati
     described = description_of(experiment)
     if described is None:
         raise TypeError("an experiment is a mapping, or the path of a .json file")
-    return Simulation(_mechid.simulate(*described))
+    return Simulation(_mechid.simulate(*described, memory_gb))
 
 
 @careful
