@@ -612,6 +612,16 @@ pub enum AnalysisError {
         /// The limit, in s.
         seconds: f64,
     },
+    /// The time limit has ended the work before there was a result.
+    #[error(
+        "the time limit of {seconds} s ended the work before there was a result ({failure}): raise `time_limit`"
+    )]
+    TimeLimit {
+        /// The limit, in s.
+        seconds: f64,
+        /// Failure of the work after the end of the limit, in a sentence.
+        failure: String,
+    },
     /// The process for a record of a fleet has ended.
     #[error("the process that worked on the record has ended: {how}")]
     RecordProcess {

@@ -69,6 +69,7 @@ pub mod reconstruct;
 pub mod review;
 pub mod sweep;
 pub mod text;
+pub mod time_limit;
 pub mod words;
 
 pub use batch::{ResultRow, SavedAnalysis};

@@ -144,6 +144,8 @@ findings! {
     SensorDelay in sensor_delay,
     /// Number of searches that ended at the highest likelihood.
     SearchAgreement in search,
+    /// A search that the time limit has ended before it reached a minimum.
+    TimeLimit in time_limit,
     /// Residual of a fit that is attributed to unmeasured forces.
     UnmeasuredForce in unmeasured_force,
     /// The response does not follow the force.

@@ -20,6 +20,7 @@ use std::io::{ErrorKind, Write as _, stderr};
 use std::process::ExitCode;
 
 use clap::Parser as _;
+use mechid::analysis::time_limit;
 
 use crate::commands::Cli;
 use crate::error::CliError;
@@ -79,9 +80,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// Runs the command and delivers its outcome; returns whether everything requested has a result.
 fn outcome(cli: &Cli, words: &[OsString]) -> Result<bool, CliError> {
     cli.command.files().check()?;
+    let run = || time_limit::within(cli.command.time_limit(), || cli.command.run(words));
     let outcome = match cli.command.waiting() {
-        Some(message) => progress::watched(message, || cli.command.run(words))?,
-        None => cli.command.run(words)?,
+        Some(message) => progress::watched(message, run)?,
+        None => run()?,
     };
     let is_complete = outcome.is_complete();
     outcome.deliver(cli.command.report(), options::spelled)?;

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use mechid_numerics::time_limit;
 use mechid_spectra::LineData;
 use nalgebra::Complex;
 
@@ -84,7 +85,7 @@ pub fn identify_modes(
     let poles = initial_poles(&lines)?;
     let delays = apparent_delays(&lines, &poles);
     let plain = Identification::selected(&lines, settings, poles);
-    let Some(delays) = delays else { return plain.finish() };
+    let Some(delays) = delays.filter(|_| !time_limit::is_over()) else { return plain.finish() };
     let advanced = lines.advanced(delays.iter().copied().map(OutputDelay::exact).collect());
     let Ok(poles) = initial_poles(&advanced) else { return plain.finish() };
     let search = Identification::selected(&advanced, settings, poles);
@@ -261,7 +262,7 @@ impl<'a> Identification<'a> {
         self.remove_impossible();
         self.remove_insignificant(required);
         let most = self.settings.max_modes.max(self.settings.modes.unwrap_or(0));
-        while self.modes_in_band() < most {
+        while self.modes_in_band() < most && !time_limit::is_over() {
             let is_stated = self.settings.modes.is_some_and(|least| self.modes_in_band() < least);
             let least = if is_stated { 0.0 } else { required };
             let before = self.fit.model.modes();
@@ -294,7 +295,10 @@ impl<'a> Identification<'a> {
     /// mode is added if the likelihood of fit and noise together rises by at least the penalty of
     /// its parameters.
     fn add_hidden(&mut self, required: f64, most: usize) {
-        while self.settings.unmeasured_forces && self.modes_in_band() < most {
+        while self.settings.unmeasured_forces
+            && self.modes_in_band() < most
+            && !time_limit::is_over()
+        {
             let mut trial = self.fit.clone();
             weigh(&mut trial, &Noise::from_fit(&self.fit, None));
             let Some(candidate) = hidden(&trial, required) else { return };
@@ -383,7 +387,7 @@ impl<'a> Identification<'a> {
         let required = required_gain(self.lines);
         let mut removed = false;
         let mut tried = 0;
-        while tried < MAX_TRIES {
+        while tried < MAX_TRIES && !time_limit::is_over() {
             let losses = removal_losses(&self.fit);
             let protected = self.protected();
             let mut order: Vec<usize> = (0..losses.len())

@@ -1,5 +1,6 @@
 //! Number of modes: candidates in the residual, and the gain in likelihood of each mode.
 
+use mechid_numerics::time_limit;
 use nalgebra::Complex;
 use rayon::prelude::*;
 
@@ -243,12 +244,13 @@ fn rank_one(
     gain.is_finite().then_some((direction, gain))
 }
 
-/// Adds the best candidate whose gain after a search is at least `required`; otherwise returns the
-/// candidates that were tried, with their gains.
+/// Adds the best candidate whose gain after a search is at least `required`; otherwise, and after
+/// the end of a time limit, returns the candidates that were tried, with their gains.
 pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candidate>> {
     let mut tried: Vec<Candidate> = Vec::new();
     for candidate in scan(fit) {
-        if tried.len() >= MAX_TRIES || candidate.gain < TRIAL_GAIN * required {
+        let is_last = tried.len() >= MAX_TRIES || candidate.gain < TRIAL_GAIN * required;
+        if is_last || time_limit::is_over() {
             break;
         }
         let is_near = |other: &Candidate| {

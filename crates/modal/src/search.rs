@@ -1,5 +1,6 @@
 //! Damped Gauss–Newton steps of poles and participations, with bounded steps of the poles.
 
+use mechid_numerics::time_limit;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::limits::{
@@ -59,9 +60,9 @@ impl<'a> Fit<'a> {
         self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE, goal);
     }
 
-    /// Takes at most `limit` steps, until a step lowers the cost by less than `tolerance`. It also
-    /// ends if the cost would remain above `goal` with all further steps as effective as the last
-    /// one.
+    /// Takes at most `limit` steps, until a step lowers the cost by less than `tolerance` or the
+    /// time limit is over. It also ends if the cost would remain above `goal` with all further steps
+    /// as effective as the last one.
     fn search_until(&mut self, limit: usize, tolerance: f64, goal: f64) {
         if self.model.modes() == 0 {
             return;
@@ -69,6 +70,9 @@ impl<'a> Fit<'a> {
         let mut cost = self.cost();
         let mut damping = 1e-3;
         for further in (0..limit).rev() {
+            if time_limit::is_over() {
+                return;
+            }
             let Some(next) = self.step(cost, &mut damping) else {
                 self.projection.solve(self.lines, &self.model);
                 return;

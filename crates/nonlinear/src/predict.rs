@@ -4,6 +4,7 @@ use mechid_estimate::EstimateError;
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity, exact_periodic};
 use mechid_numerics::check_size;
 use mechid_numerics::gauss_newton::{Residuals, minimise_residuals};
+use mechid_numerics::time_limit;
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
@@ -122,8 +123,8 @@ pub fn fitted_start(
     let theta = DVector::from_iterator(2 * n, state);
     let mut problem =
         Start { system, directions: &directions, fine: &fine, measured, course: None };
-    let minimum =
-        minimise_residuals(&mut problem, theta, SEARCH_STEPS).filter(|minimum| minimum.converged);
+    let minimum = minimise_residuals(&mut problem, theta, SEARCH_STEPS)
+        .filter(|minimum| minimum.converged || time_limit::is_over());
     initial(&minimum.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.parameters)
 }
 

@@ -17,6 +17,7 @@ use crate::limits::{
     COST_TOLERANCE, FIRST_DAMPING, LARGEST_CORRECTION, LARGEST_DAMPING, SMALLEST_DAMPING,
     STEP_TOLERANCE,
 };
+use crate::time_limit;
 pub use gram_matrix::GramMatrix;
 pub use residuals::{Residuals, minimise_residuals};
 pub use triangle::{DampedTriangle, Triangle};
@@ -91,13 +92,14 @@ pub struct Minimum {
     pub cost: f64,
     /// Number of steps taken.
     pub steps: usize,
-    /// `true` if a minimum was reached up to rounding; `false` if the number of steps was
-    /// exhausted.
+    /// `true` if a minimum was reached up to rounding; `false` if the number of steps was exhausted
+    /// or the time limit was over.
     pub converged: bool,
 }
 
 /// Searches for the local minimum from `parameters` in at most `max_steps` steps; afterwards
-/// `problem` holds the accepted parameters.
+/// `problem` holds the accepted parameters. A [time limit](crate::time_limit) ends the search at the
+/// lowest sum of squares so far.
 ///
 /// A step v and its correction a for the curvature of the residuals solve
 ///
@@ -151,6 +153,9 @@ pub fn minimise<P: SumOfSquares>(
     problem.accept();
     let mut damping = 0.0;
     for steps in 0..max_steps {
+        if time_limit::is_over() {
+            return Some(Minimum { parameters, cost, steps, converged: false });
+        }
         log::trace!("step {}, sum of squares {cost:.4e}", steps + 1);
         let linearisation = problem.linearise()?;
         let undamped = linearisation.factor(0.0);
@@ -179,6 +184,9 @@ pub fn minimise<P: SumOfSquares>(
                 damping *= f64::max(0.1, 1.0 - (2.0 * gain - 1.0).powi(3));
                 damping = if damping < SMALLEST_DAMPING { 0.0 } else { damping };
                 break;
+            }
+            if time_limit::is_over() {
+                return Some(Minimum { parameters, cost, steps, converged: false });
             }
             damping = f64::max(growth * damping, FIRST_DAMPING);
             growth *= 2.0;
@@ -239,6 +247,7 @@ mod tests {
     use nalgebra::{dmatrix, dvector};
 
     use super::*;
+    use crate::time_limit::{TimeLimit, within};
 
     /// Rosenbrock's valley, 10(y − x²) and 1 − x, linearised by `L`.
     struct Valley<L> {
@@ -273,6 +282,32 @@ mod tests {
             let scale = linearisation.coordinates(&dvector![1.0, 1.0]);
             self.is_curved.then(|| in_parameters.component_div(&scale))
         }
+    }
+
+    #[test]
+    fn a_time_limit_ends_at_the_best_parameters_so_far() {
+        let linearise = |at| {
+            let (jacobian, residual) = linearised(at);
+            Triangle::new(&jacobian, &residual)
+        };
+        let search = |polls| {
+            let mut valley = Valley { at: [0.0; 2], tried: [0.0; 2], is_curved: false, linearise };
+            let limit = Some(TimeLimit::from_polls(polls));
+            let from = dvector![-1.2, 1.0];
+            let minimum = within(limit, || minimise(&mut valley, from, 40)).unwrap();
+            // The problem is at the returned parameters.
+            assert_eq!(valley.at.as_slice(), minimum.parameters.as_slice());
+            let cost = valley.try_at(&minimum.parameters);
+            assert_eq!(cost, Some(minimum.cost));
+            minimum
+        };
+        let whole = search(u64::MAX);
+        assert!(whole.converged);
+        let costs: Vec<f64> = (0..100).map(|polls| search(polls).cost).collect();
+        assert!((costs[0] - 24.2).abs() < 1e-12, "{}", costs[0]);
+        assert!(costs.windows(2).all(|pair| pair[1] <= pair[0]), "{costs:?}");
+        let converged = (0..100).filter(|polls| search(*polls).converged).count();
+        assert!((1..100).contains(&converged), "{converged}");
     }
 
     fn linearised([x, y]: [f64; 2]) -> (nalgebra::DMatrix<f64>, DVector<f64>) {

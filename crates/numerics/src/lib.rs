@@ -14,6 +14,7 @@
 //! | linear equations and largest eigenvalues of operators given by products | [`krylov`] |
 //! | the logarithm of a matrix, its integral and their derivatives | [`logarithm`] |
 //! | the minimum of a function of a few variables, without derivatives | [`nelder_mead`] |
+//! | time limits of searches | [`time_limit`] |
 //! | values with a standard error, and their intervals | [`Uncertain`] |
 //!
 //! ```
@@ -39,6 +40,7 @@ pub mod nelder_mead;
 pub mod products;
 mod quasi_triangular;
 pub mod real_schur;
+pub mod time_limit;
 pub mod triangular;
 mod uncertain;
 

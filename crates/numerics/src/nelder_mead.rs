@@ -1,8 +1,11 @@
 //! Minimum of a function of a few variables, without derivatives.
 
+use crate::time_limit;
+
 /// Returns the best point from a search at `start`, with an initial simplex of edge `step`. The
 /// search ends after `rounds` rounds, or earlier if the values at the corners of the simplex differ
-/// by at most `settled`. A point is a list of coordinates, which all have the same unit.
+/// by at most `settled` or the [time limit](crate::time_limit) is over. A point is a list of
+/// coordinates, which all have the same unit.
 ///
 /// # Source
 /// Nelder & Mead (1965), with the usual coefficients 1, 2, ½, ½.
@@ -25,7 +28,7 @@ pub fn minimise(
         .collect();
     for _ in 0..rounds {
         simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
-        if simplex[n].0 - simplex[0].0 < settled {
+        if simplex[n].0 - simplex[0].0 < settled || time_limit::is_over() {
             break;
         }
         let centre: Vec<f64> =

@@ -1,6 +1,7 @@
 //! Bearing tests.
 
 use mechid::analysis::bearing::BearingPlan;
+use mechid::analysis::time_limit::within;
 use mechid::io::FrequencyResponses;
 use mechid::{BearingData, IdentifyBearing, identify_bearing};
 use pyo3::prelude::*;
@@ -12,12 +13,13 @@ use crate::{failure, work};
 
 /// Identifies a bearing from records, minus baseline records if there are any; settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (tests, baseline, settings, threads))]
+#[pyo3(signature = (tests, baseline, settings, time_limit, threads))]
 pub fn bearing(
     py: Python<'_>,
     tests: Vec<PyRef<'_, Measurement>>,
     baseline: Vec<PyRef<'_, Measurement>>,
     settings: &str,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<Answer> {
     let how: IdentifyBearing = failure::settings(py, settings)?;
@@ -28,18 +30,20 @@ pub fn bearing(
         let dry = (!baseline.is_empty()).then(|| BearingData::from_records(&baseline, &how));
         identify_bearing(&BearingData::from_records(&tests, &how)?, dry.transpose()?.as_ref(), &how)
     };
+    let find = move || within(time_limit, find);
     work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 
 /// Identifies a bearing from tables of frequency responses, minus baseline tables if there are any;
 /// settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (tests, baseline, settings, threads))]
+#[pyo3(signature = (tests, baseline, settings, time_limit, threads))]
 pub fn bearing_of_responses(
     py: Python<'_>,
     tests: Vec<PyRef<'_, ResponseTable>>,
     baseline: Vec<PyRef<'_, ResponseTable>>,
     settings: &str,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<Answer> {
     let how: IdentifyBearing = failure::settings(py, settings)?;
@@ -54,6 +58,7 @@ pub fn bearing_of_responses(
             &how,
         )
     };
+    let find = move || within(time_limit, find);
     work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 

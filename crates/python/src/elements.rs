@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mechid::analysis::AnalysisError;
+use mechid::analysis::time_limit::within;
 use mechid::io::parse_machine;
 use mechid::{ElementData, IdentifyElements};
 use pyo3::prelude::*;
@@ -43,7 +44,8 @@ pub fn described_machine(
 /// Identifies a machine from records, tables of frequency responses or tables over the speed (their
 /// names and columns), and from the measured receptances of its parts; settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (records, tables, speeds, parts, settings, threads))]
+#[pyo3(signature = (records, tables, speeds, parts, settings, time_limit, threads))]
+#[allow(clippy::too_many_arguments, reason = "one argument for each kind of data and each limit")]
 pub fn identify_elements(
     py: Python<'_>,
     records: Vec<PyRef<'_, Measurement>>,
@@ -51,6 +53,7 @@ pub fn identify_elements(
     speeds: Vec<std::path::PathBuf>,
     parts: Vec<PyRef<'_, ResponseTable>>,
     settings: &str,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<IdentifiedElements> {
     let how: IdentifyElements = failure::settings(py, settings)?;
@@ -71,6 +74,7 @@ pub fn identify_elements(
         let data = if parts.is_empty() { data } else { data.with_parts(&parts, &how)? };
         mechid::identify_elements(&data, &how)
     };
+    let find = move || within(time_limit, find);
     let identified = work::watched(py, threads, || Ok(()), find)?;
     Ok(IdentifiedElements(Arc::new(identified)))
 }

@@ -7,6 +7,7 @@ use mechid::analysis::AnalysisError;
 use mechid::analysis::identify::ValidationWindow;
 use mechid::analysis::review::Review;
 use mechid::analysis::review::receptance::ActingAlone;
+use mechid::analysis::time_limit::within;
 use mechid::estimate::EstimateError;
 use mechid::report::page;
 use nalgebra::{Complex, DMatrix};
@@ -24,12 +25,13 @@ pub struct Identified(pub Arc<mechid::Identified>);
 
 /// Identifies the machine from the records; settings and the window for validation are JSON.
 #[pyfunction]
-#[pyo3(signature = (records, settings, validate, threads))]
+#[pyo3(signature = (records, settings, validate, time_limit, threads))]
 pub fn identify(
     py: Python<'_>,
     records: Vec<PyRef<'_, Measurement>>,
     settings: &str,
     validate: Option<(PyRef<'_, Measurement>, &str)>,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<Identified> {
     let how: Identify = failure::settings(py, settings)?;
@@ -49,6 +51,7 @@ pub fn identify(
         }
         Ok(identified)
     };
+    let find = move || within(time_limit, find);
     work::watched(py, threads, || Ok(()), find).map(|identified| Identified(Arc::new(identified)))
 }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mechid::analysis::sweep::{SweepSettings, sweep_record};
+use mechid::analysis::time_limit::within;
 use mechid::analysis::{InspectSettings, RecordPlan};
 use mechid::io::FrequencyResponses;
 use mechid::{DecaySettings, FrfSettings, ModeSet, ModesSettings};
@@ -35,28 +36,31 @@ pub fn frf(
 
 /// Identifies the modes of a free decay; settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (record, settings, threads))]
+#[pyo3(signature = (record, settings, time_limit, threads))]
 pub fn decay(
     py: Python<'_>,
     record: PyRef<'_, Measurement>,
     settings: &str,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<Answer> {
     let how: DecaySettings = failure::settings(py, settings)?;
     let record = record.0.clone();
-    work::watched(py, threads, || Ok(()), move || mechid::decay(&record, &how)).map(Answer::new)
+    let find = move || within(time_limit, || mechid::decay(&record, &how));
+    work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 
 /// Identifies the modes of a test with forces, of an ambient record, or of tables of frequency
 /// responses; settings are JSON, and diagrams are added on demand.
 #[pyfunction]
-#[pyo3(signature = (records, tables, settings, diagrams, threads))]
+#[pyo3(signature = (records, tables, settings, diagrams, time_limit, threads))]
 pub fn modes(
     py: Python<'_>,
     records: Vec<PyRef<'_, Measurement>>,
     tables: Vec<PyRef<'_, ResponseTable>>,
     settings: &str,
     diagrams: bool,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<Answer> {
     let how: ModesSettings = failure::settings(py, settings)?;
@@ -73,6 +77,7 @@ pub fn modes(
         }
         Ok::<_, mechid::analysis::AnalysisError>(modes)
     };
+    let find = move || within(time_limit, find);
     work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use mechid::Reconstruct;
+use mechid::analysis::time_limit::within;
 use mechid::signal::Record;
 use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray1, PyArray2};
@@ -20,12 +21,13 @@ pub struct Reconstructed(Arc<mechid::Reconstructed>);
 
 /// Reconstructs the force that acted on a machine or on modes; settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (record, system, settings, threads))]
+#[pyo3(signature = (record, system, settings, time_limit, threads))]
 pub fn reconstruct(
     py: Python<'_>,
     record: PyRef<'_, Measurement>,
     system: Answering<'_>,
     settings: &str,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<Reconstructed> {
     let how: Reconstruct = failure::settings(py, settings)?;
@@ -33,13 +35,14 @@ pub fn reconstruct(
     let force = match system {
         Answering::Machine(machine) => {
             let machine = machine.0.clone();
-            let find = move || mechid::reconstruct(&record, &machine, &how);
+            let find = move || within(time_limit, || mechid::reconstruct(&record, &machine, &how));
             work::watched(py, threads, || Ok(()), find)
         }
         Answering::Modes(modes) => {
             let modes = modes.0.clone();
             let find =
                 move || mechid::reconstruct_with_modes(&record, &modes, &how, &mut |_| Ok(()));
+            let find = move || within(time_limit, find);
             work::watched(py, threads, || Ok(()), find)
         }
     };

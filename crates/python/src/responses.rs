@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use mechid::analysis::time_limit::within;
 use mechid::estimate::EstimateError;
 use mechid::io::{AveragedSegments, CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid::{IdentifyResponses, ResponseQuantity};
@@ -107,16 +108,17 @@ pub struct IdentifiedResponses(Arc<mechid::IdentifiedResponses>);
 
 /// Identifies the machine from tables of frequency responses; settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (tables, settings, threads))]
+#[pyo3(signature = (tables, settings, time_limit, threads))]
 pub fn identify_responses(
     py: Python<'_>,
     tables: Vec<PyRef<'_, ResponseTable>>,
     settings: &str,
+    time_limit: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<IdentifiedResponses> {
     let how: IdentifyResponses = failure::settings(py, settings)?;
     let tables: Vec<FrequencyResponses> = tables.iter().map(|table| table.0.clone()).collect();
-    let find = move || mechid::identify_responses(&tables, &how);
+    let find = move || within(time_limit, || mechid::identify_responses(&tables, &how));
     work::watched(py, threads, || Ok(()), find).map(|found| IdentifiedResponses(Arc::new(found)))
 }
 

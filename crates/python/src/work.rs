@@ -8,6 +8,7 @@ use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use mechid::numerics::time_limit;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -50,6 +51,9 @@ pub fn watched<T: Send + 'static, E: Failure + Send + 'static>(
         None => shared(py)?,
     };
     let (done, mut end) = sync_channel(1);
+    // A thread that waits for a part of other work may take on this work: the time limit of that
+    // does not apply here.
+    let work = move || time_limit::within(None, work);
     pool.spawn(move || {
         // After Ctrl-C there is no receiver any more, so a failed send is ignored.
         let _ = done.send(catch_unwind(AssertUnwindSafe(work)));

@@ -43,6 +43,28 @@ def test_threads_work_side_by_side() -> None:
         assert set(pool.map(lambda _: stiffness(), range(64))) == {stiffness()}
 
 
+def test_a_time_limit_ends_only_its_own_call() -> None:
+    def text(limit: float | None) -> str:
+        found = mechid.identify(FILE, force="force", displacement="displacement", time_limit=limit)
+        return found.to_json()
+
+    whole, limited = text(None), text(0.0)
+    assert "the time limit of 0 s ended the work early" in limited
+    assert text(1e6) == whole
+    limits = [None, 0.0] * 8
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(text, limits)) == [whole, limited] * 8
+
+
+def test_a_time_limit_without_a_result_is_named() -> None:
+    with pytest.raises(mechid.MechidError) as raised:
+        mechid.decay("examples/decay.csv", acceleration=["a1", "a2", "a3"], time_limit=0.0)
+    assert raised.value.code == "analysis.time-limit"
+    assert raised.value.fields["seconds"] == 0.0
+    with pytest.raises(mechid.MechidError, match="`time_limit`"):
+        mechid.identify(FILE, force="force", displacement="displacement", time_limit=-1.0)
+
+
 def test_the_lock_is_released_during_the_work() -> None:
     rng = np.random.default_rng(1)
     f, x, v = rng.standard_normal((3, 200_000))
@@ -71,6 +93,36 @@ def test_children_work_as_the_parent_does(method: str) -> None:
     with multiprocessing.get_context(method).Pool(2) as pool:
         found = [pool.apply_async(stiffness).get(timeout=60) for _ in range(4)]
     assert set(found) == {here}
+
+
+def code_or_stiffness(file: str) -> str | float:
+    try:
+        found = mechid.identify(file, force="force", displacement="displacement", period=256)
+    except mechid.MechidError as error:
+        return error.code
+    return found.parameters["k"].value
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")
+def test_a_damaged_record_does_not_stop_a_pool(method: str, tmp_path: Path) -> None:
+    if method not in multiprocessing.get_all_start_methods():
+        pytest.skip(f"{method} is not a way to start processes here")
+    mechid.identify(FILE, force="force", displacement="displacement", period=256)
+    damaged = {"empty.csv": b"", "bytes.mat": b"MATLAB 5.0 MAT-file" + bytes(300), "short.csv": b"time,force\n0,1\n"}
+    for name, content in damaged.items():
+        (tmp_path / name).write_bytes(content)
+    files = [FILE, *(str(tmp_path / name) for name in damaged), FILE]
+    with multiprocessing.get_context(method).Pool(2) as pool:
+        found = pool.map_async(code_or_stiffness, files, chunksize=1).get(timeout=60)
+        # A failure reaches the parent as itself.
+        failure = pool.apply_async(mechid.identify, [files[1]], {"force": "f", "displacement": "x"})
+        with pytest.raises(mechid.MechidError) as raised:
+            failure.get(timeout=60)
+    assert found[0] == found[-1] == stiffness()
+    codes = [code for code in found[1:-1] if isinstance(code, str)]
+    assert len(codes) == len(damaged) and all(code.startswith("io.") for code in codes), codes
+    assert raised.value.code == found[1]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as POSIX has them")

@@ -12,7 +12,7 @@ use crate::identify::checks::CheckRow;
 use crate::identify::rows::{ModeRow, Uncertain, WindowRow};
 use crate::identify::summary::{FitRow, IdentificationSummary};
 use crate::modes::{ModalCheck, ModesSummary, modes};
-use crate::{AnalysisError, ElementData, Measurement, identify, identify_elements};
+use crate::{AnalysisError, ElementData, Measurement, identify, identify_elements, time_limit};
 
 /// Result of one record: a machine with its uncertainty and the warnings, or an error.
 ///
@@ -167,7 +167,8 @@ impl ResultRow {
                 Some(settings) => empty.clone().with_modes(modes(&records, settings)?.summary()),
             })
         };
-        let error = match catch_unwind(AssertUnwindSafe(work)) {
+        let limited = || time_limit::within(analysis.time_limit, work);
+        let error = match catch_unwind(AssertUnwindSafe(limited)) {
             Ok(Ok(row)) => return row,
             Ok(Err(error)) => RowError { code: error.code(), message: error.to_string() },
             Err(panic) => RowError { code: "internal".into(), message: panic_message(&*panic) },

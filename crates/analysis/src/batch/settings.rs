@@ -48,6 +48,10 @@ pub struct SavedAnalysis {
     /// Settings of a modal test, which replaces the identification; `None` without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes: Option<ModesSettings>,
+    /// Time after which the searches for the result of a record end at their best points so far, in
+    /// s; `None` without a limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_limit: Option<f64>,
 }
 
 impl SavedAnalysis {

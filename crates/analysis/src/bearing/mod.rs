@@ -53,7 +53,7 @@ pub use self::settings::{BearingSize, Coefficients, IdentifyBearing};
 pub use self::speeds::{BearingPlan, BearingPoint, BearingTable};
 pub use self::stiffness::StiffnessLine;
 pub use self::summary::{Amplitude, BearingSummary, CoefficientRow, Dimensionless, StabilityRow};
-use crate::AnalysisError;
+use crate::{AnalysisError, time_limit};
 
 /// Identifies the film of a bearing from tests with excitation. The coefficients of baseline tests
 /// of the same rig without the film, if there are any, are subtracted with their covariance.
@@ -72,7 +72,8 @@ pub fn identify_bearing(
     how.check()?;
     let film = Film::new(tests, baseline, how.coefficients)?;
     let lines = stiffness::lines(tests, &film)?;
-    let checks = checks::rows(tests, baseline, &film, how.stator_mass)?;
+    let mut checks = checks::rows(tests, baseline, &film, how.stator_mass)?;
+    checks.extend(time_limit::check());
     let summary = BearingSummary::new(tests, baseline, &film, lines, checks, how)?;
     Ok(IdentifiedBearing { film, summary })
 }

@@ -18,12 +18,12 @@ pub use self::nonlinear::{BackbonePointRow, BackboneRow, Harmonic};
 use self::release::release;
 use self::steps::{coarse, last_shown};
 pub use self::summary::DecaySummary;
-use crate::AnalysisError;
 use crate::identify::checks;
 use crate::identify::prediction::Compared;
 use crate::measurement::{Block, Measurement, Window};
 use crate::modes::{all_responses, other_places};
 use crate::text::significant;
+use crate::{AnalysisError, time_limit};
 
 /// Settings of an analysis of a free decay.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -124,6 +124,7 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     }));
     let predicted = estimate.fitted().clone();
     let names = summary.channels.iter().map(|channel| channel.column.clone()).collect();
+    summary.remarks.extend(time_limit::remark());
     let compared = Compared { kind, names, measured: record, predicted };
     Ok(Decayed { summary, estimate, compared })
 }

@@ -34,9 +34,9 @@ pub use self::data::{ElementData, TestKind, TestRow};
 pub use self::notes::ElementNote;
 pub use self::settings::IdentifyElements;
 pub use self::summary::{CandidateRow, CombinationRow, ElementRow, ElementSummary, SensorRow};
-use crate::AnalysisError;
 use crate::identify::checks::{CheckRow, When};
 use crate::machine::Machine;
+use crate::{AnalysisError, time_limit};
 
 /// Identifies the unknown coefficients of a machine of named elements by maximum likelihood.
 ///
@@ -76,6 +76,7 @@ pub fn identify_elements(
         None => estimate,
     };
     let mut summary = ElementSummary::new(data, &estimate, how, checks)?;
+    summary.checks.extend(time_limit::check());
     summary.notes.extend(is_late.then_some(ElementNote::Delayed).into_iter().chain(note));
     Ok(IdentifiedElements { estimate, summary, spectrum: ElementSpectrum::new(data) })
 }

@@ -99,11 +99,11 @@ use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, identify_responses};
 pub use self::unscaled::Unscaled;
 pub use self::validation::{Validation, ValidationWindow};
-use crate::AnalysisError;
 use crate::hits::{self, HitNoise, Windows};
 use crate::machine::Machine;
 use crate::measurement::{Block, Channels, Hold, Measurement, Windowed, check_distinct};
 use crate::modes::resonances;
+use crate::{AnalysisError, time_limit};
 pub use mechid_nonlinear::RestoringForce;
 
 /// Maximum unexplained part of the response without a remark, a ratio of RMS values.
@@ -167,6 +167,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
             summary.remarks.extend(records.iter().find_map(spectra::unsaid_period));
         }
     }
+    summary.checks.extend(time_limit::check());
     Ok(Identified {
         measurements: measurements.to_vec(),
         records,

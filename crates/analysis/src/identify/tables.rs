@@ -21,10 +21,10 @@ use super::summary::{FitRow, verdict};
 use super::table_fit::{CheckedFit, TableFit};
 use super::tabulated::{Tabulated, joined};
 use super::{FittedLine, Unscaled};
-use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph, significant};
+use crate::{AnalysisError, time_limit};
 
 /// Identifies a machine from one or several tables of frequency responses, which are fitted
 /// together; each needs the response at every point where a force acts.
@@ -63,7 +63,8 @@ pub fn identify_responses(
     let mut remarks = remarks(tables, &measured, added_decay, &fit, unscaled.as_ref());
     remarks.extend(checked.remarks(&fit, tables, how)?);
     let row = checked.row(&fit, data.len());
-    let CheckedFit { checks, estimate, .. } = checked;
+    let CheckedFit { mut checks, estimate, .. } = checked;
+    checks.extend(time_limit::check());
     let system = estimate.system()?;
     let summary = ResponseSummary {
         files: tables.iter().map(|table| table.file.clone()).collect(),

@@ -51,8 +51,8 @@ pub use self::summary::{
 };
 pub use self::system::ModalSystem;
 use self::tables::Tables;
-use crate::AnalysisError;
 use crate::measurement::Measurement;
+use crate::{AnalysisError, time_limit};
 
 /// Modes of a structure with their uncertainty, and their fit to the records.
 #[derive(Debug)]
@@ -99,6 +99,15 @@ pub fn modes(
     settings: &ModesSettings,
 ) -> Result<Modes, AnalysisError> {
     settings.check()?;
+    let mut modes = modes_of_records(measurements, settings)?;
+    modes.summary.checks.extend(time_limit::check_of_modes());
+    Ok(modes)
+}
+
+fn modes_of_records(
+    measurements: &[Measurement],
+    settings: &ModesSettings,
+) -> Result<Modes, AnalysisError> {
     let hits = match &settings.test {
         ModalTest::Forced { hits } => hits,
         ModalTest::Decay { from_s, to_s } => {
@@ -143,7 +152,9 @@ pub fn modes_of_responses(
     settings.check()?;
     let tables = Tables::new(tables, settings.quantity)?;
     let band_hz = settings.band_hz.unwrap_or_else(|| tables.range_hz());
-    forced::modes_of_tables(&tables, band_hz, settings)
+    let mut modes = forced::modes_of_tables(&tables, band_hz, settings)?;
+    modes.summary.checks.extend(time_limit::check_of_modes());
+    Ok(modes)
 }
 
 impl Modes {

@@ -43,9 +43,9 @@ pub use self::options::{Method, ParameterRule, Reconstruct};
 use self::summary::{Chosen, ForceRow, ForceSummary};
 use self::tally::{Take, Tally};
 pub use self::unexplained::Measured;
-use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::measurement::Measurement;
+use crate::{AnalysisError, time_limit};
 
 /// Reconstructed force on a machine, with its method.
 ///
@@ -255,6 +255,7 @@ impl Task {
         let mut remarks = recorded.unit_notes();
         remarks.extend(tally.remark());
         remarks.extend(how.remarks.iter().cloned());
+        remarks.extend(time_limit::remark());
         let unexplained = how.unexplained.as_deref();
         let channels = Measured::all(recorded, unexplained);
         let System { name, forces, uncertain } = system;

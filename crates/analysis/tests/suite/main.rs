@@ -26,4 +26,5 @@ mod random;
 mod reading;
 mod rig;
 mod tables;
+mod time_limit;
 mod unscaled;

@@ -34,6 +34,15 @@ pub struct ReportArgs {
     pub quiet: bool,
 }
 
+/// Limit of the time of an analysis.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct TimeLimitArgs {
+    /// Time after which all searches end at their best points so far, in s; the result then says
+    /// that it is not final [default: none]
+    #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
+    pub time_limit: Option<f64>,
+}
+
 /// File to draw the result into.
 #[derive(Debug, Default, Args)]
 pub struct PlotArgs {
@@ -312,6 +321,15 @@ pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if value > 0.0 && f64::is_finite(value) => Ok(value),
         Ok(value) => Err(format!("a positive number is needed, got {value}")),
+        Err(e) => Err(format!("a number is needed: {e}")),
+    }
+}
+
+/// Parses a finite number that is not negative.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),
+        Ok(value) => Err(format!("a finite number of at least 0 is needed, got {value}")),
         Err(e) => Err(format!("a number is needed: {e}")),
     }
 }

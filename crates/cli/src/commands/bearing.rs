@@ -12,7 +12,7 @@ use mechid::{BearingData, identify_bearing};
 
 use crate::args::fit::LineArgs;
 use crate::args::word::word;
-use crate::args::{ChannelArgs, FigureArgs, RecordArgs, ReportArgs, at_least_one};
+use crate::args::{ChannelArgs, FigureArgs, RecordArgs, ReportArgs, TimeLimitArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -87,6 +87,8 @@ pub struct BearingArgs {
     ross: Option<PathBuf>,
     #[command(flatten)]
     page: FigureArgs,
+    #[command(flatten)]
+    pub limit: TimeLimitArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }

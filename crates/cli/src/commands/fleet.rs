@@ -12,7 +12,7 @@ use mechid::analysis::fleet::{
     Fleet, Isolation, PartDone, RECORD_MEMORY_GB, RECORD_SECONDS, RECORDS_PER_PART,
 };
 
-use crate::args::{ReportArgs, at_least_one, positive};
+use crate::args::{ReportArgs, at_least_one, not_negative, positive};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 use crate::worker::worker_program;
@@ -59,6 +59,10 @@ pub struct FleetArgs {
     /// Maximum time for a record, in s; a record that needs more has an error in its row
     #[arg(long, value_name = "SECONDS", default_value_t = RECORD_SECONDS, value_parser = positive)]
     record_seconds: f64,
+    /// Time after which the searches for a record end at their best points so far, in s; the row then
+    /// has a bad check `time_limit` [default: that of the analysis]
+    #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
+    time_limit: Option<f64>,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -80,7 +84,8 @@ impl FleetArgs {
 
     /// Computes the missing parts, and summarises all of them.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let analysis = SavedAnalysis::read(&self.analysis)?;
+        let saved = SavedAnalysis::read(&self.analysis)?;
+        let analysis = SavedAnalysis { time_limit: self.time_limit.or(saved.time_limit), ..saved };
         let fleet = Fleet::new(analysis, &self.records, &self.output, self.part_records)?;
         let workers =
             self.workers.unwrap_or_else(|| available_parallelism().map_or(1, NonZero::get));

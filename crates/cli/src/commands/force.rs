@@ -15,7 +15,7 @@ use mechid::report::{FigureStyle, spectrum_csv};
 use mechid::{Reconstruct, Reconstructed};
 
 use crate::args::word::{one_of, word};
-use crate::args::{FigureArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
+use crate::args::{FigureArgs, RecordArgs, ReportArgs, ResponseArgs, TimeLimitArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -94,6 +94,8 @@ pub struct ForceArgs {
     spectrum: Option<PathBuf>,
     #[command(flatten)]
     page: FigureArgs,
+    #[command(flatten)]
+    pub limit: TimeLimitArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::args::elements::ElementArgs;
 use crate::args::fit::{FitArgs, TableArgs};
-use crate::args::{FigureArgs, ReportArgs, StyleArgs};
+use crate::args::{FigureArgs, ReportArgs, StyleArgs, TimeLimitArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -58,6 +58,8 @@ pub struct IdentifyArgs {
     page: FigureArgs,
     #[command(flatten)]
     style: StyleArgs,
+    #[command(flatten)]
+    pub limit: TimeLimitArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }

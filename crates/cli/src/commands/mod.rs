@@ -90,6 +90,19 @@ impl Command {
         }
     }
 
+    /// Returns the limit of the time of the command, in s; a fleet has a limit for each record
+    /// instead.
+    pub fn time_limit(&self) -> Option<f64> {
+        match self {
+            Command::Bearing(args) => args.limit.time_limit,
+            Command::Force(args) => args.limit.time_limit,
+            Command::Identify(args) => args.limit.time_limit,
+            Command::Modes(args) => args.limit.time_limit,
+            Command::Report(args) => args.limit.time_limit,
+            _ => None,
+        }
+    }
+
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
         match self {

@@ -19,8 +19,8 @@ use serde::Serialize;
 use crate::args::hits::HitRuleArgs;
 use crate::args::word::word;
 use crate::args::{
-    AboutArgs, ChannelArgs, PlotArgs, RecordArgs, ReportArgs, ShapeArgs, StyleArgs, at_least_one,
-    positive,
+    AboutArgs, ChannelArgs, PlotArgs, RecordArgs, ReportArgs, ShapeArgs, StyleArgs, TimeLimitArgs,
+    at_least_one, positive,
 };
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -138,6 +138,8 @@ pub struct ModesArgs {
     style: StyleArgs,
     #[command(flatten)]
     about: AboutArgs,
+    #[command(flatten)]
+    pub limit: TimeLimitArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::args::elements::ElementArgs;
 use crate::args::fit::{FitArgs, TableArgs};
-use crate::args::{AboutArgs, ReportArgs};
+use crate::args::{AboutArgs, ReportArgs, TimeLimitArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 use crate::{options, repeat};
@@ -63,6 +63,8 @@ pub struct PageArgs {
     /// names of the channels]
     #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "machine")]
     geometry: Option<PathBuf>,
+    #[command(flatten)]
+    pub limit: TimeLimitArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }

@@ -24,6 +24,7 @@ mod streams;
 mod stretches;
 mod sweep;
 mod talk;
+mod time_limit;
 mod unexplained;
 mod units;
 

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 
 use mechid_model::{Matrix, Parameter, SecondOrderSystem};
 use mechid_numerics::linear_algebra::hermitian_eigen;
+use mechid_numerics::time_limit;
 use mechid_numerics::triangular::TriangularFactor;
 use mechid_spectra::transient;
 use mechid_spectra::transient::powers;
@@ -119,10 +120,14 @@ impl<'a> InitialEstimates<'a> {
         families.map(|family| family.into_iter().map(with_ends).collect()).collect()
     }
 
-    /// Returns the estimates of every round of weighting, beginning with the weights of `start`.
+    /// Returns the estimates of every round of weighting, beginning with the weights of `start`; the
+    /// end of a time limit ends the rounds.
     fn reweighted(&self, kind: Kind, start: &DVector<f64>) -> Vec<DVector<f64>> {
         let mut rounds: Vec<DVector<f64>> = Vec::new();
         for _ in 0..INITIAL_ROUNDS {
+            if time_limit::is_over() {
+                break;
+            }
             let weights = self.weights(rounds.last().unwrap_or(start));
             let Some(next) = weights.and_then(|w| self.estimate(kind, &w)) else { break };
             rounds.push(next);

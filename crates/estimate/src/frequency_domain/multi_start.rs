@@ -1,6 +1,7 @@
 //! Global minimum from searches with several initial estimates.
 
 use mechid_numerics::gauss_newton::{Minimum, minimise};
+use mechid_numerics::time_limit;
 use mechid_spectra::{FrequencyData, NoiseSpectrum, transient};
 use nalgebra::DVector;
 
@@ -45,6 +46,9 @@ pub(super) struct GlobalMinimum {
 /// there is one. A search continues on all lines if it ends near the best minimum so far or below
 /// that minimum.
 ///
+/// After the end of a time limit, the result is the lowest sum of squares so far, which may not be a
+/// minimum.
+///
 /// # Errors
 /// [`EstimateError::NotConverged`] if no search ends at a minimum.
 ///
@@ -72,7 +76,7 @@ pub(super) fn search<P: Restartable>(
             None => None,
         });
         let needed = if ends.explained() { RESTART_CONFIRMED } else { CONFIRMED_OTHERWISE };
-        if ends.searches >= needed && !ends.many() {
+        if (ends.searches >= needed && !ends.many()) || time_limit::is_over() {
             break;
         }
     }
@@ -83,7 +87,8 @@ pub(super) fn search<P: Restartable>(
         ends.push(minimise(problem, open, SEARCH_STEPS));
     }
     let failed = EstimateError::NotConverged { searches: ends.searches, steps: SEARCH_STEPS };
-    let best = ends.distinct.into_iter().find(|end| end.minimum.converged).ok_or(failed)?;
+    let is_result = |end: &End| end.minimum.converged || time_limit::is_over();
+    let best = ends.distinct.into_iter().find(is_result).ok_or(failed)?;
     problem.try_at(&best.minimum.parameters);
     problem.accept();
     Ok(GlobalMinimum { minimum: best.minimum, searches: ends.searches, agreeing: best.count })
@@ -131,6 +136,9 @@ pub(super) fn thinned(
 fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
     let mut without_gain = 0;
     for seed in 0..MAX_RESTARTS {
+        if time_limit::is_over() {
+            return;
+        }
         let Some(from) = ends.turn(seed as usize) else { return };
         log::debug!("search {}", ends.searches + 1);
         problem.resample(Some(seed));
@@ -257,7 +265,8 @@ impl GlobalMinimum {
     /// [`EstimateError::NotConverged`].
     pub(super) fn followed(self, problem: &mut impl Restartable) -> Result<Self, EstimateError> {
         let Self { minimum: before, searches, agreeing } = self;
-        let minimum = minimise(problem, before.parameters, SEARCH_STEPS).filter(|m| m.converged);
+        let minimum = minimise(problem, before.parameters, SEARCH_STEPS)
+            .filter(|minimum| minimum.converged || time_limit::is_over());
         let mut minimum =
             minimum.ok_or(EstimateError::NotConverged { searches, steps: SEARCH_STEPS })?;
         minimum.steps += before.steps;

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::NumericsError;
 use mechid_numerics::gauss_newton::SumOfSquares;
+use mechid_numerics::time_limit;
 use mechid_spectra::SpectraError;
 use mechid_spectra::noise::level::{ResponseNoise, motion_level};
 use mechid_spectra::noise::pulse::PulseErrors;
@@ -335,7 +336,8 @@ fn with_white_noise(
         // With a wrong model, the level of a channel may decrease in every round, until the number
         // of rounds ends the search. The fit is then a minimum for its weights, and the residual
         // shows the error of the model.
-        if settled || exact || (known_force && data.dof() == 1) || rounds == MAX_ROUNDS {
+        let is_last = settled || exact || (known_force && data.dof() == 1) || rounds == MAX_ROUNDS;
+        if is_last || time_limit::is_over() {
             drop(misfit);
             return Ok((Weighted { fit, noise }, exact));
         }
@@ -356,6 +358,9 @@ fn reweighted(
 ) -> Result<Option<Weighted>, EstimateError> {
     let mut last: Option<Weighted> = None;
     for _ in 0..COLOURED_ROUNDS {
+        if time_limit::is_over() {
+            break;
+        }
         let before = last.as_ref().unwrap_or(white);
         let Some(noise) = next(before)? else { return Ok(None) };
         let mut misfit = Misfit::new(data, unknowns, &noise)?;

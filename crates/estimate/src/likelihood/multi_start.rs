@@ -1,5 +1,6 @@
 //! Searches from several initial estimates, and their minima.
 
+use mechid_numerics::time_limit;
 use mechid_signal::{Sampling, noise};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -59,7 +60,8 @@ pub(super) fn starts(
 /// sum of squares is far above that of the search with the lowest minimum after its first steps, or
 /// if they end at the same point as the first steps of another search. No further search begins
 /// when enough searches have ended at the lowest minimum; `agreeing` returns this number for a sum
-/// of squares.
+/// of squares. After the end of a time limit, the result is the lowest sum of squares so far, which
+/// may not be a minimum.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search converges.
@@ -71,6 +73,7 @@ pub(super) fn search(
     agreeing: impl Fn(f64) -> usize,
 ) -> Result<Minima, LikelihoodError> {
     let mut minima = Minima { ends: Vec::new(), searches: 0 };
+    let is_result = |minimum: &Minimum| minimum.converged || time_limit::is_over();
     for start in starts {
         minima.searches += 1;
         let near = minimise(rough, bounds, start, Effort::ROUGH);
@@ -80,13 +83,13 @@ pub(super) fn search(
             near.as_ref().is_some_and(|near| minima.is_hopeless(near) || minima.count_again(near));
         if !is_done {
             let minimum = minimise(problem, bounds, &from, Effort::ROUGH);
-            if let Some(minimum) = minimum.filter(|minimum| minimum.converged) {
+            if let Some(minimum) = minimum.filter(is_result) {
                 log::debug!("search {} ended at {:.6e}", minima.searches, minimum.cost);
                 minima.push(minimum, near);
             }
         }
         let agreed = |best: &SearchEnd| best.searches >= agreeing(best.minimum.cost);
-        if minima.ends.first().is_some_and(agreed) {
+        if minima.ends.first().is_some_and(agreed) || time_limit::is_over() {
             break;
         }
     }

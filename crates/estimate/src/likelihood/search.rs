@@ -1,6 +1,7 @@
 //! Bounded Gauss–Newton search with damping (Levenberg–Marquardt).
 
 use mechid_numerics::products::transposed_product;
+use mechid_numerics::time_limit;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::limits::{SAME_MINIMUM, SHORT_STEP, STEPS};
@@ -153,7 +154,7 @@ impl Effort {
 }
 
 /// Searches for a local minimum within `bounds` from `start`; `None` if the residual does not
-/// exist.
+/// exist. A time limit ends the search at the lowest sum of squares so far.
 ///
 /// A step v and its correction a for the curvature r″ of the residual along v solve (JᵀJ + λI) v =
 /// −Jᵀr and (JᵀJ + λI) a = −½ Jᵀr″(v) for the parameters that no bound blocks; the step is
@@ -174,7 +175,8 @@ pub(super) fn minimise(
     let mut damping = 0.0_f64;
     let mut at = problem.linearised(&parameters, problem.evaluate(&parameters)?)?;
     let mut cost = at.residual.norm_squared();
-    for steps in 0..effort.steps {
+    let mut steps = 0;
+    while steps < effort.steps && !time_limit::is_over() {
         let local = Local::new(&at, &parameters, bounds);
         let newton = local.factor(damping.max(LEAST_DAMPING)).map(|f| f.solve(&-&local.gradient));
         if let Some(newton) = &newton {
@@ -190,15 +192,18 @@ pub(super) fn minimise(
         }
         let next = descend(problem, bounds, &local, &parameters, cost, &mut damping);
         let Some((next, evaluation)) = next else {
-            // No damped step reduces the cost: this is a minimum up to rounding.
-            return Some(Minimum { steps, converged: true, ..ended(&local, &parameters, cost) });
+            // No damped step reduces the cost: this is a minimum up to rounding, unless the time
+            // for damped steps was over.
+            let converged = !time_limit::is_over();
+            return Some(Minimum { steps, converged, ..ended(&local, &parameters, cost) });
         };
         parameters = next;
         at = problem.linearised(&parameters, evaluation)?;
         cost = at.residual.norm_squared();
+        steps += 1;
     }
     let local = Local::new(&at, &parameters, bounds);
-    Some(Minimum { steps: effort.steps, ..ended(&local, &parameters, cost) })
+    Some(Minimum { steps, ..ended(&local, &parameters, cost) })
 }
 
 fn ended(local: &Local<'_>, parameters: &[f64], cost: f64) -> Minimum {
@@ -232,7 +237,7 @@ fn cost_at(problem: &impl LeastSquaresProblem, parameters: &[f64]) -> Option<f64
 }
 
 /// Returns the next parameters, which have a lower sum of squares, and their residual; `None` if no
-/// damping gives a lower sum.
+/// damping gives a lower sum, or the time limit is over.
 fn descend<P: LeastSquaresProblem>(
     problem: &P,
     bounds: &Bounds,
@@ -261,7 +266,7 @@ fn descend<P: LeastSquaresProblem>(
         }
         *damping = f64::max(growth * *damping, FIRST_DAMPING);
         growth *= 2.0;
-        if *damping > MAX_DAMPING {
+        if *damping > MAX_DAMPING || time_limit::is_over() {
             return None;
         }
     }

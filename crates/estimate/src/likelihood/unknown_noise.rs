@@ -1,6 +1,7 @@
 //! Noise of the outputs, estimated from the residual in alternation with the parameters: first
 //! levels, later spectra.
 
+use mechid_numerics::time_limit;
 use mechid_spectra::LineData;
 use nalgebra::DMatrix;
 
@@ -53,7 +54,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
 
     fn minimise(&self, weights: &Weights, from: &[f64]) -> Option<Minimum> {
         let residual = self.residual(weights);
-        minimise(&residual, self.bounds, from, Effort::FINAL).filter(|minimum| minimum.converged)
+        let is_result = |minimum: &Minimum| minimum.converged || time_limit::is_over();
+        minimise(&residual, self.bounds, from, Effort::FINAL).filter(is_result)
     }
 
     /// Alternates between the most likely levels of white noise and the parameters. A level is
@@ -75,7 +77,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
                 .iter()
                 .zip(&before)
                 .all(|(now, before)| (now - before).abs() <= NOISE_LEVEL_CHANGE * now);
-            if settled && !before.is_empty() {
+            if (settled && !before.is_empty()) || time_limit::is_over() {
                 break;
             }
             before = levels;
@@ -127,6 +129,9 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
     ) -> Result<Option<WeightedMinimum>, LikelihoodError> {
         let mut last: Option<WeightedMinimum> = None;
         for _ in 0..COLOURED_ROUNDS {
+            if time_limit::is_over() {
+                break;
+            }
             let before = last.as_ref().unwrap_or(white);
             let (variance, bases) = self.spectra(before)?;
             if bases.iter().all(|basis| basis.ncols() <= 1) {

@@ -1,5 +1,7 @@
 //! Number of polynomials of the sensors' noise: decided by Akaike's criterion.
 
+use mechid_numerics::time_limit;
+
 use super::information::information;
 use super::likelihood::gradient;
 use super::limits::{MOST_NOISE_TERMS, NOISE_TERMS_ADDED, POOLING};
@@ -17,7 +19,8 @@ use super::search::{Effort, Fit, full_step, search_pooled};
 /// Akaike (1974), IEEE Transactions on Automatic Control 19, 716–723.
 pub(super) fn with_more_noise_terms(fit: &Fit, band: &BandLines) -> Option<Fit> {
     let mut best = extended(fit, band)?;
-    while let Some(next) = extended(&best, band) {
+    while !time_limit::is_over() {
+        let Some(next) = extended(&best, band) else { break };
         best = next;
     }
     Some(best)

@@ -3,6 +3,8 @@
 
 use std::f64::consts::TAU;
 
+use mechid_numerics::time_limit;
+
 use super::initial::{initial_fit, match_amplitudes, scan};
 use super::limits::{
     DAMPING_SIGNIFICANCE, MAX_DAMPING, NUISANCE_POLES, POOLING, REFUSALS, STRONG_EVIDENCE,
@@ -138,7 +140,7 @@ impl Choice<'_> {
 
     /// Removes insignificant modes, one after another.
     fn pruned(&mut self, mut fit: Fit) -> Fit {
-        while fit.parameters.layout.modes > 0 {
+        while fit.parameters.layout.modes > 0 && !time_limit::is_over() {
             if self.wanted.exactly.is_some_and(|n| self.sound_modes(&fit) <= n) {
                 break;
             }
@@ -217,7 +219,7 @@ impl Choice<'_> {
         let mut refusals = 0;
         let before = fit.parameters.layout.modes;
         let mut refused: Vec<f64> = Vec::new();
-        while refusals < REFUSALS {
+        while refusals < REFUSALS && !time_limit::is_over() {
             let poles = fit.parameters.layout.modes;
             let full = self.sound_modes(&fit) >= limit || poles >= limit + NUISANCE_POLES;
             let Some(candidates) = scan(&fit.parameters, self.band) else { break };

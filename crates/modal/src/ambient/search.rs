@@ -1,5 +1,6 @@
 //! Search for the maximum of the likelihood by scoring with Levenberg's damping.
 
+use mechid_numerics::time_limit;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::information::information;
@@ -122,6 +123,9 @@ fn search_with_information(
     let mut path = Path { lines, first_free, slope, damping: FIRST_DAMPING, updates };
     let mut slow = 0;
     for _ in 0..effort.iterations {
+        if time_limit::is_over() {
+            break;
+        }
         let gain = path.step(&mut fit)?;
         if gain >= effort.slow {
             slow = 0;

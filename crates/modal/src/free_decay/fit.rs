@@ -1,6 +1,7 @@
 //! Maximum-likelihood poles of a record for a given number of poles and a given autoregression of
 //! the noise.
 
+use mechid_numerics::time_limit;
 use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
@@ -186,7 +187,8 @@ impl Data {
     }
 
     /// Searches for the maximum-likelihood poles for given noise, from initial poles. It ends when
-    /// a step decreases minus twice the log-likelihood by less than `tolerance`.
+    /// a step decreases minus twice the log-likelihood by less than `tolerance`, or the time limit
+    /// is over.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, with the Jacobian of
@@ -201,6 +203,9 @@ impl Data {
         let mut cost = fit.cost(self.len());
         let mut damping = 0.0;
         for _ in 0..MAX_STEPS {
+            if time_limit::is_over() {
+                break;
+            }
             let (jacobian, side) = fit.weighted(self.len());
             let scale: Vec<f64> =
                 jacobian.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();

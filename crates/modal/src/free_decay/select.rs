@@ -1,5 +1,6 @@
 //! Choice of the number of decays in a record and of the noise colour.
 
+use mechid_numerics::time_limit;
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -103,7 +104,8 @@ impl<'a> Search<'a> {
         let nothing = self.nothing()?;
         let (mut last, mut best) = (nothing.clone(), nothing.clone());
         let (mut idle, mut first_gain) = ([0; 2], 0.0);
-        while last.decays() < most && idle.iter().any(|idle| *idle < SELECTION_PATIENCE) {
+        let is_idle = |idle: &[usize; 2]| idle.iter().all(|idle| *idle >= SELECTION_PATIENCE);
+        while last.decays() < most && !is_idle(&idle) && !time_limit::is_over() {
             let Some(next) = self.one_more(&last) else { break };
             if last.decays() == 0 {
                 first_gain = nothing.better().cost - next.better().cost;

@@ -10,7 +10,7 @@ use mechid_estimate::EstimateParts;
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Term, Terms};
 use mechid_numerics::gauss_newton::{Residuals, minimise_residuals};
-use mechid_numerics::{NumericsError, Uncertain, check_size};
+use mechid_numerics::{NumericsError, Uncertain, check_size, time_limit};
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -277,7 +277,7 @@ impl<'a> Problem<'a> {
     fn minimum(&mut self, start: DVector<f64>) -> Result<(DVector<f64>, usize), EstimateError> {
         let lost = |steps| EstimateError::NotConverged { searches: 1, steps };
         let minimum = minimise_residuals(self, start, SEARCH_STEPS).ok_or(lost(0))?;
-        if !minimum.converged {
+        if !minimum.converged && !time_limit::is_over() {
             return Err(lost(minimum.steps));
         }
         let mut residual = DVector::zeros(self.len());

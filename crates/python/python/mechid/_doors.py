@@ -111,6 +111,7 @@ def identify(
     weighting: Literal["automatic", "white-force", "response", "smooth-spectrum"] | None = None,
     validate: Measurement | Mapping[str, Any] | None = None,
     settings: dict[str, Any] | None = None,
+    time_limit: float | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> Identified:
@@ -203,6 +204,9 @@ def identify(
         ``record``, a part of the first fitted record.
     settings : dict, optional
         ``settings`` of another result, instead of the options above; the keys are those options.
+    time_limit : float, optional
+        Time in s after which all searches end at their best points so far; the result then says
+        that it is not final. Default: no limit.
     threads : int, optional
         Number of threads. Default: one per processor.
     **record
@@ -245,7 +249,7 @@ def identify(
         other = window.pop("record", None) or records[0]
         predicted = (other._inner, json.dumps(window))
     inner = _mechid.identify(
-        [record._inner for record in records], told, predicted, threads
+        [record._inner for record in records], told, predicted, time_limit, threads
     )
     return Identified(inner)
 
@@ -264,6 +268,7 @@ def identify_elements(
     starts: int | None = None,
     seed: int = 0,
     confidence: float = 0.95,
+    time_limit: float | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> IdentifiedElements:
@@ -304,6 +309,9 @@ def identify_elements(
         Seed of the random initial values.
     confidence : float
         Confidence level of the intervals, between 0 and 1.
+    time_limit : float, optional
+        Time in s after which all searches end at their best points so far; the result then says
+        that it is not final. Default: no limit.
     threads : int, optional
         Number of threads. Default: one per processor.
     **record
@@ -357,15 +365,15 @@ def identify_elements(
     settings = json.dumps(told, default=_plain)
     if speed_table:
         paths = [os.fspath(source) for source in sources]  # type: ignore[call-overload]
-        inner = _mechid.identify_elements([], [], paths, of_parts, settings, threads)
+        inner = _mechid.identify_elements([], [], paths, of_parts, settings, time_limit, threads)
     elif sources and all(isinstance(source, ResponseTable) for source in sources):
         tables = [source._inner for source in sources if isinstance(source, ResponseTable)]
-        inner = _mechid.identify_elements([], tables, [], of_parts, settings, threads)
+        inner = _mechid.identify_elements([], tables, [], of_parts, settings, time_limit, threads)
     else:
         if not all(isinstance(source, Measurement) for source in sources):
             record = {**{kind: names for kind, names in columns.items() if names}, **record}
         records = [one._inner for one in measurements(sources, "identify_elements", record)]
-        inner = _mechid.identify_elements(records, [], [], of_parts, settings, threads)
+        inner = _mechid.identify_elements(records, [], [], of_parts, settings, time_limit, threads)
     return IdentifiedElements(inner)
 
 
@@ -379,6 +387,7 @@ def identify_responses(
     mass: float | Sequence[float | None] | None = None,
     structure: str | Sequence[str] = (),
     method: Method | None = None,
+    time_limit: float | None = None,
     threads: int | None = None,
 ) -> IdentifiedResponses:
     """Identify mass, damping and stiffness from frequency responses measured elsewhere.
@@ -405,6 +414,9 @@ def identify_responses(
         Known structure of M, C and K, as in `identify`.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
         Estimator. Default: maximum likelihood.
+    time_limit : float, optional
+        Time in s after which all searches end at their best points so far; the result then says
+        that it is not final. Default: no limit.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -438,7 +450,7 @@ def identify_responses(
         "structure": _structure(structure),
         "method": method,
     }
-    inner = _mechid.identify_responses([one._inner for one in given], json.dumps(settings), threads)
+    inner = _mechid.identify_responses([one._inner for one in given], json.dumps(settings), time_limit, threads)
     return IdentifiedResponses(inner)
 
 
@@ -462,6 +474,7 @@ def bearing(
     averages: float | None = None,
     points: Sequence[str] = (),
     settings: dict[str, Any] | None = None,
+    time_limit: float | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> IdentifiedBearing:
@@ -499,6 +512,9 @@ def bearing(
         Two points of the tables to use, x before y. Default: all.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
+    time_limit : float, optional
+        Time in s after which all searches end at their best points so far; the result then says
+        that it is not final. Default: no limit.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -540,13 +556,13 @@ def bearing(
         if record:
             raise TypeError(f"`{next(iter(record))}` belongs to records, not to frequency responses")
         inner = _mechid.bearing_of_responses(
-            _response_tables(tests), _response_tables(dry), json.dumps(settings), threads
+            _response_tables(tests), _response_tables(dry), json.dumps(settings), time_limit, threads
         )
     else:
         wet = measurements(tests, "bearing", record)
         still = measurements(dry, "bearing", record) if dry else []
         inner = _mechid.bearing(
-            [one._inner for one in wet], [one._inner for one in still], json.dumps(settings), threads
+            [one._inner for one in wet], [one._inner for one in still], json.dumps(settings), time_limit, threads
         )
     return IdentifiedBearing(inner)
 
@@ -658,6 +674,7 @@ def decay(
     max_modes: int = 10,
     offset: bool = True,
     settings: dict[str, Any] | None = None,
+    time_limit: float | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> Decayed:
@@ -681,6 +698,9 @@ def decay(
         Whether each channel has an unknown constant.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
+    time_limit : float, optional
+        Time in s after which all searches end at their best points so far; the result then says
+        that it is not final. Default: no limit.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -702,7 +722,7 @@ def decay(
             "max_modes": _index("max_modes", max_modes),
             "offset": bool(offset),
         }
-    return Decayed(_mechid.decay(found._inner, json.dumps(settings), threads))
+    return Decayed(_mechid.decay(found._inner, json.dumps(settings), time_limit, threads))
 
 
 @careful
@@ -725,6 +745,7 @@ def modes(
     quantity: Literal["displacement", "velocity", "acceleration"] | None = None,
     diagrams: bool = False,
     settings: dict[str, Any] | None = None,
+    time_limit: float | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> Modes:
@@ -774,6 +795,9 @@ def modes(
         ``diagrams``.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
+    time_limit : float, optional
+        Time in s after which all searches end at their best points so far; the result then says
+        that it is not final. Default: no limit.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -818,7 +842,8 @@ def modes(
             "validate": float(validate),
         }
     given = [table._inner for table in tables]
-    return Modes(_mechid.modes(records, given, json.dumps(settings, default=_plain), bool(diagrams), threads))
+    told = json.dumps(settings, default=_plain)
+    return Modes(_mechid.modes(records, given, told, bool(diagrams), time_limit, threads))
 
 
 @careful
@@ -896,6 +921,7 @@ def reconstruct(
     rule: Literal["likelihood", "gcv", "l-curve"] = "likelihood",
     parameter: float | None = None,
     settings: dict[str, Any] | None = None,
+    time_limit: float | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> Reconstructed:
@@ -928,6 +954,9 @@ def reconstruct(
         Rule for the regularisation parameter, or the parameter itself.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
+    time_limit : float, optional
+        Time in s after which all searches end at their best points so far; the result then says
+        that it is not final. Default: no limit.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -957,7 +986,7 @@ def reconstruct(
             "noise": [float(level) for level in noise],
             "rule": rule if parameter is None else {"given": float(parameter)},
         }
-    inner = _mechid.reconstruct(found._inner, system_of(machine), json.dumps(settings), threads)
+    inner = _mechid.reconstruct(found._inner, system_of(machine), json.dumps(settings), time_limit, threads)
     return Reconstructed(inner)
 
 

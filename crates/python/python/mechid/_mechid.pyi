@@ -148,6 +148,7 @@ def identify(
     records: Sequence[Measurement],
     settings: str,
     validate: tuple[Measurement, str] | None,
+    time_limit: float | None,
     threads: int | None,
 ) -> Identified: ...
 
@@ -182,7 +183,7 @@ class IdentifiedResponses:
     def machine(self) -> Machine: ...
 
 def identify_responses(
-    tables: Sequence[ResponseTable], settings: str, threads: int | None
+    tables: Sequence[ResponseTable], settings: str, time_limit: float | None, threads: int | None
 ) -> IdentifiedResponses: ...
 @final
 class IdentifiedElements:
@@ -201,6 +202,7 @@ def identify_elements(
     speeds: Sequence[str],
     parts: Sequence[ResponseTable],
     settings: str,
+    time_limit: float | None,
     threads: int | None,
 ) -> IdentifiedElements: ...
 @final
@@ -254,19 +256,28 @@ def modes(
     tables: Sequence[ResponseTable],
     settings: str,
     diagrams: bool,
+    time_limit: float | None,
     threads: int | None,
 ) -> Answer: ...
 def shapes_file(result: str, geometry: str | None) -> str | None: ...
 def compare_modes(
     first: tuple[str | PathLike[str], str | None], second: tuple[str | PathLike[str], str | None]
 ) -> tuple[str, str]: ...
-def decay(record: Measurement, settings: str, threads: int | None) -> Answer: ...
+def decay(record: Measurement, settings: str, time_limit: float | None, threads: int | None) -> Answer: ...
 def bearing(
-    tests: Sequence[Measurement], baseline: Sequence[Measurement], settings: str, threads: int | None
+    tests: Sequence[Measurement],
+    baseline: Sequence[Measurement],
+    settings: str,
+    time_limit: float | None,
+    threads: int | None,
 ) -> Answer: ...
 def bearing_campaign(campaign: str, threads: int | None) -> Answer: ...
 def bearing_of_responses(
-    tests: Sequence[ResponseTable], baseline: Sequence[ResponseTable], settings: str, threads: int | None
+    tests: Sequence[ResponseTable],
+    baseline: Sequence[ResponseTable],
+    settings: str,
+    time_limit: float | None,
+    threads: int | None,
 ) -> Answer: ...
 def inspect(plan: str, settings: str) -> Answer: ...
 def sweep(
@@ -278,7 +289,7 @@ def sweep(
     threads: int | None,
 ) -> Answer: ...
 def reconstruct(
-    record: Measurement, system: Machine | ModalSystem, settings: str, threads: int | None
+    record: Measurement, system: Machine | ModalSystem, settings: str, time_limit: float | None, threads: int | None
 ) -> Reconstructed: ...
 def simulate(file: str, text: str | None, memory_gb: float | None) -> _Simulated: ...
 def integrate(description: str, force: NDArray[np.float64], fs: float) -> list[_Named]: ...
