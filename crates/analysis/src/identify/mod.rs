@@ -58,7 +58,7 @@ mod sinusoids;
 pub(crate) mod spectra;
 pub mod structure;
 pub mod summary;
-mod table_fit;
+pub(crate) mod table_fit;
 pub mod tables;
 pub(crate) mod tabulated;
 mod unscaled;
@@ -277,23 +277,12 @@ impl Identify {
         period_given: bool,
         hit_noise: &[HitNoise],
     ) -> Result<Fitted, AnalysisError> {
-        let as_usual = Acquisition::default();
         let open = |noise: &OpenNoise, lines: &SpectralLines, acquisition, excitation| {
             let how = open_records::How { rule: lines.rule(), noise, acquisition, excitation };
             open_records::fit(records, unknowns, how)
         };
         match &self.source {
-            Source::Spectra(SpectralFit { likelihood, lines }) => {
-                if !period_given && open_records::suit(records, unknowns) {
-                    let noise = OpenNoise { response: likelihood.unwrap_or_default(), force: None };
-                    match open(&noise, lines, &as_usual, Excitation::Lasting) {
-                        Ok(open) if open.ends_show => return Ok(open.fitted),
-                        _ => {}
-                    }
-                }
-                let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
-                spectra::fit(records, unknowns, lines.rule(), estimator)
-            }
+            Source::Spectra(how) => spectral(records, unknowns, how, period_given),
             Source::Periods(PeriodFit { estimator, lines }) => {
                 spectra::fit(records, unknowns, lines.rule(), *estimator)
             }
@@ -312,6 +301,39 @@ impl Identify {
             Source::Samples(how) => how.fit(records, unknowns),
         }
     }
+}
+
+/// Fits spectra of windows as periods, as open records, or, if they are not periods and too long for
+/// an open fit without a request, averaged over segments.
+fn spectral(
+    records: &[Windowed],
+    unknowns: &Unknowns,
+    SpectralFit { likelihood, lines }: &SpectralFit,
+    period_given: bool,
+) -> Result<Fitted, AnalysisError> {
+    let is_short = open_records::suit(records, unknowns);
+    if !period_given && is_short {
+        let noise = OpenNoise { response: likelihood.unwrap_or_default(), force: None };
+        let how = open_records::How {
+            rule: lines.rule(),
+            noise: &noise,
+            acquisition: &Acquisition::default(),
+            excitation: Excitation::Lasting,
+        };
+        match open_records::fit(records, unknowns, how) {
+            Ok(open) if open.ends_show => return Ok(open.fitted),
+            _ => {}
+        }
+    }
+    let is_default = !period_given && likelihood.is_none();
+    if is_default && !is_short && responses::suit(records, lines)? {
+        let segments = SegmentFit { lines: lines.clone(), ..SegmentFit::default() };
+        let mut fitted = responses::fit(records, unknowns, &segments, false)?;
+        fitted.remarks.push(responses::UNTRIED.into());
+        return Ok(fitted);
+    }
+    let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
+    spectra::fit(records, unknowns, lines.rule(), estimator)
 }
 
 impl Identified {

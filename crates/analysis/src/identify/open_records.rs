@@ -29,6 +29,7 @@ use super::options::OpenNoise;
 use super::prediction::Prediction;
 use super::remarks::{noise_remark, one_motion_of};
 use super::sinusoids::SinusoidRow;
+use super::spectra::LIKELIHOOD_PARAMETERS;
 use crate::AnalysisError;
 use crate::hits::HitNoise;
 use crate::measurement::{Block, Windowed};
@@ -43,9 +44,6 @@ const ROUNDING: f64 = 1e-20;
 /// Maximum number of lines for which a record without settings is tried as an open record. A fit
 /// with two forces and an eighth of [`SENSITIVITIES`] takes ten seconds on one processor.
 const LINES: usize = 1 << 19;
-/// Maximum number of unknown parameters for which a record without settings is tried as an open
-/// record.
-const PARAMETERS: usize = 100;
 /// Maximum product of lines and unknown parameters for which a record without settings is tried as
 /// an open record.
 const SENSITIVITIES: usize = 100 << 17;
@@ -88,7 +86,7 @@ pub(super) fn suit(records: &[Windowed], unknowns: &Unknowns) -> bool {
     let lines: usize = records.iter().map(|record| record.held.force.len() / 2).sum();
     let parameters = unknowns.free().len();
     let is_short = lines <= LINES && lines.saturating_mul(parameters) <= SENSITIVITIES;
-    whole && is_short && parameters <= PARAMETERS
+    whole && is_short && unknowns.independent() <= LIKELIHOOD_PARAMETERS
 }
 
 /// Spectra of open records, with the noise of their forces.

@@ -1,8 +1,8 @@
 //! Fits frequency responses.
 
 use mechid_checks::{
-    Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
-    delay_of_lines, leakage, linearity,
+    Finding, Subject, Verdict, after_response_fit, before_spectral_fit, claimed_period, coherence,
+    delay_of_lines, leakage, linearity, steady_periods,
 };
 use mechid_estimate::frequency_domain::equation_error;
 use mechid_estimate::{
@@ -18,18 +18,45 @@ use super::compared::Compared;
 use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Misfit};
 use super::keywords::Domain;
-use super::options::{Method, SegmentFit};
+use super::lines::LineChoice;
+use super::options::{Method, SegmentFit, SpectralLines};
 use super::prediction::Prediction;
 use super::remarks::one_motion_of;
 use super::rows::LinesUsed;
 use super::spectra::no_period;
 use crate::AnalysisError;
 use crate::frf::Responses;
+use crate::hits;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
 /// Minimum change of a parameter by the correction of the window, in standard errors, for a remark.
 const BLUNTED: f64 = 0.5;
+
+/// Remark on records that are neither whole periods nor short enough to be fitted as open records
+/// without a request.
+pub(super) const UNTRIED: &str = "the windows are not whole periods, and their lines and unknowns are too many to estimate the transients without a request: frequency responses were averaged over segments; `extent` open estimates the transients";
+
+/// Returns whether averages over segments suit the records better than whole windows do: a window
+/// is not a whole period, the force is not a series of hits, and no lines were chosen by their
+/// numbers, which refer to whole windows.
+///
+/// # Errors
+/// [`AnalysisError::Estimate`] if a window cannot be checked.
+pub(super) fn suit(records: &[Windowed], lines: &SpectralLines) -> Result<bool, AnalysisError> {
+    let by_number = matches!(lines.choice, LineChoice::Lines(_)) || lines.without.lines.is_some();
+    if by_number || hits::uncut(records).is_some() {
+        return Ok(false);
+    }
+    for Windowed { held, .. } in records {
+        let checks = steady_periods(&held.force, held.response().0, held.period)?;
+        let is_other = |finding: &Finding| finding.verdict() > Verdict::Good;
+        if checks.iter().any(|f| f.subject() == Subject::Periodicity && is_other(f)) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
 
 /// Fits the frequency responses of one or several records, weighted by their coherence unless least
 /// squares is requested. Without a period and a length of segments, the length is chosen for the

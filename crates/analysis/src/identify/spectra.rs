@@ -30,8 +30,9 @@ use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
 /// Maximum number of unknown parameters for which maximum likelihood is the default: 20 degrees of
-/// freedom, which take seconds. With more, least squares is the default.
-const LIKELIHOOD_PARAMETERS: usize = 1200;
+/// freedom, which take seconds. With more, least squares is the default, and a record without
+/// settings is not tried as an open record.
+pub(super) const LIKELIHOOD_PARAMETERS: usize = 1200;
 
 /// Maximum mean force-to-noise power ratio of a channel that counts as unexcited; noise alone gives
 /// 1.
