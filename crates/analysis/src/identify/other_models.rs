@@ -1,6 +1,8 @@
 //! Alternative models for tables of frequency responses: delay, structural damping, another
 //! quantity, levels in dB.
 
+use std::f64::consts::PI;
+
 use mechid_checks::{
     Alternative, Cause, Finding, ModelledResponses, better_model, delay_of_responses,
 };
@@ -56,7 +58,7 @@ pub(super) fn better_model_of(
     if tables.iter().all(|table| table.added_decay.is_none()) {
         let stated = data.measured();
         for quantity in ResponseQuantity::ALL.into_iter().filter(|other| *other != stated) {
-            if let Some((fit, model)) = refitted(tables, how, quantity, estimate, &|z| z) {
+            if let Some((fit, model)) = refitted(tables, how, quantity, estimate) {
                 add(Cause::Quantity { quantity, stated }, model, Some(fit));
             }
         }
@@ -142,21 +144,17 @@ fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, Estimate)>
     Some((seconds, fit))
 }
 
-/// Returns a fit to tables whose numbers are reinterpreted as another quantity, and its responses.
+/// Returns a fit to tables whose numbers have another quantity, and its responses.
 fn refitted(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
     quantity: ResponseQuantity,
     estimate: &Estimate,
-    number: &dyn Fn(Complex<f64>) -> Complex<f64>,
 ) -> Option<(Estimate, ModelledResponses)> {
     let how = IdentifyResponses { quantity: Some(quantity), ..how.clone() };
     let one = |table: &FrequencyResponses| {
         let mut modified = table.clone();
-        for function in &mut modified.functions {
-            function.quantity = Some(quantity);
-            function.values.iter_mut().for_each(|z| *z = number(*z));
-        }
+        modified.functions.iter_mut().for_each(|function| function.quantity = Some(quantity));
         Tabulated::new(&modified, &how).ok()
     };
     let measured = tables.iter().map(one).collect::<Option<Vec<_>>>()?;
@@ -166,8 +164,8 @@ fn refitted(
     Some((fit.estimate, model))
 }
 
-/// Returns a fit to tables whose magnitudes are levels in dB with the given sign, and its
-/// responses.
+/// Returns a fit to tables whose magnitudes are levels in dB, and its responses. The first level
+/// has the given sign.
 fn level_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -179,19 +177,53 @@ fn level_responses(
     if values().any(|z| z.norm() > MAX_LEVEL) {
         return None;
     }
-    let without_noise = |table: &FrequencyResponses| {
+    let mut first = None;
+    let mut converted = |table: &FrequencyResponses| {
         let mut table = FrequencyResponses { coherence: Vec::new(), ..table.clone() };
-        table.functions.iter_mut().for_each(|function| function.standard_error = None);
+        for function in &mut table.functions {
+            function.standard_error = None;
+            let levels = levels(&function.values);
+            let mean = levels.iter().sum::<f64>() / levels.len() as f64;
+            // The levels of several functions of one machine are similar.
+            let first = *first.get_or_insert(sign * mean);
+            let sign = if (mean - first).abs() <= (mean + first).abs() { 1.0 } else { -1.0 };
+            let pairs = function.values.iter_mut().zip(levels);
+            pairs.for_each(|(z, level)| *z = magnitude(*z, sign * level));
+        }
         table
     };
-    let tables: Vec<FrequencyResponses> = tables.iter().map(without_noise).collect();
-    // If a negative level (dB) was read as a magnitude, its phase is shifted by π.
-    let magnitude = |z: Complex<f64>| z * (sign * (sign * z.norm() / DECIBELS).exp() / z.norm());
-    let (fit, model) = refitted(&tables, how, quantity, estimate, &magnitude)?;
+    let tables: Vec<FrequencyResponses> = tables.iter().map(&mut converted).collect();
+    let (fit, model) = refitted(&tables, how, quantity, estimate)?;
     let log_area = |z: &Complex<f64>| {
-        let level = sign * DECIBELS * z.norm().ln();
-        (z.norm_sqr() / (DECIBELS * level)).ln()
+        let level = (DECIBELS * z.norm().ln()).abs();
+        if level > 0.0 { (z.norm_sqr() / (DECIBELS * level)).ln() } else { 0.0 }
     };
     let log_area = model.measured.iter().map(log_area).sum();
     Some((fit, ModelledResponses { log_area, ..model }))
+}
+
+/// Returns the response with a level (dB) that was read as the magnitude of `z`. If a negative
+/// level was read as a magnitude, its phase is shifted by π.
+fn magnitude(z: Complex<f64>, level: f64) -> Complex<f64> {
+    let turn = if level < 0.0 { PI } else { 0.0 };
+    Complex::from_polar((level / DECIBELS).exp(), z.arg() + turn)
+}
+
+/// Returns the levels (dB) that were read as magnitudes, up to a common sign: from line to line the
+/// level or the sign of the level changes, whichever needs the smaller change of the logarithm of
+/// the response. Where the sign changes, the phase that was read jumps by π.
+fn levels(values: &[Complex<f64>]) -> Vec<f64> {
+    let mut sign = 1.0;
+    let mut levels: Vec<f64> = values.iter().map(|z| z.norm()).collect();
+    for (at, pair) in values.windows(2).enumerate() {
+        let [before, after] = [pair[0].norm() / DECIBELS, pair[1].norm() / DECIBELS];
+        let turned = |z: Complex<f64>| (z * pair[0].conj()).arg();
+        let same = (after - before).hypot(turned(pair[1]));
+        let opposite = (after + before).hypot(turned(-pair[1]));
+        if opposite < same {
+            sign = -sign;
+        }
+        levels[at + 1] *= sign;
+    }
+    levels
 }

@@ -170,10 +170,10 @@ fn another_quantity_is_told() {
     }
 }
 
-/// Levels in decibels whose magnitudes are all below or all above one.
+/// Levels in decibels whose magnitudes are all below one, all above one, or below and above one.
 #[test]
 fn decibels_read_as_magnitudes_are_told() {
-    for gain in [1e-3, 1e6] {
+    for gain in [1e-3, 1e6, 1.0, 5.0, 50.0] {
         let mut levels = table(&viscous, 4, false);
         for value in &mut levels.functions[0].values {
             let level = 20.0 * (gain * value.norm()).log10();
