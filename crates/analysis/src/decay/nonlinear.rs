@@ -100,7 +100,7 @@ impl DecaySummary {
     }
 
     /// Returns remarks about deviations from a sum of decaying oscillations.
-    pub(super) fn model_remarks(&self) -> Vec<String> {
+    pub(crate) fn model_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if let Some(backbone) = &self.backbone {
             let numbers: Vec<String> = backbone.modes.iter().map(usize::to_string).collect();

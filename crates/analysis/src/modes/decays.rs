@@ -1,5 +1,6 @@
 //! Common modes of several free decays.
 
+use mechid_modal::free_decay::FreeDecayError;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::forced::Test;
@@ -8,7 +9,7 @@ use super::sources::{Recorded, all_responses};
 use super::summary::RecordRow;
 use super::{Modes, checks};
 use crate::AnalysisError;
-use crate::decay::{DecaySettings, decaying_part};
+use crate::decay::{DecaySettings, decay, decaying_part};
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::measurement::{Block, Measurement, check_distinct};
 
@@ -37,7 +38,28 @@ pub(super) fn modes(
     let band_hz = settings.band_hz.unwrap_or([0.0, nyquist_hz]);
     let records = blocks.iter().map(RecordRow::from_block).collect();
     let checks = checks::channel_checks(&cut)?;
-    Test { recorded, struck_apart: None, band_hz }.modes(records, checks, settings)
+    let mut modes =
+        Test { recorded, struck_apart: None, band_hz }.modes(records, checks, settings)?;
+    for measurement in measurements {
+        modes.summary.notes.extend(deviations(measurement, &how));
+    }
+    Ok(modes)
+}
+
+/// Returns a note if the modes of a single decay show that it is not a sum of decaying
+/// oscillations; none for a decay that cannot be analysed alone, such as a short one.
+fn deviations(measurement: &Measurement, how: &DecaySettings) -> Option<String> {
+    let found = match decay(measurement, how) {
+        Ok(found) => found.summary().model_remarks(),
+        Err(AnalysisError::FreeDecay(
+            error @ (FreeDecayError::NoOscillation { .. } | FreeDecayError::Grows { .. }),
+        )) => vec![error.to_string()],
+        Err(_) => Vec::new(),
+    };
+    (!found.is_empty()).then(|| {
+        let file = measurement.name();
+        format!("{file}, analysed alone (`decay`): {}", found.join("; "))
+    })
 }
 
 /// Returns whether the second half of a response has more power than the first, by more than noise

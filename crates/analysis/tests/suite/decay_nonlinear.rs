@@ -2,7 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mechid_analysis::{Channels, DecaySettings, Decayed, Measurement, ResponseQuantity, decay};
+use mechid_analysis::modes::ModalTest;
+use mechid_analysis::{
+    Channels, DecaySettings, Decayed, Measurement, ModesSettings, ResponseQuantity, decay, modes,
+};
 use mechid_signal::{Sampling, noise};
 
 fn measured(sampling: Sampling, exact: Vec<f64>, level: f64, seed: u64) -> Measurement {
@@ -177,4 +180,33 @@ fn a_second_hit_and_the_largest_number_of_modes_are_said() {
     let few = DecaySettings { max_modes: 1, ..DecaySettings::default() };
     let found = decay(&measured(sampling, one, 0.005, 6), &few).unwrap();
     assert!(told(&found, "the maximum number of modes was found"), "{found}");
+}
+
+/// The notes on several decays are those on each of them alone.
+#[test]
+fn decays_that_are_analysed_together_are_judged_one_by_one() {
+    let sampling = Sampling::from_rate_hz(200.0, 1600).unwrap();
+    let omega = TAU * 5.0;
+    let cubic = |x: f64, v: f64| -0.02 * omega * v - omega * omega * x * (1.0 + 0.1 * x * x);
+    let linear = |seed| measured(sampling, decays(sampling, &[[5.0, 0.01, 1.0]]), 1e-3, seed);
+    let hardening = measured(sampling, solved(sampling, 1.0, cubic), 1e-3, 2);
+    let mut struck = decays(sampling, &[[5.0, 0.01, 1.0], [17.0, 0.02, 0.5]]);
+    let again = struck.clone();
+    struck[600..].iter_mut().zip(again).for_each(|(x, second)| *x += 0.6 * second);
+    let struck = measured(sampling, struck, 0.005, 5);
+    let settings = ModesSettings {
+        test: ModalTest::Decay { from_s: None, to_s: None },
+        ..ModesSettings::default()
+    };
+    let notes = |records: &[Measurement]| {
+        let found = modes(records, &settings).unwrap();
+        let alone = found.summary().notes.iter().filter(|note| note.contains("analysed alone"));
+        alone.cloned().collect::<Vec<_>>()
+    };
+    let right = notes(&[linear(4), linear(5)]);
+    assert!(right.is_empty(), "{right:?}");
+    let wrong = notes(&[linear(4), hardening, struck]);
+    assert_eq!(wrong.len(), 2, "{wrong:?}");
+    assert!(wrong[0].contains("does not fall exponentially"), "{wrong:?}");
+    assert!(wrong[1].contains("excited again at about 3"), "{wrong:?}");
 }
