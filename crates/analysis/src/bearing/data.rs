@@ -16,6 +16,7 @@ use crate::identify::Disturbance;
 use crate::identify::IdentifyResponses;
 use crate::identify::checks::sensor_findings;
 use crate::identify::left_out::LineRule;
+use crate::identify::table_fit::table_findings;
 use crate::identify::tabulated::response_data;
 use crate::measurement::{
     Block, CHUNK_SAMPLES, Channels, Hold, Measurement, Windowed, check_distinct,
@@ -142,7 +143,7 @@ impl BearingData {
             name: names.join(", "),
             channels: Arc::default(),
             data: data.clone(),
-            before: Vec::new(),
+            before: [displacement, acceleration].into_iter().flat_map(table_findings).collect(),
         };
         Ok(Self {
             names,

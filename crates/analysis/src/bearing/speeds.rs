@@ -111,8 +111,11 @@ impl BearingTable {
     }
 
     /// Returns the table as text: `speed` in rad/s, `load` in N, the coefficients kxx … myy in SI
-    /// units (zero if they were not identified), and their standard errors. The columns except the
-    /// load and the errors are the arguments of a bearing element in rotor-dynamics programs.
+    /// units (zero if they were not identified), and their standard errors; then the whirl frequency
+    /// ratio and the critical mass (kg), each with its standard error. The columns from kxx to myy
+    /// are the arguments of a bearing element in rotor-dynamics programs. Without a threshold of
+    /// instability, the cells of the whirl frequency ratio are empty, and the critical mass is `inf`
+    /// if every rotor is stable.
     pub fn csv(&self) -> String {
         let names = NAMED;
         let mut text = String::from("speed,load");
@@ -121,6 +124,9 @@ impl BearingTable {
         }
         for name in names {
             let _ = write!(text, ",{name}_standard_error");
+        }
+        for name in ["whirl_frequency_ratio", "critical_mass"] {
+            let _ = write!(text, ",{name},{name}_standard_error");
         }
         for row in &self.rows {
             let speed = row.rotation_hz.unwrap_or(0.0) * TAU;
@@ -135,14 +141,29 @@ impl BearingTable {
                 // The error cell is empty if the estimate has no error, and 0 if the mass is not
                 // identified.
                 let error = coefficient(name).map_or(Some(0.0), |c| c.estimate.standard_error);
-                let _ = match error {
-                    Some(error) => write!(text, ",{error:?}"),
-                    None => write!(text, ","),
-                };
+                text += &cell(error);
             }
+            text += &threshold_cells(row);
         }
         text + "\n"
     }
+}
+
+/// Returns a cell of the table with its comma; an empty cell without a number.
+fn cell(value: Option<f64>) -> String {
+    value.map_or_else(|| ",".to_owned(), |value| format!(",{value:?}"))
+}
+
+/// Returns the cells of the whirl frequency ratio and the critical mass (kg), with their standard
+/// errors.
+fn threshold_cells(row: &BearingSummary) -> String {
+    let Some(stability) = &row.stability else { return cell(None).repeat(4) };
+    let with_error = |estimate: Option<&Uncertain>, otherwise: Option<f64>| {
+        let value = estimate.map_or(otherwise, |estimate| Some(estimate.value));
+        cell(value) + &cell(estimate.and_then(|estimate| estimate.standard_error))
+    };
+    with_error(stability.whirl_frequency_ratio.as_ref(), None)
+        + &with_error(stability.critical_mass.as_ref(), Some(f64::INFINITY))
 }
 
 impl fmt::Display for BearingTable {

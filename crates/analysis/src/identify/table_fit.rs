@@ -314,13 +314,7 @@ impl Scope<'_> {
         let mut findings: Vec<Row> =
             before.map(|finding| (When::Before, None, finding.clone())).collect();
         for table in self.tables {
-            let doubts = table.doubts.iter();
-            let doubts =
-                doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
-            let phases = table.functions.iter().filter_map(|f| {
-                constant_phase(&f.response, &f.reference, f.values.iter().copied())
-            });
-            let before = doubts.chain(phases);
+            let before = table_findings(table).into_iter();
             findings.extend(before.map(|finding| (When::Before, self.named(table), finding)));
         }
         findings
@@ -330,6 +324,16 @@ impl Scope<'_> {
     fn named(&self, table: &FrequencyResponses) -> Option<String> {
         (self.tables.len() > 1).then(|| table.file.clone())
     }
+}
+
+/// Returns the findings on the units and the phases of a table.
+pub(crate) fn table_findings(table: &FrequencyResponses) -> Vec<Finding> {
+    let doubts = table.doubts.iter();
+    let doubts = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
+    let functions = table.functions.iter();
+    let phases = functions
+        .filter_map(|f| constant_phase(&f.response, &f.reference, f.values.iter().copied()));
+    doubts.chain(phases).collect()
 }
 
 /// Returns whether a finding is about the residual of a fit.

@@ -8,6 +8,7 @@ use mechid_analysis::{
     BearingData, FrfSettings, IdentifiedBearing, IdentifyBearing, Measurement, ResponseQuantity,
     frf, identify_bearing,
 };
+use mechid_checks::Finding;
 use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_model::elements::{Element, Input, Instruments, Machine, Sensor};
 use mechid_problems::rig::{BearingRig, RigTest, Shakers};
@@ -190,9 +191,13 @@ fn tables_of_frequency_responses_give_the_same() {
     refused(&tables, &still, "every frequency is a multiple of the frequency of rotation");
 }
 
-/// Results from records of `count` periods in x and as many in y, and results from the tables of
-/// d/f and a/f that `mechid frf` would write for these records.
-fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [IdentifiedBearing; 2] {
+/// Records of `count` periods in x and as many in y, and the tables of d/f and a/f that `mechid frf`
+/// would write for these records.
+fn records_and_tables(
+    rig: &BearingRig,
+    count: usize,
+    seed: u64,
+) -> (Vec<Measurement>, Vec<FrequencyResponses>) {
     let mut tables = Vec::new();
     let mut tests = Vec::new();
     for (at, period) in (0..).zip(&periods(rig, 20.0)) {
@@ -211,12 +216,37 @@ fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [Identi
             tables.push(FrequencyResponses::parse("h.csv", table.csv().as_bytes()).unwrap());
         }
     }
+    (tests, tables)
+}
+
+/// Results from records of `count` periods in x and as many in y, and results from their tables.
+fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [IdentifiedBearing; 2] {
+    let (tests, tables) = records_and_tables(rig, count, seed);
     // Without a rotation frequency both use the same lines; a record and its table differ in the
     // neighbours of excluded lines.
     let twelve = Coefficients::Twelve;
     let how = IdentifyBearing { rotation_hz: None, coefficients: twelve, ..settings(rig) };
     [BearingData::from_records(&tests, &how), BearingData::from_responses(&tables, &how)]
         .map(|data| identify_bearing(&data.unwrap(), None, &how).unwrap())
+}
+
+/// A table whose phase is missing is named by a check before the fit.
+#[test]
+fn tables_are_checked_before_the_fit() {
+    let rig = rig(3.0);
+    let (_, mut tables) = records_and_tables(&rig, 16, 1);
+    let how = IdentifyBearing { rotation_hz: None, ..settings(&rig) };
+    let is_named = |tables: &[FrequencyResponses]| {
+        let data = BearingData::from_responses(tables, &how).unwrap();
+        let found = identify_bearing(&data, None, &how).unwrap();
+        let mut checks = found.summary().checks.iter();
+        checks.any(|check| matches!(check.finding, Finding::ConstantPhase(_)))
+    };
+    assert!(!is_named(&tables));
+    for function in &mut tables[1].functions {
+        function.values.iter_mut().for_each(|value| *value = value.norm().into());
+    }
+    assert!(is_named(&tables));
 }
 
 /// If the force is measured without noise and the weights are accurate, a record and its tables
@@ -339,6 +369,7 @@ fn a_result_tells_what_a_bearing_engineer_asks() {
     let loud = identify_bearing(&tests(2000.0), None, &how).unwrap();
     assert!(loud.summary().remarks[0].contains("of the clearance: above 0.05"));
 
+    let stability = found.summary().stability.clone().unwrap();
     let table = BearingTable::new([loud, found]).csv();
     let header = table.lines().next().unwrap();
     assert!(
@@ -346,6 +377,12 @@ fn a_result_tells_what_a_bearing_engineer_asks() {
     );
     let speed: f64 = table.lines().nth(1).unwrap().split(',').next().unwrap().parse().unwrap();
     assert_eq!(speed, TAU * 50.0);
+    let cells = [stability.whirl_frequency_ratio, stability.critical_mass].map(|value| {
+        let value = value.unwrap();
+        format!(",{:?},{:?}", value.value, value.standard_error.unwrap())
+    });
+    assert!(header.ends_with("critical_mass,critical_mass_standard_error"), "{header}");
+    assert!(table.lines().any(|row| row.ends_with(&cells.concat())), "{table}");
     let negative = IdentifyBearing { stator_mass: -1.0, ..how };
     let refused = identify_bearing(&tests(20.0), None, &negative).unwrap_err().to_string();
     assert_eq!(refused, "`stator_mass`: a positive number is needed, not -1");

@@ -69,6 +69,9 @@ fn run_out_under_a_wrong_speed_is_named_and_no_interval_is_given() {
     // A standard error that is not given is an empty cell, not zero.
     let table = BearingTable::new([found]).csv();
     assert!(table.lines().nth(1).unwrap().contains(",,,,,,,,"), "{table}");
+    let header = table.lines().next().unwrap();
+    let cells = table.lines().nth(1).unwrap().split(',').count();
+    assert_eq!(header.split(',').count(), cells, "{table}");
 }
 
 #[test]
