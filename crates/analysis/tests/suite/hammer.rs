@@ -116,7 +116,7 @@ fn a_column_that_shows_noise_alone_is_no_second_hammer() {
 /// Responses that come late or early by whole samples, as from a converter that scans its channels.
 #[test]
 fn a_late_response_to_hits_is_told_by_its_delay() {
-    for (late, seed) in [(0_isize, 2), (3, 0), (1, 1), (-2, 0), (39, 0)] {
+    for (late, seed) in [(0_isize, 2), (3, 0), (1, 1), (-2, 0)] {
         let rig = rig(ACCELERATION);
         let tests: Vec<Measurement> = (0..2)
             .map(|dof| {
