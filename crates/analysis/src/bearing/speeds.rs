@@ -111,11 +111,11 @@ impl BearingTable {
     }
 
     /// Returns the table as text: `speed` in rad/s, `load` in N, the coefficients kxx … myy in SI
-    /// units (zero if they were not identified), and their standard errors; then the whirl frequency
-    /// ratio and the critical mass (kg), each with its standard error. The columns from kxx to myy
-    /// are the arguments of a bearing element in rotor-dynamics programs. Without a threshold of
-    /// instability, the cells of the whirl frequency ratio are empty, and the critical mass is `inf`
-    /// if every rotor is stable.
+    /// units (zero if they were not identified), and their standard errors; then the whirl
+    /// frequency ratio and the critical mass (kg), each with its standard error. The columns from
+    /// kxx to myy are the arguments of a bearing element in rotor-dynamics programs. Without a
+    /// threshold of instability, the cells of the whirl frequency ratio are empty, and the critical
+    /// mass is `inf` if every rotor is stable.
     pub fn csv(&self) -> String {
         let names = NAMED;
         let mut text = String::from("speed,load");

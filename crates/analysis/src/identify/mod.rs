@@ -303,8 +303,8 @@ impl Identify {
     }
 }
 
-/// Fits spectra of windows as periods, as open records, or, if they are not periods and too long for
-/// an open fit without a request, averaged over segments.
+/// Fits spectra of windows as periods, as open records, or, if they are not periods and too long
+/// for an open fit without a request, averaged over segments.
 fn spectral(
     records: &[Windowed],
     unknowns: &Unknowns,

@@ -191,8 +191,8 @@ fn tables_of_frequency_responses_give_the_same() {
     refused(&tables, &still, "every frequency is a multiple of the frequency of rotation");
 }
 
-/// Records of `count` periods in x and as many in y, and the tables of d/f and a/f that `mechid frf`
-/// would write for these records.
+/// Records of `count` periods in x and as many in y, and the tables of d/f and a/f that `mechid
+/// frf` would write for these records.
 fn records_and_tables(
     rig: &BearingRig,
     count: usize,

@@ -569,7 +569,7 @@ fn six_random_forces_need_no_settings() {
     assert_eq!(warned, 0);
 }
 
-/// Of six sensors and forces an earlier version did not correct the window, without a word: the
+/// With six sensors and forces an earlier version did not correct the window, without a word: the
 /// damping ratios of such chains were several standard errors too high.
 #[test]
 fn intervals_of_frequency_responses_of_six_sensors_hold() {

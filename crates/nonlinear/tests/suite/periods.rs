@@ -191,8 +191,8 @@ fn a_true_term_is_kept_and_a_false_one_is_not() {
     assert!(10 * more <= runs, "{chosen:?}");
 }
 
-/// Judge: the generator. The intervals hold with friction and without it, so that a friction that is
-/// stated but absent is not significant, and it is chosen from candidates only if it is there.
+/// Judge: the generator. The intervals hold with friction and without it, so that a friction that
+/// is stated but absent is not significant, and it is chosen from candidates only if it is there.
 #[test]
 fn friction_is_present_only_where_it_acts() {
     let (test, unknowns) = (Oscillator::short(), Unknowns::unknown_mass(1).unwrap());
