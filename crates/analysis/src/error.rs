@@ -10,9 +10,8 @@ use crate::text::significant;
 
 /// A failure of an analysis.
 ///
-/// Messages put the names of settings, as the fields of the option structs are called, between
-/// backticks, so that each interface can show its own spelling (`--sample-rate` on the command
-/// line).
+/// Messages name settings by the fields of the option structs, between backticks, so that each
+/// interface can show its own spelling (`--sample-rate` on the command line).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
@@ -104,8 +103,8 @@ pub enum AnalysisError {
     NoRecord,
     /// Two records of one analysis are equal in every sample.
     #[error(
-        "{first} and {second} are equal in every sample: they are one test, and counted \
-         twice it would halve the variances of all results; leave one out"
+        "{first} and {second} are equal in every sample: they are one test. A test that \
+         is counted twice halves the variances of all results; leave one of the two out"
     )]
     RepeatedRecord {
         /// The record given first.
@@ -251,7 +250,7 @@ pub enum AnalysisError {
     NoMotion,
     /// The columns do not pair up with the degrees of freedom.
     #[error(
-        "`{response}` names {} and `force` {forces}: every degree of freedom needs one response and one force \
+        "`{response}` names {}, but `force` names {forces}: every degree of freedom needs one response and one force \
          (`force` 0 where no force acts)", message::count(*got, "column")
     )]
     ColumnCount {
@@ -459,7 +458,7 @@ pub enum AnalysisError {
     /// Second derivatives are only for the fit of the equation of motion.
     #[error(
         "with the acceleration alone, a sliding polynomial gives second derivatives of force and \
-         response, which only the fit of the equation of motion uses: leave `between_samples` out"
+         response. Only the fit of the equation of motion uses these derivatives: leave `between_samples` out"
     )]
     TwiceDifferentiated,
     /// Instrumental variables need two halves of the periods, which averaged frequency responses do
@@ -499,9 +498,9 @@ pub enum AnalysisError {
     },
     /// The machine has nonlinear terms, and the measured responses are not sufficient for them.
     #[error(
-        "{file}: this machine has nonlinear terms ({terms}); its force is reconstructed by the equation \
-         of motion, which needs displacement, velocity and acceleration of every degree of freedom, \
-         and a possible force on each (`forced`)"
+        "{file}: this machine has nonlinear terms ({terms}), so its force is reconstructed by the \
+         equation of motion. This method needs displacement, velocity and acceleration of every degree of \
+         freedom, and `forced` must not exclude a degree of freedom"
     )]
     NonlinearMachine {
         /// The file of the machine.
@@ -582,8 +581,8 @@ pub enum AnalysisError {
     },
     /// The computation needs more memory than the limit for a file of this size.
     #[error(
-        "{file}: the work on {numbers} numbers takes about {} GB of memory, and {} GB is the limit for a file of this size; \
-         if the record is correct and the memory is available, set `memory_gb`: {}",
+        "{file}: an analysis of {numbers} numbers needs about {} GB of memory, but the limit for a file \
+         of this size is {} GB; if the record is correct and the memory is available, set `memory_gb`: {}",
         message::number(two_digits(*needed_gb)),
         message::number(two_digits(*allowed_gb)),
         message::number(needed_gb.ceil())
@@ -726,7 +725,7 @@ fn two_digits(size: f64) -> f64 {
 /// Returns the reason why no record could be selected.
 fn other(id: Option<&str>) -> String {
     match id {
-        Some(id) => format!(", none of which is {}", escaped(id)),
+        Some(id) => format!(", but none of them is {}", escaped(id)),
         None => ": choose one with `record_id`".into(),
     }
 }

@@ -230,7 +230,8 @@ fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
     during <= between * (1.0 + MOVES * (2.0 / samples).sqrt())
 }
 
-/// Noise of the force in the window of a hit, which is set to zero away from the pulse.
+/// Noise of the force in the window of a hit. The force is set to zero away from the pulse, so only
+/// the pulse has noise.
 #[derive(Debug, Clone)]
 pub(crate) struct HitNoise {
     /// Standard deviation between the hits, in N.

@@ -44,8 +44,8 @@ pub const PAIR_BYTES: usize = 128;
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
 /// Decay of the slowest mode, as a natural logarithm, during the zeros that are appended to the
-/// forces of a prediction: the response that wraps around from the end is below 0.1 % of its value
-/// at the end.
+/// forces of a prediction: the part of the response that wraps around to the beginning is below
+/// 0.1 % of the response at the end of the record.
 pub const REST_DECAY: f64 = 7.0;
 
 /// Largest number of zeros that are appended to the forces of a prediction by modes, in lengths of
@@ -65,9 +65,9 @@ pub const LEAST_EXPLAINED: f64 = 0.5;
 /// has little power; the longest record is divided instead.
 pub const SMALLER_HALF: f64 = 0.25;
 
-/// Minimum number of modes of an ambient record within one half-width for a suspected peak of the
-/// unmeasured forces. Two modes may be a close pair, as of a symmetric tower; a force with a peak
-/// gives one mode for each independent force.
+/// Minimum number of modes of an ambient record, within one half-width, that indicates a spectral
+/// peak of the unmeasured forces. Two modes may be a close pair, as in a symmetric tower; a force
+/// with a peak gives one mode for each independent force.
 pub const CROWDED_MODES: usize = 3;
 
 /// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest
@@ -84,8 +84,8 @@ pub const DRIVEN_LINES: usize = 16;
 /// fit to the small remainder is not representative of the fit to all data.
 pub const MOST_VALIDATED: f64 = 0.8;
 
-/// Minimum share of unmeasured forces in the motion of a mode for a note; a smaller share is only
-/// in the table.
+/// Minimum share of unmeasured forces in the motion of a mode; a mode with a larger share gets a
+/// note. A smaller share is only in the table.
 pub const NOTED_UNMEASURED: f64 = 0.01;
 
 /// Maximum correlation of the errors of two lines of averaged responses in the same fit: neighbours

@@ -80,7 +80,7 @@ pub struct PredictionError {
     pub rmse: f64,
     /// RMSE over the RMS of the measured response about its mean (pure number).
     pub nrmse: f64,
-    /// RMS of the errors due to the uncertainty of the modes, in this unit; `None` for a machine.
+    /// RMS of the errors due to the uncertainty of the modes, in `unit`; `None` for a machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
 }
@@ -154,7 +154,8 @@ pub fn predict(
 
 /// Number of parts of a record; the first and the last are compared.
 const PARTS: usize = 8;
-/// Minimum ratio of the errors in the first and the last part that indicates a wrong initial state.
+/// Minimum ratio of the error in the first part to the error in the last part that indicates a
+/// wrong initial state.
 const DIES_AWAY: f64 = 3.0;
 /// Minimum number of samples in a part of a record, and number of initial samples that must show
 /// the error.
@@ -202,8 +203,8 @@ fn settle(
     Ok(samples)
 }
 
-/// Returns the number of samples to which the motion at the beginning of a record is fitted; 0 for
-/// a start at rest.
+/// Returns the number of samples at the beginning of a record to which the initial motion is
+/// fitted; 0 for a start at rest.
 pub(crate) fn settled_samples(
     how: &Predict,
     block: &Block,
@@ -314,8 +315,9 @@ impl Predicted {
         }
     }
 
-    /// Returns the columns of a record of the prediction, with their names: every measured kind of
-    /// response, or displacements, in m, m/s or m/s²; for modes, the measured responses, or all.
+    /// Returns the columns of a record of the prediction, with their names. For a machine these are
+    /// all measured kinds of response (displacements if none was measured), in m, m/s or m/s². For
+    /// modes they are the measured responses (all responses if none was measured).
     pub fn columns(&self) -> Vec<(String, &[f64])> {
         match &self.motion {
             PredictedMotion::Machine(response) => self.machine_columns(response),

@@ -97,7 +97,8 @@ pub fn paragraph(lines: impl Iterator<Item = String>) -> String {
 /// Returns the note on standard errors that are scaled by `factor`, with the reasons from `checks`.
 pub(crate) fn scaled_errors(factor: f64, checks: &str) -> String {
     format!(
-        "standard errors and intervals are {} times those of the noise alone, because model and data disagree by more than noise (see {checks}); they do not cover a wrong model",
+        "standard errors and intervals are {} times those of the noise alone, because model and \
+         data disagree by more than noise (see {checks}); the intervals do not cover a wrong model",
         significant(factor, 3)
     )
 }

@@ -156,8 +156,9 @@ impl Residuals<'_> {
     }
 }
 
-/// Returns the variance of each residual as the mean square of its channel on the lines around it:
-/// a fault that affects only a few lines of a resonance would otherwise increase its own variance.
+/// Returns the variance of each residual: the mean square of the residuals of its channel on the
+/// surrounding lines. Without this mean, a fault that affects only a few lines of a resonance would
+/// increase the variance of these lines.
 fn local_variance(deviations: &DVector<f64>, dof: usize) -> DVector<f64> {
     let lines = deviations.len() / (2 * dof);
     let power = |line: usize, channel: usize| deviations[2 * (dof * line + channel)].powi(2);
@@ -197,9 +198,9 @@ fn without_explained(
 
 /// Finds a fault of the acquisition that explains the residual of an `estimate`
 /// ([`Finding::Alternative`]): a force held or linear between samples `dt` (s) apart, or channels
-/// with a first-order high-pass. `after` has the residuals of the fit. `None` unless the fault is
-/// significant and, after its removal, the residual of a fit is uncorrelated with the forces or has
-/// less than a quarter of the power.
+/// with a first-order high-pass. `after` has the residuals of the fit. The fault must be
+/// significant. After its removal, the residual of a fit must be uncorrelated with the forces or
+/// have less than a quarter of the power. Otherwise `None`.
 ///
 /// # Errors
 /// As [`after_spectral_fit`].
@@ -245,8 +246,8 @@ pub fn fault_of_acquisition(
             continue;
         }
         let residuals_without = after_spectral_fit(&without, estimate, extent)?.records;
-        // Correlation from line to line is allowed: the transients were estimated from data with
-        // the fault.
+        // Correlation from line to line is allowed: the transients were estimated from the
+        // uncorrected data, which contain the fault.
         if remaining <= DELAY_REMAINING || is_noise(after) || is_uncorrelated(&residuals_without) {
             let cause = fault.cause(first, &driven, corner);
             best = Some((remaining, Finding::Alternative(Alternative { cause, remaining })));
@@ -288,10 +289,10 @@ pub fn forces_between_samples(
 
 /// Finds AC coupling that explains the residual of a maximum-likelihood `fit` to hits
 /// ([`Finding::Alternative`]). `records` are the data of the fit, sampled every `dt` (s), `closed`
-/// are the data without the transients, and `after` are the residuals. `None` unless the tests of
-/// the residual warn, and without the AC coupling they pass or at most a quarter of the power
-/// remains. It is not sufficient that the residual is uncorrelated with the force, because a short
-/// force hardly shows a correlation.
+/// are the data without the transients, and `after` are the residuals. The tests of the residual
+/// must warn. Without the AC coupling they must pass, or at most a quarter of the power may remain.
+/// Otherwise `None`. It is not sufficient that the residual is uncorrelated with the force, because
+/// a short force hardly shows a correlation.
 ///
 /// # Source
 /// Rao's score test; maximum likelihood with new transients for the corner frequency.

@@ -124,10 +124,10 @@ impl Check for Alternative {
             Cause::Quantity { .. } => "State what was measured (`quantity`)",
             Cause::Decibels => "State the unit in the header, as in magnitude [dB]",
             Cause::BetweenSamples { .. } => {
-                "In records of a simulation this is usual: state it with `between_samples`"
+                "This is usual in records of a simulation: state it with `between_samples`"
             }
             Cause::AcCoupling { .. } => {
-                "State it with `ac_coupling`, or measure all channels with the same coupling"
+                "State the coupling with `ac_coupling`, or measure all channels with the same coupling"
             }
         })
     }
@@ -156,8 +156,8 @@ impl ModelledResponses {
         self.power(deviation) / weighted(&self.measured, deviation).norm_squared()
     }
 
-    /// Returns whether the residual of no channel is correlated from line to line within a stretch
-    /// of rising `omega` (rad/s).
+    /// Returns whether the residuals of all channels are uncorrelated from line to line within
+    /// every stretch of rising `omega` (rad/s).
     fn is_white(&self, omega: &[f64], deviation: Option<&DMatrix<f64>>) -> bool {
         let residual = weighted(&(&self.measured - &self.modelled), deviation);
         let first = |row: &usize| *row == 0 || omega[*row] < omega[row - 1];

@@ -71,7 +71,7 @@ impl Check for Bias {
             write!(
                 f,
                 "noise on the response biases the estimate ({p_value}): {parameter} is {value}, but \
-                 {other} by {reference}, {errors:.1} standard errors away; \
+                 {other} by {reference}, a difference of {errors:.1} standard errors; \
                  prefer maximum likelihood on whole periods"
             )
         }

@@ -56,7 +56,7 @@ impl Check for Clipping {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} is clipped at {}: {} have this value, three or more in a row; choose a wider \
+            "{} is clipped at {}: {} have this value, always three or more in a row; choose a wider \
              range of the amplifier or converter and measure again",
             names.channel(self.channel),
             six_digits(self.level),

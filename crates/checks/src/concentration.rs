@@ -99,9 +99,9 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
     alone.then_some(Concentration { frequencies_hz, share, multiples_of_hz })
 }
 
-/// Returns the frequency that has all `chosen` lines of `all` near its multiples, within the line
-/// spacing; `None` if random lines would satisfy this as well, or if a single line leaves the
-/// spacing unknown.
+/// Returns the frequency whose multiples are near all `chosen` lines: the distance is less than the
+/// spacing of the lines in `all`. `None` if random lines would satisfy this as well, or if there is
+/// only one line in `chosen` or in `all`.
 ///
 /// Candidates are the fractions of the lowest chosen frequency. The probability that all lines of a
 /// random choice are multiples of one of them follows from the hypergeometric distribution, times

@@ -262,8 +262,8 @@ fn driven(force: &DMatrix<f64>) -> Vec<usize> {
     (0..force.ncols()).filter(|dof| force.column(*dof).amax() > 0.0).collect()
 }
 
-/// Returns the residual power of the equations with a force, each relative to the power of its
-/// right-hand side.
+/// Returns the ratio of the residual power of an equation to the power of its right-hand side,
+/// added over the equations with a force.
 fn residual_power(estimate: &Estimate, driven: &[usize]) -> Option<f64> {
     let power = driven.iter().map(|dof| estimate.residual_nrmse()[*dof].powi(2)).sum::<f64>();
     (estimate.undetermined().is_empty() && power.is_finite()).then_some(power)

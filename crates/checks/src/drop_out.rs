@@ -67,7 +67,7 @@ fn longest_run(x: &[f64]) -> Option<(usize, usize)> {
 }
 
 /// Returns the probability that the channel has a run of equal samples of this length by chance;
-/// `None` unless the channel moves on both sides.
+/// `None` if the channel does not move before the run, or does not move after it.
 fn p_value(x: &[f64], sample: usize, samples: usize) -> Option<f64> {
     let (before, after) = (&x[..sample], &x[sample + samples..]);
     let step = smallest_change(x);
@@ -142,8 +142,8 @@ impl Check for DropOut {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} is {} from sample {} on for {}, but changes before and after them: {}; \
-             choose a window without these samples",
+            "{} is {} from sample {} on, for {}, but changes before and after these samples: {}; \
+             choose a window without them",
             names.channel(self.channel),
             message::number(self.level),
             self.sample + 1,

@@ -60,7 +60,7 @@ impl Check for ExcitedLines {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} with force: {} for {} in each equation of motion",
+            "{} with force: each equation of motion gives {} for {}",
             message::count(self.lines, "line"),
             message::count(2 * self.lines, "equation"),
             message::count(self.unknowns, "unknown")

@@ -55,8 +55,8 @@ impl Check for FluidInertia {
         }
         write!(
             f,
-            "the fluid has inertia (likelihood ratio {statistic}, {p_value}), which eight coefficients \
-             ignore, so they are biased: identify twelve (`coefficients`)"
+            "the fluid has inertia (likelihood ratio {statistic}, {p_value}). Eight coefficients \
+             ignore this inertia and are biased: identify twelve (`coefficients`)"
         )
     }
 }

@@ -197,7 +197,7 @@ impl ModeLimit {
                     .into()
             }
             (ModeLimit::AtSamples | ModeLimit::BetweenSamples, _) => {
-                ", so few that it may be the alias of a mode above the Nyquist frequency: sample faster"
+                ", so few that this mode may be the alias of a mode above the Nyquist frequency: sample faster"
                     .into()
             }
             (ModeLimit::Euler { bias }, _) => {

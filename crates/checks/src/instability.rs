@@ -26,8 +26,8 @@ pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     let p_value = |mode: &IdentifiedMode| {
         let mut rate = mode.growth_rate;
         if mode.partner.is_some() && mode.squared_frequency.value < 0.0 {
-            // The product is a smooth function of the parameters, even where both eigenvalues are
-            // zero.
+            // The product of the two eigenvalues is a smooth function of the parameters, even where
+            // both are zero.
             rate = mode.squared_frequency;
             rate.value = -rate.value;
         }
@@ -96,8 +96,8 @@ impl Check for Instability {
         if self.verdict() == Verdict::Good {
             return write!(
                 f,
-                "mode {number} ({frequency} Hz) of the estimate grows at {growth} 1/s, no more \
-                 than the noise explains ({p_value}); its free response cannot be predicted"
+                "mode {number} ({frequency} Hz) of the estimate grows at {growth} 1/s. Noise \
+                 alone can cause this growth ({p_value}); the free response cannot be predicted"
             );
         }
         let doubling = three_digits(std::f64::consts::LN_2 / growth_rate);

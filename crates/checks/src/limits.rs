@@ -7,8 +7,8 @@ pub const SIGNIFICANCE: f64 = 0.01;
 /// Minimum share of the residual power beyond the noise that a few lines must have to be reported.
 pub const CONCENTRATED: f64 = 0.8;
 
-/// Maximum ratio of residual power to noise power on all lines except the few with most of the
-/// misfit, for the model to count as correct on these other lines.
+/// Maximum ratio of residual power to noise power on the lines outside a concentrated misfit; up to
+/// this ratio, the model counts as correct on these lines.
 pub const DISTURBED_ALONE: f64 = 10.0;
 
 /// Minimum share of the residual power of a linear model that a reported nonlinear term explains.
@@ -76,8 +76,9 @@ pub const EULER_BIAS_BAD: f64 = 0.1;
 pub const DELAY_REMAINING: f64 = 0.25;
 
 /// Factor between a measured derivative and the derivative computed from another channel, above
-/// which units, columns or signs are wrong. Sensor errors are smaller, and so is the error of the
-/// rule between two samples below four tenths of the sampling rate.
+/// which units, columns or signs are wrong. Sensor errors give a smaller factor. So do the
+/// trapezoidal rule and the second difference at frequencies below four tenths of the sampling
+/// rate.
 pub const KINEMATIC_GAIN: f64 = 3.0;
 
 /// Power that forces extract from a machine, relative to the apparent power, above which it is
@@ -106,7 +107,7 @@ pub const SAMPLES_PER_LAG: usize = 4;
 pub const ASYMMETRY: f64 = 1e-6;
 
 /// Share of the response attributed to unmeasured forces, at or above which this explanation is
-/// doubtful: few tests have a disturbance of this size, and nonlinear systems have a larger share.
+/// doubtful: few tests have a disturbance of this size, and nonlinear systems give a larger share.
 pub const UNMEASURED_FORCE: f64 = 0.1;
 
 /// Minimum deviation of the ratio of two mirrored entries from 1, in standard errors, for a gain to
@@ -207,8 +208,8 @@ pub(crate) const PERIOD_CLEARLY: f64 = 4.0;
 /// Minimum ratio of the squared mismatch across an interruption to that at the other samples.
 pub(crate) const PERIOD_INTERRUPTED: f64 = 10.0;
 
-/// Number of strongest lines in the test of the power flow: the share [`STRONGEST_FRACTION`] of
-/// them must extract power.
+/// Number of strongest lines in the test of the power flow: for a finding, at least the fraction
+/// [`STRONGEST_FRACTION`] of these lines must extract power.
 pub(crate) const STRONGEST_LINES: usize = 32;
 
 /// Minimum fraction of the strongest lines that extract power: chance does not reach it, even for
@@ -245,7 +246,7 @@ pub(crate) const LINES_PER_CORRELATION: usize = 8;
 pub(crate) const FREE_RESIDUALS: f64 = 8.0;
 
 /// Minimum residual power relative to the stated power of the response to an unmeasured force: the
-/// mean of the periods may contain only this part.
+/// mean of the periods may contain only this fraction of the response.
 pub(crate) const SPECTRAL_LEAKED: f64 = 0.5;
 
 /// Minimum singular value of the sensitivity (columns of unit length), relative to the largest; a
@@ -308,8 +309,8 @@ pub const DROP_OUT_FORCE_PAUSE: f64 = 0.05;
 /// rest for a larger part of the record.
 pub const DROP_OUT_FORCE_ACTING: f64 = 0.75;
 
-/// Minimum jump of a force at the beginning or the end of a drop-out near its mean, in standard
-/// deviations of the force; a sweep comes to rest with a smaller one.
+/// Minimum jump of a force at the beginning or the end of a drop-out near the mean of the force, in
+/// standard deviations of the force; a sweep that comes to rest has a smaller jump.
 pub const DROP_OUT_FORCE_JUMP: f64 = 0.2;
 
 /// Minimum number of samples of a drop-out of a force; at a smooth peak a converter gives fewer

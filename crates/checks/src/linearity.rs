@@ -271,8 +271,8 @@ fn without_linear_part(
 }
 
 /// Returns the probability that noise with the spectra of the residual (channels × lines, `sizes`
-/// averaged over neighbouring lines) is correlated at least as much with the responses;
-/// `correlation` is the correlation of neighbouring lines.
+/// averaged over neighbouring lines) has at least as much correlation with the responses as the
+/// residual has; `correlation` is the correlation of neighbouring lines.
 ///
 /// For given magnitudes the phases of the noise are random from line to line. The sum over the
 /// channels of a line has one phase, because noise on a force, or an unmeasured force, affects all

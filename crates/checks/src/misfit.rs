@@ -128,8 +128,8 @@ impl Misfit {
                  the standard errors are too large; average frequency responses instead"
             }
             _ => {
-                "exceeds the noise: wrong model (nonlinearity, missing degree of freedom, wrong known mass), \
-                 spectral leakage, or a biased estimate; do not rely on the intervals"
+                "it exceeds the noise. Possible causes: a wrong model (nonlinearity, missing degree of freedom, wrong \
+                 known mass), spectral leakage, or a biased estimate. Do not rely on the intervals"
             }
         }
     }

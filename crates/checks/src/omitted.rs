@@ -82,8 +82,8 @@ pub struct NonlinearTermsLeftOut {
     pub laws: Vec<String>,
     /// Fraction of the power of the unexplained force that the terms explain.
     pub explained: f64,
-    /// Probability that noise alone makes the coefficient of one of the candidates differ from zero
-    /// at least as much.
+    /// Probability that noise alone makes the coefficient of any candidate differ from zero by at
+    /// least as many standard errors as the most significant coefficient of these terms.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Changes by the terms, parameter by parameter (unit of the parameter).

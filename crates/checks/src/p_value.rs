@@ -14,8 +14,8 @@ pub struct PValue {
     /// Probability of this test alone (pure number).
     #[cfg_attr(feature = "serde", serde(rename = "p_value"))]
     pub raw: f64,
-    /// Adjusted for the number of tests made on the same fit; equal to `raw` before the adjustment
-    /// (pure number).
+    /// Probability adjusted for the number of tests made on the same fit; equal to `raw` before the
+    /// adjustment (pure number).
     #[cfg_attr(feature = "serde", serde(rename = "adjusted_p_value"))]
     pub adjusted: f64,
 }

@@ -153,8 +153,8 @@ impl Check for PartsAgreement {
         match self.verdict() {
             Verdict::Good => write!(
                 f,
-                "parts of the data agree ({p_value}): the largest difference is that of {parameter}, \
-                 {value} for {part} and {others} for the rest, {errors} standard errors"
+                "parts of the data agree ({p_value}): {parameter} differs most, \
+                 {value} for {part} and {others} for the rest ({errors} standard errors)"
             ),
             _ => write!(
                 f,

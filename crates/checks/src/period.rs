@@ -76,9 +76,9 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     })
 }
 
-/// Returns the first sample that differs from the sample a claimed period before, if only one
-/// stretch of at most a period differs. The mismatch is the RMS difference of the other samples
-/// relative to √2 times the RMS of the force.
+/// Returns the first sample that differs from the sample one claimed period earlier, if all
+/// differing samples are in one stretch of at most a period. The mismatch is the RMS difference of
+/// the other samples relative to √2 times the RMS of the force.
 fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let pairs = channels[0].len().checked_sub(period)?;
     // At least one period outside the stretch must be comparable with the next period.
@@ -144,8 +144,9 @@ fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     })
 }
 
-/// Returns the squared differences of samples a lag apart, relative to the squares of both, for
-/// lags up to three quarters of the record; 1 if the overlapping samples hardly vary.
+/// Returns, for each lag up to three quarters of the record, the squared differences of samples at
+/// this distance relative to the sum of the squares of these samples; 1 if the overlapping samples
+/// hardly vary.
 fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
     let len = channels[0].len();
     let mut sums = vec![(0.0, 0.0); 3 * len / 4 + 1];

@@ -17,8 +17,8 @@ pub struct SensorDelay {
     pub sensor: Option<String>,
     /// Delay of the sensor, in s, to first order.
     pub seconds: f64,
-    /// Standard error of the delay by the noise, in s; a large delay also has an error of second
-    /// order.
+    /// Standard error of the delay due to the noise, in s. A large delay has an additional error of
+    /// second order.
     pub standard_error: f64,
     /// Probability that noise alone gives a delay at least as large.
     #[cfg_attr(feature = "serde", serde(flatten))]
@@ -70,8 +70,8 @@ impl Check for SensorDelay {
         };
         write!(
             f,
-            "{late} about {size} ms {direction} ({}): a filter, a scanning converter or an error of \
-             the model with the same effect; shift the channel, or make the delay of the sensors \
+            "{late} about {size} ms {direction} ({}). Possible causes: a filter, a scanning converter, an error of \
+             the model with the same effect. Shift the channel, or make the delay of the sensors \
              a parameter",
             self.p_value
         )

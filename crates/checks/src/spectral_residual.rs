@@ -300,8 +300,9 @@ impl SpectralResidual {
     }
 
     /// Returns the correlation of the residual of each channel with a force, Re Σ F̄(l) r(l)
-    /// e^{iωτ}, at an odd number of lags τ, multiples of [`SpectralResidual::lag`] around 0: up to
-    /// 51, fewer with few lines. `None` for a channel without residual, and if the force is zero.
+    /// e^{iωτ}, at lags τ that are multiples of [`SpectralResidual::lag`]: 0, and as many negative
+    /// as positive ones. There are at most 51 lags, fewer if there are few lines. `None` for a
+    /// channel without residual, and if the force is zero.
     ///
     /// # Panics
     /// If there is no such force.

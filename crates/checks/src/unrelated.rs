@@ -20,9 +20,10 @@ pub struct Unrelated {
     pub p_value: f64,
 }
 
-/// Finds a response that does not follow the force ([`Finding::Unrelated`]) from the residual,
-/// `unexplained` (ratio of RMS values), of a fit of `unknowns` parameters to `equations` real
-/// equations (each of one degree of freedom); `None` if the response follows.
+/// Finds a response that does not follow the force ([`Finding::Unrelated`]) from the residual of a
+/// fit: `unexplained` is the RMS of the residual relative to the RMS of the fitted quantity. The
+/// fit has `unknowns` parameters and `equations` real equations of one degree of freedom each.
+/// `None` if the response follows the force.
 ///
 /// The p-value is that of the F test of the regression, times the number of lines, because a fit
 /// can place the resonance at any of them.
@@ -61,7 +62,7 @@ impl Check for Unrelated {
         write!(
             f,
             "the response does not follow the force: the fit explains {} % of the power of the response, \
-             no more than if it were pure noise; the parameters are meaningless. Check columns, cables and units",
+             and would explain as much of pure noise; the parameters are meaningless. Check columns, cables and units",
             three_digits(100.0 * self.explained)
         )
     }

@@ -93,9 +93,9 @@ impl Check for Whiteness {
         if let Some(NoiseSpan { lags, first_coefficient, beyond }) = significant {
             return write!(
                 f,
-                "correlated up to lag {lags} ({first_coefficient:.2} at lag 1), but not at longer lags ({beyond}), \
-                 as with noise on the response, which least squares ignores: the parameters are \
-                 biased by more than their standard errors"
+                "correlated up to lag {lags} ({first_coefficient:.2} at lag 1), but not at longer lags ({beyond}): \
+                 noise on the response has this effect. Least squares ignores this noise, so the parameters \
+                 are biased by more than their standard errors"
             );
         }
         write!(f, "{test}; {}", residual.clause(test.is_significant()))

@@ -195,7 +195,7 @@ fn empty_record() {
 #[test]
 fn uneven_time_steps() {
     let text = with_line(18, "0.0615,1,0");
-    identify(&text, "", &["the step up to line 19 is 0.0065 s, the usual step 0.004 s"]);
+    identify(&text, "", &["the step up to line 19 is 0.0065 s, but the usual step is 0.004 s"]);
 }
 
 #[test]

@@ -65,8 +65,8 @@ pub struct Estimated {
 pub struct Undetermined {
     /// Ratio of the singular value of this combination to that of the best determined combination.
     pub relative_singular_value: f64,
-    /// Parameters, each with its weight in the unit of the parameter. If a multiple of all weights
-    /// is added to the parameters, the fit to the data does not change.
+    /// Parameters, each with its weight in the unit of the parameter. If the same multiple of every
+    /// weight is added to its parameter, the fit to the data does not change.
     pub terms: Vec<(Parameter, f64)>,
 }
 

@@ -28,8 +28,8 @@ pub struct ResponseEstimate {
     pub settled: bool,
 }
 
-/// Fits the frequency responses of one or several records of a machine; each record has the degrees
-/// of freedom of its forces, counted from 0.
+/// Fits the frequency responses of one or several records of a machine. The second entry of a
+/// record is the list of the degrees of freedom of its forces, counted from 0.
 ///
 /// An average over segments smooths a response with |W|², the squared magnitude of the spectrum of
 /// the window. The bias is computed from the identified system and subtracted from the data, and

@@ -1,7 +1,7 @@
 //! Limits of this crate, each with what happens on either side.
 
-/// Maximum ratio of noise power to power on a line that is used in the weighted linear estimate;
-/// lines with more noise have zero weight.
+/// Maximum ratio of the noise power of the motion to the power of the motion on a line of the
+/// weighted linear estimate; a line with more noise has zero weight.
 pub(crate) const WEIGHTING_CLEAR: f64 = 0.1;
 
 /// Maximum number of Gauss–Newton steps after each change of the delay in a search for the delay of
@@ -113,7 +113,7 @@ pub(crate) const MAX_PULSE_EFFECTS: usize = 1 << 24;
 pub(crate) const PULSE_ROUNDS: usize = 8;
 
 /// Change of the amplitudes of pulse errors, in standard deviations of the stated noise, below
-/// which the rounds between the errors of pulses and the fit end.
+/// which the alternating rounds ([`PULSE_ROUNDS`]) end.
 pub(crate) const PULSE_SETTLED: f64 = 0.02;
 
 /// Relative change of the noise levels that ends the rounds of weighting.

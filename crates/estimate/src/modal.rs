@@ -96,9 +96,9 @@ impl Estimate {
     }
 }
 
-/// Returns the modes of a machine that was identified elsewhere or read from a file, as
-/// [`Estimate::modes`] does; `degrees_of_freedom` belong to the residual variance of its
-/// covariance.
+/// Returns the modes of a machine that was identified by another method or read from a file, as
+/// [`Estimate::modes`] does; `degrees_of_freedom` is the number of degrees of freedom of the
+/// residual variance in the covariance of this machine.
 ///
 /// # Errors
 /// [`EstimateError::Model`] if the eigenvalues do not converge.
@@ -133,9 +133,9 @@ fn modes(
     Ok(partners.iter().enumerate().map(identify).collect())
 }
 
-/// Pairs the real eigenvalues of overdamped modes. If there are only two, they form a pair; of
-/// more, those whose shapes agree best form pairs, if their MAC is at least [`SAME_SHAPE`]. With
-/// proportional damping the two shapes of a pair are equal.
+/// Pairs the real eigenvalues of overdamped modes. If there are only two, they form a pair. If
+/// there are more, the pairs with the most similar shapes are formed first; the MAC of a pair must
+/// be at least [`SAME_SHAPE`]. With proportional damping the two shapes of a pair are equal.
 fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
     let mut partners = vec![None; modes.len()];
     let real: Vec<usize> = (0..modes.len()).filter(|at| !modes[*at].oscillates()).collect();
@@ -269,8 +269,8 @@ struct Value {
 }
 
 /// Returns the modulus (rad/s) and the damping ratio of a mode from the `sum` and the product
-/// (`square`) of two eigenvalues: that of the mode and that of its partner; `gradient` belongs to
-/// the eigenvalue of the mode.
+/// (`square`) of the eigenvalues of the mode and its partner; `gradient` is the derivative of the
+/// eigenvalue of the mode.
 fn modulus_and_damping(
     mode: &Mode,
     gradient: &DVector<Complex<f64>>,

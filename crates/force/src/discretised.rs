@@ -166,13 +166,13 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
     change
 }
 
-/// Returns the factors of the input matrix, or an error if it is nearly singular: some force then
-/// has almost no effect on the end of the step.
+/// Returns the factors of the input matrix, or an error if the matrix is nearly singular: some
+/// force then has almost no effect on the state at the end of the step.
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
-    // The input matrix of a short step is about I in step units; the test with 1 as a reference
-    // thus works for a single force, too.
+    // In step units, the input matrix of a short step is about I. The smallest singular value is
+    // therefore compared with at least 1, so that the test also works for a single force.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });

@@ -113,8 +113,8 @@ impl Evidence {
         let most = components.transmitted();
         let mut reach = most;
         let mut best = Self::at_reach(components, most, colour, noise);
-        // Only a white force has an upper end; the falling spectrum of a coloured force has none,
-        // so this force reaches all components.
+        // The reach is searched only for a white force. The spectrum of a coloured force falls
+        // without a limit, so a coloured force reaches all components.
         while colour == 0 && reach > 2 {
             reach = ((reach as f64 * limits::REACH_RATIO) as usize).max(2);
             best = best.better(Self::at_reach(components, reach, colour, noise));
@@ -268,8 +268,8 @@ impl Evidence {
             .expect("there are starts")
     }
 
-    /// Returns initial noise variances: the mean beyond the reach or, if few data remain there, low
-    /// quantiles of all components.
+    /// Returns initial noise variances: the mean square of the data beyond the reach or, if few
+    /// data remain there, low quantiles of the mean squares of all components.
     fn first_noises(components: &Components, reach: usize) -> Vec<f64> {
         let tail_weight: f64 =
             components.weight[reach..].iter().sum::<f64>() + components.outside_weight;
@@ -302,8 +302,8 @@ impl Evidence {
             log += (data - within) * ratio.ln();
             force /= data;
             let cost = match noise {
-                // If the noise variance is known, this variance and the ratio give the variance of
-                // the force.
+                // If the noise variance is known, it gives the variance of the force, by the ratio
+                // of the two variances.
                 Some(noise) => {
                     let given = noise / ratio;
                     data * given.ln() + log + data * force / given

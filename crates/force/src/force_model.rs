@@ -105,7 +105,7 @@ impl LowPass {
     }
 }
 
-/// Returns the covariance that white noise gives the state of u̇ = A u + noise within a unit of
+/// Returns the covariance, due to white noise, of the state of u̇ = A u + noise after a unit of
 /// time: a series over a short step, which is doubled until it covers the unit. Only sums of
 /// squares are added.
 ///

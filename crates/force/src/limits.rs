@@ -9,8 +9,8 @@ pub(crate) const CURVATURE_STEP: f64 = 0.15;
 /// Standard deviation of a logarithm that the measurement does not determine.
 pub(crate) const UNDETERMINED_LOGARITHM: f64 = 1.5;
 
-/// Standard deviation of a logarithm whose effect on a standard error is at most a hundredth; the
-/// best point alone is then enough.
+/// Standard deviation of the logarithm of a parameter below which the best point alone is enough:
+/// the effect of such a deviation on a standard error is at most a hundredth.
 pub(crate) const NARROW_POSTERIOR: f64 = 0.02;
 
 /// Largest logarithm of a ratio: the likelihood of a posterior point divided by its approximation.
@@ -22,8 +22,8 @@ pub(crate) const POINT_WEIGHT: f64 = 1.0;
 /// previous order; the first two start from a grid.
 pub(crate) const FORCE_ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
 
-/// Smallest gain in the log-likelihood by an order of the force model above 4 over the best lower
-/// order. If the gain is smaller, no higher order is tried.
+/// Minimum gain in log-likelihood of the force model with an order above 4, relative to the best
+/// lower order. If the gain is smaller, no higher order is tried.
 pub(crate) const ORDER_GAIN: f64 = 1.0;
 
 /// Maximum number of states of all forces; with more, long records take too long.
@@ -50,8 +50,8 @@ pub(crate) const CONVERGED_COVARIANCE: f64 = 1e-12;
 /// likelihood is needed.
 pub(crate) const CONVERGED_LIKELIHOOD: f64 = 1e-7;
 
-/// Number of time constants 1/ω_c after which the initial state of a force model has decayed:
-/// e^(−0.1·512) for order 16.
+/// Number of time constants 1/ω_c after which the initial state of a force model has decayed; for
+/// order 16 by the factor e^(−0.1·512).
 pub(crate) const DECAY_TIME: f64 = 512.0;
 
 /// Largest norm of a rate matrix times a sub-step; the terms of the series then fall by half or
@@ -74,7 +74,7 @@ pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
 /// Colours tried: white, random walk, integrated random walk.
 pub(crate) const COLOURS: [i32; 3] = [0, 1, 2];
 
-/// Minimum number of components that can carry a force for which a colour is tried. If a white
+/// Minimum number of components that can carry a force; with fewer, only white is tried. If a white
 /// force drives fewer than this number, a colour needs the gain [`COLOUR_GAIN`]: the amplitudes of
 /// few components may follow a slope by chance.
 pub(crate) const COLOUR_COMPONENTS: f64 = 16.0;
@@ -101,12 +101,12 @@ pub(crate) const ENDLESS_PRIOR: f64 = 0.25;
 /// Number of reaches on either side of the best reach that are averaged.
 pub(crate) const NEIGHBOURING_REACHES: usize = 16;
 
-/// Minimum share of driven components of a band; with less the force consists of single lines. The
+/// Minimum share of driven components of a band; below it the force consists of single lines. The
 /// silent components then determine where the lines are, and the reach adds no information.
 pub(crate) const BAND_SHARE: f64 = 0.5;
 
-/// Minimum number of driven components of a band; with fewer the force consists of single lines, at
-/// any share.
+/// Minimum number of driven components of a band; below it the force consists of single lines, even
+/// if [`BAND_SHARE`] is exceeded.
 pub(crate) const BAND_COMPONENTS: f64 = 6.0;
 
 // Regularisation

@@ -30,9 +30,9 @@ pub enum Rule {
     /// # Source
     /// Golub, Heath & Wahba (1979).
     Gcv,
-    /// The corner of an L-curve: the logarithm of the residual per remaining datum over the
-    /// logarithm of ‖force‖. It is searched for only where this residual is at most twice the noise
-    /// (in variance).
+    /// The corner of an L-curve: the logarithm of ‖force‖² over the logarithm of ‖residual‖²/(data
+    /// − unknowns). The corner is searched for only where this residual variance is at most twice
+    /// that of the noise.
     ///
     /// The curve of the textbooks has ‖residual‖, which vanishes when there are as many unknowns as
     /// data; the corner of this curve is then at zero damping. If the residual is far above the

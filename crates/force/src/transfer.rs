@@ -30,7 +30,7 @@ pub trait FrequencyResponse {
     ) -> Option<DMatrix<Complex<f64>>>;
 
     /// Returns the dynamic stiffness, if channels and forces are the degrees of freedom of one
-    /// matrix: places × places, in N/m.
+    /// matrix: n × n for n degrees of freedom, in N/m.
     fn stiffness_matrix(&self, _omega: f64) -> Option<DMatrix<Complex<f64>>> {
         None
     }

@@ -129,8 +129,8 @@ fn propagate(
     Ok(force.with_standard_error(Some(error)).with_residual(residual))
 }
 
-/// Returns gᵀ Σ g for every entry of a matrix of this shape; g are the derivatives of this entry,
-/// from one matrix per parameter.
+/// Returns gᵀ Σ g for every entry of a matrix of this shape. The vector g has the derivatives of
+/// the entry with respect to the parameters; `derivatives` has one matrix per parameter.
 fn propagated(
     covariance: &DMatrix<f64>,
     (rows, columns): (usize, usize),

@@ -132,8 +132,8 @@ pub enum IntegrateError {
         "the LU factors of the {} need at least {:.2} GB, more than the limit of {:.2} GB: the factors \
          of a three-dimensional body have many additional entries. Use a coarser model, a scheme \
          whose matrix is diagonal (central-difference with lumped masses), or raise the limit \
-         (`factor_memory_gb` of the system, `SparseSystem::with_factor_limit`); the time then \
-         grows faster than the memory",
+         (`factor_memory_gb` of the system, `SparseSystem::with_factor_limit`); the computing \
+         time then grows faster than the memory",
         message::count(*dof, "degree of freedom"), 1e-9 * *bytes as f64, 1e-9 * *limit as f64
     )]
     FactorsTooLarge {
@@ -238,7 +238,7 @@ pub enum IntegrateError {
     #[error(
         "the response that repeats every {period} s was not found to rounding accuracy: after {products} \
          passes over the period the best response still changes by {missed:.1e} of its size in a period, \
-         because much of the free motion lasts longer; choose a longer period",
+         because much of the free motion lasts longer than a period; choose a longer period",
         period = message::number(*period)
     )]
     PeriodNotClosed {
@@ -253,8 +253,8 @@ pub enum IntegrateError {
     /// Newton's method found no periodic response of a nonlinear system.
     #[error(
         "no response that repeats every {period} s was found from this initial motion: the best one \
-         still changes by {missed:.1e} of its size in a period; choose an initial motion nearer to it, \
-         or a longer settling time",
+         still changes by {missed:.1e} of its size in a period; choose an initial motion nearer to \
+         the periodic response, or a longer settling time",
         period = message::number(*period)
     )]
     NoOrbit {

@@ -60,7 +60,7 @@ pub(crate) const NUMBERS_PER_MESSAGE: usize = 1 << 20;
 pub(crate) const STEP_RESIDUAL: f64 = 1e-12;
 
 /// Residual, relative to the largest acceleration, that is accepted if no Newton step reduces it: a
-/// small extension between large displacements has a rounding error.
+/// small difference of large displacements has a rounding error.
 pub(crate) const STEP_RESIDUAL_ROUNDING: f64 = 1e-9;
 
 /// Maximum number of Newton steps.
@@ -106,8 +106,8 @@ pub(crate) const SEARCH_BYTES: usize = 1 << 30;
 /// Maximum number of vectors of a Krylov space; each costs a pass over the period.
 pub(crate) const SEARCH_VECTORS: usize = 1000;
 
-/// Maximum number of degrees of freedom for which the derivative of a period is formed as a
-/// matrix; above it Newton steps are found in a Krylov space.
+/// Maximum number of degrees of freedom for which the derivative of the map over a period is formed
+/// as a matrix; above it Newton steps are found in a Krylov space.
 pub(crate) const MONODROMY_DOF: usize = 64;
 
 /// Relative residual of a Newton step in a Krylov space: each step then reduces the change of the
@@ -148,7 +148,7 @@ pub(crate) const MULTIPLIER_CHECK_INTERVAL: usize = 10;
 pub(crate) const AMPLIFICATION_DOF: usize = 20;
 
 /// Maximum number of degrees of freedom for which all eigenvalues of a dense matrix are computed;
-/// above it Krylov spaces give the largest.
+/// above it only the largest eigenvalues are computed, in Krylov spaces.
 pub(crate) const DENSE_EIGENVALUE_DOF: usize = 200;
 
 /// Largest growth per step that is accepted. Rounding turns the double eigenvalue 1 of a free body
@@ -259,8 +259,8 @@ pub(crate) const NEGLIGIBLE_EIGENVALUE: f64 = 1e-14;
 /// eigenvalue.
 pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-9;
 
-/// Smallest norm of a unit eigenvector, after its parts along other eigenvectors of the same
-/// eigenvalue are subtracted, for which it is independent of these other eigenvectors.
+/// Minimum norm of the part of a unit eigenvector that is orthogonal to the other eigenvectors of
+/// the same eigenvalue; above it the eigenvector is independent of these other eigenvectors.
 pub(crate) const INDEPENDENT_EIGENVECTOR: f64 = 1e-6;
 
 /// Number of eigenvalues that are examined in addition to the requested modes, because the order of

@@ -65,8 +65,8 @@ fn parse_details(head: &str) -> Vec<(String, String)> {
     if lines.first().is_some_and(|line| line.trim() == "-1") {
         return once(universal_details(&lines));
     }
-    // In a LabVIEW header, name and value are separate fields; elsewhere such a line is a row of
-    // names.
+    // In a LabVIEW header, name and value are separate fields; in other files such a line is a row
+    // of names.
     let is_labview = lines.first().is_some_and(|line| line.starts_with("LabVIEW Measurement"));
     let signs: &[char] = if is_labview { &['\t', ',', ';'] } else { &[':', '='] };
     let above_table = lines.iter().take_while(|line| !begins_table(line));

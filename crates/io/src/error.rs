@@ -306,8 +306,8 @@ pub enum IoError {
         value: f64,
     },
     /// The instants of the time column are not equally spaced.
-    #[error("{}", Message(format_args!("{file}: the time steps are not uniform: the step up to {at} is {} s, the usual step \
-         {} s ({})",
+    #[error("{}", Message(format_args!("{file}: the time steps are not uniform: the step up to {at} is {} s, \
+         but the usual step is {} s ({})",
         message::number(six_digits(*step)),
         message::number(six_digits(*usual)),
         remedy(*step, *usual))))]

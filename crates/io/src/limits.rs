@@ -18,8 +18,9 @@ pub(crate) const SIMULATION_MEMORY: usize = 1 << 30;
 /// analysers are shorter.
 pub(crate) const DETAILS_BYTES: u64 = 64 << 10;
 
-/// Memory of a record in the lists of the records of a file, in bytes, without the texts of its
-/// identifier: two texts, its rows, and its part of a tree and of growing lists.
+/// Memory of each record in the lists of the records of a file, in bytes: two strings for its
+/// identifier, its rows, and its part of a tree and of growing lists. The texts in the strings are
+/// counted separately.
 #[cfg(feature = "parquet")]
 pub(crate) const RECORD_BYTES: usize = 256;
 

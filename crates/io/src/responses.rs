@@ -246,8 +246,8 @@ impl FrequencyResponses {
         let any = AveragedSegments::COLUMNS[..4].iter().any(|name| table.find(name).is_ok());
         if any && responses.segments.is_none() {
             responses.remarks.push(format!(
-                "the columns {} do not state the same possible segments in every row: the \
-                 bias of the window was not corrected",
+                "the bias of the window was not corrected, because the columns {} are incomplete, differ from row \
+                 to row, or describe impossible segments",
                 AveragedSegments::COLUMNS.join(", ")
             ));
         }

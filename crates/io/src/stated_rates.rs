@@ -91,7 +91,7 @@ pub(crate) fn with_own_times(mut contents: Contents) -> Contents {
     });
     let time_of_column: Vec<Option<usize>> = time_of_column.collect();
     for (column, time) in contents.columns.iter_mut().zip(time_of_column) {
-        // A time column has priority over a rate that a number states.
+        // A time column has priority over a sampling rate that the file states as a number.
         if let (Axis::Unknown | Axis::Stated { .. } | Axis::Contradiction { .. }, Some(time)) =
             (column.axis, time)
         {

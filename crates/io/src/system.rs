@@ -108,8 +108,8 @@ impl Described {
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
         "the machine has {dof} degrees of freedom in sparse matrices, too many for a computation that needs all entries \
-         of the matrices: simulate computes its response, stability the largest steps, and modes with `modes` \
-         some of its modes; for other computations reduce it to the measured degrees of freedom"
+         of the matrices. Possible commands are simulate (response), stability (largest steps) and modes with \
+         `modes` (some of the modes); for other computations reduce the machine to the measured degrees of freedom"
     );
     IoError::Description { file: file.into(), what }
 }

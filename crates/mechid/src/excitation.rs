@@ -308,8 +308,8 @@ mod figure {
     /// Minimum number of points of a drawn period: enough to show the force between its samples.
     const DRAWN_POINTS: usize = 4096;
 
-    /// Draws one period of each input, force (N) over time (s), above the amplitudes (N) of the
-    /// lines.
+    /// Draws one period of each input, force (N) over time (s), and in a last panel the amplitudes
+    /// (N) of the lines of all inputs.
     ///
     /// # Errors
     /// [`SignalError`] if a period cannot be interpolated.

@@ -92,8 +92,8 @@ pub struct MachineStability {
     pub spectral_radius: f64,
 }
 
-/// Compares schemes for an oscillation with a damping ratio, at any number of steps, each a
-/// fraction of the undamped period, and for a machine if one is given.
+/// Compares schemes for an oscillation with a damping ratio, and for a machine if one is given.
+/// Each of `steps` is the length of a step as a fraction of the undamped period.
 ///
 /// ```
 /// use mechid::integrate::Houbolt;

@@ -356,8 +356,8 @@ fn sensor_variance(
     (meat, unknowns)
 }
 
-/// Returns, for every line, the mean over the outputs of the ratio of sensor noise variance to
-/// squared level.
+/// Returns, for every line, the mean over the outputs of the ratio of the sensor noise variance to
+/// the squared level of the output in the weights.
 fn mean_sensor(fit: &Fit<'_>, noise: &Noise) -> Vec<f64> {
     let levels = &fit.weights.level;
     let mut mean = vec![0.0; fit.lines.len()];

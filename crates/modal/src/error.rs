@@ -41,7 +41,7 @@ pub enum ModalError {
     /// An input is a combination of the other inputs on every line.
     #[error(
         "input {input} is a combination of the other inputs (independent share {own_share:.1e}): their responses \
-         cannot be separated; record a test in which it differs, or leave it out"
+         cannot be separated; record a test in which this input varies independently, or leave this input out"
     )]
     DependentInputs {
         /// Index of the input.

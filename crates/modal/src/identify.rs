@@ -163,8 +163,8 @@ struct Identification<'a> {
     fit: Fit<'a>,
     noise: Noise,
     dropped: Vec<DroppedCandidate>,
-    /// `true` after the first choice of the residual powers; from this point on the noise is known
-    /// well enough.
+    /// `true` after the first choice of the residual powers. The noise is then known well enough to
+    /// choose these powers again after a mode is removed.
     has_chosen_powers: bool,
 }
 
@@ -291,7 +291,7 @@ impl<'a> Identification<'a> {
         self.add_hidden(required, most);
     }
 
-    /// Adds modes whose response the fit attributes to the unmeasured force of a mode nearby. A
+    /// Adds modes whose response the fit attributes to the unmeasured force on a nearby mode. A
     /// mode is added if the likelihood of fit and noise together rises by at least the penalty of
     /// its parameters.
     fn add_hidden(&mut self, required: f64, most: usize) {
@@ -402,8 +402,8 @@ impl<'a> Identification<'a> {
             trial.model.select(&retained);
             trial.refresh();
             trial.search_roughly_to(self.fit.cost() + required);
-            // Another mode may take the place of the removed one and leave the band or the
-            // permitted range of damping: it would be lost, too.
+            // Another mode may move to the place of the removed mode and so leave the band or the
+            // permitted range of damping. This mode would then be lost, too.
             let is_lost = |(before, after): (&usize, &Complex<f64>)| -> bool {
                 self.is_possible(self.fit.model.poles[*before]) && !self.is_possible(*after)
             };
@@ -444,9 +444,9 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Returns the modes in the band that were requested: those nearest to the stated frequencies,
-    /// and of these as many as stated, those with the largest gains. Without a request these are
-    /// all modes in the band.
+    /// Returns which modes in the band were requested: the modes nearest to the stated frequencies,
+    /// or all modes if no frequency is stated. If a number of modes is stated, only this number of
+    /// these modes is requested: those with the largest gains.
     fn requested(&self) -> Vec<bool> {
         let poles = &self.fit.model.poles;
         let mut requested = stated_modes(poles, &self.settings.near_hz);
@@ -479,8 +479,8 @@ impl<'a> Identification<'a> {
         self.fit.search_roughly();
     }
 
-    /// Lists the modes for which there is a reason as rejected, and returns the indices of the
-    /// other modes.
+    /// Records the rejected modes, each with its reason, and returns the indices of the other
+    /// modes.
     fn reject(&mut self, reasons: &[Option<DropReason>]) -> Vec<usize> {
         for (pole, reason) in self.fit.model.poles.iter().zip(reasons) {
             if let Some(reason) = reason {
@@ -617,8 +617,8 @@ impl<'a> Identification<'a> {
     }
 }
 
-/// Returns whether the mode has no measurable damping, as a sinusoid such as mains hum. It stays in
-/// the model, so that it does not count as noise near it, but it is not reported.
+/// Returns whether the mode has no measurable damping, like a sinusoid (for example mains hum). The
+/// mode stays in the model, so that its response does not count as noise, but it is not reported.
 fn is_sinusoid(reason: &DropReason) -> bool {
     matches!(reason, DropReason::UndeterminedDamping { .. })
 }

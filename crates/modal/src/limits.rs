@@ -11,10 +11,11 @@ pub const DEPENDENT_COLUMN: f64 = 1e-11;
 pub const MAX_STEPS: usize = 40;
 /// Largest number of damping increases within a step before the search ends.
 pub const MAX_DAMPING_INCREASES: usize = 14;
-/// Decrease of −2 log L in a step below which the last search has converged: at this limit the
-/// estimates differ from the optimum by a few hundredths of their standard errors.
+/// Decrease of −2 log L in one step. At a smaller decrease the last search has converged: its
+/// estimates then differ from the optimum by a few hundredths of their standard errors.
 pub const COST_TOLERANCE: f64 = 1e-3;
-/// Decrease of −2 log L in a step below which a search between two changes of the model ends.
+/// Decrease of −2 log L in one step. At a smaller decrease, a search between two changes of the
+/// model ends.
 pub const ROUGH_COST_TOLERANCE: f64 = 0.5;
 /// Maximum number of steps of a search while noise and number of modes are still unknown.
 pub const ROUGH_STEPS: usize = 10;
@@ -120,8 +121,8 @@ pub const DEPENDENT_EQUATION: f64 = 1e-9;
 pub(crate) const MAX_DELAY_TURNS: f64 = 1.0;
 /// Number of outputs that give the initial estimate of the delay.
 pub(crate) const DELAY_OUTPUTS: usize = 4;
-/// Maximum number of Gauss–Newton steps of the delays at initial poles: an estimate that the final
-/// modes refine.
+/// Maximum number of Gauss–Newton steps of the delays with the initial poles. This gives rough
+/// delays, which are refined with the final modes.
 pub(crate) const ROUGH_DELAY_STEPS: usize = 4;
 /// Maximum number of Gauss–Newton steps of the delays with the final modes.
 pub(crate) const DELAY_STEPS: usize = 10;

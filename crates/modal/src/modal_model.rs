@@ -99,8 +99,9 @@ impl ModalTerm {
         2 + 2 * self.shape.len() + 2 * self.participation.len()
     }
 
-    /// Returns the derivatives of the response of an output to forces with respect to those
-    /// parameters of the mode that change it, each with the index of the parameter.
+    /// Returns the derivatives of the response of an output to forces with respect to the
+    /// parameters of the mode that affect this response. Each derivative has the index of its
+    /// parameter.
     fn derivatives(&self, output: usize, omega: f64, forces: &[C]) -> Vec<(usize, C)> {
         let pole = self.pole();
         let Kernel { value, mirror, slope, mirror_slope } = Kernel::from_force(pole, omega);

@@ -82,8 +82,8 @@ pub enum DropReason {
         /// Required decrease.
         required: f64,
     },
-    /// The damping ratio is not significantly larger than zero, as of a sinusoid such as mains hum.
-    /// The mode is part of the model.
+    /// The damping ratio is not significantly larger than zero, as for a sinusoid (for example
+    /// mains hum). The mode is part of the model.
     UndeterminedDamping {
         /// Standard error of the damping ratio.
         standard_error: f64,
@@ -106,7 +106,7 @@ pub enum DropReason {
         ratio: f64,
     },
     /// The mode is part of the model, but was not requested: other modes are nearer to the stated
-    /// frequencies or, of the stated number of modes, explain more.
+    /// frequencies, or the stated number of modes is reached by modes that explain more.
     NotRequested,
 }
 
@@ -121,8 +121,7 @@ impl DropReason {
             Self::OutsideBand => "outside of the band",
             Self::Twin { .. } => "the same as another mode",
             Self::Undriven { .. } => "driven by unmeasured forces",
-            Self::BeyondNumber { .. } => "weaker than the modes asked for",
-            Self::NotStated => "not near a stated frequency",
+            Self::NotRequested => "not requested",
         }
     }
 }

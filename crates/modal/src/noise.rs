@@ -172,8 +172,8 @@ impl Noise {
         let initial_variance = |mode: usize| {
             let (pole, shape) = (model.poles[mode], &shapes[mode]);
             if !lines.contains(pole) {
-                // The response of a mode outside the band is smooth there; the sensor noise
-                // includes it.
+                // If a mode is outside the band, its response in the band is smooth; the sensor
+                // noise includes this response.
                 return 0.0;
             }
             let nearest = lines.omega.iter().map(|w| (w - pole.im).abs()).fold(f64::MAX, f64::min);

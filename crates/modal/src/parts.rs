@@ -19,7 +19,7 @@ pub struct PartsComparison {
     pub pairs: Vec<ModePair>,
     /// Factor for the standard errors of each mode of the whole data. It is 1 if the parts agree;
     /// otherwise it is the largest significant difference, in units of its standard error. `None`
-    /// for a mode that one of the parts alone does not determine.
+    /// if one of the parts alone does not determine the mode.
     pub error_scales: Vec<Option<f64>>,
 }
 
@@ -82,8 +82,8 @@ impl PartsComparison {
         Self { parts, pairs, error_scales }
     }
 
-    /// Returns the mode that differs most between the parts: the mode in both parts, and their
-    /// pair. `None` if the parts have no common mode.
+    /// Returns the mode that differs most between the parts: its estimates in the first and in the
+    /// second part, and the comparison of these estimates. `None` if the parts have no common mode.
     pub fn largest_difference(&self) -> Option<([&ComparedMode; 2], &ModePair)> {
         let pair = self.pairs.iter().min_by(|a, b| p_value(a).total_cmp(&p_value(b)))?;
         let [first, second] = &self.parts;

@@ -26,8 +26,8 @@ pub(crate) struct BlockProducts {
     derivatives: Vec<f64>,
 }
 
-/// Effect of the unmeasured force on a mode on the two unknowns of its shape, for a whitened shape
-/// of 1.
+/// Covariances that the unmeasured force on a mode causes in the two unknowns of its shape, for a
+/// whitened shape of 1.
 #[derive(Debug, Clone)]
 pub(crate) struct ProcessEffect {
     /// Covariance of the two unknowns.
@@ -93,8 +93,8 @@ pub(crate) struct Scores<'a> {
 }
 
 impl Scores<'_> {
-    /// Adds the variance of the score that the unmeasured force of one mode causes, and returns its
-    /// effect on the shape of the mode.
+    /// Adds to `meat` the variance of the score due to the unmeasured force on one mode, and
+    /// returns the effect of this force on the shape of the mode.
     pub(crate) fn add_process(
         &self,
         fit: &Fit<'_>,

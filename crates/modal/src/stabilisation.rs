@@ -11,8 +11,8 @@ pub const STABLE_FREQUENCY: f64 = 0.01;
 /// Largest relative change of the damping ratio of a stable pole from one order to the next.
 pub const STABLE_DAMPING: f64 = 0.05;
 
-/// Largest value of 1 − MAC for a stable pole, where the MAC compares its participations or shapes
-/// of one order and the next.
+/// Largest value of 1 − MAC for a stable pole. The MAC compares the participations (or shapes) of
+/// the pole in two successive orders.
 pub const STABLE_VECTOR: f64 = 0.02;
 
 /// Minimum radius of a cluster, in relative frequency: the half-power width of very lightly damped
@@ -26,8 +26,8 @@ const CLUSTER_REACH: f64 = 0.005;
 /// of the centre.
 const CLUSTER_DAMPING: f64 = 0.3;
 
-/// Distance from the median of a cluster, in decay rates, within which further poles belong to this
-/// cluster.
+/// Distance in frequency from the median of a cluster within which further poles belong to this
+/// cluster, relative to the decay rate of the median.
 const CLUSTER_CLAIM: f64 = 0.3;
 
 /// Pole of a model of one order.
@@ -35,8 +35,8 @@ const CLUSTER_CLAIM: f64 = 0.3;
 pub struct Pole {
     /// λ, in rad/s, with Im λ > 0 and Re λ < 0.
     pub pole: Complex<f64>,
-    /// Participation of the inputs (tables of frequency responses) or shape of the outputs (ambient
-    /// records) of unit length.
+    /// Vector of unit length: participation of the inputs (tables of frequency responses) or shape
+    /// of the outputs (ambient records).
     pub vector: DVector<Complex<f64>>,
 }
 

@@ -1,5 +1,5 @@
-//! Score and information from the residuals of one line about the unmeasured forces on the modes
-//! near this line.
+//! Score and information about the unmeasured forces on the modes near a line, from the residuals
+//! of this line.
 
 use nalgebra::Complex;
 

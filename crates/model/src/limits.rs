@@ -31,7 +31,7 @@ pub(crate) const SINGULAR_VALUES_DOF: usize = 64;
 pub(crate) const HARMONICS: usize = 9;
 
 /// Number of instants per period: enough to avoid aliasing of the ninth power of a sum of nine
-/// harmonics, multiplied by one of them.
+/// harmonics, multiplied by one of these harmonics.
 pub(crate) const INSTANTS: usize = 128;
 
 /// Maximum number of Newton steps for one amplitude of a backbone.

@@ -88,8 +88,8 @@ impl Sdof {
         self.sampled(force, x0, v0, |_, right| right)
     }
 
-    /// Computes the response; `end` returns the force just before the end of a step from the
-    /// samples at its beginning and end.
+    /// Computes the response; `end` computes the force just before the end of a step from its two
+    /// arguments: the samples at the beginning and at the end of the step.
     fn sampled(
         &self,
         force: &Record,

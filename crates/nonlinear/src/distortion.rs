@@ -104,7 +104,8 @@ pub fn distortion(
     Ok(Distortion { even, odd, linear_leaves, kinds })
 }
 
-/// Returns the levels on even lines and on odd lines without force, if only odd lines are driven.
+/// Returns the levels on the lines without force, first for even lines, then for odd lines, if only
+/// odd lines are driven.
 fn levels(
     lines: &Lines,
     force: &Record,
@@ -286,7 +287,7 @@ impl fmt::Display for Distortion {
         }
         let mut write_level = |name: &str, level: Option<Level>| match level {
             Some(level) if level.db.is_finite() => {
-                write!(f, "; {name} distortion {:.0} dB against the response", level.db)
+                write!(f, "; {name} distortion {:.0} dB relative to the response", level.db)
             }
             Some(_) => write!(f, "; no {name} distortion above the noise"),
             None => Ok(()),

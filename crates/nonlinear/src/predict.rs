@@ -96,7 +96,7 @@ pub(super) fn initial(state: &DVector<f64>) -> Result<InitialState, EstimateErro
     Ok(InitialState::new(state.rows(0, n).into_owned(), state.rows(n, n).into_owned())?)
 }
 
-/// Returns the initial state of an open record for which [`predict`] fits the measured responses
+/// Returns the initial state with which [`predict`] fits the measured responses of an open record
 /// best; the error of each channel is divided by the size of the channel.
 ///
 /// Use only the first samples, over some time constants of the system: later samples do not depend

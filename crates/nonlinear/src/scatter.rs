@@ -118,7 +118,7 @@ pub(super) struct Powers {
 
 impl Powers {
     /// Adds a line: the squared magnitude of the residual of the mean period, the variance of the
-    /// mean from the number `periods` of periods, and the power of the signal, all weighted.
+    /// mean of `periods` periods, and the power of the signal, all weighted.
     pub(super) fn push(
         &mut self,
         [residual, noise, signal]: [f64; 3],

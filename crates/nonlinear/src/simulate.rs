@@ -33,9 +33,9 @@ pub(super) struct FineForce {
 }
 
 impl FineForce {
-    /// Interpolates a band-limited force by a Fourier series: that of a period or, for an open
-    /// record, that of the record followed by its mirror image, which has no jump. The number of
-    /// steps is the number that the response from `start` needs.
+    /// Interpolates a band-limited force by the Fourier series of one period. For an open record
+    /// this period is the record followed by its mirror image, so that the force has no jump. The
+    /// number of steps is the number that the response from `start` needs.
     pub(super) fn sufficient(
         force: &Record,
         system: &NonlinearSystem,

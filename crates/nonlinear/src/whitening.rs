@@ -42,8 +42,8 @@ struct NoiseStep {
 pub(super) struct Filter {
     /// Gains of all samples side by side, 2n × n each.
     gains: DMatrix<f64>,
-    /// For all samples side by side, the inverse of the triangular factor of the covariance of the
-    /// innovations, n × n each.
+    /// Inverses of the triangular factors of the covariances of the innovations: n × n for each
+    /// sample, all samples side by side.
     inverses: DMatrix<f64>,
     /// Sum of the logarithms of the determinants of the covariances.
     log_determinant: f64,

@@ -71,9 +71,9 @@ pub trait SumOfSquares {
     /// prevents it.
     fn linearise(&mut self) -> Option<Self::Linearisation>;
 
-    /// Returns Jᵀr″ with r″ the second derivative of the residuals along `change`, a change of the
-    /// parameters; `None` if r″ is not known; steps are then not corrected. The change is a list,
-    /// one entry for each parameter, in its unit.
+    /// Returns Jᵀr″ where r″ is the second derivative of the residuals along `change`. `None` if r″
+    /// is not known; steps are then not corrected. `change` is a change of the parameters: one
+    /// entry for each parameter, in its unit.
     fn curvature(
         &self,
         _linearisation: &Self::Linearisation,
@@ -191,7 +191,7 @@ pub fn minimise<P: SumOfSquares>(
             damping = f64::max(growth * damping, FIRST_DAMPING);
             growth *= 2.0;
             if damping > LARGEST_DAMPING {
-                // No direction descends: this is a minimum up to rounding, unless the data
+                // The cost decreases in no direction: this is a minimum up to rounding, or the data
                 // determine no minimum.
                 return Some(Minimum { parameters, cost, steps, converged: undamped.is_some() });
             }

@@ -98,7 +98,8 @@ impl Part {
         }
     }
 
-    /// Returns this part of 2 φ̄_a φ_b; `a` and `b` are (real, imaginary part) of φ_a and φ_b.
+    /// Returns the real part of 2 φ̄_a φ_b, or its imaginary part with the opposite sign; `a` and
+    /// `b` are the pairs (real part, imaginary part) of φ_a and φ_b.
     #[inline(always)]
     fn product(self, a: (f64, f64), b: (f64, f64)) -> f64 {
         match self {

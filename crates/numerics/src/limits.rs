@@ -5,8 +5,8 @@
 pub(crate) const COST_TOLERANCE: f64 = 1e-12;
 
 /// Length of a step, relative to the parameters and in scaled coordinates, that ends a search at a
-/// minimum. It is needed for data without noise: there the predicted decrease does not end the
-/// search.
+/// minimum. It is needed for data without noise: with such data the predicted decrease does not end
+/// the search.
 pub(crate) const STEP_TOLERANCE: f64 = 1e-12;
 
 /// Initial damping after a step that does not descend, relative to a Gram matrix of unit diagonal.
@@ -45,8 +45,8 @@ pub(crate) const ITERATIONS: usize = 200;
 /// bounds the truncation error, must be finite.
 pub(crate) const EXPONENTIAL_NORM: f64 = 1e11;
 
-/// Number of QR sweeps without a deflation after which a subdiagonal entry below ε‖A‖ is set to
-/// zero, too.
+/// Number of QR sweeps without a deflation; after this number, a subdiagonal entry below ε‖A‖ is
+/// also set to zero.
 pub(crate) const PATIENCE: usize = 20;
 
 /// Maximum number of QR sweeps without a deflation; if more are needed, the iteration does not

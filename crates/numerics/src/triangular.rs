@@ -12,8 +12,8 @@ use crate::limits::SMALLEST_NORM;
 /// Number of rows reduced at a time: a block of a dozen columns fits into the first-level cache.
 const BLOCK_ROWS: usize = 256;
 
-/// Number of rows that one thread reduces. It does not depend on the number of threads; therefore
-/// the results do not depend on it, either.
+/// Number of rows that one thread reduces. It is fixed, so that the results do not depend on the
+/// number of threads.
 const SEGMENT_ROWS: usize = 16_384;
 
 /// Triangular factor R of A = Q R, computed from row blocks of A; Q is never formed.
@@ -122,8 +122,8 @@ impl TriangularFactor {
         finite
     }
 
-    /// Returns the first column whose squares are too small to be distinguished from 0, and its
-    /// largest entry in R.
+    /// Returns the index of the first column whose squares are too small to be distinguished from
+    /// 0, and the largest entry of this column in R.
     pub fn too_small(&self) -> Option<(usize, f64)> {
         // The largest entry is used because the squares of small entries underflow.
         let sizes = self.r.column_iter().map(|column| column.amax()).enumerate();

@@ -112,8 +112,8 @@ impl Mapping {
     }
 }
 
-/// Minimum magnitude of a value and length of an axis; smaller values are drawn as zero, because
-/// the pixels per unit would overflow.
+/// Minimum magnitude of a value, and minimum length of an axis; smaller values are drawn as zero,
+/// because the pixels per unit would overflow.
 pub(crate) const TINY: f64 = 1e-290;
 
 /// Returns the range that shows everything from `low` to `high`, with the fraction `margin` of this

@@ -130,8 +130,8 @@ pub fn bode(
     Figure::new(title).panel(above).panel(below).share_x()
 }
 
-/// Returns estimates of one coefficient over a swept setting, with one marked line for each method,
-/// and the true value, all in the units of the axes.
+/// Returns a panel with the estimates of one coefficient over a swept setting: one marked line for
+/// each method, and a reference line for the true value. All values are in the units of the axes.
 ///
 /// The k-th method always has the k-th style, so that several sweeps can be compared.
 pub fn sweep_panel(

@@ -109,8 +109,9 @@ impl Curve {
         self
     }
 
-    /// Gives the curve style number `slot` of the cycle, independent of its position in the panel,
-    /// so that the same method has the same style in every figure.
+    /// Sets the style of the curve to number `slot` of the cycle. The style is then independent of
+    /// the position of the curve in the panel, so that the same method has the same style in every
+    /// figure.
     #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(slot);

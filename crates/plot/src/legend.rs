@@ -111,8 +111,9 @@ pub(crate) fn box_size(entries: &[Entry]) -> Point {
     (indent(entries) + widest + 2.0 * PADDING, ROW * entries.len() as f64 + 2.0 * PADDING - 4.0)
 }
 
-/// Returns the corner, inside the frame from `corner` of `size`, at which a box of size `legend`
-/// hides none of `drawn`; `None` if there is no such corner.
+/// Returns the corner of a legend, a box of size `legend`, that hides none of `drawn`; `None` if
+/// there is no such position. The box is inside the frame, which begins at `corner` and has the
+/// size `size`.
 pub(crate) fn free_place(
     corner: Point,
     size: Point,

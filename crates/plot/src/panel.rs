@@ -105,8 +105,7 @@ impl Panel {
     }
 
     /// States which part of a frequency response the panel shows, so that an interactive figure can
-    /// offer the other parts: a magnitude whose curves have phases, and the phase in the next
-    /// panel.
+    /// offer the other parts. The magnitude has curves with phases; the phase is in the next panel.
     #[must_use]
     pub fn part(mut self, part: ResponsePart) -> Self {
         self.part = Some(part);
@@ -241,8 +240,8 @@ impl Panel {
         self.curves.iter().any(Curve::has_markers)
     }
 
-    /// Returns the abscissae that the panel shows when all points are in `extent`, with or without
-    /// space for markers.
+    /// Returns the range of the abscissa of the panel. All points are in `extent`; `markers` states
+    /// whether the range has space for markers.
     pub(crate) fn x_range(&self, extent: (f64, f64), markers: bool) -> (f64, f64) {
         // Lines extend from edge to edge.
         let margin = if markers { 0.03 } else { 0.0 };

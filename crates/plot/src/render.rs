@@ -47,7 +47,8 @@ impl Figure {
         bitmap::svg_to_png(&self.to_svg()?, scale)
     }
 
-    /// Saves the figure as SVG or, at two pixels per px, as PNG, by the extension of `path`.
+    /// Saves the figure. The extension of `path` selects the format: SVG, or PNG with two pixels
+    /// per px.
     ///
     /// The file is written completely or not at all: a temporary file in the same folder is
     /// renamed.

@@ -27,7 +27,8 @@ impl Format {
     }
 }
 
-/// Saves an SVG document unchanged or, at two pixels per px, as PNG, by the extension of `path`.
+/// Saves an SVG document. The extension of `path` selects the format: SVG (unchanged), or PNG with
+/// two pixels per px.
 ///
 /// # Errors
 /// [`PlotError::Extension`] unless the extension is `.svg` or `.png`, [`PlotError::Raster`] for a

@@ -44,9 +44,9 @@ const COLORS: [Color; 3] = [Color::GREY, Color::BLUE, Color::VERMILION];
 /// same value.
 const DEFLECTION: f64 = 0.16;
 
-/// Maximum fractions of the width and of the height of the canvas that the structure fills, and a
-/// third fraction for its depth: this fraction of its horizontal extent is added to its drawn
-/// height. The script uses the same values.
+/// Maximum fractions of the width and of the height of the canvas that the structure fills. The
+/// third number is for the depth of the structure: this fraction of its horizontal extent is added
+/// to its drawn height. The script uses the same values.
 const FILLED: (f64, f64, f64) = (0.7, 0.8, 0.45);
 
 /// Maximum number of points whose names are written.
@@ -107,8 +107,8 @@ impl ShapeDrawing {
 
     /// Draws the first mode at its largest deflection on the undeformed lines, and small drawings
     /// of all modes, with the numbers for the script. The script animates the modes, so that
-    /// complex modes travel. The canvas is empty without modes, for a line with a missing point, a
-    /// mode without a displacement for each point, or a number that is not finite.
+    /// complex modes travel. The canvas is empty if there are no modes, if a line has a missing
+    /// point, if a mode has no displacement for one of the points, or if a number is not finite.
     pub fn draw(&self, label: &str) -> DrawnSet {
         let Some(first) = self.modes.first().filter(|_| self.is_drawable()) else {
             return DrawnSet { svg: Canvas::new(SIZE.0, SIZE.1).finish(label), map: Vec::new() };
@@ -205,8 +205,8 @@ impl View {
     }
 }
 
-/// Maximum number of modes for which the squares of a matrix have numbers; with more, they do not
-/// fit.
+/// Maximum number of modes for which the squares of a matrix have numbers; with more modes, the
+/// numbers do not fit.
 const NUMBERED: usize = 20;
 
 /// Draws a matrix of pure numbers from 0 to 1, row by row, as squares with their numbers; larger

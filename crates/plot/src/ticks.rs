@@ -52,8 +52,8 @@ fn multiples(low: f64, high: f64, step: f64) -> (f64, usize) {
     (first, (last - first).max(-1.0) as usize + 1)
 }
 
-/// Returns `step`, or a finer one if it gives fewer than two ticks: a single tick does not show the
-/// scale of the axis.
+/// Returns `step`, or a finer step if `step` gives fewer than two ticks: a single tick does not
+/// show the scale of the axis.
 fn step_of_two_ticks(low: f64, high: f64, step: f64) -> f64 {
     let finer = std::iter::successors(Some(step), |step| Some(nice_step(step / 2.6)));
     finer.take(3).find(|step| multiples(low, high, *step).1 >= 2).unwrap_or(step)

@@ -9,9 +9,9 @@ use mechid_signal::SignalError;
 pub enum ProblemError {
     /// No periodic response exists, or it is not unique.
     #[error(
-        "there is no unique response with the period {period} s (I − Φᴺ has a reciprocal condition of about \
-         {reciprocal_condition:.1e}, where Φᴺ is the transition matrix over the period): \
-         an undamped mode lies on a spectral line of the period, or the response overflows"
+        "there is no unique response with the period {period} s: an undamped mode lies on a spectral line of the \
+         period, or the response overflows. With the transition matrix Φᴺ over the period, I − Φᴺ has a reciprocal \
+         condition of about {reciprocal_condition:.1e}"
     )]
     NoPeriodicMotion {
         /// Period of the force, in seconds.

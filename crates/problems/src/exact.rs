@@ -105,8 +105,9 @@ pub fn exact_harmonic_periodic(
     Ok(Response::new(x?, v?, a?)?)
 }
 
-/// Response from `start` to the band-limited force: the sum of the periodic response and the free
-/// decay from `start` minus the initial state of the periodic response.
+/// Response from `start` to the band-limited force: the sum of the periodic response and a free
+/// decay. The initial state of the free decay is `start` minus the initial state of the periodic
+/// response.
 ///
 /// # Errors
 /// The errors of [`exact_harmonic_periodic`] and [`exact_zoh`].

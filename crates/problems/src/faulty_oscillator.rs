@@ -7,8 +7,8 @@ use nalgebra::Complex;
 
 use crate::error::ProblemError;
 
-/// An oscillator under a force of many lines, whose motion is integrated at eight times the
-/// sampling rate by the classical Runge–Kutta rule. With all faults zero it is linear.
+/// An oscillator under a force of many lines. The classical Runge–Kutta rule integrates the motion
+/// at eight times the sampling rate. With all faults zero the oscillator is linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaultyOscillator {
     /// Mass, in kg.

@@ -83,8 +83,8 @@ pub struct Test {
 
 /// Returns machine `index` of a series of any length, each with its test: 1 to 10 degrees of
 /// freedom, damping ratios of 0.3 to 5 %, and five kinds of machine in turn. The force has lines of
-/// 10 N with random phases up to 1.3 times the highest natural frequency, at least twenty for each
-/// degree of freedom.
+/// 10 N up to 1.3 times the highest natural frequency, with random phases; there are at least
+/// twenty lines for each degree of freedom.
 ///
 /// # Errors
 /// [`ProblemError::Model`] if a line is an undamped resonance.
@@ -102,8 +102,8 @@ pub fn series(index: u64) -> Result<Test, ProblemError> {
     steady_test(name, system, one_force, 60 + 20 * dof, index)
 }
 
-/// Returns a steady test of a machine: `count` lines of 10 N with random phases up to 1.3 times its
-/// highest natural frequency. The forces act at every degree of freedom, or only at the first,
+/// Returns a steady test of a machine: `count` lines of 10 N up to 1.3 times its highest natural
+/// frequency, with random phases. The forces act at every degree of freedom, or only at the first,
 /// whose mass is then known.
 ///
 /// # Errors

@@ -102,7 +102,7 @@ pub fn synthesise(
 }
 
 /// Returns the largest deviation of two matrices of the same shape (rows × columns), relative to
-/// the largest entry of the expected one (pure number).
+/// the largest entry of `expected` (a pure number).
 pub fn relative_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     (found - expected).abs().max() / expected.abs().max()
 }

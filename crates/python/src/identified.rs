@@ -134,9 +134,9 @@ impl Identified {
         )))
     }
 
-    /// Returns the frequencies in rad/s, and the receptances of frequencies × motions · forces in
-    /// m/N: measured (NaN on lines where the force does not act alone), and of the identified
-    /// system.
+    /// Returns the frequencies in rad/s, and the receptances (frequencies × motions · forces) in
+    /// m/N: those measured (NaN on lines where the force does not act alone), and those of the
+    /// identified system.
     fn receptances<'py>(&self, py: Python<'py>) -> PyResult<Spectra<'py>> {
         let identified = Arc::clone(&self.0);
         let compare = move || -> Result<_, AnalysisError> {

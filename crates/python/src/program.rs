@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use pyo3::prelude::*;
 
 /// Runs the program with these arguments, beginning with its name, and returns its exit code;
-/// `python` is the interpreter that runs it again for the records of a fleet.
+/// `python` is the interpreter that runs the program again for the records of a fleet.
 #[pyfunction]
 #[pyo3(signature = (arguments, python))]
 pub fn program(py: Python<'_>, arguments: Vec<OsString>, python: Option<PathBuf>) -> u8 {

@@ -1,5 +1,5 @@
-//! Simulations: of a described experiment, of the response to a force by a scheme, and of the exact
-//! response between samples; and excitations.
+//! Excitation signals, and simulation of a described experiment, of the response to a force by a
+//! scheme, and of the exact response between samples.
 
 use std::path::{Path, PathBuf};
 
@@ -24,8 +24,9 @@ type Simulated<'py> = (String, f64, Option<Machine>, Channels<'py>, Channels<'py
 /// Force, and each kind of response.
 type Channels<'py> = (Bound<'py, PyArray2<f64>>, Vec<Named<'py>>);
 
-/// Reads a described experiment: a JSON file, to whose folder the names of other files are
-/// relative, or a JSON text and its name in messages.
+/// Reads a described experiment from a JSON text or, without a text, from a JSON file. For a text,
+/// `file` is its name in messages. In a JSON file, the names of other files are relative to its
+/// folder.
 pub fn described(file: &Path, text: Option<&str>) -> Result<Experiment, IoError> {
     match text {
         Some(text) => Experiment::parse(file.display().to_string(), text),
@@ -51,8 +52,8 @@ pub fn simulate<'py>(
     Ok((run.scheme, fs, machine, measured, truth))
 }
 
-/// Computes the response of a described machine, by its scheme, to a force of samples × degrees of
-/// freedom.
+/// Computes the response of a described machine to a force of samples × degrees of freedom, with
+/// the scheme of the description.
 #[pyfunction]
 pub fn integrate<'py>(
     py: Python<'py>,

@@ -33,7 +33,7 @@ pub fn brief<T: Send, E: Failure + Send>(
 }
 
 /// Runs a computation in the pool of this process, or in a separate pool of `threads` threads, and
-/// regularly calls `poll` with the lock.
+/// regularly calls `poll` with the lock of the Python interpreter.
 ///
 /// If `poll` fails or Ctrl-C is pressed, the call returns at once; the computation continues to its
 /// end in the background, and its result is dropped.

@@ -26,8 +26,8 @@ impl Correlation {
     }
 }
 
-/// Autocorrelation of a residual (one value per sample, any unit) at the lags 1 … `lags`, judged by
-/// the statistic of Ljung and Box.
+/// Autocorrelation of a residual (one value per sample, any unit) at the lags 1 … `lags`, tested
+/// with the statistic of Ljung and Box.
 ///
 /// # Errors
 /// [`SignalError::TooShort`] unless there are more than `lags + 1` samples and lags.
@@ -156,7 +156,8 @@ fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
 }
 
 /// Returns the probability that a sum of squares of normal variables of mean zero is above `sum`.
-/// Their covariance matrix has the trace `mean`, and its square has the trace `square`.
+/// Their covariance matrix has the trace `mean`, and the square of this matrix has the trace
+/// `square`.
 ///
 /// # Source
 /// Box (1954), Annals of Mathematical Statistics 25, 290–302.

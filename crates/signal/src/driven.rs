@@ -8,8 +8,8 @@ use crate::lines;
 use crate::record::Record;
 use crate::spectrum::Spectrum;
 
-/// Returns the lines of consecutive periods of `period` samples, without DC and Nyquist, that at
-/// least one channel drives; none if no channel varies.
+/// Returns the lines that at least one channel drives, without DC and Nyquist; none if no channel
+/// varies. The record has consecutive periods of `period` samples.
 ///
 /// A driven line has at least a thousandth of the amplitude of the strongest one, and exceeds the
 /// noise:

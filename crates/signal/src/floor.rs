@@ -79,8 +79,8 @@ fn levels(powers: &[f64]) -> Vec<f64> {
     powers.rchunks_exact(limits::FLOOR_LINES).map(mean).collect()
 }
 
-/// Returns the mean of the highest lines over which the power is flat, unless the signal drives
-/// them.
+/// Returns the mean level of the highest lines, as far as their level is flat; `None` if there are
+/// too few such lines or if the signal drives them.
 fn even_level(levels: &[f64]) -> Option<f64> {
     let strongest = levels.iter().copied().fold(0.0, f64::max);
     let mut equal = 0;

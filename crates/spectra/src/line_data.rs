@@ -193,7 +193,7 @@ impl LineData {
     }
 
     /// Returns these lines followed by the lines of further records; the noise is kept if it is
-    /// known for both.
+    /// known for both sets of lines.
     ///
     /// # Errors
     /// [`SpectraError::Size`] if the number of inputs or outputs differs.

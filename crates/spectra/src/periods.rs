@@ -35,9 +35,8 @@ pub struct RepeatedPeriods {
     /// 2n, first the responses in the measured quantity, then the forces.
     sum: DMatrix<Complex<f64>>,
     half_sums: [DMatrix<Complex<f64>>; 2],
-    /// Sum Σ (z − z̄)(z − z̄)ᴴ over the periods so far, per line, 2n×2n. If the spectrum of several
-    /// periods is taken as one, it is an equivalent sum over the lines between the lines of a
-    /// period.
+    /// Sum Σ (z − z̄)(z − z̄)ᴴ over the periods so far, per line, 2n×2n. If several periods are
+    /// taken as one record, it is an equivalent sum over the lines between the lines of a period.
     scatter: Vec<DMatrix<Complex<f64>>>,
     /// Periods that are not included in the scatter yet.
     together: BetweenLines,

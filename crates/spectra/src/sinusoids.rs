@@ -54,8 +54,8 @@ impl Sinusoid {
     }
 }
 
-/// Returns the amplitudes of e^{iωt}/2 and e^{−iωt}/2 at a line; their sum is that of a cosine of
-/// amplitude 1.
+/// Returns the amplitudes of e^{iωt}/2 and e^{−iωt}/2 at a line. Their sum is the amplitude, at
+/// this line, of a cosine of amplitude 1.
 fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
     let samples = sampling.len() as f64;
     // This is the sum of a geometric series, divided by its number of terms.

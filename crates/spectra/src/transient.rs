@@ -1,5 +1,5 @@
-//! Transient of an open record, written as a load. It is the effect on the lines of the difference
-//! between the final and initial states of the record.
+//! Transient of an open record, written as a load. It is the effect that the difference between the
+//! final and initial states of the record has on the lines.
 
 use mechid_model::Matrix;
 use nalgebra::{Complex, DMatrix};

@@ -107,8 +107,9 @@ pub struct FindingRow {
 }
 
 impl SavedAnalysis {
-    /// Identifies the record that `source` opens, called `record` in the row. Every failure, also a
-    /// panic, becomes the error of the row. The same record and analysis always give the same row.
+    /// Identifies the record that `source` opens. The row names it `record`. Every failure,
+    /// including a panic, becomes the error of the row. The same record and analysis always give
+    /// the same row.
     pub fn row(
         &self,
         record: &str,

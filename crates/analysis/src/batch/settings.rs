@@ -41,8 +41,8 @@ pub struct SavedAnalysis {
     pub window: Window,
     /// Settings of the identification.
     pub identify: Identify,
-    /// Settings of the identification of a machine of named elements, whose sensors and inputs name
-    /// the columns; then `channels` and `identify` are not used.
+    /// Settings of the identification for a machine of named elements. The names of its sensors and
+    /// inputs are the names of the columns, and `channels` and `identify` are not used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub elements: Option<IdentifyElements>,
     /// Settings of a modal test, which replaces the identification; `None` without one.

@@ -80,7 +80,7 @@ fn data_of(tests: &BearingData) -> Vec<FrequencyData> {
 }
 
 /// Returns the ratio of the residual power of all tests to the noise power if the residual of any
-/// test exceeds its noise significantly; otherwise, or if the noise is not known, 1.
+/// test significantly exceeds its noise. Returns 1 if none does, or if the noise is not known.
 pub(super) fn excess(tests: &BearingData, fit: &OutputErrorFit) -> Result<f64, AnalysisError> {
     let residuals = after_spectral_fit(&data_of(tests), &fit.estimate, Extent::WholePeriod)?;
     let mut findings: Vec<Finding> =

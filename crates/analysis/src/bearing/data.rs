@@ -80,9 +80,9 @@ impl BearingData {
         data.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
     }
 
-    /// Reads tables of frequency responses, two per test: the displacement relative to the shaft
-    /// and then the acceleration of the housing per shaker force, at the same frequencies. A test
-    /// has forces in both directions, or in one direction.
+    /// Reads tables of frequency responses per shaker force. Each test has two tables at the same
+    /// frequencies: first the displacement of the housing relative to the shaft, then the
+    /// acceleration of the housing. A test has forces in both directions, or in one direction.
     ///
     /// The errors of displacement and acceleration are assumed to be independent, because they come
     /// from different sensors.
@@ -219,8 +219,8 @@ impl BearingData {
     }
 }
 
-/// Returns the mean of the periods of a test with its noise, and the source of the noise in words;
-/// without noise if there is one period, or if the periods differ by rounding alone.
+/// Returns the mean of the periods of a test with its noise, and the source of the noise in words.
+/// The mean has no noise if there is one period, or if the periods differ only by rounding.
 fn mean_with_noise(
     periods: &RepeatedPeriods,
 ) -> Result<(FrequencyData, Option<&'static str>), AnalysisError> {
@@ -284,7 +284,8 @@ fn film_data(
     let displacement = d.displacement().select_rows(keep);
     let mut force = d.force().select_rows(keep);
     for (index, row) in keep.iter().enumerate() {
-        // `a` has the accelerations as displacements; the factor converts them back.
+        // The table `a` holds displacements computed from the accelerations; the factor converts
+        // them back.
         let factor = ResponseQuantity::Acceleration.per_displacement(d.omega()[*row]) * mass;
         for direction in 0..2 {
             force[(index, direction)] -= a.displacement()[(*row, direction)] * factor;

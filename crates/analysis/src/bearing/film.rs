@@ -95,7 +95,8 @@ impl Film {
             let chosen = coefficients == Coefficients::Automatic && film.inertia.is_some();
             film.critical = fisher
                 .filter(|_| chosen)
-                // The excess multiplies the covariance, and so divides the statistic.
+                // `widen` multiplies the covariance by `before_choice`, so the statistic is divided
+                // by it.
                 .map(|fisher| EACH as f64 * fisher.inverse_cdf(1.0 - SIGNIFICANCE) / before_choice);
             film.widen(before_choice);
             return Ok(film);
@@ -162,8 +163,8 @@ impl Film {
         }
     }
 
-    /// Returns the interval of a coefficient at a level, conditional on the choice of twelve
-    /// coefficients by the test; `None` if the test has not chosen them, or if its choice does not
+    /// Returns the interval of a coefficient at a level, given that the test chose the model with
+    /// twelve coefficients. `None` if the test did not choose this model, or if its choice does not
     /// depend on the coefficient.
     pub fn interval_after_choice(&self, at: usize, level: f64) -> Option<[f64; 2]> {
         let masses = 2 * EACH..3 * EACH;

@@ -6,8 +6,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 /// Number of bisections for a limit of an interval; they reduce its error to rounding.
 const HALVINGS: usize = 80;
 
-/// Half the search range for a limit, in standard errors: the condition on a test of four
-/// coefficients at 5 % moves the limit by far less.
+/// Half the width of the search range for a limit of an interval, in standard errors. A test of
+/// four coefficients at 5 % moves the limit by far less.
 const REACH: f64 = 60.0;
 
 /// Returns the range [low, high] of the estimate `at` in which the test would have chosen the model

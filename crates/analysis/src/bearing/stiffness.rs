@@ -73,8 +73,8 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
         forces += force * d.adjoint();
         power += d * d.adjoint();
     }
-    // For two displacements the root is |det [d₁ d₂]|; divided by the mean of their squared lengths
-    // it is at most the sine of the angle between them.
+    // For two displacements the root of the determinant is |det [d₁ d₂]|. Divided by the mean of
+    // their squared lengths, this value is at most the sine of the angle between them.
     let lengths = power[(0, 0)].re + power[(1, 1)].re;
     if power.determinant().norm().sqrt() < INDEPENDENT * 0.5 * lengths {
         return None;

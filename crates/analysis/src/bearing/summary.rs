@@ -29,8 +29,8 @@ pub const LARGEST_AMPLITUDE: f64 = 0.05;
 /// Half the width of an interval at 95 %, in standard errors.
 const NORMAL: f64 = 1.96;
 
-/// Minimum relative change of the width of an interval by the choice of the model; a larger change
-/// gets a remark.
+/// Minimum relative change of the width of an interval due to the choice of the model; a larger
+/// change gets a remark.
 const MOVED: f64 = 0.02;
 
 /// Units of k, c and m.
@@ -134,7 +134,7 @@ impl Amplitude {
     fn remark(self) -> Option<String> {
         let ratio = self.over_clearance.filter(|ratio| *ratio > LARGEST_AMPLITUDE)?;
         Some(format!(
-            "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} the film is \
+            "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} of it the film is \
              not linear, and the coefficients depend on the amplitude; use smaller forces",
             significant(ratio, 2)
         ))

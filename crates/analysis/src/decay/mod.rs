@@ -117,7 +117,8 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     summary.remarks.extend(faults.iter().map(|fault| checks::sentence(fault, &whole.names)));
     summary.remarks.extend(coarse.into_iter().map(|(channel, steps)| {
         format!(
-            "the values of {} span {steps} steps of its converter: rounding of so few steps differs from noise and may appear as modes; \
+            "the values of {} span {steps} steps of its converter: rounding to these few steps \
+             does not act like noise, and may appear as modes; \
              leave the column out, or measure with a higher gain",
             summary.channels[channel].column
         )

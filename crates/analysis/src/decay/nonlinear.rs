@@ -72,7 +72,7 @@ impl BackboneRow {
 impl DecaySummary {
     /// Marks the modes whose frequency is, within four standard errors, a multiple of the frequency
     /// of the nonlinear mode at some amplitude. Without a nonlinear mode, no mode is marked,
-    /// because a multiple is a coincidence.
+    /// because then a multiple is a coincidence.
     pub(super) fn name_harmonics(&mut self, modes: &[IdentifiedMode]) {
         let named: Vec<Option<Harmonic>> =
             (0..modes.len()).map(|at| self.harmonic(modes, at)).collect();
@@ -94,7 +94,8 @@ impl DecaySummary {
         });
         let energy = |number: usize| self.modes[number - 1].energy_share;
         let strongest = backbone.modes.iter().max_by(|a, b| energy(**a).total_cmp(&energy(**b)));
-        // The interval of an uncertain frequency is wide and may contain a multiple by chance.
+        // The interval of an uncertain frequency is wide and may contain a multiple of the
+        // fundamental frequency by chance.
         let (order, of_mode) = order.zip(strongest).filter(|_| reach < HARMONIC_REACH * low)?;
         Some(Harmonic { of_mode: *of_mode, order })
     }
@@ -113,15 +114,15 @@ impl DecaySummary {
             remarks.push(format!(
                 "the amplitude does not fall exponentially: a frequency and damping that depend on the \
                  amplitude describe the response better (the Bayesian information criterion falls by \
-                 {}). {stand}; use the values given over the amplitude",
+                 {}). {stand}; use the frequencies and damping ratios that are given over the amplitude",
                 significant(backbone.gain, 3)
             ));
         }
         if let Some(at) = self.excited_again_s {
             let at = compact(at, 4);
             remarks.push(format!(
-                "the response is excited again at about {at} s, as by a second hit: the modes are not those of one \
-                 decay. Use only the samples before it (`to` {at}) or after it (`from` {at})"
+                "the response is excited again at about {at} s, for example by a second hit: the modes are not \
+                 those of one decay. Use only the samples before this time (`to` {at}) or after it (`from` {at})"
             ));
         }
         if self.analysis.modes.is_none() && self.modes.len() == self.analysis.max_modes {

@@ -6,7 +6,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Minimum ratio of the sum of squares at the beginning of the decay to the largest sum.
 const LEVEL: f64 = 0.8;
-/// Number of equal parts of a record; the mean of the last part is the constant of a channel.
+/// Number of equal parts of a record; the mean of a channel over the last part is its constant
+/// component.
 const REST: usize = 4;
 /// Number of intervals of time for the trend of the amplitude.
 const PARTS: usize = 8;
@@ -44,9 +45,9 @@ pub(super) fn release(record: &Record) -> usize {
     if rises { 0 } else { last }
 }
 
-/// Returns the logarithms of the means of the `sums`, which begin at the sample `first`, over
-/// intervals of whole periods of the strongest line; none for a record without such a line, or with
-/// too few periods.
+/// Returns the logarithms of the means of the `sums` over intervals of whole periods of the
+/// strongest line. The first sum belongs to the sample `first`. The result is empty for a record
+/// without such a line, or with too few periods.
 fn energies(record: &Record, sums: &[f64], first: usize) -> Vec<f64> {
     let Ok(part) = record.window(first, record.len() - first) else { return Vec::new() };
     let spectrum = Spectrum::from_record(&part.without_mean());

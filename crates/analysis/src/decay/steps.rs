@@ -9,8 +9,8 @@ const SHORTEST: usize = 32;
 /// Minimum range of a channel in an interval, in quantisation steps; with less, rounding distorts
 /// the motion.
 const STEPS: f64 = 12.0;
-/// Minimum of the largest range of a channel, in quantisation steps; with less, quantisation does
-/// not end the decay.
+/// Minimum range of a channel, in quantisation steps, in the interval where its range is largest;
+/// with a smaller range, quantisation does not end the decay.
 const LARGE: f64 = 8.0 * STEPS;
 
 /// End of the part of a decay that its converter resolves.
@@ -55,7 +55,7 @@ pub(super) fn last_shown(record: &Record) -> Option<LastShown> {
 }
 
 /// Returns the channels, counted from 0, that span so few quantisation steps that their rounding
-/// error is not white noise at any time, each with its number of steps.
+/// error is never white noise. Each is returned with its number of steps.
 ///
 /// # Source
 /// As [`last_shown`].
@@ -69,8 +69,8 @@ pub(super) fn coarse(record: &Record) -> Vec<(usize, usize)> {
     (0..record.channels()).filter_map(span).collect()
 }
 
-/// Returns the smallest distance of the values of a channel, in its unit, if it has only a few
-/// different values.
+/// Returns the smallest difference between two values of a channel, in its unit, if it has only a
+/// few different values.
 fn smallest_step(samples: &[f64]) -> Option<f64> {
     let mut values = samples.to_vec();
     values.sort_unstable_by(f64::total_cmp);

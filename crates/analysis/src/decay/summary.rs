@@ -206,8 +206,8 @@ impl DecaySummary {
         let names = message::list(coloured.map(|c| &c.column), ", ", 6);
         if !names.is_empty() {
             remarks.push(format!(
-                "the noise of {names} is coloured; the fit and the standard errors model it as an \
-                 autoregressive process"
+                "the noise of {names} is coloured; the fit uses an autoregressive \
+                 model of this noise, and the standard errors include it"
             ));
         }
         remarks

@@ -122,7 +122,7 @@ impl fmt::Display for ElementNote {
             Self::DoubtfulKnown { parameter, known, value, standard_error, misfit, .. } => {
                 write!(
                     f,
-                    "{parameter} is stated as {}, but the data give {} ± {} if it is estimated, too",
+                    "{parameter} is stated as {}, but the estimate from the data is {} ± {}",
                     compact(*known, 6),
                     compact(*value, 6),
                     compact(*standard_error, 2)

@@ -353,8 +353,8 @@ fn notes_of(estimate: &MachineEstimate, checks: &[CheckRow]) -> impl Iterator<It
         let mut causes: Vec<String> =
             checks.iter().filter(is_cause).map(|check| check.subject.to_string()).collect();
         causes.dedup();
-        // The misfit can scale the errors although its check does not warn, because the check is
-        // adjusted for the number of tests.
+        // The misfit can scale the errors although the check `misfit` does not warn, because this
+        // check is adjusted for the number of tests.
         if causes.is_empty() {
             causes.push(Subject::Misfit.to_string());
         }

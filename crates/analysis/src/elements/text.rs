@@ -82,8 +82,8 @@ impl ElementSummary {
         text_table(&rows)
     }
 
-    /// Returns the modes up to the highest frequency of the data, after an empty line; an empty
-    /// text without modes.
+    /// Returns the modes up to the highest frequency of the data, after an empty line. The text is
+    /// empty if there are no modes.
     fn mode_table(&self) -> String {
         let header = ["mode", "value", "±"].map(String::from).to_vec();
         let mut rows = vec![header];

@@ -12,8 +12,8 @@ const LEAST: usize = 4;
 /// Maximum number of random permutations for a p-value; its inverse is about the smallest p-value.
 const ORDERS: usize = 9999;
 
-/// Number of permutations with at least the observed change that ends the test; the p-value is then
-/// about the ratio of this number to the number of permutations.
+/// Number of permutations with at least the observed change after which the test ends; the p-value
+/// is then about this number divided by the number of permutations made.
 ///
 /// # Source
 /// J. Besag and P. Clifford, "Sequential Monte Carlo p-values", Biometrika 78 (1991).

@@ -38,7 +38,7 @@ pub fn read_results(folder: impl AsRef<Path>) -> Result<Results, AnalysisError> 
             parts.push((written, path));
         }
     }
-    // The newest part comes last and replaces earlier rows.
+    // The newest part comes last, so its rows replace those of earlier parts.
     parts.sort();
     let (mut places, mut rows) = (HashMap::new(), Vec::<ResultRow>::new());
     let mut superseded = 0;

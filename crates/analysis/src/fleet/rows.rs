@@ -7,7 +7,8 @@ use mechid_io::{RecordRows, path_text};
 use crate::measurement::{Measurement, open_all};
 use crate::{AnalysisError, ResultRow, SavedAnalysis};
 
-/// Number of rows of a file with many records that are read at a time, unless one record has more.
+/// Maximum number of rows that are read at a time from a file with many records; a record with more
+/// rows is read alone.
 const ROWS_AT_ONCE: usize = 1 << 20;
 
 /// Identifies some records of a file, or the whole file if `records` is empty, and passes their

@@ -106,7 +106,7 @@ impl fmt::Display for FleetSummary {
             writeln!(
                 f,
                 "note: the folder also contains {} from other records or from a different analysis: a program \
-                 that reads the whole folder reads all of them",
+                 that reads the whole folder also reads these",
                 message::count(self.other_parts, "part")
             )?;
         }

@@ -435,7 +435,7 @@ impl fmt::Display for Trends {
             let count = message::count(self.superseded, "older row");
             writeln!(
                 f,
-                "left out: {count} of the same records, computed before the record or the analysis changed"
+                "left out: {count} that were computed before the record or the analysis changed"
             )?;
         }
         if self.without_number > 0 {

@@ -26,8 +26,7 @@ pub const RECORD_SECONDS: f64 = 600.0;
 /// Maximum number of bytes kept from the error stream of a process.
 const LONGEST_MESSAGE: u64 = 4096;
 
-/// Maximum time for the start of a process. A failure before the end of the start is not due to a
-/// record.
+/// Maximum time for the start of a process. A failure during the start is not due to a record.
 const START: Duration = Duration::from_secs(120);
 
 /// Maximum time from the end of the output of a process to its exit.
@@ -87,7 +86,8 @@ impl Isolation {
     /// Returns the memory that a record may take, in bytes: the smaller of the limit and the memory
     /// that the system allows this process (`ulimit -v`).
     fn memory_bytes(&self) -> u64 {
-        // The conversion saturates, at a size above any address space.
+        // The conversion saturates: a number that is too large becomes the largest integer, which
+        // exceeds any address space.
         let bytes = (self.record_memory_gb * 1e9) as u64;
         #[cfg(target_os = "linux")]
         let bytes = {

@@ -462,7 +462,7 @@ impl Responses {
         let forces = if listed.len() == 1 { "force" } else { "forces" };
         let idle = (!listed.is_empty()).then(|| {
             format!(
-                "{of_record}only noise in {forces} {}: weak, and without coherence with \
+                "{of_record}only noise in {forces} {}: a weak signal that is not coherent with \
                  the other forces and the response",
                 listed.join(", ")
             )
@@ -470,8 +470,10 @@ impl Responses {
         let following = self.following.iter().map(|one| {
             let (force, driver) = (one.force + 1, one.driver + 1);
             format!(
-                "{of_record}force {force} is coherent with force {driver} ({} % of it) and has no independent part: the responses to force {driver} include this percentage of the responses to force {force}; a record in \
-                 which force {force} dominates separates them",
+                "{of_record}force {force} is coherent with force {driver} (at {} % of the amplitude of \
+                 force {driver}) and has no independent part: the responses to force {driver} include this \
+                 percentage of the responses to force {force}. To separate them, use a record in which force \
+                 {force} dominates",
                 significant(100.0 * one.share, 2)
             )
         });

@@ -72,9 +72,9 @@ impl Segmentation {
         let resolved = tried[enough..].iter().find(|(.., is_resolved)| *is_resolved);
         let (len, ..) = *resolved.unwrap_or(&tried[enough]);
         let why = if len > tried[enough].0 {
-            "in which the narrowest peak is wider than the window alone would make it"
+            "in which at least three lines lie within the half-power width of the narrowest peak"
         } else {
-            "that give at least 90 % of the largest information (from coherence, number of averages and of lines)"
+            "that give at least 90 % of the largest information (coherence, number of averages, number of lines)"
         };
         let remark = format!("segments of {len} samples were chosen: the shortest {why}");
         Ok(Some((Self { segment: Some(len), ..self.clone() }, remark)))

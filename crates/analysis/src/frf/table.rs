@@ -191,8 +191,8 @@ impl FrfTable {
             let name = |force: usize| &table.force_names[parts[force].driven[0]];
             let [force, driver] = [one.force, one.driver].map(name);
             format!(
-                "on the lines of {driver}, {force} has {} % of the amplitude of {driver}: an \
-                 interpolation of the response to {force} between the lines of {force} was subtracted",
+                "on the lines of {driver}, {force} has {} % of the amplitude of {driver}: the \
+                 response to {force}, interpolated from the lines of {force}, was subtracted",
                 significant(100.0 * one.share, 2)
             )
         }));
@@ -351,7 +351,7 @@ impl FrfTable {
         let last_force = self.responses.iter().map(|response| response.force).max();
         let dofs = motions.max(last_force.unwrap_or(0));
         if self.is_interleaved() {
-            let why = "the forces have separate lines, and this format has the same frequencies for all \
+            let why = "the forces have separate lines, but this format needs the same frequencies for all \
                        functions: write a .csv file";
             return Err(AnalysisError::Setting { setting: "output", why: why.into() });
         }
@@ -379,7 +379,7 @@ impl FrfTable {
         });
         let coherence = self.coherence.iter().map(|c| CoherenceFunction {
             response: motions_at[c.motion - 1].clone(),
-            // The multiple coherence with one force is the ordinary one.
+            // With one force, the multiple coherence is the ordinary coherence.
             reference: (self.responses.len() == motions)
                 .then(|| self.responses.first().map(|r| forces_at[r.force - 1].clone()))
                 .flatten(),

@@ -88,7 +88,7 @@ impl Acquisition {
                 let channels: Vec<&str> =
                     names.force.iter().chain(names.response(kind)).map(String::as_str).collect();
                 let why = format!(
-                    "{} has no channel {channel} among those that are fitted: {}",
+                    "{} has no fitted channel {channel}; the fitted channels are {}",
                     held.file,
                     channels.join(", ")
                 );
@@ -150,8 +150,8 @@ impl Acquisition {
 /// Force that is held or linear between its samples, as an explanation of a residual.
 pub(super) struct BetweenSamples {
     kind: Discretisation,
-    /// Fraction of the residual power of the fit with a band-limited force that remains: the
-    /// geometric mean over the channels, as in the likelihood of white noise.
+    /// Ratio of the residual power with this force to that of the fit with a band-limited force:
+    /// the geometric mean over the channels, as in the likelihood of white noise.
     pub(super) remaining: f64,
     /// `true` if less power remains and no test of the residual warns any more.
     pub(super) leaves_noise: bool,

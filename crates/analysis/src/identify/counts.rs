@@ -30,7 +30,7 @@ pub(super) fn check(
         Source::Terms(fit) => fit.terms.terms.len() + fit.terms.candidates.len(),
         _ => 0,
     };
-    // Some equation of motion has at least this number of unknowns.
+    // At least one equation of motion has this number of unknowns or more.
     let needed = (unknowns.independent() + terms).div_euclid(unknowns.dof().max(1));
     if rows < needed {
         return Err(NumericsError::TooFewRows { rows, unknowns: needed }.into());

@@ -68,8 +68,8 @@ fn explains_failure(check: &CheckRow) -> bool {
     check.is_bad() && check.when == When::Before || check.is_explanation()
 }
 
-/// Refuses a fit with nonlinear terms that explains no more of the force, or by output error of the
-/// response, than chance does, or in which the interval of every parameter contains zero.
+/// Refuses a fit with nonlinear terms that explains no more than chance does (of the force or, with
+/// output error, of the response), or in which the interval of every parameter contains zero.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -83,8 +83,8 @@ pub(super) fn check_nonlinear(fit: &NonlinearEstimate) -> Result<(), AnalysisErr
     {
         let percent = significant(100.0 * unrelated.explained, 3);
         let why = format!(
-            "the model explains {percent} % of the fitted data, no more than by chance; if noise biases least \
-             squares, use several periods or maximum likelihood (`method`)"
+            "the model explains {percent} % of the fitted data; it would explain as much of pure noise. If noise \
+             biases least squares, use several periods or maximum likelihood (`method`)"
         );
         return Err(AnalysisError::NothingDetermined { why });
     }

@@ -74,8 +74,8 @@ impl Disagreement {
         Self { omitted, explained, scale: None }
     }
 
-    /// Returns the additions for which a check warns, with the scale that the checks give. The
-    /// residual has `spare` degrees of freedom.
+    /// Returns the additions to the covariance for which a check warns, with the scale that the
+    /// checks give. The residual has `spare` degrees of freedom.
     pub(super) fn warned_of(self, checks: &[CheckRow], spare: usize) -> Self {
         let warns = |is_of: fn(&CheckRow) -> bool| {
             checks.iter().any(|check| check.is_conspicuous() && is_of(check))
@@ -137,7 +137,7 @@ impl Disagreement {
         let explanation = checks.iter().find(|check| check.is_explanation());
         let explanation = explanation.filter(|_| self.explained.is_some()).map(|check| {
             format!(
-                "standard errors and intervals include the change of the parameters to those of the model that \
+                "standard errors and intervals include the difference from the parameters of the model that \
                  explains the residual (check: {})",
                 check.subject
             )

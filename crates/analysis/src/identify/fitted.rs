@@ -46,8 +46,8 @@ pub struct Fitted {
     pub equations: usize,
     /// The spectra of a fit in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
-    /// The same spectra with the noise from the scatter of the periods of every record; `None` if a
-    /// record has one period, and for other fits.
+    /// Spectra of `frequency` with the noise from the scatter of the periods of every record;
+    /// `None` if a record has one period, and for other fits.
     pub scattered: Option<FrequencyData>,
     /// Coherence of the frequency responses of the first record; `None` if no frequency responses
     /// were fitted.

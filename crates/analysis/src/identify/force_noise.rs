@@ -130,7 +130,7 @@ impl ForceNoise {
         let Some(levels) =
             levels_and_rms.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>()
         else {
-            return "the noise of the force is not known, because the force spectrum has no flat floor above the excited band (it covers all lines or falls slowly, or the record is too short): it is assumed zero, and any noise biases the estimate; state it (`force_noise`)"
+            return "the noise of the force is not known, because the force spectrum has no flat floor above the excited band (it covers all lines or falls slowly, or the record is too short): the noise is assumed zero, and any noise of the force biases the estimate; state this noise (`force_noise`)"
                 .into();
         };
         let of = match source {

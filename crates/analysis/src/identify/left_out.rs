@@ -27,8 +27,8 @@ pub struct LeftOut {
 pub struct Disturbance {
     /// Frequency, in Hz.
     pub frequency_hz: f64,
-    /// Half the width of the band around it, in Hz; `None` for the nearest lines only: one if the
-    /// frequency is on a line, two if it is between lines.
+    /// Half the width of the band around the frequency, in Hz; `None` for the nearest lines only:
+    /// one if the frequency is on a line, two if it is between lines.
     #[serde(default)]
     pub half_width_hz: Option<f64>,
     /// `true` if the multiples of the frequency are disturbed, too.

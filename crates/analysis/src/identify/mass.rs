@@ -34,7 +34,7 @@ impl FromStr for KnownMass {
             number => match number.parse::<f64>() {
                 Ok(value) if value.is_finite() => Ok(Some(value)),
                 Ok(value) => Err(format!("a mass must be finite, got {value} kg")),
-                Err(_) => Err(format!("\"{t}\" is not a number, nor {UNKNOWN}")),
+                Err(_) => Err(format!("\"{t}\" is neither a number nor {UNKNOWN}")),
             },
         };
         Ok(Self { values: text.split(',').map(entry).collect::<Result<_, _>>()? })

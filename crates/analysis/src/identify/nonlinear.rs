@@ -62,8 +62,8 @@ pub struct NonlinearSummary {
     pub selection: Option<SelectionSummary>,
 }
 
-/// Restoring force in the equation of motion of a term, at the largest amplitude of the data and at
-/// 1.5 times this amplitude.
+/// Restoring force of the equation of motion in which a term acts, at the largest amplitude of the
+/// data and at 1.5 times this amplitude.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExtrapolationRow {
     /// Name of the term.
@@ -94,10 +94,10 @@ impl ExtrapolationRow {
         let error = percent(self.relative_error[1]);
         self.poor.then(|| {
             format!(
-                "{term} extrapolates badly: its force grows with the power {order}, from {near} of the \
-                 restoring force at the edge of the data to {far} at {REACH} times the amplitude, where \
-                 the standard error of the restoring force is {error}. Do not predict beyond the \
-                 amplitudes measured"
+                "{term} extrapolates badly: its force grows with the power {order} of the motion. At the \
+                 largest amplitude of the data it is {near} of the restoring force, at {REACH} times this \
+                 amplitude {far}; there the standard error of the restoring force is {error}. Do not predict \
+                 beyond the measured amplitudes"
             )
         })
     }
@@ -125,7 +125,7 @@ pub struct DistortionRow {
     pub even: Option<Level>,
     /// Level on odd lines without excitation.
     pub odd: Option<Level>,
-    /// Part of the force on the lines of the fit that a linear model does not explain (pure
+    /// Part of the force that a linear model does not explain, on the lines of the fit (pure
     /// number).
     pub linear_leaves: f64,
     /// The finding, in a sentence.
@@ -277,7 +277,7 @@ fn select(
     if how.criterion == Criterion::HeldOut && data.count() < HELD_OUT_RECORDS {
         let got = data.count();
         let why = format!(
-            "held-out needs at least {HELD_OUT_RECORDS} records or windows, each of which is left out once; got {got}"
+            "held-out needs at least {HELD_OUT_RECORDS} records or windows; it leaves out one at a time; got {got}"
         );
         return Err(AnalysisError::Setting { setting: "criterion", why });
     }

@@ -34,8 +34,8 @@ use crate::AnalysisError;
 use crate::hits::HitNoise;
 use crate::measurement::{Block, Windowed};
 
-/// Significance level of the test for transients; a record of whole periods is called open with
-/// this probability.
+/// Significance level of the test for transients; a record of whole periods is mistaken for an open
+/// record with this probability.
 const LEVEL: f64 = 1e-3;
 /// Ratio of transient power to force power that counts as rounding; a larger ratio shows a
 /// transient.
@@ -271,7 +271,7 @@ impl Tested<'_> {
             if kinds.is_empty() { None } else { BandLimitedFit::new(records, fit, pooling) };
         let Some(compared) = compared else { return Ok(likelier(late, fault)) };
         let between = compared.between_samples(&kinds, dt);
-        // The fit may be at a wrong minimum, so that both explanations need a new search.
+        // The fit may be at a wrong minimum, so each of the two possible causes needs a new search.
         let again = |fault: &Finding| compared.after(uncoupled(fault, closed[0].measured())?);
         let remaining = fault.as_ref().and_then(again);
         let fault = fault.map(|fault| with_remaining(fault, remaining));
@@ -308,8 +308,8 @@ fn with_remaining(finding: Finding, remaining: Option<f64>) -> Finding {
     }
 }
 
-/// Returns the change of a record with responses of a `quantity` that gives all channels the same
-/// AC coupling; `None` unless the finding names AC coupling.
+/// Returns a function that gives all channels of a record the same AC coupling; the responses of
+/// the record have the given `quantity`. `None` if the finding does not name AC coupling.
 fn uncoupled(
     finding: &Finding,
     quantity: ResponseQuantity,

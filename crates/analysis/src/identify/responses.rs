@@ -192,7 +192,8 @@ fn estimated(
 pub(super) fn blunted(found: &ResponseEstimate) -> Option<String> {
     (found.blunted > BLUNTED).then(|| {
         format!(
-            "the bias of the window of the segments was subtracted from the responses; this changes a parameter by {} standard errors",
+            "the bias of the window of the segments was subtracted from the responses; \
+             this changes a parameter by up to {} standard errors",
             significant(found.blunted, 2)
         )
     })

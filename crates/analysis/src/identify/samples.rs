@@ -132,7 +132,7 @@ impl SampleFit {
             if let Some((factor, interpolation)) = self.refinement() {
                 return Ok(rows.push_refined(p.states(), extent, factor, interpolation)?);
             }
-            // The sample after the last sample of a period is its first sample.
+            // In a periodic record, the last sample is followed by the first sample.
             let closes = last && extent == Extent::WholePeriod;
             let p = if closes { p.followed_by(held)? } else { p };
             let [x, v, force] = p.states();
@@ -278,7 +278,11 @@ impl SampleFit {
                     .into(),
             );
         } else if self.derivatives.is_some() {
-            remarks.push("two of displacement, velocity and acceleration are computed derivatives, not measured".into());
+            remarks.push(
+                "only one of displacement, velocity and acceleration is measured; \
+                 the other two are computed from this one"
+                    .into(),
+            );
         }
         let residual = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
         if self.derivatives == Some(Derivatives::Spectral) && residual > CONSPICUOUS {
@@ -293,8 +297,8 @@ impl SampleFit {
     }
 }
 
-/// Replaces the warning about a force held between the samples by a check against the identified
-/// modes, which is more specific.
+/// Replaces the warning about a force held between the samples by a more specific check against the
+/// identified modes.
 fn judge_step_by_modes(
     findings: &mut [Finding],
     estimate: &Estimate,

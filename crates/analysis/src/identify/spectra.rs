@@ -408,7 +408,8 @@ fn least_squares(
 }
 
 /// Returns the estimate by maximum likelihood from data with noise. If the noise may be the
-/// response to unmeasured forces, a second search uses the system of the first for its form.
+/// response to unmeasured forces, a second search takes the form of the noise from the system of
+/// the first search.
 fn likelihood(
     spectra: &[Spectra],
     noisy: &FrequencyData,
@@ -445,9 +446,9 @@ fn likelihood(
 }
 
 /// Returns least squares if it explains the response as well as maximum likelihood. Also returns
-/// least squares if the residual of maximum likelihood is more than noise and the residual of least
-/// squares is less than [`MUCH`] times as large. Otherwise noise has biased least squares: returns
-/// maximum likelihood with this reason.
+/// least squares if the residual of maximum likelihood is more than noise, and the residual of
+/// least squares is less than [`MUCH`] times the residual of maximum likelihood. Otherwise noise
+/// has biased least squares: returns maximum likelihood with this reason.
 fn preferred(
     data: &FrequencyData,
     plain: SpectralEstimate,
@@ -480,8 +481,8 @@ fn preferred(
         return Ok(plain);
     }
     let reason = format!(
-        "maximum likelihood was used: least squares, which is biased by noise, leaves \
-         {} % of the motion unexplained, maximum likelihood {} %",
+        "maximum likelihood was used: least squares is biased by noise and does not explain \
+         {} % of the motion; with maximum likelihood this part is {} %",
         significant(100.0 * of_plain, 3),
         significant(100.0 * of_likely, 3)
     );
@@ -530,8 +531,8 @@ fn steps(held: &Block) -> Vec<f64> {
     [of(held.response().0), of(&held.force)].concat()
 }
 
-/// Returns the mean of the periods, with their noise if it exceeds rounding; with a `machine` the
-/// noise may be its response to unmeasured forces.
+/// Returns the mean of the periods, with its noise if this noise exceeds rounding. If a `machine`
+/// is given, the noise may be the response of the machine to unmeasured forces.
 fn with_noise(
     periods: &RepeatedPeriods,
     noise: Pooling,

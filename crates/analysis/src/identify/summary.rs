@@ -411,8 +411,8 @@ impl FitRow {
         text_table(&self.rows(model))
     }
 
-    /// Returns names and values of the quality of the fit; `model` is the name of the model in
-    /// them.
+    /// Returns the quality of the fit as rows of a name and a value; `model` is the name of the
+    /// model in the rows.
     pub fn rows(&self, model: &str) -> Vec<Vec<String>> {
         let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
         let mut rows = Vec::new();

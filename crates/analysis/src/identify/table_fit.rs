@@ -133,7 +133,8 @@ impl TableFit {
     fn correlated_lines(&self) -> Option<String> {
         (self.variance_ratio > 1.0).then(|| {
             format!(
-                "the errors of neighbouring lines are correlated, as under a window: standard errors and intervals are {} times those of independent lines",
+                "the errors of neighbouring lines are correlated, for example by a \
+                 window: standard errors and intervals are {} times those of independent lines",
                 significant(self.variance_ratio.sqrt(), 3)
             )
         })
@@ -299,7 +300,7 @@ impl Scope<'_> {
         let row =
             |(when, name, finding): Row| CheckRow::new(when, name, &finding, &Channels::default());
         // With an exponential window, or without a scale, the fitted parameters are not those of
-        // the machine, so that their changes by another model are no changes of the machine.
+        // the machine. If another model changes them, this is not a change of the machine.
         let is_same =
             !self.is_unscaled && self.tables.iter().all(|table| table.added_decay.is_none());
         let [omitted, explained] =

@@ -136,8 +136,8 @@ fn with_reciprocal<'a>(
     }
     completed.retain(|f| whole.contains(&f.reference));
     let remark = format!(
-        "{0}: by reciprocity the responses at {1} to forces at other points are used as \
-         the responses at these points to a force at {1}",
+        "{0} has responses at {1} to forces at other points. By reciprocity they are also \
+         used as the responses at these other points to a force at {1}",
         table.file,
         whole.join(", ")
     );
@@ -230,8 +230,8 @@ impl Tabulated {
         Ok(Self { points, driven, noise, data, coherent, columns, is_averaged, remarks })
     }
 
-    /// Returns the responses as averages over segments with a known window and number, with the
-    /// degrees of freedom of their forces; `None` if the table does not state the segments.
+    /// Returns the responses as averages over segments whose window and number are known, with the
+    /// degrees of freedom of the forces; `None` if the table does not state the segments.
     pub(super) fn averaged(&self) -> Option<&Coherent> {
         self.is_averaged.then_some(&self.coherent)
     }
@@ -331,8 +331,8 @@ fn columns(
 ) -> Result<Vec<(FrequencyData, usize)>, AnalysisError> {
     let column = |(input, dof): (usize, &usize)| {
         let response: Vec<_> = response.iter().map(|h| h.columns(input, 1).into_owned()).collect();
-        // The standard error is that of the real part and also that of the imaginary part, so the
-        // variance of the complex value is twice its square.
+        // The real and the imaginary part each have this standard error, so the variance of the
+        // complex value is twice the square of the standard error.
         let variance: Option<Vec<_>> = errors.map(|errors| {
             errors.iter().map(|e| e.columns(input, 1).map(|e| 2.0 * e * e)).collect()
         });

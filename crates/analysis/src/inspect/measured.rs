@@ -66,7 +66,7 @@ impl Span {
         self.held().map(|(first, last)| {
             format!(
                 "period, mismatch and strongest lines were computed from samples {first} to {last} of {file} \
-                 only; the levels count all samples up to {end}"
+                 only; the levels are those of all samples up to {end}"
             )
         })
     }

@@ -162,8 +162,8 @@ impl Inspection<'_> {
     }
 
     /// Measures the columns of a text while its samples are counted, so that it is read only once.
-    /// This requires that the window ends with the record, and that neither its length nor a mean
-    /// is needed beforehand.
+    /// This requires that the window ends with the record, and that neither the length of the
+    /// record nor a mean is needed beforehand.
     fn while_reading(
         &self,
         file: &RecordFile,
@@ -235,7 +235,7 @@ impl Inspection<'_> {
                     shown.push(Shown { place, column, offset, spectral, drawn: false });
                 }
                 Ok(tally) => left_out.push(format!(
-                    "column {} has {}, most have {}",
+                    "column {} has {}, but most columns have {}",
                     table.label(column),
                     message::count(tally.samples, "sample"),
                     inventory.samples

@@ -141,7 +141,7 @@ impl RecordSummary {
             self.channels.iter().filter_map(|c| c.clipping.as_ref().map(|cut| (c, cut)))
         {
             text += &format!(
-                "column {} is clipped at {}: {samples} samples have this value, three or more in a row\n",
+                "column {} is clipped at {}: {samples} samples have this value, always three or more in a row\n",
                 channel.title(),
                 significant(*level, 5)
             );

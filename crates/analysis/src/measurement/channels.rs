@@ -115,8 +115,8 @@ impl Channels {
     }
 
     /// Returns common names for several records of the same machine. A force has the name from the
-    /// first record in which it acts; a force that acts at several points in turn, as of a roving
-    /// hammer, is also named after the point: `force at a1`.
+    /// first record in which it acts; a force that acts at several points in turn, such as that of
+    /// a roving hammer, is also named after the point: `force at a1`.
     pub(crate) fn together(records: &[&Self]) -> Self {
         let mut common = records.first().map(|first| Self::clone(first)).unwrap_or_default();
         for (dof, name) in common.force.iter_mut().enumerate() {

@@ -417,8 +417,8 @@ fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
 }
 
 impl RecordSource {
-    /// Refuses a computation on `samples` samples of the used columns, with `bytes` bytes a number,
-    /// that needs too much memory.
+    /// Refuses a computation on `samples` samples of the used columns, with `bytes` bytes per
+    /// number, that needs too much memory.
     pub fn check_memory(&self, samples: usize, bytes: usize) -> Result<(), AnalysisError> {
         let numbers = samples.saturating_mul(self.channels.roles().len());
         check_memory(&self.name, numbers, bytes, self.memory)

@@ -34,8 +34,8 @@ pub struct Reading {
     /// `ms`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, String>,
-    /// Factors to SI units, by column name or number; they replace the units in the headers; in SI
-    /// units per unit of the column.
+    /// Factors that convert columns to SI units, by column name or number, in SI units per unit of
+    /// the column. They replace the units in the headers.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scales: BTreeMap<String, f64>,
     /// Factor on the memory limits for reading a file ([`mechid_io::Limits`]); `None`: 1.

@@ -98,7 +98,7 @@ pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Opti
     })
 }
 
-/// Returns a remark on a text in the header of a column that may be a unit, for any quantity.
+/// Returns a remark if the header of a column contains a text that may be a unit, of any quantity.
 pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     let stated = table.stated_unit(column, None)?;
     if stated.evidence == Evidence::Stated || table.values(column).is_err() {
@@ -168,8 +168,8 @@ fn two_rates(table: &Table, reading: &Reading) -> Option<[String; 3]> {
 
 /// Maximum sampling rate, in Hz, that is doubtful for a time column without a unit in a record of
 /// any length: only very slow structures need no higher rate. Milliseconds that are read as seconds
-/// give such a rate for true rates up to 2 kHz, sample numbers that are read as seconds for all
-/// true rates.
+/// give such a rate if the true rate is at most 2 kHz. Sample numbers that are read as seconds give
+/// it for every true rate.
 const SLOW_HZ: f64 = 2.0;
 
 /// Maximum sampling rate, in Hz, that is doubtful in records longer than [`LONG_S`]: records of

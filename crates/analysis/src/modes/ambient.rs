@@ -196,7 +196,7 @@ fn notes(estimate: &AmbientEstimate) -> Vec<String> {
         if mode.natural_frequency_hz.interval().is_none() {
             notes.push(format!(
                 "mode {number} ({hz} Hz): the record is {} decay times long, too short for an interval; \
-                 record longer",
+                 make a longer record",
                 significant(mode.decay_times, 2)
             ));
         }

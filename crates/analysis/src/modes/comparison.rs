@@ -28,8 +28,8 @@ pub struct ModeComparison {
     pub only_first: Vec<LoneRow>,
     /// Modes of the second set without a partner.
     pub only_second: Vec<LoneRow>,
-    /// Modal assurance criterion of each mode of the first set (rows) with each of the second, a
-    /// pure number from 0 to 1.
+    /// Modal assurance criterion of each mode of the first set (rows) with each mode of the second
+    /// set (columns), a pure number from 0 to 1.
     pub mac: Vec<Vec<f64>>,
 }
 

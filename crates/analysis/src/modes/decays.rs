@@ -62,8 +62,8 @@ fn deviations(measurement: &Measurement, how: &DecaySettings) -> Option<String> 
     })
 }
 
-/// Returns whether the second half of a response has more power than the first, by more than noise
-/// of constant power explains. Each channel is divided by its power.
+/// Returns whether the second half of a response has significantly more power than the first half:
+/// more than noise of constant power explains. Each channel is divided by its power.
 ///
 /// # Source
 /// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1 (F test).

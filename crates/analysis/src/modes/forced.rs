@@ -234,8 +234,8 @@ fn engine_settings(settings: &ModesSettings) -> ModalSettings {
     }
 }
 
-/// Returns the share of the variance of each output at the end of the records that a fit to their
-/// beginning predicts.
+/// Returns the share of the variance of each output that a fit to the beginning of the records
+/// predicts at their end.
 fn predicted(
     recorded: &Recorded,
     band_hz: [f64; 2],

@@ -16,14 +16,14 @@ const SAMPLES_AT_ONCE: usize = 256;
 pub(super) struct FreeMotion {
     /// Samples × outputs.
     pub motion: DMatrix<f64>,
-    /// RMS of the error that the uncertainty of the amplitudes a_r causes, over the samples that
-    /// count in the errors, one for each output.
+    /// RMS of the error that the uncertainty of the amplitudes a_r causes, one for each output,
+    /// over all samples except the first `settle`.
     pub standard_error: Vec<f64>,
 }
 
 impl FreeMotion {
-    /// Fits the amplitudes by least squares to the difference between the first `settle` samples of
-    /// the measured channels and a response from rest, together with a constant for each channel.
+    /// Fits the amplitudes, and a constant for each channel, by least squares. The data are the
+    /// first `settle` samples of the measured channels minus a response from rest.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if these samples do not determine every amplitude.

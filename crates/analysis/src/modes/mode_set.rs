@@ -25,8 +25,9 @@ pub struct ModeSet {
     pub modes: Vec<ComparedMode>,
 }
 
-/// Frequencies and shapes alone, such as those of a finite-element model. A misspelt field is
-/// refused, whereas a result of mechid has many fields that do not concern a comparison.
+/// Frequencies and shapes alone, such as those of a finite-element model. Unknown fields are
+/// refused here, because they may be misspelt. A result of mechid, in contrast, has many fields
+/// that a comparison does not use.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlainModes {

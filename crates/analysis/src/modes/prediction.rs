@@ -141,8 +141,8 @@ impl Response {
         }
         let motion = Spectrum::from_lines(sampling, lines)?.to_record()?;
         let record = if steady { repeated(&motion, block)? } else { motion.window(0, len)? };
-        // The power is averaged over the record and the zeros behind it, but the response is in the
-        // record: the mean is rescaled to the length of the record.
+        // The power is a mean over the record and the zeros after it, but the response is only in
+        // the record. The mean is therefore converted to the length of the record.
         let share = if steady { 1.0 } else { sampling.len() as f64 / len as f64 };
         let standard_error = power.into_iter().map(|power| (power * share).sqrt()).collect();
         Ok(Self { record, standard_error })

@@ -110,8 +110,8 @@ fn test(estimate: &ModalEstimate, engine: &ModalSettings, constraint: usize) -> 
             p_value,
             passes: "the modes agree with real shapes, which are imposed".into(),
             fails: format!(
-                "the modes contradict real shapes, most at {hz:.4} Hz: damping that is not \
-                 proportional, or channels with different delays; real shapes are not imposed"
+                "the modes contradict real shapes, most at {hz:.4} Hz, so real shapes are \
+                 not imposed; possible causes: damping that is not proportional, or channels with different delays"
             ),
         },
         _ => Tested {
@@ -120,9 +120,9 @@ fn test(estimate: &ModalEstimate, engine: &ModalSettings, constraint: usize) -> 
             passes: "the modes agree with reciprocity between the driving points, which is imposed"
                 .into(),
             fails: format!(
-                "the modes contradict reciprocity between the driving points, most at {hz:.4} Hz: a \
-                 wrong calibration or place, forces that are not the ones measured, or a structure \
-                 that is not reciprocal; reciprocity is not imposed"
+                "the modes contradict reciprocity between the driving points, most at {hz:.4} Hz, so \
+                 reciprocity is not imposed; possible causes: a wrong calibration or place, other forces than the \
+                 measured ones, or a structure that is not reciprocal"
             ),
         },
     }

@@ -55,8 +55,8 @@ fn surplus_of(data: &LineData, responses: usize) -> Option<String> {
     let frequencies = modes.iter().map(|mode| compact(mode.natural_frequency_hz.value, 4));
     Some(format!(
         "the data show {} ({} Hz) and {}: a machine with one degree of freedom for each response cannot \
-         describe them; `mechid modes` finds frequencies, damping ratios and shapes with any number of \
-         sensors, or choose a band with fewer resonances",
+         describe them. Use `mechid modes`, which finds frequencies, damping ratios and shapes with any \
+         number of sensors, or choose a band with fewer resonances",
         message::count(modes.len(), "resonance"),
         message::list(frequencies, ", ", LISTED),
         message::count(responses, "response"),

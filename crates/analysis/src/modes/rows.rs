@@ -138,7 +138,7 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(required, 3)
         ),
         DropReason::UndeterminedDamping { standard_error } => format!(
-            "its damping ratio is not above zero (± {} %), as of a sinusoid: it stays in the model",
+            "its damping ratio is not above zero (± {} %), like that of a sinusoid: the candidate stays in the model",
             significant(100.0 * standard_error, 2)
         ),
         DropReason::Undetermined => "the data do not determine it beside the other modes".into(),
@@ -201,8 +201,8 @@ pub(super) fn notes(estimate: &ModalEstimate, outputs: &[Output]) -> Vec<String>
         let hz = significant(mode.natural_frequency_hz.value, 4);
         if mode.near_edge {
             notes.push(format!(
-                "mode {number} ({hz} Hz) is at an edge of the band: choose a wider one (`band_hz`) if the \
-                 forces reach further"
+                "mode {number} ({hz} Hz) is at an edge of the band: if the forces also excite frequencies \
+                 beyond this edge, choose a wider band (`band_hz`)"
             ));
         }
         if mode.gain < estimate.required_gain() {
@@ -216,7 +216,7 @@ pub(super) fn notes(estimate: &ModalEstimate, outputs: &[Output]) -> Vec<String>
         if let Some(share) = mode.driven_share.filter(|share| 1.0 - share > NOTED_UNMEASURED) {
             notes.push(format!(
                 "{} % of the motion of mode {number} ({hz} Hz) is caused by forces that were not \
-                 measured; its intervals allow for that",
+                 measured; its intervals include this effect",
                 compact(100.0 * (1.0 - share), 2)
             ));
         }

@@ -145,8 +145,8 @@ pub struct SavedCandidate {
     pub reason: String,
 }
 
-/// Frequency over amplitude: of a free decay with its damping, or of the modes of a nonlinear
-/// machine.
+/// Frequency as a function of amplitude: of a free decay (with its damping), or of the modes of a
+/// nonlinear machine.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
 pub enum SavedBackbone {

@@ -136,9 +136,9 @@ impl Recorded {
         Ok(self.with_parts(parts))
     }
 
-    /// Returns the first and the second half of the records: between two records if the smaller
-    /// half then has at least the share [`SMALLER_HALF`] of the samples, otherwise at the middle of
-    /// the longest record.
+    /// Returns the first and the second half of the records. They are divided between two records
+    /// if the smaller half then has at least the share [`SMALLER_HALF`] of the samples; otherwise
+    /// the longest record is divided at its middle.
     ///
     /// Forces that are zero in a half are not among its inputs.
     pub fn halves(&self) -> Result<[Self; 2], AnalysisError> {

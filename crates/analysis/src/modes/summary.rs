@@ -161,7 +161,7 @@ pub struct OutputRow {
     /// Share of the variance that the model explains in the band, a ratio; `None` without forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_explained: Option<f64>,
-    /// Share of the variance at the end of the records that a fit to their beginning predicts, a
+    /// Share of the variance that a fit to the beginning of the records predicts at their end, a
     /// ratio; `None` without a validation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
@@ -179,8 +179,8 @@ pub struct ModalModeRow {
     pub mode: ShapedMode,
     /// Participation of each force, scaled to 1 for the largest; empty without forces.
     pub participation: Vec<ShapeEntry>,
-    /// Modal phase collinearity of the shape, a pure number: 1 if all entries have one phase or its
-    /// opposite.
+    /// Modal phase collinearity of the shape, a pure number: 1 if all entries are in phase or in
+    /// opposite phase.
     pub phase_collinearity: f64,
     /// Standard error of the phase collinearity, a pure number; `None` if the errors of the shape
     /// are not known.
@@ -238,8 +238,8 @@ pub struct ModalCheck {
 }
 
 impl ModesSummary {
-    /// Returns the modes with their shapes and the names of the entries: at the responses, or,
-    /// where more points are struck than measured, by reciprocity at the forces.
+    /// Returns the modes with their shapes and the names of the entries. The entries belong to the
+    /// responses or, if there are more forces than responses, to the forces (by reciprocity).
     pub fn shapes(&self) -> (Vec<ShapedMode>, Vec<String>) {
         if self.inputs.len() <= self.outputs.len() {
             let modes = self.modes.iter().map(|row| row.mode.clone()).collect();

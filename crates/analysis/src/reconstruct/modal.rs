@@ -13,8 +13,9 @@ use crate::measurement::Measurement;
 use crate::modes::ModalSystem;
 use crate::text::significant;
 
-/// Reconstructs forces at the places of a modal test from measured responses, by the frequency
-/// responses of its modes, in the band of the test; the force is passed to `take`, too.
+/// Reconstructs the forces at the places of a modal test from measured responses. The method uses
+/// the frequency responses of the modes in the band of the test. The force is also passed to
+/// `take`.
 ///
 /// Forces and responses are those of the test: columns are matched by name, or in order, and
 /// `forced` counts the forces of the test from 1. The window holds whole periods, or an open record

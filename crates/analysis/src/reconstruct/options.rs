@@ -16,8 +16,8 @@ pub struct Reconstruct {
     pub forced: Vec<usize>,
     /// Spectral lines with force; `None` if unknown.
     pub lines: Option<LineSpec>,
-    /// Frequency band of the reconstructed force, ends included; `None`: all frequencies, or
-    /// without a displacement those at which the responses show a force.
+    /// Frequency band of the reconstructed force, ends included; `None`: all frequencies; without a
+    /// displacement, only the frequencies at which the responses show a force.
     pub band_hz: Option<Band>,
     /// `true` if an open record begins at rest.
     pub at_rest: bool,

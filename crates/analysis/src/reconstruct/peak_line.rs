@@ -98,7 +98,7 @@ impl PeakLine {
     pub fn remark(&self) -> Option<String> {
         (self.pieces > 1).then(|| {
             format!(
-                "strongest line: by the mean power of {} pieces of {} samples each",
+                "the strongest line is that of the mean power spectrum of {} pieces of {} samples each",
                 self.pieces,
                 self.piece.len()
             )

@@ -28,8 +28,8 @@ pub struct Reconstruction {
 }
 
 impl Reconstruction {
-    /// Reconstructs the force line by line on `lines` of the mean `period`, or without lines by the
-    /// method for an open record.
+    /// Reconstructs the force line by line, on the `lines` of the mean `period`. If no lines are
+    /// given, uses the method for an open record.
     ///
     /// # Errors
     /// [`AnalysisError::Force`] if the method refuses the record.

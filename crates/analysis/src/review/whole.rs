@@ -113,8 +113,8 @@ impl Gathered {
         Ok(())
     }
 
-    /// Returns the RMS, over all samples of one channel, of the deviation from the mean period, in
-    /// the unit of the channel; `None` for one period.
+    /// Returns the RMS deviation of one channel from its mean period, over all samples, in the unit
+    /// of the channel; `None` for one period.
     pub fn scatter(&self, channel: usize) -> Option<f64> {
         self.periods.as_ref().map(|periods| periods.scatter(channel))
     }

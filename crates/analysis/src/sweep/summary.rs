@@ -52,8 +52,8 @@ pub struct Point {
     pub step_s: f64,
     /// Samples in one cycle of the natural frequency, a pure number.
     pub samples_per_cycle: Option<f64>,
-    /// Largest error of an entry relative to the largest entry of its matrix; without a reference,
-    /// the largest standard error relative to this entry. A ratio.
+    /// Largest ratio of the error of an entry to the largest entry of its matrix. Without a
+    /// reference, the standard error of the entry replaces the error.
     pub error: Option<f64>,
     /// Parameters, one each.
     pub parameters: Vec<SweptParameter>,

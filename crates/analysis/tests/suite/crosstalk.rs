@@ -55,7 +55,7 @@ fn a_force_that_follows_another_has_no_responses_and_is_told() {
                 .iter()
                 .find(|remark| remark.contains("force 2 is coherent with force 1"));
             assert!(
-                told.is_some_and(|told| told.contains("(2")),
+                told.is_some_and(|told| told.contains("(at 2")),
                 "{periodic} {level} {seed}: {table}"
             );
             assert_eq!(table.responses.len(), 2);

@@ -240,7 +240,8 @@ fn a_file_of_many_records_makes_a_row_for_each() {
     assert!(matches!(error, AnalysisError::RecordId { id: None, records: 4, .. }), "{error}");
     let error = refused(&alone("sunday")).to_string();
     assert!(
-        error.ends_with("holds 4 records (monday, cut, broken, friday), none of which is sunday"),
+        error
+            .ends_with("holds 4 records (monday, cut, broken, friday), but none of them is sunday"),
         "{error}"
     );
     // If the column does not identify records, the row of the file has the error.

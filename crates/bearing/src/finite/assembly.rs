@@ -58,7 +58,7 @@ struct Element {
 }
 
 impl Assembly {
-    /// Assembles the equations with the journal at `position` and the derivatives with respect to
+    /// Assembles the equations for the journal at `position`, and their derivatives with respect to
     /// the fronts in `unknown` (side and row).
     pub(super) fn new(film: &Film, position: Vector2<f64>, unknown: &[(usize, usize)]) -> Self {
         let (rows, columns) = (film.rows(), film.columns.len());

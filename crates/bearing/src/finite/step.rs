@@ -106,7 +106,7 @@ impl Step {
         let Some(arc) = film.pad.converging(position) else { return Ok(0.0) };
         let by = |steps: [f64; 3]| steps[0] + steps[1] * moved[0] + steps[2] * moved[1];
         let mut largest: f64 = 0.0;
-        // The film ends where its pressure would fall below zero before the edge of the pad.
+        // The film ends before the edge of the pad if its pressure would otherwise fall below zero.
         for (side, converging) in arc.iter().enumerate() {
             let edge = film.pad.edges[side];
             for (free, outflow) in film.free[side].iter_mut().zip(&self.outflow[side]) {

@@ -106,8 +106,8 @@ pub struct ModesArgs {
     /// imposed
     #[arg(long)]
     reciprocal: bool,
-    /// Make a second fit without this percentage at the end of each record, and predict the
-    /// excluded part with it
+    /// Make a second fit that excludes this percentage at the end of each record, and predict the
+    /// excluded part with this fit
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     validate_percent: Option<f64>,
     /// Predict this record, with the same columns, from its forces

@@ -54,7 +54,7 @@ pub struct StabilityArgs {
     #[arg(long, default_value_t = 1.4, allow_negative_numbers = true, help_heading = "Schemes")]
     theta: f64,
     /// ρ∞ of the generalised-α schemes and of ρ∞-Bathe, the spectral radius at very large steps;
-    /// HHT-α is shown only from 0.5 up
+    /// HHT-α is shown only if ρ∞ is at least 0.5
     #[arg(
         long = "rho-infinity",
         value_name = "RADIUS",

@@ -128,7 +128,9 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     let amplitude = (0.5 * (parts[0] * parts[0] + parts[1] * parts[1])).sqrt();
     let value = report["forces"][0]["strongest_amplitude"].as_f64().unwrap();
     assert!((value / amplitude - 1.0).abs() < 1e-3, "{value}, truth {amplitude}");
-    let remark = format!("strongest line: by the mean power of 2 pieces of {PIECE} samples each");
+    let remark = format!(
+        "the strongest line is that of the mean power spectrum of 2 pieces of {PIECE} samples each"
+    );
     assert_eq!(report["remarks"][0], remark);
 
     // If a spectrum is written, the record is kept in memory, with the same result.

@@ -336,7 +336,11 @@ fn masses_may_be_known_in_part() {
     let known: Vec<bool> = rows[..4].iter().map(|row| row["known"].as_bool().unwrap()).collect();
     assert_eq!(known, [true, true, true, false]);
     assert!((parameter(&found, "m22", "value") / 14.8 - 1.0).abs() < 1e-9);
-    refused(folder, &format!("{common} 14.8,heavy"), &["\"heavy\" is not a number, nor unknown"]);
+    refused(
+        folder,
+        &format!("{common} 14.8,heavy"),
+        &["\"heavy\" is neither a number nor unknown"],
+    );
     refused(folder, &format!("{common} 1e300,1e300"), &["exceeds the range of double precision"]);
     refused(folder, &format!("{common} unknown,-1"), &["got -1 kg"]);
 }

@@ -301,7 +301,7 @@ fn levels_of_a_long_text_are_those_of_all_of_it() {
     assert_eq!(
         report["remarks"][0],
         "period, mismatch and strongest lines were computed from samples 1 to 262144 of rec.csv only; \
-         the levels count all samples up to 270000"
+         the levels are those of all samples up to 270000"
     );
     // A short window is analysed as a whole, at any position.
     let report = run("rec.csv", "--columns square --start 269001");

@@ -71,9 +71,9 @@ impl<'a> DelayedForce<'a> {
         Some(Self { data, weight, driven: driven.len(), groups })
     }
 
-    /// Returns, for a force that is `delay` (s) later, the ratio of residual power to the power of
-    /// the right-hand side; the ratios of the driven equations are added. For related equations it
-    /// is the ratio for all equations together, times the number of forces. `None` if it is not
+    /// Returns the ratio of residual power to the power of the right-hand side, added over the
+    /// driven equations, for a force that is `delay` (s) later. For related equations, the ratio of
+    /// all equations together is multiplied by the number of forces. `None` if the result is not
     /// finite.
     ///
     /// # Source

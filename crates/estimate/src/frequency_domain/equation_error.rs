@@ -62,10 +62,11 @@ pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateE
     weighted_rows(data, 0.0, |_| 1.0)
 }
 
-/// Returns estimates of [`equation_error`] with every row divided by the standard deviation of its
-/// equation error, from the stated noise and the measured receptance, so that noisy lines have
-/// little weight. The first one uses all lines, the second one only lines with little noise: a
-/// noisy line with hardly any force would make the stiffness far too small.
+/// Returns estimates of [`equation_error`] in which every row is divided by the standard deviation
+/// of its equation error, so that noisy lines have little weight. The standard deviation follows
+/// from the stated noise and the measured receptance. The first estimate uses all lines, the second
+/// only lines with little noise: a noisy line with hardly any force would make the stiffness far
+/// too small.
 ///
 /// There is no estimate if no noise is stated, or if the lines do not determine a parameter.
 pub(super) fn weighted_equation_errors<'a>(

@@ -223,8 +223,8 @@ impl<'a> InitialEstimates<'a> {
         Some(linear.entries(values.as_slice()))
     }
 
-    /// Returns the triangular factor R of the weighted regressors and, as last column, the force
-    /// minus the forces of the known entries.
+    /// Returns the triangular factor R of the weighted regressors. Its last column belongs to the
+    /// force minus the forces of the known entries.
     fn triangle(&self, equation: &Equation, weights: &[f64]) -> Option<DMatrix<f64>> {
         let (lines, last) = (self.data.len(), equation.parameters.len());
         let (x, force) = (self.data.displacement(), self.data.force());

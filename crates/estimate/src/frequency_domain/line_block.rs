@@ -73,8 +73,8 @@ impl LineBlock {
         widened
     }
 
-    /// Rotates rows with the columns of the block into a triangular factor; `None` if a value is
-    /// not finite.
+    /// Adds `rows`, which have the columns of the block, to the triangular factor `r` by an
+    /// orthogonal decomposition; `None` if a value is not finite.
     pub(super) fn push(&self, r: &mut DMatrix<f64>, rows: &DMatrix<f64>) -> Option<()> {
         let mut closed = self.clone();
         closed.close(r);

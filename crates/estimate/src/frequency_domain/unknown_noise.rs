@@ -374,9 +374,9 @@ fn reweighted(
 }
 
 /// Estimates the noise spectrum from the residual, separately for each channel or for unmeasured
-/// forces. At each line the noise of the round before is scaled by the ratio of the residual power
-/// to its expected value; the part due to the stated noise of the force is subtracted. `None` if
-/// the spectrum is white.
+/// forces. At each line the noise of the previous round is multiplied by the ratio of the residual
+/// power to its expected value, which includes the stated noise of the force. `None` if the
+/// spectrum is white.
 fn spectrum_of_residual(
     data: &FrequencyData,
     unknowns: &Unknowns,

@@ -16,8 +16,8 @@ pub(super) struct WeightUncertainty {
 }
 
 impl WeightUncertainty {
-    /// Computes the correction for an estimate at the entries `values`, weighted by `noise`; `None`
-    /// if the noise is not a smooth spectrum, or for large fits.
+    /// Computes the correction for an estimate with the entries `values` from lines that are
+    /// weighted by `noise`. `None` if the noise is not a smooth spectrum, or for large fits.
     ///
     /// The logarithms of the noise powers are B β with the basis B; the information about β is ν
     /// times the identity matrix. With the orthonormal sensitivities Q_l of line l, P_i = Σ b_li

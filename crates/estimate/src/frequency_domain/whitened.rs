@@ -11,8 +11,8 @@ use crate::relations::Relations;
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// Residual of a system for given spectra, and the sensitivity of the residual to the free
-/// parameters. Both are weighted by L Lᴴ, the covariance of the residual due to the noise on
-/// displacement and force.
+/// parameters. Both are multiplied by √2·L⁻¹, where L Lᴴ is the covariance of the residual due to
+/// the noise on displacement and force.
 ///
 /// Real and imaginary parts are separate: row 2(n·line + channel) is the real part of a line and
 /// channel, the next row its imaginary part.

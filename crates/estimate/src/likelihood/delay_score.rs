@@ -51,9 +51,9 @@ struct Sums {
     explained: DMatrix<f64>,
 }
 
-/// Returns the delay that explains most of the residual beyond the part that the parameters
-/// explain; `None` if the data do not determine a delay. Outputs whose `known` entry is `false`
-/// have a delay among the parameters; they are not tested.
+/// Returns the delay, of one output or of all outputs, that explains the largest part of the
+/// residual in addition to the parameters; `None` if the data do not determine a delay. An output
+/// whose `known` entry is `false` is not tested, because its delay is already a parameter.
 pub(super) fn delay_score<M: ResponseModel>(
     fit: &Fit<'_, M>,
     linearised: &Linearisation,
@@ -85,8 +85,8 @@ pub(super) fn delay_score<M: ResponseModel>(
     Some(DelayScore { output, delay, standard_error, p_value, changes })
 }
 
-/// Returns the direction, in the space of the delays of p outputs, of a delay of one output or of
-/// all outputs.
+/// Returns the direction of a delay of one output, or of all outputs, in the space of the delays of
+/// p outputs.
 fn direction_of(output: Option<usize>, p: usize) -> DVector<f64> {
     DVector::from_fn(p, |at, _| f64::from(output.is_none_or(|one| one == at)))
 }

@@ -49,7 +49,8 @@ pub struct ParameterEstimate {
     pub name: String,
     /// Most likely value, in the unit of the parameter.
     pub value: f64,
-    /// Standard error, in the unit of the parameter; `None` if it is at a bound or not determined.
+    /// Standard error, in the unit of the parameter; `None` if the parameter is at a bound or not
+    /// determined.
     pub standard_error: Option<f64>,
     /// Interval at the confidence level of the settings, in the unit of the parameter.
     pub interval: [f64; 2],
@@ -290,9 +291,9 @@ fn interval<M: ResponseModel>(
     ([end(-1.0), end(1.0)], IntervalKind::Profile)
 }
 
-/// Returns the share of a prior and the test of this prior. If data and prior agree, the difference
-/// of the estimate from the prior mean has the variance s² − v, with the prior variance s² and the
-/// posterior variance v.
+/// Returns the report on the prior of parameter `at`, with the share of the prior and its test. If
+/// data and prior agree, the difference between the estimate and the prior mean has the variance s²
+/// − v, with the prior variance s² and the posterior variance v.
 fn prior<M: ResponseModel>(
     fit: &Fit<'_, M>,
     at: usize,

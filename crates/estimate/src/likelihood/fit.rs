@@ -244,9 +244,9 @@ fn searched<M: ResponseModel>(
     multi_start::search(&rough, residual, &space.bounds, &starts, agreeing)
 }
 
-/// Returns the ratio of the covariance of an estimate to the inverse of the Fisher information, and
-/// the mean of a squared residual, for weights Ŝ⁻¹ of sample covariances Ŝ with ν degrees of
-/// freedom: ν²/((ν − p)² − 1) and ν/(ν − p).
+/// Returns two factors for weights Ŝ⁻¹ of p outputs, where the sample covariances Ŝ have ν degrees
+/// of freedom. The first, ν²/((ν − p)² − 1), is the ratio of the covariance of an estimate to the
+/// inverse of the Fisher information. The second, ν/(ν − p), is the mean of a squared residual.
 fn sampled_weights(freedom: f64, outputs: usize) -> Result<[f64; 2], LikelihoodError> {
     if freedom.is_infinite() {
         return Ok([1.0, 1.0]);

@@ -19,8 +19,9 @@ pub(super) const RANK: f64 = 1e-9;
 /// the delay counts as undetermined, because rounding would determine its value.
 pub(super) const DETERMINED_DELAY: f64 = 1e-9;
 
-/// Maximum relative standard error for a Wald interval. For a larger one the interval comes from
-/// the profile of the likelihood, because the likelihood is not quadratic over such a distance.
+/// Maximum relative standard error for a Wald interval. If the standard error is larger, the
+/// interval comes from the profile of the likelihood, because the likelihood is not quadratic so
+/// far from the estimate.
 pub(super) const WEAK: f64 = 0.3;
 
 /// Noise, relative to the response, that the first steps of every search assume. These steps weight
@@ -28,10 +29,10 @@ pub(super) const WEAK: f64 = 0.3;
 /// all other lines.
 pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 
-/// Maximum excess of the sum of squares after the first steps of a search over that of the search
-/// with the lowest minimum, in units of the noise. Above it the search ends. With the noise of
-/// [`FIRST_RELATIVE_NOISE`], which is more than that of most measurements, the end of such a search
-/// is less likely by a factor e²⁵.
+/// Maximum excess, in units of the noise, of the sum of squares of a search over that of the search
+/// with the lowest minimum. Both are the sums after the first steps. Above the limit the search
+/// ends. With the noise of [`FIRST_RELATIVE_NOISE`], the end of such a search is less likely by a
+/// factor e²⁵; most measurements have less noise.
 pub(super) const HOPELESS_RISE: f64 = 50.0;
 
 /// Numbers (real and imaginary parts of the lines) per unknown in the first steps of every search:
@@ -44,9 +45,9 @@ pub(super) const SEARCH_NUMBERS: usize = 100;
 /// directions, in which the residual is curved.
 pub(super) const SHORT_STEP: f64 = 1.0;
 
-/// Maximum number of responses to state loads (of the sensors, and for each parameter, over all
-/// lines) that stay in memory between a residual and its derivative: 64 MiB. If there are more, the
-/// responses are computed again for each record.
+/// Maximum number of responses to state loads that stay in memory between a residual and its
+/// derivative: 64 MiB. On each line, every state load has one response per sensor and one per
+/// parameter. If there are more, the responses are computed again for each record.
 pub(super) const KEPT_RESPONSES: usize = 1 << 22;
 
 /// Maximum number of steps of a search.
@@ -60,8 +61,8 @@ pub(super) const PROFILE_STEPS: usize = 24;
 /// profile interval.
 pub(super) const PROFILE_FACTORS: [f64; 2] = [1.5, 8.0];
 
-/// Ratio of the next distance to the extrapolated distance of the limit of a profile interval: a
-/// step slightly beyond the limit gives a value on either side of the limit.
+/// Ratio of the next distance to the extrapolated distance of the limit of a profile interval. It
+/// is slightly above 1, so that the next value is probably beyond the limit.
 pub(super) const PROFILE_MARGIN: f64 = 1.1;
 
 /// Maximum number of steps between values on either side of the limit of a profile interval.
@@ -127,8 +128,8 @@ pub(super) const FREED_COEFFICIENTS: usize = 24;
 /// second.
 pub(super) const FREED_WORK: f64 = 1e9;
 
-/// Number of searches that must end at the lowest minimum if the known noise explains it; otherwise
-/// the search uses all initial estimates.
+/// Number of searches that must end at the lowest minimum if the known noise explains the residual
+/// of this minimum; otherwise the search uses all initial estimates.
 pub(super) const CONFIRMED: usize = 2;
 
 /// Number of searches that must end at the lowest minimum if the noise is unknown: without known

@@ -56,11 +56,11 @@ pub(super) fn starts(
 }
 
 /// Searches from one initial estimate after another: first with weights relative to the response,
-/// then with the weights of the noise. A search stops after its first steps in two cases: if their
-/// sum of squares is far above that of the search with the lowest minimum after its first steps, or
-/// if they end at the same point as the first steps of another search. No further search begins
-/// when enough searches have ended at the lowest minimum; `agreeing` returns this number for a sum
-/// of squares. After the end of a time limit, the result is the lowest sum of squares so far, which
+/// then with the weights of the noise. A search is compared with earlier searches after its first
+/// steps. It stops there if its sum of squares is far above that of the search with the lowest
+/// minimum, or if its parameters are those of an earlier search; all these values are those after
+/// the first steps. No further search begins when enough searches have ended at the lowest minimum;
+/// `agreeing` returns the required number of searches for a sum of squares. After the end of a time limit, the result is the lowest sum of squares so far, which
 /// may not be a minimum.
 ///
 /// # Errors
@@ -121,8 +121,9 @@ impl Minima {
     }
 
     /// Returns whether, after the first steps, the sum of squares of a search is far above that of
-    /// the search with the lowest minimum. Such a search is very unlikely to end lower. The rise is
-    /// relative to the misfit of the lowest minimum if this misfit is larger than the noise.
+    /// the search with the lowest minimum. Such a search is very unlikely to end lower. The limit
+    /// [`HOPELESS_RISE`] is multiplied by the mean square of the residual of the latter search, in
+    /// units of the noise, if this mean square is above 1.
     fn is_hopeless(&self, near: &Minimum) -> bool {
         let best = self.ends.first().and_then(|end| end.near.first());
         best.is_some_and(|best| {

@@ -65,9 +65,9 @@ pub(super) struct Minimum {
     pub(super) at_bound: Vec<bool>,
 }
 
-/// Ratio of the length of a step to the length of the parameters that also ends a search; both
-/// lengths are scaled by the columns of the Jacobian. For data without noise this criterion ends
-/// the search.
+/// Maximum ratio of the length of a step to the length of the parameters for the end of a search;
+/// the other criterion is [`Effort::tolerance`]. Both lengths are scaled by the columns of the
+/// Jacobian. For data without noise, this ratio ends the search.
 const STEP_TOLERANCE: f64 = 1e-12;
 /// First damping, relative to the unit diagonal of the Gram matrix.
 const FIRST_DAMPING: f64 = 1e-8;

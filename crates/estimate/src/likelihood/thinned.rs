@@ -36,8 +36,8 @@ impl<'a, M: ResponseModel> Thinned<'a, M> {
         Self { model, rows, omega }
     }
 
-    /// Returns the data of these lines without the errors of pulses, because the first steps ignore
-    /// these errors.
+    /// Returns the data of the selected lines without the errors of pulses, because the first steps
+    /// ignore these errors.
     pub(super) fn lines(&self, data: &LineData) -> Option<LineData> {
         data.rows(&self.rows).map(LineData::without_pulse_noise)
     }

@@ -47,8 +47,8 @@ impl<'a> RecordUnknowns<'a> {
         Self { transient, reference, pulses, amplitudes }
     }
 
-    /// Returns the effects of the amplitudes on a line at `omega` (rad/s): an input and its error,
-    /// for a unit of each amplitude.
+    /// Returns, for each amplitude, the index of the input and the error of this input on a line at
+    /// `omega` (rad/s), per unit of the amplitude.
     fn input_errors(&self, omega: f64) -> Vec<(usize, Complex<f64>)> {
         let mut errors = Vec::with_capacity(self.amplitudes);
         for pulse in &self.pulses {

@@ -182,8 +182,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok((variance, bases))
     }
 
-    /// Returns the share of the noise in the residual after the fit (1 − leverage of the parameters
-    /// and of the errors of pulses), lines × p.
+    /// Returns the share of the noise that remains in the residual after the fit (1 − leverage of
+    /// the parameters and of the errors of pulses), lines × p.
     fn residual_share(&self, before: &WeightedMinimum) -> Option<DMatrix<f64>> {
         let residual = self.residual(&before.weights);
         let linearisation = residual.linearise(&before.minimum.parameters)?;

@@ -37,8 +37,8 @@ pub fn fitted_start(
     fit.start()
 }
 
-/// Estimate of the initial state, as by [`fitted_start`], of a record that is given in segments:
-/// memory does not grow with the length of the record.
+/// Estimate of the initial state of a record that is given in segments. The result is that of
+/// [`fitted_start`], but the memory does not grow with the length of the record.
 ///
 /// # Source
 /// As [`fitted_start`]; also chapter 6 of the same book (a triangular factor updated by rows).
@@ -49,8 +49,8 @@ pub struct StartFit {
     /// States, at the last sample so far, of the superposed motions: the free response to each unit
     /// initial state, and the response from rest to the force.
     runs: Vec<InitialState>,
-    /// Triangular factor for each measured channel of the columns
-    /// \[free responses | measured motion minus response from rest\].
+    /// Triangular factor of the columns \[free responses | measured motion minus response from
+    /// rest\], for each measured channel.
     channels: Vec<TriangularFactor>,
     /// Sum of squares of each measured channel.
     sizes: Vec<f64>,

@@ -266,7 +266,7 @@ impl Fitted<'_> {
                     .filter(|p| direction.involved[column(p)])
                     .map(|p| (*p, direction.combination[column(p)]))
                     .collect();
-                // A direction among the forces alone concerns neither C nor K.
+                // A direction that combines only forces contains no entry of C or K.
                 if !terms.is_empty() {
                     let relative_singular_value = direction.relative_singular_value;
                     undetermined.push(Undetermined { relative_singular_value, terms });
@@ -344,7 +344,7 @@ impl Fitted<'_> {
             .collect();
         let count = sensitivities.len();
         Ok(DMatrix::from_fn(count, count, |p, q| {
-            // The same product for both orders makes the matrix exactly symmetric.
+            // The same product for (p, q) and (q, p) makes the matrix exactly symmetric.
             let (p, q) = (p.min(q), p.max(q));
             weighted[p].dot(&gradients[q])
         }))

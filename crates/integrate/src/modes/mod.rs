@@ -172,9 +172,9 @@ fn search_modes(
                 space = Space::new(len);
                 continue;
             }
-            // The search continues from another shift if fewer than a quarter of the requested
-            // modes have converged when the space has half of its largest size, or if all modes of
-            // the space have converged but are too far away.
+            // The search continues from another shift in two cases: fewer than a quarter of the
+            // requested modes have converged when the space has half of its largest size, or all
+            // modes of the space have converged but are too far away.
             let stalled = most < len && 2 * target >= most && 4 * usable < count;
             if target == most || stalled || exhausted {
                 break (modes, reach, usable);

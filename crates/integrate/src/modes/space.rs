@@ -90,8 +90,8 @@ impl Space {
             return Err(overflow());
         }
         let remainder = DMatrix::from_fn(self.basis.len() - m, m, |i, j| entry(m + i, j));
-        // The last entry of column j belongs to the basis vector that the image of basis vector j
-        // added.
+        // The image of basis vector j added a vector to the basis. The last entry of column j
+        // belongs to this added vector.
         let below = self.columns.iter().enumerate().map(|(j, column)| column.len() - 1 - j);
         let below = below.max().unwrap_or(0);
         let mut modes: Vec<Candidate> = Vec::new();

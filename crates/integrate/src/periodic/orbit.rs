@@ -40,16 +40,18 @@ impl PeriodicOrbit {
         &self.multipliers
     }
 
-    /// Returns the error of the largest multiplier as one of the steps of the scheme (pure number).
-    /// For more than 64 degrees of freedom, the error is the norm of the residual of this
-    /// multiplier. It is large if many multipliers have about the same modulus.
+    /// Returns the error of the largest multiplier of the steps of the scheme (pure number). It
+    /// does not include the error due to the time step, [`scheme_error`](Self::scheme_error). For
+    /// more than 64 degrees of freedom it is the norm of the residual of this multiplier, which is
+    /// large if many multipliers have about the same modulus.
     pub fn multiplier_error(&self) -> f64 {
         self.multiplier_error
     }
 
-    /// Returns the error of the largest multiplier by the time step of the scheme (pure number):
-    /// its change with twice the step, which for a scheme of order p is about 2ᵖ − 1 times the
-    /// error. `None` if the number of samples is odd, or if there is no orbit with twice the step.
+    /// Returns an estimate of the error of the largest multiplier due to the time step of the
+    /// scheme (pure number): the change of the multiplier with twice the step. For a scheme of
+    /// order p, this change is about 2ᵖ − 1 times the error. `None` if the number of samples is
+    /// odd, or if there is no orbit with twice the step.
     ///
     /// # Source
     /// Richardson (1911), Philosophical Transactions of the Royal Society A 210, 307–357.
@@ -225,8 +227,8 @@ fn by_whole_derivative(
     Ok((state, multipliers))
 }
 
-/// Returns the derivative of the state at the end of the period with respect to its beginning, both
-/// relative to the scales.
+/// Returns the derivative of the state at the end of the period with respect to the state at the
+/// beginning, both relative to the scales.
 fn whole_derivative(
     shooting: &mut Shooting<'_>,
     state: &DVector<f64>,

@@ -19,8 +19,8 @@ pub enum CentralDifferenceStart {
     #[default]
     Taylor,
     /// No motion before t = 0, x(−Δt) = x(0): the system is at rest until the force begins at t =
-    /// 0. The error is of first order unless F(0) balances x(0). The velocity at t = 0 then follows
-    /// from the formula.
+    /// 0. The error is of first order unless F(0) balances x(0). The velocity at t = 0 follows from
+    /// the central difference.
     Rest,
 }
 

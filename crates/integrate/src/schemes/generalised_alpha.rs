@@ -65,8 +65,8 @@ pub struct GeneralisedAlpha {
 }
 
 impl GeneralisedAlpha {
-    /// Creates the member with the least damping of slow motions; ρ∞ is a pure number between 0 and
-    /// 1.
+    /// Creates the generalised-α method that damps slow motions least for this ρ∞, a pure number
+    /// between 0 and 1.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].

@@ -19,8 +19,8 @@ pub enum HouboltStart {
     AverageAcceleration,
     /// Two steps of central difference, itself started by the Taylor step.
     CentralDifference,
-    /// Displacements given by the caller, in m. The velocities there are differences of second
-    /// order over x(0), x(Δt), x(2Δt), the accelerations from the equation of motion.
+    /// Displacements given by the caller, in m. The velocities at these instants are differences of
+    /// second order over x(0), x(Δt), x(2Δt); the accelerations follow from the equation of motion.
     Given {
         /// Displacement x(Δt), one entry per degree of freedom.
         at_dt: Vec<f64>,

@@ -86,7 +86,7 @@ impl Tridiagonal {
             second = b[bottom] - m[bottom] * second;
             (b[top], b[bottom]) = (first, second);
         }
-        // An odd number of rows has one more row, in the middle.
+        // If the number of rows is odd, one row remains in the middle.
         if n - half > half {
             b[half] -= m[half] * second;
         }

@@ -118,7 +118,7 @@ impl UnsymmetricPlan {
         };
         let reciprocal = reciprocal_condition(n, solve);
         if reciprocal <= f64::EPSILON {
-            // The matrix may still be regular with exchanges of rows.
+            // A factorisation with row exchanges may still succeed.
             return Ok(None);
         }
         Ok((factors.backward_error(matrix, sizes) < limits::BACKWARD_ERROR).then_some(factors))
@@ -131,8 +131,8 @@ impl UnsymmetricPlan {
         let n = starts.len() - 1;
         let [mut lower, mut upper] = [(); 2].map(|()| vec![0.0; rows.len()]);
         let [mut column, mut row] = [(); 2].map(|()| vec![0.0; n]);
-        // Lists of the columns that change column k next, and, for each of them, the position at
-        // which its rows from k on begin.
+        // `first` and `next` list the columns that change column k next. For each of these columns,
+        // `at` is the position of its first row from k on.
         let [mut first, mut next, mut at] = [vec![NONE; n], vec![NONE; n], vec![0; n]];
         for k in 0..n {
             let entries = starts[k]..starts[k + 1];

@@ -1,4 +1,5 @@
-//! Steps of one or two degrees of freedom with nonlinear forces on one of them, at fixed size.
+//! Steps of one or two degrees of freedom with nonlinear forces on one of them, with arrays of
+//! fixed size.
 //!
 //! ```text
 //! z(t+Δt) = z + D z + B F + Σ E_s g_s,   g_s = g(x_s, ẋ_s, t_s)
@@ -60,7 +61,8 @@ struct Before {
 
 impl Collocations {
     /// Creates the maps of `scheme` for a step of `dt` seconds, if the system is small enough, all
-    /// nonlinear forces act on the same degree of freedom, and the step is short.
+    /// nonlinear forces act on the same degree of freedom, and the step is short compared with
+    /// every period.
     pub(crate) fn from_scheme(scheme: &dyn Scheme, system: &dyn System, dt: f64) -> Option<Self> {
         let forces = system.nonlinear_forces();
         let &[dof] = forces.first()?.dofs() else { return None };
@@ -345,7 +347,8 @@ impl NonlinearForce for Probe {
 
     fn force(&self, time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
         let mut state = self.state();
-        // After the tangent, Newton's method evaluates a constant force exactly one more time.
+        // After it has asked for the tangent, Newton's method evaluates a constant force exactly
+        // once more.
         if std::mem::take(&mut state.goes_on) {
             state.asked.pop();
         }

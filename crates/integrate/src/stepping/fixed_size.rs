@@ -10,14 +10,14 @@ use crate::stepping::transition::Transition;
 #[derive(Debug)]
 pub(crate) struct FixedSize {
     one: Transition,
-    /// Two steps at once, if both together are short: each step depends on the one before, so that
-    /// this halves the waiting time.
+    /// Two steps at once, if both together are short compared with every period. This halves the
+    /// waiting time, because each step depends on the one before.
     two: Option<Transition>,
 }
 
 impl FixedSize {
     /// Returns the transition of `stepper` for a step of `dt` seconds, if its system is small
-    /// enough and the step is short.
+    /// enough and the step is short compared with every period.
     pub(crate) fn from_stepper(stepper: &mut dyn Stepper, dt: f64) -> Option<Self> {
         let n = stepper.dof();
         if n > limits::FIXED_SIZE_DOF {

@@ -226,8 +226,8 @@ impl Simulation {
         self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
     }
 
-    /// Takes as many steps as possible at fixed size; returns the next step, and whether the motion
-    /// is finite so far.
+    /// Takes as many steps as possible with arrays of fixed size; returns the next step, and
+    /// whether the motion is finite so far.
     fn advance_small(
         &mut self,
         table: &ForceTable<'_>,

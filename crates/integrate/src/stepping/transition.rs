@@ -24,8 +24,8 @@ impl Transition {
         Self::read(stepper, || ())
     }
 
-    /// Creates the same map and calls `after` after each unit state, then after each unit load, in
-    /// the order of the columns.
+    /// Creates the map as [`from_stepper`](Self::from_stepper) does, and calls `after` after each
+    /// unit state, then after each unit load, in the order of the columns.
     pub(crate) fn read(stepper: &mut dyn Stepper, mut after: impl FnMut()) -> Self {
         let (n, len) = (stepper.dof(), stepper.state_len());
         let (instants, zeros) = (stepper.instants(), vec![0.0; n]);
@@ -64,7 +64,7 @@ impl Transition {
         Self { change, loads }
     }
 
-    /// Returns an entry of D or, from column `state` on, of the matrices of the loads side by side.
+    /// Returns an entry of the matrix \[D B₁ B₂ …\]: D and the matrices of the loads side by side.
     pub(crate) fn entry(&self, row: usize, column: usize) -> f64 {
         match column.checked_sub(self.change.ncols()) {
             None => self.change[(row, column)],

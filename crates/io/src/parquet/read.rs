@@ -225,8 +225,9 @@ impl<R: ChunkReader + 'static> Columns<R> {
         Ok(values)
     }
 
-    /// Passes a column to `take` for every range of rows within one span and one row group, with
-    /// the index of the span and the number of rows, which `take` must read.
+    /// Passes a column to `take` for every range of rows within one span and one row group. The
+    /// other arguments are the index of the span and the number of rows; `take` must read these
+    /// rows.
     pub fn visit(
         &self,
         groups: &Groups<'_>,

@@ -4,8 +4,8 @@ use super::delimiter::Delimiter;
 use super::fields::{Fields, Layout, Row};
 use super::rows::text_of;
 
-/// Splits rows into their fields. In a row with more words than the last row has fields, the words
-/// of a name are joined if that gives one name per column.
+/// Splits rows into their fields. A row may have more words than the last row has fields. The words
+/// of a name in this row are then joined, if that gives one name per column.
 pub(super) fn split(rows: &[Row<'_>], layout: Layout) -> Vec<Fields> {
     let mut split: Vec<Fields> = Vec::new();
     for row in rows {

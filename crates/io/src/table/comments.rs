@@ -137,7 +137,7 @@ impl Comments {
             let what = if *has_units { "names or units" } else { "names" };
             format!(
                 "not read: the comment \"{}\" has {fields} fields, but the table has {}: if the fields are {what} \
-                 of columns, give one field for each column (units also with `unit`)",
+                 of columns, give one field for each column, or the units with `unit`",
                 escaped(text),
                 message::count(columns, "column")
             )

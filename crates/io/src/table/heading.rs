@@ -108,7 +108,8 @@ impl Above {
             let count = row.fields.filled();
             count == filled.first || filled.is_longer(row) || row.fields.len() == width
         };
-        // A row of numbers only is a row of data, unless it numbers the channels.
+        // A row that contains only numbers is a row of data, except a first row that numbers the
+        // channels.
         let is_data_row = |(at, row): (usize, &Beginning<'_>)| {
             numbers(row, layout) == row.fields.filled() && !(at == 0 && is_numbering(row))
         };

@@ -65,8 +65,8 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// Returns the seconds since the beginning of the first day or hour. If the time goes back by
-    /// more than half of the period, the clock has begun again; the start of a second record seldom
-    /// causes such a step.
+    /// more than half a day (or half an hour), the clock has begun again; the start of a second
+    /// record seldom causes such a step.
     pub fn continued(&mut self, seconds: f64) -> f64 {
         if self.last_s - seconds > 0.5 * self.period_s {
             self.passed_s += self.period_s;

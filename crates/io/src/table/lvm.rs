@@ -61,7 +61,7 @@ impl LvmHeader {
         let start = &text[..text.len().min(MAX_BYTES)];
         let mut ends = memmem::find_iter(start, END);
         let first = ends.next()?;
-        // A second header belongs to the segment, unless it follows the beginning of the table.
+        // A second header above the table is the header of the segment.
         let table = memmem::find(&start[first..], X.as_bytes()).map(|at| first + at);
         let last =
             ends.next().filter(|end| table.is_none_or(|table| *end < table)).unwrap_or(first);

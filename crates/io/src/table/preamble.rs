@@ -20,8 +20,8 @@ pub(crate) struct Beginning {
     pub fields: usize,
 }
 
-/// Returns the first line after which rows have the same number of fields, two or more, and are
-/// numbers after at most two rows of words.
+/// Returns the first line at which a table begins: rows with the same number of fields, two or
+/// more. At most two rows of words come first, then rows of numbers.
 pub(crate) fn table(text: &[u8], terminator: u8) -> Option<Beginning> {
     let mut remaining = text;
     for line in (1..).take(MOST_LINES) {

@@ -263,7 +263,8 @@ impl RecordFile {
         self.chunks(columns, &mut |chunk| {
             let last = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
             let mut next = window.start.max(chunk.first);
-            // A table in memory is a single chunk: copied whole, it would need its memory again.
+            // A table in memory is a single chunk. A copy of the whole chunk would need the same
+            // memory again, so it is copied in blocks.
             while next < last.min(window.end) {
                 let upto = last.min(window.end).min(next + rows);
                 for (values, column) in buffered.iter_mut().zip(chunk.columns) {

@@ -219,8 +219,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the error for text above the table, if there is any, otherwise `error` about rows of
-/// different lengths.
+/// Returns the error for text above the table if there is such text and `error` is about rows of
+/// different lengths; otherwise returns `error`.
 fn above_or(table: Option<Beginning>, rows: &Rows, error: IoError) -> IoError {
     match &error {
         IoError::Ragged { file, .. } => above(table, rows, file).unwrap_or(error),

@@ -74,7 +74,7 @@ pub(crate) fn is_time(name: &str) -> bool {
 /// Returns whether a column is called time, in any unit.
 pub(super) fn is_called_time(name: &str) -> bool {
     let bare = without_unit(name).to_lowercase();
-    // The last part is the name, in a path of an HDF5 file or a struct.
+    // In the path of an HDF5 file or of a struct, the last part is the name.
     let last = bare.rsplit(['/', '.']).next().unwrap_or(&bare);
     let words = last.split([' ', '_', '-', '(', ')', ':']).filter(|word| !word.is_empty());
     let (times, others): (Vec<&str>, Vec<&str>) = words.partition(|word| WORDS.contains(word));

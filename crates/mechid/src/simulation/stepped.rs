@@ -23,12 +23,14 @@ pub struct Multiplier {
     pub value: Complex<f64>,
     /// Error of the factor for the steps of the scheme (pure number).
     pub error: f64,
-    /// Error of the factor by the time step of the scheme (pure number); `None` if it is not known.
+    /// Error of the factor due to the time step of the scheme (pure number); `None` if it is not
+    /// known.
     pub scheme_error: Option<f64>,
 }
 
-/// Maximum excess over 1 of a Floquet multiplier that counts as rounding of a double one, as for an
-/// undamped machine: about the square root of the accuracy of the multipliers (pure number).
+/// Maximum excess over 1 of the modulus of a Floquet multiplier that counts as rounding of a double
+/// multiplier, as for an undamped machine: about the square root of the accuracy of the multipliers
+/// (pure number).
 const MULTIPLIER_ROUNDING: f64 = 1e-4;
 
 /// Response, and for a periodic response of a nonlinear machine its largest multiplier.

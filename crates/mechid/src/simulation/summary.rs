@@ -101,7 +101,8 @@ pub struct LargestMultiplier {
     pub modulus: f64,
     /// Error of the factor, with that by the time step if it is known (pure number).
     pub error: f64,
-    /// Error of the factor by the time step of the scheme (pure number); `None` if it is not known.
+    /// Error of the factor due to the time step of the scheme (pure number); `None` if it is not
+    /// known.
     pub scheme_error: Option<f64>,
     /// Text with these numbers.
     pub text: String,
@@ -247,15 +248,15 @@ impl LargestMultiplier {
         let error = of_steps + scheme_error.unwrap_or(0.0);
         let lacking = match scheme_error {
             Some(_) => "",
-            None => "; the error by the time step is not known and not included",
+            None => "; ± does not include the error of the time step, which is not known",
         };
         let becomes = match modulus {
-            _ if modulus + error < 1.0 => "it is stable",
-            _ if modulus - error > 1.0 => "it lies at the limit of stability",
-            _ => "whether it is stable is not known",
+            _ if modulus + error < 1.0 => "the response is stable",
+            _ if modulus - error > 1.0 => "the response is at the limit of stability",
+            _ => "the stability of the response is not known",
         };
         let text = format!(
-            "each period multiplies a disturbance of the response by {} ± {} at most (the largest Floquet \
+            "each period multiplies a disturbance of the response by at most {} ± {} (the largest Floquet \
              multiplier): {becomes}{lacking}",
             significant(modulus, 4),
             significant(error, 1),

@@ -13,8 +13,8 @@ use super::transient::TransientResponse;
 use crate::decomposition::hermitian_eigen;
 
 /// Step of the second differences of the spectrum, in standard errors of a combination of
-/// parameters. It is also the largest change of a parameter in such a step; the parameters have
-/// unit scale.
+/// parameters. The step is shorter if it would change a parameter by more than this number; the
+/// parameters have unit scale.
 const ERROR_STEP: f64 = 0.05;
 
 /// Parts of the mean excess of the fitted spectrum over the true spectrum, M = ½ Σ C_ab
@@ -25,8 +25,8 @@ const ERROR_STEP: f64 = 0.05;
 /// change them.
 pub(super) struct Excess {
     centre: Coefficients,
-    /// Coefficients on both sides of the fit along the columns of F that change poles. Each has the
-    /// factor of its spectrum in M.
+    /// Coefficients after a step to either side of the fit, along each column of F that changes
+    /// poles. Each has the factor of its spectrum in M.
     moved: Vec<(Coefficients, f64)>,
     /// Contribution of the columns of F that do not change poles: half the sum of the second
     /// derivatives of ψγᵀ of each mode, and of D Q Dᵀ.
@@ -122,8 +122,8 @@ impl Fit {
 }
 
 impl Excess {
-    /// Adds the changes of ψγᵀ and D Q Dᵀ from the centre to coefficients with the same poles,
-    /// times `weight`.
+    /// Adds, times `weight`, the differences of ψγᵀ and D Q Dᵀ between `moved` and the centre,
+    /// which have the same poles.
     fn add_residues(&mut self, moved: &Coefficients, weight: f64) {
         for (r, sum) in self.residues.iter_mut().enumerate() {
             for (coefficients, sign) in [(moved, weight), (&self.centre, -weight)] {

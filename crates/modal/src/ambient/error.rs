@@ -37,8 +37,8 @@ pub enum AmbientError {
     },
     /// A channel is a multiple of another channel.
     #[error(
-        "channels {} and {} are copies of one another: all but {unexplained:.0e} of their \
-         power is common; leave one out",
+        "channels {} and {} are copies of one another: only a fraction of {unexplained:.0e} of their \
+         power is not common; leave one out",
         first.saturating_add(1), second.saturating_add(1)
     )]
     CopiedChannel {
@@ -52,7 +52,7 @@ pub enum AmbientError {
     /// The band has too few lines.
     #[error(
         "{lines} spectral lines lie between {from_hz} and {to_hz} Hz; one mode with {outputs} outputs \
-         needs {needed}: record for longer, or widen `band_hz`"
+         needs {needed}: make a longer record, or widen `band_hz`"
     )]
     TooFewLines {
         /// Number of lines in the band.
@@ -68,7 +68,8 @@ pub enum AmbientError {
     },
     /// The record is too short for the subspace method.
     #[error(
-        "{samples} samples after resampling to the band are too few for covariances over {lags} lags: record longer"
+        "{samples} samples after resampling to the band are too few for covariances over {lags} lags: \
+         make a longer record"
     )]
     TooShort {
         /// Number of samples after resampling to the band.

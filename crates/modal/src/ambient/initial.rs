@@ -87,8 +87,8 @@ fn initial_parameters(
     parameters
 }
 
-/// Scales each shape: near the resonance, the power of the model along the shape then equals the
-/// power of the lines.
+/// Scales each shape so that, near the resonance, the power of the model along the shape is equal
+/// to the power of the lines.
 pub(super) fn match_amplitudes(
     parameters: &mut Parameters,
     pooled: &[PooledLines],

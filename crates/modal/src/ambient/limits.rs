@@ -95,8 +95,8 @@ pub(super) const EXCLUDED_LINES: f64 = 2.0;
 /// copies.
 pub(super) const COPIED_CHANNEL: f64 = 1e-10;
 
-/// Ratio of the Wald statistic of a shape to the penalty of a mode above which the mode is accepted
-/// without a further test.
+/// Minimum ratio of the Wald statistic of a shape to the penalty of a mode; with a larger ratio the
+/// mode is accepted without a further test.
 pub(super) const STRONG_EVIDENCE: f64 = 4.0;
 
 /// Maximum number of additional poles for harmonics, a background or modes outside the band.

@@ -58,7 +58,7 @@ pub(super) struct Effort {
 impl Effort {
     /// Effort to compare quantities at initial estimates. The initial poles are more accurate than
     /// the initial amplitudes. With wrong amplitudes, a search with free poles would move a damping
-    /// ratio to nearly zero, as of a sinusoid, and no later search would increase it again.
+    /// ratio to nearly zero, the value for a sinusoid, and no later search would increase it again.
     pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true, even_pools: false };
     /// Effort to approach the maximum with coarse lines.
     pub const SHORT: Self =
@@ -205,8 +205,8 @@ impl Path<'_> {
         if self.updates > 0 {
             fit.information = information(&fit.parameters, self.lines.coarse, self.lines.span)?;
             self.updates = 0;
-            // Steps that were refused with the updated information may succeed with the new
-            // information.
+            // Steps that were refused with the approximate, updated information may succeed with
+            // the newly computed information.
             self.damping = self.damping.min(FIRST_DAMPING);
         }
         Some(())

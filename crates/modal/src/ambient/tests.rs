@@ -359,7 +359,8 @@ fn the_transient_correlates_the_lines() {
             let exact = terms.sum::<Complex<f64>>() * (dt * dt / DURATION);
             let [one, other] = [lines[j], *second].map(|w| response.gains(w));
             let [[_, force], [_, other_force]] = [lines[j], *second].map(|w| response.parts(w));
-            // Forces at two lines are independent, so for a known transient they are not.
+            // Forces at two lines are independent. For a given transient, which depends on both of
+            // them, they are correlated.
             let remaining = force * &prior * other_force.adjoint();
             let modelled = (one * &prior * other.adjoint() - remaining)[(0, 0)];
             let gap = (exact - modelled).norm() / exact.norm();

@@ -103,8 +103,9 @@ pub(super) fn search_with_transient(fit: Fit, band: &BandLines) -> Option<FitWit
     best
 }
 
-/// Returns the parameters with the noise under which the lines are most likely once the transient
-/// is known: that of `parameters`, or constant noise at or below the weakest lines.
+/// Returns the candidate for which the lines are most likely, with the transient that this
+/// candidate predicts. The candidates are `parameters`, and the same parameters with constant
+/// noise at or below the power of the weakest lines.
 ///
 /// The expected periodogram does not determine noise below the leakage of the resonances. With
 /// noise that is too small, a few lines of pure noise would determine the transient.
@@ -251,7 +252,8 @@ impl TransientResponse {
         let mut root = hermitian_eigen(prior.clone())?;
         let least = DETERMINED_SHARE * root.eigenvalues.max();
         for (mut column, power) in root.eigenvectors.column_iter_mut().zip(&root.eigenvalues) {
-            // Forces that drive two modes alike determine no difference of their transients.
+            // If the forces drive two modes equally, the covariance does not determine the
+            // difference of the transients of these modes.
             column.scale_mut(if *power > least { 1.0 / power.sqrt() } else { 0.0 });
         }
         let precision = (&root.eigenvectors * root.eigenvectors.transpose()).map(Complex::from);

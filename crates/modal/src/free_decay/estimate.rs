@@ -210,8 +210,8 @@ impl<'a> Spread<'a> {
     }
 }
 
-/// Returns modes and channels of a fit; `scale` is the unit of each channel of the data, in the
-/// unit of the record. `None` if the fit does not determine all unknowns.
+/// Returns the modes and channels of a fit; `None` if the fit does not determine all unknowns. The
+/// record is the scaled data times `scale`, channel by channel.
 pub(super) fn estimate(
     record: &Record,
     data: &Data,

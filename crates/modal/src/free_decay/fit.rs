@@ -249,8 +249,8 @@ impl Fit {
             + self.noise.iter().map(Autoregression::log_volume).sum::<f64>()
     }
 
-    /// Returns derivatives with respect to the poles and residual of all channels, divided by the
-    /// standard deviation of the noise.
+    /// Returns, for all channels, the derivatives with respect to the poles, and the residual. Both
+    /// are divided by the standard deviation of the noise.
     fn weighted(&self, len: usize) -> (DMatrix<f64>, DVector<f64>) {
         let columns = 2 * self.poles.len();
         let mut jacobian = DMatrix::zeros(columns * self.channels.len(), columns);
@@ -300,8 +300,8 @@ impl FewColumns {
     }
 }
 
-/// Returns the prediction errors of columns, beginning with row `before`; the first row is sample
-/// `first` of the record.
+/// Returns the prediction errors of `columns`, beginning with row `before`. The first row of
+/// `columns` is sample `first` of the record.
 fn whitened(
     noise: &Autoregression,
     columns: &DMatrixView<'_, f64>,

@@ -30,8 +30,8 @@ pub(crate) const MAX_STEPS: usize = 50;
 /// Decrease of minus twice the log-likelihood in a step below which the last search ends.
 pub(crate) const FINE: f64 = 1e-7;
 
-/// Decrease of minus twice the log-likelihood in a step below which a search in the comparison of
-/// numbers of modes ends.
+/// Decrease of minus twice the log-likelihood in one step. While numbers of modes are compared, a
+/// search ends at a smaller decrease.
 pub(crate) const COARSE: f64 = 1e-2;
 
 /// Damping of a step above which a search ends, because no step lowers the cost.
@@ -101,8 +101,8 @@ pub(crate) const INITIAL_GROWTH: f64 = 6.0;
 /// Lowest order of the polynomials of a backbone: linear and quadratic damping.
 pub(crate) const LOWEST_ORDER: usize = 2;
 
-/// Highest order of the polynomials of a backbone; above it, the range of one decay does not
-/// determine the terms.
+/// Highest order of the polynomials of a backbone; above it, the amplitude range of one decay does
+/// not determine the terms.
 pub(crate) const HIGHEST_ORDER: usize = 6;
 
 /// Maximum number of Gauss–Newton steps of a backbone.

@@ -147,8 +147,8 @@ pub fn free_decay(
     Ok(estimate)
 }
 
-/// Returns the given or the maximum number of modes; refuses a number or a record outside the
-/// limits.
+/// Returns the given number of modes, or the maximum number if none is given. Refuses a number or a
+/// record outside the limits.
 fn checked_number_of_modes(record: &Record, settings: &FreeDecay) -> Result<usize, FreeDecayError> {
     let asked = settings.modes.unwrap_or(settings.max_modes);
     if asked == 0 || asked > MOST_MODES {
@@ -181,7 +181,7 @@ fn check_oscillation(data: &Data, fit: &Fit, dt: f64) -> Result<(), FreeDecayErr
     }
 }
 
-/// Returns a power of two near the peak of each channel, and the RMS about the mean relative to
+/// Returns, for each channel, a power of two near its peak, and its RMS about the mean divided by
 /// this power.
 fn units(record: &Record) -> Result<Vec<[f64; 2]>, FreeDecayError> {
     let unit = |channel: usize| {

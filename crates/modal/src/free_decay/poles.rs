@@ -17,8 +17,8 @@ pub(super) struct Pole {
     pub turn: f64,
 }
 
-/// Returns the lowest and highest turn in a record of `len` samples, in rad per sample: half a
-/// cycle in the record, and nearly half the sampling rate.
+/// Returns the lowest and the highest angular frequency in a record of `len` samples, in rad per
+/// sample: half a cycle in the record, and nearly half the sampling rate.
 pub(super) fn turns(len: usize) -> [f64; 2] {
     [PI / len as f64, POLE_HIGHEST * PI]
 }

@@ -43,7 +43,7 @@ pub(super) struct Candidate {
     pub cost: f64,
 }
 
-/// Fits with the same number of decays: one with white noise, one with coloured noise. An
+/// Pair of fits with the same number of decays: one with white noise, one with coloured noise. An
 /// autoregression of high order may hide decays that are not yet in the model.
 #[derive(Debug, Clone)]
 struct Pair {

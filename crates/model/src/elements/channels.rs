@@ -24,7 +24,7 @@ pub struct SensorRow {
 
 impl SensorRow {
     /// Returns the reading per displacement at `omega` (rad/s), in the unit of the quantity per m,
-    /// with the delay from `parameters` in their units.
+    /// including the known delay and, from `parameters` (in their units), the unknown delay.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 2.2 (a delay τ changes the phase by

@@ -13,8 +13,8 @@ pub struct Sensor {
     pub name: String,
     /// Degree of freedom.
     pub at: String,
-    /// Degree of freedom whose motion is subtracted: for a probe on a housing, or [`SUPPORT`] for a
-    /// response relative to the moving support.
+    /// Degree of freedom whose motion is subtracted: that of the housing for a probe on a housing,
+    /// or [`SUPPORT`] for a response relative to the moving support.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub relative_to: Option<String>,
     /// Measured quantity.
@@ -22,7 +22,8 @@ pub struct Sensor {
     /// Reading per unit of the quantity.
     #[cfg_attr(feature = "serde", serde(default = "one", skip_serializing_if = "is_one"))]
     pub gain: f64,
-    /// Delay relative to the inputs, in s: of a filter, or of a logger with a separate clock.
+    /// Delay relative to the inputs, in s, for example that of a filter or of a logger with a
+    /// separate clock.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Coefficient::is_zero"))]
     pub delay: Coefficient,
 }
@@ -131,7 +132,7 @@ impl Sensor {
 
 #[cfg(feature = "serde")]
 impl Input {
-    /// Returns the input with the name of its degree of freedom if it is a force without a name.
+    /// Returns the input. A force without a name gets the name of its degree of freedom.
     pub(super) fn named(self) -> Self {
         match self {
             Self::Force { name, at, against } if name.is_empty() => {

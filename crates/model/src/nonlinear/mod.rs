@@ -64,8 +64,8 @@ impl NonlinearSystem {
         Ok(Self { linear, terms, coefficients })
     }
 
-    /// Returns M, C and K: the system at small amplitudes, except for terms whose slope at zero is
-    /// not zero.
+    /// Returns M, C and K. They describe the system at small amplitudes, if every term has a slope
+    /// of zero at zero.
     pub fn linear(&self) -> &SecondOrderSystem {
         &self.linear
     }

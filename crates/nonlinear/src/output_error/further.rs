@@ -20,8 +20,8 @@ pub struct FurtherFit {
     pub fit: NonlinearFit,
     /// Fraction of the residual power that the further terms explain.
     pub explained: f64,
-    /// Probability that noise alone makes at least one of the candidates explain as much residual
-    /// power as the first of the further terms, or more.
+    /// Probability that, with noise alone, at least one of the candidates explains at least the
+    /// residual power that the first of the further terms explains.
     pub p_value: f64,
 }
 

@@ -34,7 +34,8 @@ fn equations_are_solved_in_few_products() {
     assert!((found.vector - &exact).norm() < 1e-10 * exact.norm());
     assert!(found.products < 50, "{}", found.products);
     assert!(found.residual <= 1e-12 && found.reciprocal_condition > 0.01);
-    // If the space is too small, the residual is as large as the solver reports.
+    // If the space is too small, the reported residual is still the residual of the returned
+    // vector.
     let found = solve(&right, 1e-12, 5, apply).unwrap();
     let left = &right - (DMatrix::identity(len, len) - &matrix) * found.vector;
     assert!((left.norm() / right.norm() - found.residual).abs() < 1e-12);

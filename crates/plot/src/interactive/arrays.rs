@@ -50,8 +50,8 @@ impl Arrays {
     }
 }
 
-/// Writes a list; a long list that is not evenly spaced gets this many bytes of single precision
-/// per number.
+/// Writes a list. A long list that is not evenly spaced is written in single precision, with this
+/// many bytes per number.
 fn text(values: &[f64], bytes: usize) -> String {
     let (first, last, len) = (values[0], values[values.len() - 1], values.len());
     if len <= EXACT {

@@ -11,9 +11,9 @@ use crate::panel::{Panel, ResponsePart};
 use crate::style::{Marker, Resolved};
 use crate::trace;
 
-/// Maximum number of points of a curve that are all written: more than a screen shows, and more
-/// than the lines of a response in most tests. If a record is longer, only its extremes are
-/// written.
+/// Maximum number of points of a curve for which every point is written: more than a screen shows,
+/// and more than the lines of a response in most tests. If a record is longer, only its extremes
+/// are written.
 const POINTS: usize = 8192;
 
 /// Number of columns of a thinned record; each has its first, lowest, highest and last point.

@@ -99,8 +99,8 @@ impl DrawnSet {
     }
 }
 
-/// Returns an HTML page of drawings below one another, which has zoom and cursor and loads no other
-/// file.
+/// Returns an HTML page of drawings below one another. The page has zoom and cursor, and loads no
+/// other file.
 pub fn page_of(title: &str, drawings: &[DrawnSet]) -> String {
     let figures: String = drawings
         .iter()

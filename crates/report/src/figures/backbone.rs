@@ -22,7 +22,7 @@ pub fn of_machine(title: &str, rows: &[BackboneRow]) -> Figure {
     panels.fold(Figure::new(title), Figure::panel)
 }
 
-/// Returns frequency and damping ratio of a free decay over its amplitude, in this unit, with their
+/// Returns frequency and damping ratio of a free decay over its amplitude (in `unit`), with their
 /// confidence intervals.
 pub fn of_decay(title: &str, row: &decay::BackboneRow, unit: &str) -> Figure {
     let amplitude: Vec<f64> = row.points.iter().map(|point| point.amplitude).collect();

@@ -168,10 +168,11 @@ pub(crate) fn motion_name(
 }
 
 impl ToFigure for Identified {
-    /// Draws measured and identified receptance; if no line separates the forces, the measured and
-    /// predicted amplitudes of the responses; for random and hammer tests, the coherence too. For a
-    /// fit in the time domain, draws measured and predicted response of the first record; with
-    /// nonlinear terms, the restoring force.
+    /// Draws the measured and the identified receptance. If no line separates the forces, draws the
+    /// measured and the predicted amplitudes of the responses. For random and hammer tests, also
+    /// draws the coherence. For a fit in the time domain, draws the measured and the predicted
+    /// response of the first record. With nonlinear terms and whole periods, draws only the
+    /// restoring force.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().title();
         if let Some((fitted, points)) = restoring::whole_periods(self) {

@@ -192,8 +192,8 @@ fn columns(data: &FrequencyData) -> Vec<Vec<Column>> {
 /// One column of H, with its angular frequency.
 type Column = (f64, DVector<Complex<f64>>);
 
-/// Returns H = X F⁻¹ at the frequencies at which as many rows as degrees of freedom have
-/// independent forces, unless each force acts alone.
+/// Returns H = X F⁻¹ at each frequency at which as many rows as degrees of freedom have independent
+/// forces. Frequencies at which only one force acts in each row are omitted.
 fn separated(data: &FrequencyData, acting: &ActingAlone<'_>) -> Vec<(f64, DMatrix<Complex<f64>>)> {
     let dof = data.dof();
     let mut rows: Vec<usize> = (0..data.len()).collect();

@@ -20,9 +20,9 @@ pub struct Trace {
 /// Maximum difference, in degrees, of two angles that are equal up to rounding.
 const ALIKE: f64 = 1e-6;
 
-/// Returns an angle, in degrees. If it is ±180° (up to rounding), it gets the sign of the previous
-/// angle, and is −180° without a previous one: otherwise the phase of an undamped system could
-/// alternate.
+/// Returns an angle, in degrees. An angle of ±180° (up to rounding) gets the sign of the previous
+/// angle, so that the phase of an undamped system does not alternate. Without a previous angle it
+/// is −180°.
 fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
     match angle.abs() > 180.0 - ALIKE {
         true if previous.is_some_and(|previous| previous > 90.0) => 180.0,

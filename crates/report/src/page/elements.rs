@@ -119,8 +119,8 @@ fn candidates(found: &ElementSummary) -> Markup {
         @if !rows.is_empty() {
             (Table { caption: "Possible additional measurements", header: &header, numbers_from: 1, rows }.html())
             p.note {
-                "Information: the logarithm of the factor by which the volume of the confidence region of all \
-                 unknowns shrinks."
+                "Information: natural logarithm of a ratio of two volumes, those of the confidence region of all \
+                 unknowns without and with the measurement."
             }
         }
     }
@@ -144,7 +144,7 @@ fn residual(found: &ElementSummary) -> Markup {
     html! {
         (Table { caption: "Residual of the response", header: &["sensor", "residual, of RMS"], numbers_from: 1, rows }.html())
         @if let Some(ratio) = misfit {
-            p { "Power of the residual divided by that expected from the noise: " strong { (ratio) } "; 1 is expected." }
+            p { "Power of the residual / power of the noise: " strong { (ratio) } "; 1 is expected." }
         }
         (checks::list(&found.checks, When::After))
     }

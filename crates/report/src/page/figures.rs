@@ -211,13 +211,13 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
             _ => String::new(),
         };
         let caption = format!(
-            "Response per unit force of the identified machine, and that of the record, {origin}.{below}{left_out}"
+            "Response per unit force of the identified machine and of the record, {origin}.{below}{left_out}"
         );
         return drawn_set("receptance".into(), set, caption);
     }
     let caption = format!(
-        "Amplitude of the response, {origin}, and predicted by the identified machine from the \
-         forces; no receptance, because {}.{below}",
+        "Amplitude of the response, {origin}, and the amplitude that the identified machine \
+         predicts from the forces. No receptance is shown, because {}.{below}",
         picture::WHY
     );
     let names = Names { displacement: &|dof| displacement_name(channels, kind, dof), ..names };
@@ -249,7 +249,7 @@ pub fn fit(part: &RecordReview<'_>, compared: &Compared) -> Result<Drawn, Report
 pub fn validation(source: &Block, compared: &Compared) -> Result<Drawn, ReportError> {
     let extent = extent(source);
     let caption = format!(
-        "{}: measured {} and the one predicted {extent}; below, their difference.",
+        "{}: measured and predicted {} {extent}; below, their difference.",
         source.file, compared.kind
     );
     over_time("validation".into(), compared, shown(source), caption)
@@ -327,8 +327,8 @@ pub fn residual_spectrum(
         part.id("residual-spectrum"),
         (0..motion.channels()).map(of_channel).collect(),
         format!(
-            "{}: the spectrum of pure noise is flat; an effect missing in the model \
-             has the shape of a resonance or of the force.",
+            "{}: the spectrum of pure noise is flat. If the model omits an effect, the \
+             residual has a spectrum like that of a resonance or of the force.",
             part.period_caption(&format!(
                 "Spectra of the measured {} and of the residual",
                 compared.kind

@@ -176,7 +176,7 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
 }
 
 /// Returns a document with a heading, its sections (identifier, name, body) and the command that
-/// writes it again. Names of files have no folders, except in the command.
+/// writes the document again. Names of files have no folders, except in the command.
 fn document(
     title: &str,
     heading: &Markup,

@@ -85,7 +85,7 @@ fn part_held(part: &RecordReview<'_>) -> Option<String> {
     Some(format!(
         "The record is long: levels, time histories and averages over periods or segments are those of \
          all samples used. Results for single samples (the residual in time, its correlations and its checks) \
-         are those of samples {first} to {last}; other figures that show only these samples name them in the caption."
+         are those of samples {first} to {last}. If another figure shows only these samples, its caption says so."
     ))
 }
 
@@ -363,8 +363,8 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         (checks::list(&contents.review.identified.summary().checks, When::After))
         @if contents.review.identified.summary().checks.iter().any(|check| check.when == When::After) {
             p.note {
-                "p is the probability of a result at least as bad if the residual is only noise, adjusted for the \
-                 number of tests: below 0.01 it is a warning. For pure noise, 5 % of the stems are outside the bounds."
+                "p is the probability that pure noise gives a result at least as bad, adjusted for the number of \
+                 tests; a p below 0.01 is a warning. For pure noise, 5 % of the stems are outside the bounds."
             }
         }
     })

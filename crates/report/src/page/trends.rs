@@ -47,7 +47,11 @@ pub fn trends_page(trends: &Trends, settings: &PageSettings) -> Result<String, R
                         section id="changes" aria-labelledby="changes-heading" {
                             h2 id="changes-heading" { "Steps and drifts" }
                             (changes.sortable())
-                            p.note { "p is the fraction of random permutations of the records in which the ranks show at least this change, multiplied by the number of quantities; a change with p below " (SIGNIFICANT) " is reported." }
+                            p.note {
+                                "p is the probability of a change at least as large if the order of the records is \
+                                 random (permutation test of the ranks), multiplied by the number of quantities; \
+                                 a change with p below "
+                                (SIGNIFICANT) " is reported." }
                         }
                     }
                     section id="quantities" data-filter aria-labelledby="quantities-heading" {

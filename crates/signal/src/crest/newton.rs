@@ -38,8 +38,8 @@ pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mu
     point.phases
 }
 
-/// Takes one step that lowers the norm and returns it with its damping; `None` at a stationary
-/// point.
+/// Takes one step that lowers the norm, returns the new point, and updates `damping`; `None` at a
+/// stationary point.
 fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Point> {
     let derivatives = objective.derivatives(&from.phases, &from.signal, p);
     // The damping is a multiple of the identity (Levenberg), because a common shift in time has

@@ -39,8 +39,8 @@ pub struct HitRule {
     pub trigger_percent: f64,
     /// Smallest second peak of a double hit, in per cent of the first.
     pub double_percent: f64,
-    /// Smallest peak of a hit, in per cent of the median of all peaks of at least a tenth of the
-    /// largest.
+    /// Smallest peak of a hit, in per cent of a median. This is the median of all peaks that reach
+    /// at least a tenth of the largest peak.
     pub weak_percent: f64,
     /// Time after the trigger within which a force belongs to the same hit, in s. A bouncing hammer
     /// touches the structure again some milliseconds to some hundredths of a second after the
@@ -321,9 +321,9 @@ impl Hits {
     }
 
     /// Returns the force of consecutive hits, in its unit, one value per sample from the beginning
-    /// of the first window to the end of the last: without the offset, and zero away from the
-    /// contacts (a *force window*), where the hammer does not touch the structure and the
-    /// transducer measures only noise. Empty without a hit.
+    /// of the first window to the end of the last window. The offset is subtracted. Outside the
+    /// contacts the force is zero (a *force window*), because the hammer does not touch the
+    /// structure and the transducer measures only noise. The list is empty without a hit.
     ///
     /// # Panics
     /// If a window is outside this force.
@@ -508,7 +508,7 @@ fn step(values: &[f64]) -> f64 {
     changes.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the index of the largest value in a range that is not empty, the first of several.
+/// Returns the index of the largest value in a range that is not empty; of equal values, the first.
 fn largest_of(values: &[f64], range: Range<usize>) -> usize {
     let start = range.start;
     range.fold(start, |largest, at| if values[at] > values[largest] { at } else { largest })

@@ -115,8 +115,8 @@ impl FrfAverage {
     }
 
     /// Returns the force channels, counted from 0, that contain only noise: they are weaker than a
-    /// tenth of the strongest force, and coherent with no other force and no response on any line.
-    /// Such channels come from shakers or points without a force; if they were used as forces, they
+    /// tenth of the strongest force, and on no line coherent with another force or a response. Such
+    /// channels come from shakers or points without a force; if they were used as forces, they
     /// would seem to have no effect: the responses to them would be biased towards zero.
     ///
     /// # Source

@@ -131,10 +131,10 @@ impl Coupling {
 struct Between {
     response: DVector<Complex<f64>>,
     variance: DVector<f64>,
-    /// Possible interpolation error: each of the two lines is interpolated between its neighbours,
-    /// over twice the distance, and the larger error is used. If there is a resonance between the
-    /// two lines, this error has the size of the actual interpolation error; otherwise it is four
-    /// times the actual error.
+    /// Possible interpolation error. The line before and the line after are each interpolated
+    /// between their neighbours, over twice the distance; the larger of the two errors is used. If
+    /// there is a resonance between the two lines, this error has the size of the actual
+    /// interpolation error; otherwise it is four times the actual error.
     missed: DVector<f64>,
 }
 

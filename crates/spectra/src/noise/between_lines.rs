@@ -1,5 +1,5 @@
-//! Noise between the lines of several periods that are taken as one record; a periodic signal is
-//! zero on the lines between.
+//! Noise on the lines between the lines of a period, if several periods are taken as one record. A
+//! periodic signal is zero on these lines.
 
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix, DVector};

@@ -128,7 +128,7 @@ impl fmt::Display for NoiseModel {
             Self::White => f.write_str("white"),
             Self::Smooth { order, bands_hz } | Self::UnmeasuredForce { order, bands_hz } => {
                 if matches!(self, Self::UnmeasuredForce { .. }) {
-                    f.write_str("that of the response to an unmeasured force, ")?;
+                    f.write_str("like the response to an unmeasured force, ")?;
                 }
                 match order {
                     0 => f.write_str("white")?,

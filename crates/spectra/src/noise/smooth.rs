@@ -135,8 +135,8 @@ pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
 }
 
 /// Returns the better of two spectra: a smooth spectrum, and a spectrum whose ratio to the
-/// `relative` powers (lines × channels) is smooth. Also returns `true` if it is the second
-/// spectrum.
+/// `relative` powers (lines × channels) is smooth. Also returns `true` if the better one is the
+/// second spectrum.
 pub(crate) fn choose_beside(
     omega: &[f64],
     variances: &DMatrix<f64>,
@@ -336,7 +336,8 @@ fn most_likely(
     for _ in 0..SMOOTH_STEPS {
         let slope = basis.tr_mul(&ratio.add_scalar(-1.0));
         let reused = factors.as_ref().map(|factors| factors.solve(&slope));
-        // The Hessian of an earlier step is used as long as the steps become much shorter.
+        // The Hessian of an earlier step is used as long as each step is much shorter than the step
+        // before it.
         let mut step = match reused.filter(|step| step.norm() <= HESSIAN_REUSED * previous) {
             Some(step) => step,
             None => {

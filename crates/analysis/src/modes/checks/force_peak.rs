@@ -7,7 +7,8 @@ use crate::modes::summary::{ModalCheck, ModalModeRow};
 use crate::text::significant;
 
 /// Returns a failed check if several modes lie within the half-width of one mode, and this mode
-/// within theirs. Forces with a spectral peak cause such modes, one for each independent force.
+/// lies within their half-widths. Forces with a spectral peak cause such modes, one for each
+/// independent force.
 pub(in crate::modes) fn force_peak_check(modes: &[ModalModeRow]) -> Option<ModalCheck> {
     let hz = |row: &ModalModeRow| row.mode.row.natural_frequency_hz.value;
     let half_width = |row: &ModalModeRow| row.mode.row.damping_ratio.value * hz(row);

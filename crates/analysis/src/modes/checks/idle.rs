@@ -9,8 +9,8 @@ use super::super::summary::{ModalCheck, ModalModeRow};
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Returns, for each of several forces, the check that it excites some mode, by a test of zero
-/// participations in all modes.
+/// Returns, for each of several forces, the check that it excites some mode, by a test that its
+/// participations in all modes are zero.
 ///
 /// # Source
 /// Wald's test of the participations, with two degrees of freedom for each mode.
@@ -36,8 +36,8 @@ pub(super) fn force_checks(modes: &[IdentifiedMode], inputs: &[String]) -> Vec<M
     several(inputs).filter_map(check).collect()
 }
 
-/// Returns, for each of several responses, the check that it moves in some mode, by a test of zero
-/// shapes in all modes with standard errors.
+/// Returns, for each of several responses, the check that it moves in some mode, by a test that its
+/// entries in the shapes are zero, in all modes that have standard errors.
 ///
 /// # Source
 /// Wald's test of the shapes, with two degrees of freedom for each mode.
@@ -70,8 +70,9 @@ fn several(names: &[String]) -> impl Iterator<Item = (usize, &String)> {
     names.iter().enumerate().filter(|_| names.len() > 1)
 }
 
-/// Returns the probability that the sums of squares of two numbers of each mode are at least as
-/// large as these if the numbers differ from zero only by their errors; `None` without a mode.
+/// Returns the probability that errors alone give a total at least as large as that of `squares`.
+/// Each value of `squares` is the sum of the squares of two numbers of a mode, each divided by its
+/// standard error. `None` without a mode.
 fn zero_p_value(squares: impl Iterator<Item = f64>) -> Option<f64> {
     let (modes, sum) = squares.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
     let law = ChiSquared::new(2.0 * f64::from(modes)).ok()?;

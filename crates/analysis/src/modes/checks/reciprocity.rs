@@ -65,8 +65,8 @@ fn test(
             outputs[point].name, inputs[other_force], outputs[other_point].name, inputs[force]
         ),
         fails: format!(
-            "{} per {} and {} per {} differ, most in the mode at {hz:.4} Hz, by {:.2} %: a wrong \
-             calibration or place, forces that are not the ones measured, or a structure that \
+            "{} per {} and {} per {} differ, most in the mode at {hz:.4} Hz, by {:.2} %; possible causes: \
+             a wrong calibration or place, other forces than the measured ones, or a structure that \
              is not reciprocal",
             outputs[point].name,
             inputs[other_force],

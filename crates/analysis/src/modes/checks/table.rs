@@ -54,7 +54,7 @@ fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
         format!("{}: median coherence {median:.4} in the band", table.file)
     } else if impossible > 0 {
         format!(
-            "{}: {impossible} of {} values of the coherence are not between 0 and 1, so it is not a coherence",
+            "{}: {impossible} of {} values of the coherence are not between 0 and 1, so this quantity is not a coherence",
             table.file,
             values.len()
         )

@@ -71,8 +71,8 @@ pub(crate) enum Level {
 }
 
 impl Level {
-    /// Returns the variance and its degrees of freedom, after a statistic of this rank has
-    /// explained some `squares` of the residual; `None` if no residual remains.
+    /// Returns the variance and its degrees of freedom without the `squares` of the residual that a
+    /// statistic of this rank explains; `None` if no residual remains.
     fn without(&self, squares: f64, rank: usize) -> Option<(f64, f64)> {
         let (level, of_level) = match *self {
             Self::Known { inflation, degrees_of_freedom } => (inflation, degrees_of_freedom),

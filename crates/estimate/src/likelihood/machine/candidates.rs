@@ -13,8 +13,8 @@ pub enum Candidate {
     /// An additional sensor in the same test; its noise is that of the sensors of the same
     /// quantity.
     Sensor(Sensor),
-    /// A second test with the same sensors. This force acts instead of the forces of the first test
-    /// and has their size.
+    /// A second test with the same sensors. This force acts instead of the forces of the first
+    /// test. Its amplitude on each line is the root mean square of their amplitudes.
     Force(Input),
 }
 

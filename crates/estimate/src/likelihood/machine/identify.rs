@@ -53,9 +53,10 @@ pub struct MachineEstimate {
 }
 
 impl MachineEstimate {
-    /// Returns the same estimate with all standard errors multiplied by a factor (pure number) that
-    /// has some `degrees_of_freedom`. The intervals become wider accordingly, up to the bounds of
-    /// the parameters; `confidence` is the level of the intervals, a probability.
+    /// Returns the same estimate with all standard errors multiplied by a factor (pure number);
+    /// `degrees_of_freedom` is the number of degrees of freedom of this factor. The intervals
+    /// become wider accordingly, up to the bounds of the parameters; `confidence` is the level of
+    /// the intervals, a probability.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227; Student's t for a factor from few differences.

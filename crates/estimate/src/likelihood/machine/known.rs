@@ -102,9 +102,9 @@ impl Freed {
         Some(Self { assembly, model, space, further })
     }
 
-    /// Returns the first-order rise of twice the logarithm of the likelihood. The part of the
-    /// sensitivity to the further unknown that is orthogonal to all other sensitivities has a
-    /// direction; the rise is the square of the residual's component along this direction.
+    /// Returns the first-order rise of twice the logarithm of the likelihood. It is the square of
+    /// the component of the residual along one direction. This direction is the part of the
+    /// sensitivity to the further unknown that is orthogonal to all other sensitivities.
     fn score(&self, estimate: &MachineEstimate, data: &LineData) -> Option<f64> {
         let outputs = data.outputs().ncols();
         let diagonal = |row: usize| {

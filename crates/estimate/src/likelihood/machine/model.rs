@@ -205,8 +205,8 @@ impl MachineModel {
         (change, factors)
     }
 
-    /// Returns Hᵀ from the joints, j × r, and the response H to each load, r × loads, of the
-    /// machine with the change Δ; `None` if this machine is singular.
+    /// Returns two matrices of the machine with the change Δ: Hᵀ for forces at the joints, j × r,
+    /// and the response to each load, r × loads. `None` if this machine is singular.
     fn coupled(
         &self,
         nominal: &NominalLine,

@@ -299,7 +299,7 @@ fn uneven_time_is_refused_with_its_worst_step() {
     let e = of(&[0.0, 1.0, 2.0, 3.5, 4.75]).unwrap_err();
     assert!(
         e.to_string().starts_with(
-            "a.csv: the time steps are not uniform: the step up to line 5 is 1.5 s, the usual step 1.25 s"
+            "a.csv: the time steps are not uniform: the step up to line 5 is 1.5 s, but the usual step is 1.25 s"
         ),
         "{e}"
     );
