@@ -19,12 +19,13 @@ pub const STRETCH_BYTES: usize = 256;
 /// separation of hits, derivatives of a whole period.
 pub const WHOLE_BYTES: usize = 640;
 
-/// Minimum number of bytes of memory per number of a record whose transient is fitted: one force and
-/// one response took 920 bytes.
+/// Minimum number of bytes of memory per number of a record whose transient is fitted: one force
+/// and one response took 920 bytes.
 pub const OPEN_BYTES: usize = 1100;
 
 /// Bytes of memory per number of such a record and degree of freedom: the sensitivities of a line
-/// grow with the number of unknowns, and 3, 4 and 10 degrees of freedom took 620, 630 and 650 bytes.
+/// grow with the number of unknowns, and 3, 4 and 10 degrees of freedom took 620, 630 and 650
+/// bytes.
 pub const OPEN_DOF_BYTES: usize = 650;
 
 /// Number of degrees of freedom above which the memory per number grows no more: the largest

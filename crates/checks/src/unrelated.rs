@@ -21,8 +21,8 @@ pub struct Unrelated {
 }
 
 /// Finds a response that does not follow the force ([`Finding::Unrelated`]) from the residual of a
-/// fit: `unexplained` is the RMS of the residual relative to the RMS of the fitted quantity. The
-/// fit has `unknowns` parameters and `equations` real equations of one degree of freedom each.
+/// fit: `unexplained` is the ratio of the RMS values of the residual and of the fitted quantity.
+/// The fit has `unknowns` parameters and `equations` real equations of one degree of freedom each.
 /// `None` if the response follows the force.
 ///
 /// The p-value is that of the F test of the regression, times the number of lines, because a fit

@@ -18,8 +18,8 @@ use crate::smoother::StateSpace;
 use crate::state_space::Machine;
 
 /// The system with forces of any model, as one state space. The state of a force is its
-/// contribution to x + ½ẍΔt² within a step, so that no entry is large, whatever the units of the
-/// system are.
+/// contribution to x + ½ẍΔt² within a step, so that no entry is large in any units of the
+/// system.
 pub(crate) struct Augmented {
     machine: Machine,
     rate: DMatrix<f64>,

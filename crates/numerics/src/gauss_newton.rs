@@ -98,8 +98,8 @@ pub struct Minimum {
 }
 
 /// Searches for the local minimum from `parameters` in at most `max_steps` steps; afterwards
-/// `problem` holds the accepted parameters. A [time limit](crate::time_limit) ends the search at the
-/// lowest sum of squares so far.
+/// `problem` holds the accepted parameters. A [time limit](crate::time_limit) ends the search at
+/// the lowest sum of squares so far.
 ///
 /// A step v and its correction a for the curvature of the residuals solve
 ///

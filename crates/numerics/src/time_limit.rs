@@ -95,7 +95,7 @@ impl Drop for Restored {
 /// Runs some work on this thread with a limit, which replaces any other limit of this thread until
 /// the work ends.
 ///
-/// `None` means no limit, whatever the limit of the calling code is: a thread that waits for a part
+/// `None` means no limit, also if the calling code has a limit: a thread that waits for a part
 /// of its work may take on other work meanwhile, and the limit does not apply to that.
 pub fn within<T>(limit: Option<TimeLimit>, work: impl FnOnce() -> T) -> T {
     let active = limit.map(|limit| Rc::new(Active::new(limit)));

@@ -120,8 +120,8 @@ impl<'a> InitialEstimates<'a> {
         families.map(|family| family.into_iter().map(with_ends).collect()).collect()
     }
 
-    /// Returns the estimates of every round of weighting, beginning with the weights of `start`; the
-    /// end of a time limit ends the rounds.
+    /// Returns the estimates of every round of weighting, beginning with the weights of `start`;
+    /// the end of a time limit ends the rounds.
     fn reweighted(&self, kind: Kind, start: &DVector<f64>) -> Vec<DVector<f64>> {
         let mut rounds: Vec<DVector<f64>> = Vec::new();
         for _ in 0..INITIAL_ROUNDS {

@@ -46,8 +46,8 @@ pub(super) struct GlobalMinimum {
 /// there is one. A search continues on all lines if it ends near the best minimum so far or below
 /// that minimum.
 ///
-/// After the end of a time limit, the result is the lowest sum of squares so far, which may not be a
-/// minimum.
+/// After the end of a time limit, the result is the lowest sum of squares so far, which may not be
+/// a minimum.
 ///
 /// # Errors
 /// [`EstimateError::NotConverged`] if no search ends at a minimum.

@@ -60,8 +60,8 @@ pub(super) fn starts(
 /// steps. It stops there if its sum of squares is far above that of the search with the lowest
 /// minimum, or if its parameters are those of an earlier search; all these values are those after
 /// the first steps. No further search begins when enough searches have ended at the lowest minimum;
-/// `agreeing` returns the required number of searches for a sum of squares. After the end of a time limit, the result is the lowest sum of squares so far, which
-/// may not be a minimum.
+/// `agreeing` returns the required number of searches for a sum of squares. After the end of a time
+/// limit, the result is the lowest sum of squares so far, which may not be a minimum.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search converges.

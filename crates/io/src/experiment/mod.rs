@@ -255,8 +255,9 @@ impl Experiment {
     /// in N.
     ///
     /// # Errors
-    /// [`IoError::SimulationMemory`], [`IoError::Description`] for a degree of freedom that the system does not have,
-    /// [`IoError::LineOutside`], [`IoError::Signal`], and the errors of [`Experiment::system`].
+    /// [`IoError::SimulationMemory`], [`IoError::Description`] for a degree of freedom that the
+    /// system does not have, [`IoError::LineOutside`], [`IoError::Signal`], and the errors of
+    /// [`Experiment::system`].
     pub fn force(&self) -> Result<Record, IoError> {
         self.sampled(None)
     }
