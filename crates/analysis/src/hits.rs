@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn many_bad_hits_of_one_kind_are_one_line() {
         let overload = Some(HitFault::Overload { level: 390.0 });
-        let mut rows: Vec<HitRow> = (1..=60).map(|number| row(number, overload.clone())).collect();
+        let mut rows: Vec<HitRow> = (1..=60).map(|number| row(number, overload)).collect();
         rows.push(row(61, Some(HitFault::Cut)));
         rows.push(row(62, None));
         let text = heading(&rows, "512");

@@ -248,7 +248,7 @@ fn a_mass_no_body_has() {
         "--mass 1,2,3",
         &["--mass gives 3 values, the record has 1 degree of freedom"],
     );
-    identify(&good(), "--mass heavy", &["\"heavy\" is not a number"]);
+    identify(&good(), "--mass heavy", &["\"heavy\" is neither a number nor unknown"]);
 }
 
 #[test]
@@ -284,7 +284,7 @@ fn columns_that_do_not_pair_up() {
     refused(
         &good(),
         "identify a.csv --force 2,0 --displacement 3",
-        &["names 1 column and --force 2"],
+        &["names 1 column, but --force names 2"],
     );
     identify(&good(), "--domain time", &["in the time domain"]);
     refused(&good(), "identify a.csv --displacement x", &["--force"]);

@@ -364,7 +364,7 @@ mod tests {
         assert_eq!(moved[1], [[3.0, 0.0], [0.0; 2], [5.0, 0.0]]);
         assert!(geometry.displacement(&["9+X".to_owned()], &[[1.0, 0.0]]).is_none());
         let rotation = geometry.displacement(&["1+RZ".to_owned()], &[[1.0, 0.0]]).unwrap();
-        assert_eq!(rotation, [[[0.0; 2]; 3]; 3]);
+        assert_eq!(rotation, [[[0.0; 2]; 3]; 2]);
     }
 
     /// Judge: reading back what was written, and the field widths of the format.

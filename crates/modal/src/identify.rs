@@ -598,10 +598,10 @@ impl<'a> Identification<'a> {
         let size = self.fit.model.parameters(self.lines);
         let failed = ModalError::Decomposition { what: "the curvature of the likelihood", size };
         let covariance = self.covariance_of_all().ok_or(failed)?;
-        let mut stated = self.requested();
+        let (mut stated, protected) = (self.requested(), self.protected());
         let reasons = drop_reasons(&self.fit, &self.noise, &covariance);
         for (mode, pole) in self.fit.model.poles.iter().enumerate() {
-            let sinusoid = reasons[mode].filter(is_sinusoid);
+            let sinusoid = reasons[mode].filter(is_sinusoid).filter(|_| !protected[mode]);
             stated[mode] &= sinusoid.is_none();
             if !stated[mode] && self.lines.contains(*pole) {
                 let reason = sinusoid.unwrap_or(DropReason::NotRequested);

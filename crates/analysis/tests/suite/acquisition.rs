@@ -204,7 +204,7 @@ fn an_ac_coupled_response_is_allowed_for() {
         }
     }
     let wrong = identify(&[random_test(None, None, 0)], &open(None, &["a9=0.5"])).unwrap_err();
-    assert!(wrong.to_string().contains("no channel a9"), "{wrong}");
+    assert!(wrong.to_string().contains("no fitted channel a9"), "{wrong}");
 }
 
 /// The response is behind a high-pass of 3 Hz: every record names it, with the corner frequency.

@@ -98,7 +98,10 @@ fn a_campaign_is_one_table_over_speed_and_load() {
     assert_eq!(rows[0][..2], ["speed", "load"]);
     assert_eq!(rows[0][2..14], names);
     let errors = names.map(|name| format!("{name}_standard_error"));
-    assert_eq!(rows[0][14..], errors);
+    assert_eq!(rows[0][14..26], errors);
+    let threshold = ["whirl_frequency_ratio", "critical_mass"];
+    let threshold = threshold.map(|name| [name.to_owned(), format!("{name}_standard_error")]);
+    assert_eq!(rows[0][26..], threshold.concat());
     // The rows are sorted by speed, then by load.
     let order = [(35.0, 800.0), (35.0, 1500.0), (70.0, 1500.0)];
     assert_eq!(rows.len(), 1 + order.len());

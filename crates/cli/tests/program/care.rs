@@ -56,7 +56,7 @@ fn a_response_that_drops_out_for_ten_samples_is_named() {
     let is_lost = |at: usize| (200..210).contains(&at);
     changed(&file, 512, |at, [time, force, x]| [time, force, if is_lost(at) { 0.0 } else { x }]);
     let found = warnings(home.path(), "identify a.csv --force force --displacement x --period 256");
-    assert!(found.contains("x is 0 from sample 201 on for 10 samples"), "{found}");
+    assert!(found.contains("x is 0 from sample 201 on, for 10 samples"), "{found}");
 }
 
 #[test]

@@ -243,7 +243,7 @@ fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     assert!(message.contains("by reciprocity") && message.contains("--structure symmetric"));
     let report = json(home, "identify row.unv --frf-table --structure symmetric");
     exact(&report);
-    assert!(report["remarks"].to_string().contains("by reciprocity"), "{report}");
+    assert!(report["remarks"].to_string().contains("By reciprocity"), "{report}");
     // Force and response are both in −Z, or only one of them.
     for signs in [[-1.0, -1.0], [1.0, -1.0]] {
         let all = [(0, 0), (0, 1), (1, 0), (1, 1)];

@@ -106,8 +106,8 @@ mod tests {
             let mut random = ChaCha8Rng::seed_from_u64(3);
             // Errors are mixtures of 6 common normal variables and of those of each entry.
             let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-            let mixture = DMatrix::from_fn(16, 6, |_, _| 0.01 * normal());
-            let whole = &mixture * mixture.transpose() + DMatrix::identity(16, 16) * 1e-4;
+            let mixture = DMatrix::from_fn(16, 6, |_, _| 0.003 * normal());
+            let whole = &mixture * mixture.transpose() + DMatrix::identity(16, 16) * 1e-5;
             let part = |i: usize, j: usize| whole.view((8 * i, 8 * j), (8, 8)).into_owned();
             let [one, two] = [(0, &a), (1, &b)]
                 .map(|(at, shape)| ShapeWithCovariance::new(shape.clone(), part(at, at)).unwrap());
