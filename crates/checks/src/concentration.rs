@@ -120,7 +120,7 @@ fn common_divisor(chosen: &[f64], all: &[f64]) -> Option<f64> {
         .filter(|base| chosen.iter().all(|hz| near(*hz, *base)))
         .map(|base| {
             let multiples = all.iter().filter(|hz| near(**hz, base)).count();
-            // Choices without replacement: c/n · (c − 1)/(n − 1) …
+            // Probability that all draws without replacement are multiples: c/n · (c − 1)/(n − 1) …
             let draws = (0..chosen.len())
                 .map(|drawn| (multiples - drawn) as f64 / (all.len() - drawn) as f64);
             (draws.product::<f64>(), base)

@@ -188,7 +188,7 @@ impl ModeLimit {
     fn clause(&self, verdict: Verdict, samples_per_period: f64) -> String {
         match (self, verdict) {
             (ModeLimit::AtSamples, Verdict::Good) => {
-                "; the equation of motion holds at each sample".into()
+                ": enough, because the fitted equation of motion holds at each sample".into()
             }
             (ModeLimit::BetweenSamples, Verdict::Good) => String::new(),
             (ModeLimit::BetweenSamples, Verdict::Doubtful) => {

@@ -328,7 +328,7 @@ impl Sensitivity {
         // The row that fixes φ_r has the size of the other rows, for a small condition number.
         let size = m.norm() * lambda.norm_sqr() + c.norm() * lambda.norm() + k.norm();
         bordered[(n, fixed_entry(shape))] = Complex::from(size);
-        // Entry (i, j) of a matrix acts on equation i alone: n right-hand sides suffice.
+        // A change of entry (i, j) affects only equation i, so n right-hand sides are enough.
         let mut unit = DMatrix::identity(n + 1, n);
         let regular = bordered.lu().solve_mut(&mut unit);
         let push = |parameter: &Parameter| {

@@ -387,8 +387,8 @@ mod unnamed {
             Err(rustix::io::Errno::EXIST) => {}
             other => return Ok(other?),
         }
-        // Only a rename can replace a file, so the link first gets another name; a lock marks this
-        // name as in use.
+        // A link cannot replace a file, but a rename can. So the file is first linked to a
+        // temporary name, and a lock marks this name as in use.
         let _ = file.try_lock();
         let ((), path) = beside::named(destination, |path| Ok(link(path)?))?;
         fs::rename(&path, destination).inspect_err(|_| drop(fs::remove_file(&path)))

@@ -28,7 +28,8 @@ fn frequency_column(table: &Table) -> Option<usize> {
     names().find_map(|name| table.find(name).ok()).or_else(|| (0..table.width()).find(of_struct))
 }
 
-/// Returns the frequencies of a table, in Hz; a text that may be their unit is added to `doubts`.
+/// Returns the frequencies of a table, in Hz. If their unit is not stated with certainty, the text
+/// that may be this unit is added to `doubts`.
 pub(crate) fn frequencies(
     table: &Table,
     doubts: &mut Vec<(String, StatedUnit, Quantity)>,

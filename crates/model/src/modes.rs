@@ -232,7 +232,8 @@ impl SecondOrderSystem {
             let twins: Vec<&Mode> = modes.iter().filter(near).collect();
             let shape = decomposition.shape(eigenvalue, twins.len());
             let mut apart = shape.clone();
-            // The second pass over the same shapes removes the rounding of the first.
+            // A second pass of Gram–Schmidt over the same shapes removes the rounding errors of the
+            // first pass.
             for twin in twins.iter().chain(&twins) {
                 let along = twin.shape.dotc(&apart) / Complex::from(twin.shape.norm_squared());
                 apart.axpy(-along, &twin.shape, Complex::from(1.0));

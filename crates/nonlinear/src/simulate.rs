@@ -75,7 +75,7 @@ impl FineForce {
 
     fn new(samples: usize, period: &Record, steps: usize) -> Result<Self, EstimateError> {
         let fine = refine(period, 2 * steps, Interpolation::BandLimited)?;
-        // The last instant is the first of the next period.
+        // One instant is added at the end: the beginning of the next period.
         let instants = 2 * steps * samples + 1;
         let data = fine.data();
         let values =

@@ -243,7 +243,7 @@ impl Panel {
     /// Returns the range of the abscissa of the panel. All points are in `extent`; `markers` states
     /// whether the range has space for markers.
     pub(crate) fn x_range(&self, extent: (f64, f64), markers: bool) -> (f64, f64) {
-        // Lines extend from edge to edge.
+        // Curves without markers need no margin: they extend to both edges of the panel.
         let margin = if markers { 0.03 } else { 0.0 };
         self.x.range.unwrap_or_else(|| {
             let (low, high) = padded(self.x.scale, extent.0, extent.1, margin);

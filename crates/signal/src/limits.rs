@@ -56,8 +56,8 @@ pub(crate) const FLOOR_RATIO: f64 = 3.0;
 /// neighbours are correlated.
 pub(crate) const FLOOR_SCATTER: f64 = 0.17;
 
-/// Maximum difference between the upper and the lower half of the equal levels, in standard
-/// deviations.
+/// Maximum difference between the mean levels of the upper and the lower half of a noise floor, in
+/// standard deviations; above it the floor is not flat, and the signal is not only noise.
 pub(crate) const FLOOR_DEVIATION: f64 = 4.0;
 
 /// Level, relative to the largest, above which a group of lines counts as driven.

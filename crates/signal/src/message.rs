@@ -105,7 +105,7 @@ impl fmt::Display for NumberTo {
     }
 }
 
-/// Range of the magnitudes that are written in full.
+/// Range of the magnitudes that are written without an exponent.
 const IN_FULL: std::ops::Range<f64> = 1e-5..1e15;
 
 impl fmt::Display for Number {

@@ -131,7 +131,8 @@ fn squared_mismatches(x: &[f64]) -> Vec<f64> {
     let len = x.len();
     let products = aperiodic_autocorrelation(x);
     let total: f64 = x.iter().map(|v| v * v).sum();
-    // Sums of the squares that a lag omits at the end and at the beginning.
+    // Sums of the squares of the samples without a partner at this lag, at the end and at the
+    // beginning.
     let (mut end, mut beginning) = (0.0, 0.0);
     let mut mismatches = Vec::with_capacity(len / 2 + 1);
     for lag in 0..=len / 2 {

@@ -219,7 +219,7 @@ impl FrfTable {
         let kinds = measured.responses().into_iter().map(|(measured, _)| measured);
         let unused = kinds.filter(|measured| *measured != kind).map(|unused| {
             format!(
-                "the responses are those of the {kind}; the {unused} is not used: to use it, name it alone"
+                "the frequency responses were computed from the {kind}, not from the {unused}; to use the {unused}, name no other response"
             )
         });
         let remarks = remarks.chain(unused);

@@ -12,7 +12,7 @@ pub(super) fn noise_remark(periods: usize, shows: bool, models: &[NoiseModel]) -
     let model = distinct.join("; ");
     match (periods, shows) {
         (0 | 1, _) => format!(
-            "one period does not show its noise: the noise was estimated from the residual, as noise on the \
+            "noise cannot be measured from one period: the noise was estimated from the residual, as noise on the \
              response alone; noise spectrum: {model}"
         ),
         (_, false) => format!(

@@ -278,7 +278,7 @@ fn nonlinear_term(
         experiments.push([&held.force, held.response().0]);
     }
     let band = Lines::new(period, band)?;
-    // The fit itself reports data that cannot be fitted.
+    // An error is ignored here, because the fit reports it if the data cannot be fitted.
     Ok(distortion_of_periods(&band, &experiments, first.response().1, unknowns).unwrap_or(None))
 }
 
@@ -541,7 +541,7 @@ fn with_noise(
     if periods.count() < 2 {
         return periods.mean();
     }
-    // The spectrum of rounding cannot be estimated.
+    // If the periods differ by rounding only, their noise spectrum cannot be estimated.
     match periods.mean_with_noise(Pooling::AllLines)?.noise_above_rounding() {
         Some(_) => match machine {
             Some(machine) => periods.mean()?.with_noise(periods.noise_beside(noise, machine)?),

@@ -166,7 +166,8 @@ pub(super) struct Tabulated {
     /// Responses to each force separately, with its degree of freedom; empty if a coherence states
     /// the noise.
     columns: Vec<(FrequencyData, usize)>,
-    /// `true` if these are averages over segments with a known window and number.
+    /// `true` if the responses are averages over segments, and their window and number
+    /// are known.
     is_averaged: bool,
     /// Remarks on entries of the table that were not used.
     pub(super) remarks: Vec<String>,

@@ -261,8 +261,8 @@ impl Inspection<'_> {
         let asked_for = self.reading.time.is_some() || matches!(time, TimeAxis::RateHz(_));
         let sampling = match sampling {
             Some(sampling) if !file.is_whole() => sampling,
-            // For a text, its beginning is enough. Of other files, `head` has all samples, which
-            // gives a more reliable comparison.
+            // `head` of a text file is its beginning, which is enough for the time step. `head` of
+            // any other file has all samples, so the time step is more reliable.
             _ => file.head().sampling(&time, self.columns),
         };
         match sampling {

@@ -32,17 +32,7 @@ pub(super) fn modes(
     without_hz: &[f64],
     without_harmonics: bool,
 ) -> Result<Modes, AnalysisError> {
-    let [measurement] = measurements else {
-        let why = format!(
-            "{} records were given: ambient records are analysed one at a time",
-            measurements.len()
-        );
-        return Err(settings.refused("ambient", why));
-    };
-    settings.refuse(
-        "an ambient record",
-        &["near_hz", "force_at", "validate_percent", "real_shapes", "reciprocal"],
-    )?;
+    let measurement = only_record(measurements, settings)?;
     let outputs = outputs_of(&measurement.source().names);
     if outputs.is_empty() {
         return Err(AnalysisError::NoMotion);
@@ -87,6 +77,25 @@ pub(super) fn modes(
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
     let source = DiagramData::Ambient(estimate.stabilisation);
     Ok(Modes { summary, spectrum: spectrum(&data), source })
+}
+
+/// Returns the record; refuses several records, and settings that are not for an ambient record.
+fn only_record<'a>(
+    measurements: &'a [Measurement],
+    settings: &ModesSettings,
+) -> Result<&'a Measurement, AnalysisError> {
+    let [measurement] = measurements else {
+        let why = format!(
+            "{} records were given: ambient records are analysed one at a time",
+            measurements.len()
+        );
+        return Err(settings.refused("ambient", why));
+    };
+    settings.refuse(
+        "an ambient record",
+        &["near_hz", "force_at", "validate_percent", "real_shapes", "reciprocal"],
+    )?;
+    Ok(measurement)
 }
 
 fn engine_settings(

@@ -263,14 +263,7 @@ impl Context {
             estimate.delays(),
             settings.properties.reciprocal,
         ));
-        // The masses are those of the fitted modes, with the decay of an exponential window.
-        let collinearities = estimate.phase_collinearities().into_iter();
-        let of_mode = |(at, (mode, collinearity)): (usize, (&IdentifiedMode, _))| {
-            let scaling = scaling(&estimate, at, &self.outputs, &self.driving_points);
-            row(mode, collinearity, scaling)
-        };
-        let modes: Vec<ModalModeRow> =
-            reported.iter().zip(collinearities).enumerate().map(of_mode).collect();
+        let modes = self.mode_rows(&estimate, &reported);
         rows.extend(checks::output_checks(&explained, &modes, &names));
         let mut model = estimate.model().clone();
         for term in &mut model.terms {
@@ -312,6 +305,20 @@ impl Context {
             added_decay,
         }));
         Ok(Modes { summary, spectrum, source })
+    }
+
+    /// Returns the rows of the modes. The masses are those of the fitted modes, with the decay of an
+    /// exponential window.
+    fn mode_rows(
+        &self,
+        estimate: &ModalEstimate,
+        reported: &[IdentifiedMode],
+    ) -> Vec<ModalModeRow> {
+        let collinearities = estimate.phase_collinearities().into_iter();
+        let of_mode = |(at, (mode, collinearity)): (usize, (&IdentifiedMode, _))| {
+            row(mode, collinearity, scaling(estimate, at, &self.outputs, &self.driving_points))
+        };
+        reported.iter().zip(collinearities).enumerate().map(of_mode).collect()
     }
 
     /// Returns the row of an output, given the share of its variance that the modes explain, and

@@ -186,7 +186,9 @@ impl ModeSet {
             0 => (1..=entries).map(|number| number.to_string()).collect(),
             len if len == entries => points,
             len => {
-                let why = format!("{len} names of points for {entries} entries of a shape");
+                let why = format!(
+                    "{len} names of points, but each mode shape has {entries} entries: give one name per entry"
+                );
                 return Err(AnalysisError::SavedModes { file: name.into(), why });
             }
         };

@@ -95,7 +95,8 @@ impl Tables {
         self.averaged.iter().flatten().any(Averaged::is_smoothed)
     }
 
-    /// Returns the largest ratio of a standard error to its value for independent lines.
+    /// Returns the largest ratio of standard errors for correlated lines to those for independent
+    /// lines, at least 1.
     pub fn error_inflation(&self) -> f64 {
         self.averaged.iter().flatten().map(|averaged| averaged.inflation).fold(1.0, f64::max)
     }

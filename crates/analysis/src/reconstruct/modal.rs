@@ -35,7 +35,9 @@ pub fn reconstruct_with_modes(
     take: &mut Take<'_>,
 ) -> Result<Reconstructed, AnalysisError> {
     if !matches!(how.method, Method::Auto | Method::FrequencyDomain) {
-        let why = "modes give the force line by line: choose frequency-domain".into();
+        let why =
+            "with modes as the model, the force is computed line by line: choose frequency-domain"
+                .into();
         return Err(AnalysisError::Setting { setting: "method", why });
     }
     let recorded = Recorded::with_columns(run, &system.outputs_of(&run.source().names)?, true)?;

@@ -58,7 +58,7 @@ pub enum Method {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ParameterRule {
-    /// Likelihood: closest to the posterior mean of the force.
+    /// Maximum likelihood: λ for the force closest to its posterior mean.
     #[default]
     Likelihood,
     /// Generalised cross-validation.

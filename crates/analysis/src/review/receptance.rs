@@ -110,7 +110,8 @@ fn measured(
     // A random response needs averages: one window is not enough.
     let fitted = identified.fitted();
     if let Some(data) = fitted.drawn.as_ref().filter(|_| identified.is_hammer_test()) {
-        let origin = "measured on the lines of each hit, without the transients of its window";
+        let origin =
+            "measured on the lines of each hit; the transient of its window was subtracted";
         return Ok((data.clone(), origin.into()));
     }
     let of_responses = fitted.coherence.is_some();

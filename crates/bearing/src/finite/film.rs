@@ -105,7 +105,7 @@ fn column_nodes(relative: Vector2<f64>, fronts: [f64; 2], along: usize) -> Vec<f
     let thinnest = relative[1].atan2(relative[0]);
     let eccentricity = relative.norm().min(limits::GRADED_ECCENTRICITY);
     let root = ((1.0 + eccentricity) / (1.0 - eccentricity)).sqrt();
-    // Sommerfeld's substitution is tan(γ/2) = root tan(θ/2), applied within each turn of 2π.
+    // Sommerfeld's substitution is tan(γ/2) = `root` · tan(θ/2); whole turns of 2π are kept.
     let turned = |angle: f64, root: f64| {
         let turns = (angle / TAU).round();
         let half = (angle - turns * TAU) / 2.0;

@@ -196,8 +196,8 @@ fn factor_dense(
         [(1.0, system.mass()), (gamma_hat, system.damping()), (beta_hat, system.stiffness())];
     let n = system.dof();
     let matrix = DMatrix::from_fn(n, n, |i, j| terms.iter().map(|(s, t)| s * t[(i, j)]).sum());
-    // Rows are divided by the size of their terms: a pivot of ε is then the rounding of a zero,
-    // even if masses and stiffnesses differ by orders of magnitude.
+    // Rows are divided by the size of their terms. A pivot of about ε is then a zero with rounding
+    // error, even if masses and stiffnesses differ by orders of magnitude.
     let sizes = DVector::from_fn(n, |i, _| {
         terms.iter().map(|(s, t)| s * t.row(i).abs().sum()).sum::<f64>()
     });

@@ -115,7 +115,7 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
     lengths.iter().map(length).collect()
 }
 
-/// Returns the kind of an object; if it contains records, with advice on how to save them.
+/// Returns the kind of an object; for tables, time series and instants also how to save them.
 fn object(elements: &mut Elements<'_>) -> &'static str {
     // The kind of the object comes next, then its class.
     let mut words = [(); 2].map(|()| elements.next().ok().flatten().map(|word| text(word.data)));

@@ -138,7 +138,8 @@ impl Parameters {
         factor
     }
 
-    /// Returns the log noise variance of a sensor for values `terms` of the Chebyshev polynomials.
+    /// Returns the logarithm of the noise variance of a sensor at one frequency; `terms` are the
+    /// values of the Chebyshev polynomials there.
     pub fn log_noise(&self, output: usize, terms: &[f64]) -> f64 {
         let value = |(d, t): (usize, &f64)| t * self.values[self.layout.noise(d, output)];
         terms.iter().enumerate().map(value).sum()

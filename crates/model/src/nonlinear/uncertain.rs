@@ -117,8 +117,8 @@ pub struct UncertainNonlinearSystem {
 }
 
 impl UncertainNonlinearSystem {
-    /// Creates a system with the covariance of these parameters, one row and column each, in the
-    /// products of their units.
+    /// Creates a system with uncertain parameters. The covariance has one row and one column per
+    /// parameter, in the products of their units.
     ///
     /// # Errors
     /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,

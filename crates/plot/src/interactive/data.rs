@@ -150,7 +150,8 @@ fn panel_data<'a>(
     layout: &PanelLayout,
     arrays: &mut Arrays,
 ) -> PanelData<'a> {
-    // The script draws the phase from the curves of the magnitude.
+    // The curves of the magnitude contain the phase as well, so the phase panel needs no curves of
+    // its own.
     let has_phase = |curve: &Curve| !curve.phase_deg.is_empty();
     let part = match panel.part {
         Some(ResponsePart::Magnitude) if panel.curves.iter().any(has_phase) => Some("m"),

@@ -394,7 +394,7 @@ pub fn record_words(inspected: &Inspected) -> Words {
         warnings,
         merits: Vec::new(),
         tables: tables_of_record(inspected),
-        caption: format!("Column over time, and its amplitudes over frequency.{spectra}"),
+        caption: format!("Time history of the column, and its amplitude spectrum.{spectra}"),
     }
 }
 

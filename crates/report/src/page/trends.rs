@@ -1,6 +1,6 @@
 //! Page of the results of many records.
 
-use maud::{DOCTYPE, html};
+use maud::{DOCTYPE, Markup, html};
 use mechid_analysis::fleet::{SIGNIFICANT, Trends};
 use mechid_analysis::text::significant;
 use mechid_plot::Figure;
@@ -31,13 +31,7 @@ pub fn trends_page(trends: &Trends, settings: &PageSettings) -> Result<String, R
                 header {
                     h1 { (title) }
                     (about(&settings.about))
-                    dl.summary {
-                        div { dt { "Records" } dd { (trends.records) } }
-                        div { dt { "Without a result" } dd { (trends.failed) } }
-                        @if trends.without_number > 0 {
-                            div { dt { "Left out, no number in the name" } dd { (trends.without_number) } }
-                        }
-                    }
+                    (counts(trends))
                     @if trends.analyses > 1 {
                         p.note { "The rows come from " (trends.analyses) " analyses or versions, which may not be comparable." }
                     }
@@ -79,6 +73,19 @@ pub fn trends_page(trends: &Trends, settings: &PageSettings) -> Result<String, R
         }
     };
     Ok(page.into_string() + "\n")
+}
+
+/// Lists the numbers of records.
+fn counts(trends: &Trends) -> Markup {
+    html! {
+        dl.summary {
+            div { dt { "Records" } dd { (trends.records) } }
+            div { dt { "Without a result" } dd { (trends.failed) } }
+            @if trends.without_number > 0 {
+                div { dt { "Left out, no number in the name" } dd { (trends.without_number) } }
+            }
+        }
+    }
 }
 
 /// Draws every quantity over the records.

@@ -48,7 +48,7 @@ fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Po
     let hessian = (from.phases.len() <= limits::DENSE_HESSIAN).then(|| derivatives.hessian());
     while *damping < limits::LARGEST_DAMPING {
         let added = *damping * scale;
-        // The damping grows until the damped norm is convex.
+        // The damping grows until the damped Hessian is positive definite and the norm decreases.
         let step = match &hessian {
             Some(hessian) => {
                 let mut damped = hessian.clone();

@@ -41,7 +41,7 @@ pub(super) fn later(spectrum: &Spectrum, part: f64) -> Result<Record, SignalErro
     let mut lines = spectrum.lines().clone();
     for (n, mut line) in lines.row_iter_mut().enumerate() {
         let turn = Complex::from_polar(1.0, TAU * n as f64 * part / sampling.len() as f64);
-        // The samples contain only the cosine at the Nyquist frequency.
+        // At the Nyquist frequency the samples contain no sine, so the factor is real.
         let turn = if 2 * n == sampling.len() { turn.re.into() } else { turn };
         line *= turn;
     }

@@ -65,8 +65,8 @@ pub(crate) enum Level {
     /// Variance of the stated noise, times an `inflation` for sampled weights, with its degrees of
     /// freedom.
     Known { inflation: f64, degrees_of_freedom: f64 },
-    /// Variance of a residual, from its sum of squares and its degrees of freedom, times an
-    /// `inflation` for sampled weights.
+    /// Variance of the residual, `inflation · cost / free`, with the sum of squares `cost` and the
+    /// degrees of freedom `free`; `inflation` is the effect of weights estimated from the data.
     Residual { inflation: f64, cost: f64, free: f64 },
 }
 
