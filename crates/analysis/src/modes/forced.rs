@@ -307,8 +307,8 @@ impl Context {
         Ok(Modes { summary, spectrum, source })
     }
 
-    /// Returns the rows of the modes. The masses are those of the fitted modes, with the decay of an
-    /// exponential window.
+    /// Returns the rows of the modes. The masses are those of the fitted modes, with the decay of
+    /// an exponential window.
     fn mode_rows(
         &self,
         estimate: &ModalEstimate,

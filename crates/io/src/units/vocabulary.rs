@@ -350,8 +350,8 @@ pub(super) const VOCABULARY: &[Entry] = &[
         1.0,
     ),
     entry(&["tonne", "tonnes"], D::MASS, 1e3),
-    // These units are neither of a force nor of a response. They are known, so that a column in
-    // such a unit is always reported.
+    // Units of other quantities than force and response: a column in such a unit is always
+    // reported.
     entry(&["Nm", "newtonmeter", "newtonmetre"], D::MOMENT, 1.0),
     entry(&["mNm", "Nmm"], D::MOMENT, 1e-3),
     entry(&["cNm", "Ncm"], D::MOMENT, 1e-2),
