@@ -65,7 +65,7 @@ pub(super) fn choose(
             Some(fit) => search_with_transient(fit, band),
             None => Some(known),
         })
-        .and_then(|known| choice.confirmed(known));
+        .map(|known| choice.confirmed(known));
     let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
     (chosen, choice.dropped)
 }
@@ -151,22 +151,27 @@ impl Choice<'_> {
         fit
     }
 
-    /// Returns the fit without an insignificant mode, if there is such a mode. Modes with the least
-    /// evidence are tested first; strong modes are not tested.
-    fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
-        let (parameters, needed) = (&fit.parameters, self.penalty());
+    /// Returns the modes without strong evidence, those with the least evidence first.
+    fn weak_modes(&self, fit: &Fit) -> Option<Vec<usize>> {
         let covariance = fit.covariance()?;
-        let evidence = |mode: usize| (wald(parameters, &covariance, mode), mode);
-        let mut weak: Vec<(f64, usize)> = (0..parameters.layout.modes)
+        let evidence = |mode: usize| (wald(&fit.parameters, &covariance, mode), mode);
+        let mut weak: Vec<(f64, usize)> = (0..fit.parameters.layout.modes)
             .map(evidence)
-            .filter(|(evidence, _)| *evidence < STRONG_EVIDENCE * needed)
+            .filter(|(evidence, _)| *evidence < STRONG_EVIDENCE * self.penalty())
             .collect();
         weak.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Some(weak.into_iter().map(|(_, mode)| mode).collect())
+    }
+
+    /// Returns the fit without an insignificant mode, if there is such a mode; strong modes are not
+    /// tested.
+    fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
+        let needed = self.penalty();
         let gain = |next: &Fit| {
             let penalty = self.penalty_of_noise(next) - self.penalty_of_noise(fit);
             2.0 * (next.cost - fit.cost) + penalty
         };
-        weak.into_iter().find_map(|(_, mode)| {
+        self.weak_modes(fit)?.into_iter().find_map(|mode| {
             let mut next = self.without(fit, mode)?;
             if gain(&next) >= needed {
                 // Noise that the polynomials of the noise model cannot follow looks like a mode
@@ -178,17 +183,30 @@ impl Choice<'_> {
         })
     }
 
-    /// Removes modes that are insignificant in the lines without the transient. A chance peak can
+    /// Removes modes that are insignificant in the likelihood with the transient. A chance peak can
     /// be significant beside leakage that the expected periodogram does not describe exactly.
-    fn confirmed(&mut self, known: FitWithTransient) -> Option<FitWithTransient> {
-        let dropped = std::mem::take(&mut self.dropped);
-        let mut choice = Choice { band: &known.lines, wanted: self.wanted, dropped };
-        let fit = choice.pruned(known.fit.clone());
-        self.dropped = choice.dropped;
-        if fit.parameters.layout.modes == known.fit.parameters.layout.modes {
-            return Some(known);
+    fn confirmed(&mut self, mut known: FitWithTransient) -> FitWithTransient {
+        while let Some((next, mode, reason)) = self.unconfirmed(&known) {
+            self.drop_mode(&known.fit.parameters, mode, reason);
+            known = next;
         }
-        search_with_transient(fit, self.band)
+        known
+    }
+
+    /// Returns the fit without an insignificant mode, if there is such a mode.
+    fn unconfirmed(
+        &self,
+        known: &FitWithTransient,
+    ) -> Option<(FitWithTransient, usize, DropReason)> {
+        if self.wanted.exactly.is_some_and(|n| self.sound_modes(&known.fit) <= n) {
+            return None;
+        }
+        let needed = self.penalty();
+        self.weak_modes(&known.fit)?.into_iter().find_map(|mode| {
+            let next = search_with_transient(self.without(&known.fit, mode)?, self.band)?;
+            let gain = 2.0 * (next.cost - known.cost);
+            (gain < needed).then_some((next, mode, DropReason::SmallGain { gain, needed }))
+        })
     }
 
     fn broken_rule(&self, fit: &Fit, mode: usize) -> Option<DropReason> {
