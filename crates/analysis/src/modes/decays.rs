@@ -49,16 +49,16 @@ pub(super) fn modes(
 /// Returns a note if the modes of a single decay show that it is not a sum of decaying
 /// oscillations; none for a decay that cannot be analysed alone, such as a short one.
 fn deviations(measurement: &Measurement, how: &DecaySettings) -> Option<String> {
-    let found = match decay(measurement, how) {
-        Ok(found) => found.summary().model_remarks(),
+    let remarks = match decay(measurement, how) {
+        Ok(modes) => modes.summary().model_remarks(),
         Err(AnalysisError::FreeDecay(
             error @ (FreeDecayError::NoOscillation { .. } | FreeDecayError::Grows { .. }),
         )) => vec![error.to_string()],
         Err(_) => Vec::new(),
     };
-    (!found.is_empty()).then(|| {
+    (!remarks.is_empty()).then(|| {
         let file = measurement.name();
-        format!("{file}, analysed alone (`decay`): {}", found.join("; "))
+        format!("{file}, analysed alone (`decay`): {}", remarks.join("; "))
     })
 }
 

@@ -13,6 +13,9 @@ use crate::measurement::Measurement;
 use crate::modes::ModalSystem;
 use crate::text::significant;
 
+const LINE_BY_LINE: &str =
+    "with modes as the model, the force is computed line by line: choose frequency-domain";
+
 /// Reconstructs the forces at the places of a modal test from measured responses. The method uses
 /// the frequency responses of the modes in the band of the test. The force is also passed to
 /// `take`.
@@ -35,17 +38,15 @@ pub fn reconstruct_with_modes(
     take: &mut Take<'_>,
 ) -> Result<Reconstructed, AnalysisError> {
     if !matches!(how.method, Method::Auto | Method::FrequencyDomain) {
-        let why =
-            "with modes as the model, the force is computed line by line: choose frequency-domain"
-                .into();
-        return Err(AnalysisError::Setting { setting: "method", why });
+        return Err(AnalysisError::Setting { setting: "method", why: LINE_BY_LINE.into() });
     }
     let recorded = Recorded::with_columns(run, &system.outputs_of(&run.source().names)?, true)?;
     let places = system.inputs.len();
     let request = Request::new(how, &recorded, places, true)?;
     let window = recorded.hold()?;
     let is_open = run.window_settings().period.is_none();
-    if is_open && how.lines.is_none() && !how.at_rest {
+    let is_judged = is_open && how.lines.is_none() && !how.at_rest;
+    if is_judged {
         check_rest(system, &window.motion)?;
     }
     let band_hz = band(system, &request)?;
@@ -69,7 +70,7 @@ pub fn reconstruct_with_modes(
     let used = force.spectrum().lines().row_iter().filter(|row| row.camax() > 0.0).count();
     let how_found = How {
         method: "frequency responses of the modes, line by line",
-        why: if is_open && how.lines.is_none() && !how.at_rest {
+        why: if is_judged {
             "the system is the result of a modal test, and the record begins and ends at rest"
                 .into()
         } else {

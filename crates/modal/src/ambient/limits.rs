@@ -42,6 +42,11 @@ pub(super) const MIN_SHARE: f64 = 0.3;
 /// spectrum differs from the spectrum at the centre by at most 0.25 %.
 pub(super) const POOLING: f64 = 0.1;
 
+/// Maximum difference between the mean spectrum of pooled lines and the spectrum at their centre,
+/// relative to that spectrum in each direction of the outputs; a group with a larger difference is
+/// divided.
+pub(super) const EVEN: f64 = 0.01;
+
 /// Width of pooled lines for the comparison of initial estimates and for the information of a step,
 /// as a share of the distance to the nearest pole.
 pub(super) const COARSE_POOLING: f64 = 0.3;

@@ -6,12 +6,10 @@ use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
 use super::likelihood::{noise, positive_factor};
+use super::limits::EVEN;
 use super::parameters::{Parameters, Span};
 use super::spectrum::Coefficients;
 use super::transient::Transient;
-
-/// Maximum relative difference between the mean spectrum of pooled lines and that of their centre.
-const EVEN: f64 = 0.01;
 
 /// Maximum width of pooled lines, as a fraction of the band. Far from the poles this limit is
 /// needed because the noise varies with frequency.
