@@ -138,12 +138,13 @@ fn shaken(path: &Path, dof: usize, driven: &[usize], samples: usize) -> Result<(
         let part = record.window(1024, samples)?;
         noise::add_white(&part, NoiseLevel::FractionOfRms(level), seed)
     };
-    let force = part(&force, 0.003, 2).map_err(|e| e.to_string())?;
+    let measured = part(&white, 0.003, 2).map_err(|e| e.to_string())?;
     let response = part(response.displacement(), 0.01, 3).map_err(|e| e.to_string())?;
-    let forces = driven.iter().map(|at| (format!("f{}", at + 1), force.channel(*at)));
+    let forces = driven.iter().enumerate();
+    let forces = forces.map(|(column, at)| (format!("f{}", at + 1), measured.channel(column)));
     let responses = (0..dof).map(|at| (format!("x{}", at + 1), response.channel(at)));
     let columns: Vec<(String, &[f64])> = forces.chain(responses).collect();
-    fs::write(path, csv_text(force.sampling(), &columns)).map_err(|e| e.to_string())
+    fs::write(path, csv_text(measured.sampling(), &columns)).map_err(|e| e.to_string())
 }
 
 /// Writes the decay of ten modes between 12 and 350 Hz in three channels, with 0.5 % noise.
