@@ -1,6 +1,8 @@
 //! Coloured noise as an autoregression: each sample depends on the samples before it, and the
 //! prediction errors are white.
 
+use nalgebra::Complex;
+
 use super::limits::{MOST_ORDER, SAMPLES_PER_ORDER};
 
 /// Noise of one channel as an autoregression; of order 0 it is white.
@@ -65,6 +67,20 @@ impl Autoregression {
     /// Returns minus twice the log determinant of the whitening transformation.
     pub(super) fn log_volume(&self) -> f64 {
         2.0 * self.deviations.iter().map(|d| d.ln()).sum::<f64>()
+    }
+
+    /// Returns the complex numbers A and B of the prediction errors of exponential functions, with
+    /// the pole λ per sample: the errors of e^{λk} are A e^{λk}, those of k e^{λk} are (A k + B)
+    /// e^{λk}. This is exact for samples with as many predecessors as the order.
+    pub(super) fn response(&self, pole: Complex<f64>) -> [Complex<f64>; 2] {
+        let (mut value, mut slope) = (Complex::new(1.0, 0.0), Complex::default());
+        for (lag, a) in (1..).zip(self.predictors.last().into_iter().flatten()) {
+            let lag = f64::from(lag);
+            let term = a * (-lag * pole).exp();
+            value -= term;
+            slope += lag * term;
+        }
+        [value, slope]
     }
 
     /// Returns the prediction errors of `values`, beginning with index `before`, scaled to equal

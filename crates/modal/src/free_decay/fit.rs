@@ -1,12 +1,16 @@
 //! Maximum-likelihood poles of a record for a given number of poles and a given autoregression of
 //! the noise.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use mechid_numerics::time_limit;
 use mechid_numerics::triangular::TriangularFactor;
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::autoregression::Autoregression;
-use super::limits::{MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING};
+use super::limits::{MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING, POLE_SEGMENT};
 use super::poles::{Pole, columns, linear_columns};
 
 /// Record as samples × channels. Each channel is scaled to unit RMS about its mean; `constant`
@@ -77,27 +81,46 @@ impl Data {
     }
 
     /// Returns the triangular factor of \[linear columns | columns of poles times k/N | channels\]
-    /// after whitening.
-    ///
-    /// Modes that have decayed before a block of rows have no columns in this block: most modes of
-    /// a long record last for only a small part of the record.
+    /// from sample `from` on, with the channels as in `white`.
     fn triangle(
         &self,
         poles: &[Pole],
-        noise: &Autoregression,
-        channels: &[usize],
-    ) -> Option<DMatrix<f64>> {
-        let width = linear_columns(poles, self.constant) + 2 * poles.len() + channels.len();
+        white: &DMatrix<f64>,
+        from: usize,
+    ) -> Option<TriangularFactor> {
+        let starts: Vec<usize> = (from..self.len()).step_by(POLE_SEGMENT).collect();
+        let segment =
+            |from: usize| self.segment(poles, white, from..self.len().min(from + POLE_SEGMENT));
+        let segments = starts.into_par_iter().map(segment).collect::<Option<Vec<_>>>()?;
+        let mut segments = segments.into_iter();
+        let mut whole = segments.next()?;
+        segments.all(|other| whole.push(&[other.r().as_view()])).then_some(whole)
+    }
+
+    /// Returns the triangular factor of some rows.
+    ///
+    /// Modes that have decayed before a block of rows have no columns in this block: most modes of
+    /// a long record last for only a small part of the record.
+    fn segment(
+        &self,
+        poles: &[Pole],
+        white: &DMatrix<f64>,
+        rows: Range<usize>,
+    ) -> Option<TriangularFactor> {
+        let width = linear_columns(poles, self.constant) + 2 * poles.len() + white.ncols();
         let mut factor = TriangularFactor::new(width);
         let mut few: Option<FewColumns> = None;
-        for first in (0..self.len()).step_by(POLE_CHUNK) {
-            let before = noise.order().min(first);
+        for first in rows.clone().step_by(POLE_CHUNK) {
+            let block = first..rows.end.min(first + POLE_CHUNK);
             let alive: Vec<usize> =
-                (0..poles.len()).filter(|at| poles[*at].is_alive(first - before)).collect();
+                (0..poles.len()).filter(|at| poles[*at].is_alive(first)).collect();
+            let push = |factor: &mut TriangularFactor, poles: &[Pole]| {
+                let basis = columns(poles, self.constant, block.start, block.end, self.len());
+                let measured = white.rows_range(block.clone());
+                factor.push(&[basis.as_view(), measured.as_view()])
+            };
             if alive.len() == poles.len() {
-                if !self.push_chunk(&mut factor, poles, noise, channels, first) {
-                    return None;
-                }
+                push(&mut factor, poles).then_some(())?;
                 continue;
             }
             let mut columns = match few.take() {
@@ -106,83 +129,115 @@ impl Data {
                     if !other.is_none_or(|columns| columns.merge_into(&mut factor)) {
                         return None;
                     }
-                    FewColumns::new(poles, alive, self.constant, channels.len())
+                    FewColumns::new(poles, alive, self.constant, white.ncols())
                 }
             };
-            if !self.push_chunk(&mut columns.factor, &columns.poles, noise, channels, first) {
-                return None;
-            }
+            push(&mut columns.factor, &columns.poles).then_some(())?;
             few = Some(columns);
         }
-        if !few.is_none_or(|columns| columns.merge_into(&mut factor)) {
-            return None;
-        }
-        Some(factor.r().clone())
+        few.is_none_or(|columns| columns.merge_into(&mut factor)).then_some(factor)
     }
 
-    /// Adds the rows from sample `first` on to the triangle of these poles and channels; returns
-    /// `false` if a value overflows.
-    fn push_chunk(
+    /// Returns the triangular factor of one channel after whitening: from the common factor of all
+    /// rows from sample `from` on, and from the rows before, which have fewer predecessors than the
+    /// autoregression.
+    fn whitened_triangle(
         &self,
-        factor: &mut TriangularFactor,
         poles: &[Pole],
         noise: &Autoregression,
-        channels: &[usize],
-        first: usize,
-    ) -> bool {
-        let end = self.len().min(first + POLE_CHUNK);
-        let before = noise.order().min(first);
-        let basis = columns(poles, self.constant, first - before, end, self.len());
-        let rows = first - before..end;
-        let measured =
-            channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
-        let mut parts: Vec<DMatrixView<'_, f64>> = vec![basis.as_view()];
-        parts.extend(measured);
-        let white: Vec<DMatrix<f64>>;
-        if noise.order() > 0 {
-            white = parts.iter().map(|part| whitened(noise, part, rows.start, before)).collect();
-            parts = white.iter().map(DMatrix::as_view).collect();
+        (common, white): (&DMatrix<f64>, &DMatrix<f64>),
+        channel: usize,
+        from: usize,
+    ) -> Option<DMatrix<f64>> {
+        let width = linear_columns(poles, self.constant) + 2 * poles.len();
+        let basis = columns(poles, self.constant, 0, from, self.len());
+        let mut first = basis.clone();
+        for mut column in first.column_iter_mut() {
+            let whitened = noise.whitened(column.clone_owned().as_slice(), 0, 0);
+            column.copy_from_slice(&whitened);
         }
-        factor.push(&parts)
+        let mut factor = TriangularFactor::new(width + 1);
+        let later = common.columns(0, width) * self.whitening(poles, noise);
+        let parts = [later.as_view(), common.columns(width + channel, 1).into()];
+        let first_rows = [first.as_view(), white.view((0, channel), (from, 1)).into()];
+        (factor.push(&parts) && factor.push(&first_rows)).then(|| factor.r().clone())
+    }
+
+    /// Returns the matrix T with which the columns B of the poles are whitened: B T. A whitened
+    /// exponential function is the same function times a complex number.
+    fn whitening(&self, poles: &[Pole], noise: &Autoregression) -> DMatrix<f64> {
+        let linear = linear_columns(poles, self.constant);
+        let mut whitening = DMatrix::zeros(linear + 2 * poles.len(), linear + 2 * poles.len());
+        let mut write = |row: usize, column: usize, factor: Complex<f64>| {
+            whitening[(row, column)] = factor.re;
+            whitening[(row, column + 1)] = factor.im;
+            whitening[(row + 1, column)] = -factor.im;
+            whitening[(row + 1, column + 1)] = factor.re;
+        };
+        for (at, pole) in poles.iter().enumerate() {
+            let [value, slope] = noise.response(Complex::new(pole.growth, pole.turn));
+            write(2 * at, 2 * at, value);
+            write(linear + 2 * at, linear + 2 * at, value);
+            write(2 * at, linear + 2 * at, slope / self.len() as f64);
+        }
+        if self.constant {
+            whitening[(linear - 1, linear - 1)] = noise.response(Complex::default())[0].re;
+        }
+        whitening
+    }
+
+    /// Returns the channels after whitening.
+    fn whitened(&self, noise: &[Autoregression]) -> DMatrix<f64> {
+        let mut white = self.samples.clone();
+        for (mut column, noise) in white.column_iter_mut().zip(noise) {
+            if noise.order() > 0 {
+                let whitened = noise.whitened(column.clone_owned().as_slice(), 0, 0);
+                column.copy_from_slice(&whitened);
+            }
+        }
+        white
     }
 
     /// Solves for the linear unknowns; `None` if the record cannot determine a pole, or if two
-    /// poles are too close.
-    fn at(&self, poles: &[Pole], noise: &[Autoregression]) -> Option<Fit> {
+    /// poles are too close. `white` are the channels after whitening with the noise.
+    fn at(&self, poles: &[Pole], noise: &[Autoregression], white: &DMatrix<f64>) -> Option<Fit> {
         if !poles.iter().all(|pole| pole.is_possible(self.len())) {
             return None;
         }
         let (linear, nonlinear) = (linear_columns(poles, self.constant), 2 * poles.len());
-        let mut fits: Vec<Option<ChannelFit>> = vec![None; self.channels()];
-        while let Some(first) = fits.iter().position(Option::is_none) {
-            // Channels with white noise have the same columns: one factorisation serves all of
-            // them.
-            let shared = |c: &usize| *c == first || noise[*c].order() + noise[first].order() == 0;
-            let group: Vec<usize> =
-                (first..self.channels()).filter(|c| fits[*c].is_none()).filter(shared).collect();
-            let upper = self.triangle(poles, &noise[first], &group)?;
-            let factor = upper.view((0, 0), (linear, linear)).into_owned();
-            for (index, channel) in group.into_iter().enumerate() {
-                let column = upper.column(linear + nonlinear + index);
-                let right = column.rows(0, linear).into_owned();
-                let solved = factor.solve_upper_triangular(&right)?;
-                if solved.iter().any(|v| !v.is_finite()) {
-                    return None;
+        // One factorisation serves all channels.
+        let from = noise.iter().map(Autoregression::order).max().unwrap_or(0);
+        let common = self.triangle(poles, white, from)?;
+        let common = common.r();
+        let channel = |channel: usize| {
+            let noise = &noise[channel];
+            let (upper, right) = match from {
+                0 => (Cow::Borrowed(common), linear + nonlinear + channel),
+                _ => {
+                    let both = (common, white);
+                    let upper = self.whitened_triangle(poles, noise, both, channel, from)?;
+                    (Cow::Owned(upper), linear + nonlinear)
                 }
-                let combination = slopes(&solved, nonlinear);
-                let square = column.rows_range(linear..).norm_squared();
-                let floor = (POLE_ROUNDING * POLE_ROUNDING) * self.len() as f64;
-                fits[channel] = Some(ChannelFit {
-                    square: square + floor,
-                    along: upper.view((0, linear), (linear, nonlinear)) * &combination,
-                    across: upper.view((linear, linear), (nonlinear, nonlinear)) * &combination,
-                    side: column.rows(linear, nonlinear).into_owned(),
-                    linear: solved,
-                    factor: factor.clone(),
-                });
+            };
+            let factor = upper.view((0, 0), (linear, linear)).into_owned();
+            let column = upper.column(right);
+            let right = column.rows(0, linear).into_owned();
+            let solved = factor.solve_upper_triangular(&right)?;
+            if solved.iter().any(|v| !v.is_finite()) {
+                return None;
             }
-        }
-        let channels = fits.into_iter().collect::<Option<Vec<_>>>()?;
+            let combination = slopes(&solved, nonlinear);
+            let floor = (POLE_ROUNDING * POLE_ROUNDING) * self.len() as f64;
+            Some(ChannelFit {
+                square: column.rows_range(linear..).norm_squared() + floor,
+                along: upper.view((0, linear), (linear, nonlinear)) * &combination,
+                across: upper.view((linear, linear), (nonlinear, nonlinear)) * &combination,
+                side: column.rows(linear, nonlinear).into_owned(),
+                linear: solved,
+                factor,
+            })
+        };
+        let channels = (0..self.channels()).map(channel).collect::<Option<Vec<_>>>()?;
         Some(Fit { poles: poles.to_vec(), noise: noise.to_vec(), channels })
     }
 
@@ -199,7 +254,8 @@ impl Data {
         noise: &[Autoregression],
         tolerance: f64,
     ) -> Option<Fit> {
-        let mut fit = self.at(poles, noise)?;
+        let white = self.whitened(noise);
+        let mut fit = self.at(poles, noise, &white)?;
         let mut cost = fit.cost(self.len());
         let mut damping = 0.0;
         for _ in 0..MAX_STEPS {
@@ -222,7 +278,7 @@ impl Data {
                     turn: pole.turn + step[2 * at + 1] / (scale[2 * at + 1] * self.len() as f64),
                 });
                 let moved: Vec<Pole> = moved.collect();
-                let trial = self.at(&moved, noise);
+                let trial = self.at(&moved, noise, &white);
                 let trial = trial.map(|trial| (trial.cost(self.len()), trial));
                 if let Some((less, trial)) = trial.filter(|(less, _)| *less < cost) {
                     let gained = cost - less;
@@ -298,21 +354,6 @@ impl FewColumns {
         }
         whole.push(&[rows.as_view()])
     }
-}
-
-/// Returns the prediction errors of `columns`, beginning with row `before`. The first row of
-/// `columns` is sample `first` of the record.
-fn whitened(
-    noise: &Autoregression,
-    columns: &DMatrixView<'_, f64>,
-    first: usize,
-    before: usize,
-) -> DMatrix<f64> {
-    let mut white = DMatrix::zeros(columns.nrows() - before, columns.ncols());
-    for (mut target, column) in white.column_iter_mut().zip(columns.column_iter()) {
-        target.copy_from_slice(&noise.whitened(column.as_slice(), first, before));
-    }
-    white
 }
 
 /// Returns a matrix of coefficients. With these coefficients, the columns times k/N give the

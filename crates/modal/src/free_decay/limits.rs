@@ -19,6 +19,10 @@ pub(crate) const LEAST_ONSET: usize = 10;
 /// Number of rows of a block of columns; it limits the memory.
 pub(crate) const POLE_CHUNK: usize = 4096;
 
+/// Number of rows of a free decay that one thread reduces; it is fixed, so that the results do not
+/// depend on the number of threads.
+pub(crate) const POLE_SEGMENT: usize = 4 * POLE_CHUNK;
+
 /// Decay, in nepers, after which a mode has no columns: its amplitude is then 10⁻¹⁵ of its first
 /// amplitude, less than the rounding of a fit. A smaller limit would lose information, a larger one
 /// would cost time.
