@@ -63,8 +63,4 @@ pub(crate) const NARROW_PRODUCT: usize = 2;
 
 /// Number of rows of a tall matrix that are multiplied by their weights at a time: these rows stay
 /// in the fastest cache of a core.
-pub(crate) const WEIGHTED_ROWS: usize = 512;
-
-/// Maximum number of columns of a tall matrix whose weighted products are computed as dot products;
-/// with more, a product of matrices is faster.
-pub(crate) const NARROW_GRAM: usize = 5;
+pub(crate) const WEIGHTED_ROWS: usize = 256;

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DMatrixView};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::lanes::dot;
-use crate::limits::{NARROW_GRAM, PRODUCT_ROWS, WEIGHTED_ROWS};
+use crate::lanes::{dot, dots};
+use crate::limits::{PRODUCT_ROWS, WEIGHTED_ROWS};
 
 /// Returns AᵀB (columns of A × columns of B, in the product of their units), for two matrices with
 /// the same number of rows.
@@ -39,79 +39,63 @@ pub fn transposed_product(a: DMatrixView<'_, f64>, b: DMatrixView<'_, f64>) -> D
     products.into_iter().fold(zero, |sum, product| sum + product)
 }
 
-/// Products AᵀWA of one tall matrix A with diagonal matrices W.
+/// Returns AᵀWA (columns × columns, in the squared unit of A times the unit of W) of a tall matrix A
+/// and the diagonal of W.
+///
+/// # Panics
+/// Panics if there is not one weight for every row.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 1.3 (block matrices).
 ///
 /// ```
-/// use mechid_numerics::products::WeightedGram;
+/// use mechid_numerics::products::weighted_gram;
 /// use nalgebra::dmatrix;
 ///
 /// let a = dmatrix![1.0, 2.0; 3.0, 4.0];
-/// let gram = WeightedGram::new(a.as_view()).with(&[1.0, 10.0]);
-/// assert_eq!(gram, dmatrix![91.0, 122.0; 122.0, 164.0]);
+/// assert_eq!(weighted_gram(a.as_view(), &[1.0, 10.0]), dmatrix![91.0, 122.0; 122.0, 164.0]);
 /// ```
-#[derive(Debug)]
-pub struct WeightedGram<'a> {
-    a: DMatrixView<'a, f64>,
-    /// Aᵀ, for matrices that are not narrow.
-    transposed: Option<DMatrix<f64>>,
+pub fn weighted_gram(a: DMatrixView<'_, f64>, weights: &[f64]) -> DMatrix<f64> {
+    assert_eq!(a.nrows(), weights.len(), "one weight for every row");
+    let mut gram = DMatrix::zeros(a.ncols(), a.ncols());
+    Arch::new().dispatch(BlockedGram { a, weights, gram: &mut gram });
+    gram.fill_upper_triangle_with_lower_triangle();
+    gram
 }
 
-impl<'a> WeightedGram<'a> {
-    /// Prepares the products of A, rows × columns in any unit.
-    pub fn new(a: DMatrixView<'a, f64>) -> Self {
-        let is_narrow = a.ncols() <= NARROW_GRAM;
-        Self { a, transposed: (!is_narrow).then(|| a.transpose()) }
-    }
-
-    /// Returns AᵀWA (columns × columns, in the squared unit of A times the unit of W) for the
-    /// diagonal of W.
-    ///
-    /// # Panics
-    /// Panics if there is not one weight for every row.
-    ///
-    /// # Source
-    /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 1.3 (block matrices).
-    pub fn with(&self, weights: &[f64]) -> DMatrix<f64> {
-        assert_eq!(self.a.nrows(), weights.len(), "one weight for every row");
-        if let Some(transposed) = &self.transposed {
-            let mut weighted = self.a.into_owned();
-            for mut column in weighted.column_iter_mut() {
-                column.iter_mut().zip(weights).for_each(|(value, weight)| *value *= weight);
-            }
-            return transposed * weighted;
-        }
-        let mut gram = DMatrix::zeros(self.a.ncols(), self.a.ncols());
-        Arch::new().dispatch(NarrowGram { a: self.a, weights, gram: &mut gram });
-        gram.fill_upper_triangle_with_lower_triangle();
-        gram
-    }
-}
-
-/// Arguments of the product of few columns, which `pulp` compiles for each width of vector
-/// registers: dot products.
-struct NarrowGram<'a> {
+/// Arguments of [`weighted_gram`], which `pulp` compiles for each width of vector registers.
+struct BlockedGram<'a> {
     a: DMatrixView<'a, f64>,
     weights: &'a [f64],
     gram: &'a mut DMatrix<f64>,
 }
 
-impl WithSimd for NarrowGram<'_> {
+impl WithSimd for BlockedGram<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self { a, weights, gram } = self;
+        let columns = a.ncols();
         let mut weighted = [0.0; WEIGHTED_ROWS];
         for (block, weights) in weights.chunks(WEIGHTED_ROWS).enumerate() {
             let (first, len) = (block * WEIGHTED_ROWS, weights.len());
-            for column in 0..a.ncols() {
-                let column_of_a = &a.column(column).data.into_slice()[first..first + len];
-                for ((to, a), weight) in weighted.iter_mut().zip(column_of_a).zip(weights) {
+            let part = |column: usize| &a.column(column).data.into_slice()[first..first + len];
+            for column in 0..columns {
+                for ((to, a), weight) in weighted.iter_mut().zip(part(column)).zip(weights) {
                     *to = a * weight;
                 }
-                for row in column..a.ncols() {
-                    let right = &a.column(row).data.into_slice()[first..first + len];
-                    gram[(row, column)] += dot(&weighted[..len], right);
+                // Four products at a time, because each weighted entry is then read once for four.
+                let mut row = column;
+                while row + 4 <= columns {
+                    let others = [part(row), part(row + 1), part(row + 2), part(row + 3)];
+                    for (at, product) in dots(&weighted[..len], others).into_iter().enumerate() {
+                        gram[(row + at, column)] += product;
+                    }
+                    row += 4;
+                }
+                for row in row..columns {
+                    gram[(row, column)] += dot(&weighted[..len], part(row));
                 }
             }
         }
@@ -129,11 +113,11 @@ mod tests {
         let weights: Vec<f64> = (0..rows).map(|row| number(5 * row + 1)).collect();
         for columns in [4, 9] {
             let a = DMatrix::from_fn(rows, columns, |row, column| number(3 * row + column));
-            let gram = WeightedGram::new(a.as_view()).with(&weights);
+            let gram = weighted_gram(a.as_view(), &weights);
             let expected = a.tr_mul(&(DMatrix::from_diagonal(&weights.clone().into()) * &a));
             assert!((gram - expected).norm() < 1e-13 * a.norm_squared());
             let none = DMatrix::zeros(0, columns);
-            let gram = WeightedGram::new(none.as_view()).with(&[]);
+            let gram = weighted_gram(none.as_view(), &[]);
             assert_eq!(gram, DMatrix::zeros(columns, columns));
         }
     }

@@ -4,7 +4,7 @@ mod bump;
 
 use std::ops::Range;
 
-use mechid_numerics::products::WeightedGram;
+use mechid_numerics::products::weighted_gram;
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use rayon::prelude::*;
 
@@ -178,7 +178,8 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
         let mut trial = Trial::new(order, omega, variances);
         let mut least = cost(&trial);
         while trial.form.bumps.len() < MAX_BUMPS && 4 * (trial.form.terms() + 1) <= lines {
-            let more = trial.next_bump(variances, nu).and_then(|bump| trial.with(bump, variances));
+            let next = trial.next_bump(variances, nu);
+            let more = next.and_then(|(bump, heights)| trial.with(bump, &heights, variances));
             let Some(more) = more else { break };
             let now = cost(&more);
             if now >= least {
@@ -218,12 +219,18 @@ impl Trial {
         Self::fitted(form, basis, initial, variances)
     }
 
-    /// Returns the fit with one more bump; the search starts at the present fit. `None` if the form
-    /// already contains the bump.
-    fn with(&self, bump: Bump, variances: &DMatrix<f64>) -> Option<Self> {
+    /// Returns the fit with one more bump; the search starts at the present fit and the `heights` of
+    /// the bump for each channel. `None` if the form already contains the bump.
+    fn with(&self, bump: Bump, heights: &[f64], variances: &DMatrix<f64>) -> Option<Self> {
         let mut form = self.form.clone();
         form.bumps.push(bump);
         let mut column = DVector::from_fn(self.basis.nrows(), |line, _| bump.at(line));
+        let mut initial = self.log_power.clone();
+        for (at, height) in heights.iter().enumerate() {
+            initial.column_mut(at).axpy(*height, &column, 1.0);
+            let ratios = variances.column(at).zip_map(&initial.column(at), |v, l| v * (-l).exp());
+            initial.column_mut(at).add_scalar_mut(ratios.mean().max(f64::MIN_POSITIVE).ln());
+        }
         let length = column.norm();
         // The second pass removes the components that rounding leaves after the first.
         for _ in 0..2 {
@@ -236,7 +243,7 @@ impl Trial {
         let at = self.basis.ncols();
         let mut basis = self.basis.clone().insert_column(at, 0.0);
         basis.set_column(at, &(column / remaining));
-        Some(Self::fitted(form, basis, self.log_power.clone(), variances))
+        Some(Self::fitted(form, basis, initial, variances))
     }
 
     fn fitted(
@@ -255,8 +262,8 @@ impl Trial {
         Self { form, basis, log_power, misfit }
     }
 
-    /// Returns the bump that would raise the likelihood most.
-    fn next_bump(&self, variances: &DMatrix<f64>, nu: f64) -> Option<Bump> {
+    /// Returns the bump that would raise the likelihood most, and its height for each channel.
+    fn next_bump(&self, variances: &DMatrix<f64>, nu: f64) -> Option<(Bump, Vec<f64>)> {
         if self.form.bumps.is_empty() {
             return most_conspicuous(variances, &self.log_power, nu);
         }
@@ -330,7 +337,6 @@ fn most_likely(
     let mut misfit = deviance(&log_power, variances, &mut ratio);
     let tolerance = tolerance * (variances.len() as f64).sqrt();
     let mut next_ratio = ratio.clone();
-    let products = WeightedGram::new(basis.as_view());
     let mut factors: Option<Cholesky<f64, Dyn>> = None;
     let mut previous = f64::INFINITY;
     for _ in 0..SMOOTH_STEPS {
@@ -341,7 +347,7 @@ fn most_likely(
         let mut step = match reused.filter(|step| step.norm() <= HESSIAN_REUSED * previous) {
             Some(step) => step,
             None => {
-                factors = products.with(ratio.as_slice()).cholesky();
+                factors = weighted_gram(basis.as_view(), ratio.as_slice()).cholesky();
                 // If the Hessian is not positive definite, the expected information, which is the
                 // identity matrix, replaces it in Newton's step.
                 factors.as_ref().map_or_else(|| slope.clone(), |factors| factors.solve(&slope))

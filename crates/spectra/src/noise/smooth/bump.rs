@@ -161,13 +161,13 @@ pub(super) fn widths(lines: usize) -> impl Iterator<Item = usize> {
     all_widths.take_while(move |width| *width <= (lines / 3).max(1))
 }
 
-/// Returns the bump with the highest likelihood, given the variances. The candidates are all flat
-/// bumps and, around the best flat bumps, other shapes.
+/// Returns the bump with the highest likelihood, given the variances, and its height for each
+/// channel. The candidates are all flat bumps and, around the best flat bumps, other shapes.
 pub(super) fn most_conspicuous(
     variances: &DMatrix<f64>,
     log_power: &DMatrix<f64>,
     nu: f64,
-) -> Option<Bump> {
+) -> Option<(Bump, Vec<f64>)> {
     let (lines, channels) = variances.shape();
     let levels = variances.zip_map(log_power, |v, log| v * (-log).exp());
     let gains = FlatGains::new(&levels, nu);
@@ -190,12 +190,10 @@ pub(super) fn most_conspicuous(
             None => break,
         }
     }
-    let best = if *of_flat >= fitted.gain {
-        (*of_flat, Bump::flat(band))
-    } else {
-        (fitted.gain, fitted.bump)
-    };
-    Some(best).filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
+    if *of_flat >= fitted.gain {
+        fitted = Gained { gain: *of_flat, ..fit(Bump::flat(band), &none) };
+    }
+    (fitted.gain > 0.0).then_some((fitted.bump, fitted.heights))
 }
 
 /// Gains of flat bumps, as reductions of Σ log p + v/p with the fitted power p and the variance v.
@@ -221,7 +219,8 @@ impl FlatGains {
     /// Returns the largest gain of all bands of one width, and the band with this gain.
     fn best_of_width(&self, width: usize) -> Option<(f64, Range<usize>)> {
         let bounds = self.bounds(width);
-        let mut best: Option<(f64, usize)> = None;
+        let highest = (0..bounds.len()).max_by(|a, b| bounds[*a].total_cmp(&bounds[*b]));
+        let mut best = highest.map(|start| (self.gain(start, width), start));
         for (start, bound) in bounds.into_iter().enumerate() {
             let least = best.map_or(f64::NEG_INFINITY, |(gain, _)| gain);
             // Most bands are excluded without a logarithm.
@@ -240,8 +239,7 @@ impl FlatGains {
         for below in self.below.as_slice().chunks_exact(lines + 1) {
             let levels = Levels::new(below, width, self.nu);
             for ((bound, first), last) in bounds.iter_mut().zip(below).zip(&below[width..]) {
-                let [inside, other] = levels.ratios(last - first);
-                *bound += levels.count * (inside - 1.0) + levels.others * (other - 1.0);
+                *bound += levels.bound(last - first);
             }
         }
         bounds
@@ -283,6 +281,18 @@ impl Levels {
             mean: (total / lines as f64).max(SMOOTH_FLOOR),
             may_be_quiet: count * nu >= QUIET_DEVIATIONS,
         }
+    }
+
+    /// Returns an upper bound of the gain of a band whose sum is `inside`: the gain with x − 1
+    /// instead of ln x.
+    #[inline]
+    fn bound(&self, inside: f64) -> f64 {
+        let Self { count, others, mean, .. } = *self;
+        let other = (self.total - inside).max(others * SMOOTH_FLOOR);
+        let inside = inside.max(count * SMOOTH_FLOOR);
+        let bound = mean * (count * count / inside + others * others / other) - (count + others);
+        let counts = self.may_be_quiet | (inside * others > other * count);
+        if counts { bound } else { 0.0 }
     }
 
     /// Returns the ratios of the mean of all lines to the mean of a band whose sum is `inside`, and
