@@ -8,7 +8,7 @@ use mechid_spectra::transient::powers;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::Whitened;
+use super::whitened::WeightedLines;
 use crate::Unknowns;
 use crate::pulse_covariance::PulseCovariance;
 
@@ -23,11 +23,11 @@ impl ForceResponses {
         values: &DVector<f64>,
         noise: &NoiseSpectrum,
     ) -> Option<Self> {
-        let covariance = |row: usize| noise.covariance(row).clone();
+        let covariance = |row: usize| noise.covariance(row);
+        let weighted = WeightedLines::new(data, unknowns, values, covariance)?;
         let to_force = |dof: usize| {
             let force = data.unit_force_data(dof);
-            let whitened = Whitened::residual_of(&force, unknowns, values, covariance)?;
-            Some(whitened.residual)
+            weighted.residual(force.force(), force.displacement())
         };
         (0..data.dof()).map(to_force).collect::<Option<_>>().map(Self)
     }

@@ -68,6 +68,11 @@ impl Line {
         &self.white_receptance
     }
 
+    /// Factor L in the lower triangle, after [`Line::whiten_both`].
+    pub(super) fn lower(&self) -> &ComplexMatrix {
+        &self.lower
+    }
+
     /// Scales L⁻¹, which gives the line another weight.
     pub(super) fn scale(&mut self, by: f64) {
         self.white.scale_mut(by);

@@ -107,6 +107,56 @@ impl Whitened {
     }
 }
 
+/// Weights L⁻¹ and weighted receptances L⁻¹G of one system on all lines, for the residuals of many
+/// forces and displacements.
+pub(super) struct WeightedLines {
+    /// L in the lower triangle, and L⁻¹G (each n × n) of each line.
+    lines: Vec<(ComplexMatrix, ComplexMatrix)>,
+}
+
+impl WeightedLines {
+    /// Computes the weights of the system with the matrices of `values`; `None` as for
+    /// [`Whitened::new`].
+    pub(super) fn new<'a>(
+        data: &FrequencyData,
+        unknowns: &Unknowns,
+        values: &DVector<f64>,
+        covariance: impl Fn(usize) -> &'a ComplexMatrix,
+    ) -> Option<Self> {
+        let matrices = unknowns.assemble(values.as_slice());
+        let mut line = Line::new(data.dof());
+        let weights = (0..data.len()).map(|row| {
+            whiten(&mut line, &matrices, data, row, covariance(row))?;
+            Some((line.lower().clone(), line.white_receptance().clone()))
+        });
+        weights.collect::<Option<_>>().map(|lines| Self { lines })
+    }
+
+    /// Returns the residual √2·L⁻¹(X − G F) for the forces F and the displacements X (rows × n), in
+    /// the order of [`Whitened::residual`]; `None` if it is not finite.
+    pub(super) fn residual(
+        &self,
+        force: &ComplexMatrix,
+        displacement: &ComplexMatrix,
+    ) -> Option<DVector<f64>> {
+        let n = force.ncols();
+        let mut residual = DVector::zeros(2 * n * self.lines.len());
+        let mut white = DVector::zeros(n);
+        let parts = residual.as_mut_slice().chunks_exact_mut(2 * n);
+        for (row, ((lower, receptance), part)) in self.lines.iter().zip(parts).enumerate() {
+            white.tr_copy_from(&displacement.row(row));
+            if !lower.solve_lower_triangular_mut(&mut white) {
+                return None;
+            }
+            for (column, force) in receptance.column_iter().zip(force.row(row).iter()) {
+                white.axpy(-force, &column, Complex::ONE);
+            }
+            write_real(white.iter().copied(), part);
+        }
+        residual.iter().all(|value| value.is_finite()).then_some(residual)
+    }
+}
+
 /// Returns Q and R⁻¹ of the sensitivities J = Q R; `None` if the columns of J are linearly
 /// dependent.
 pub(crate) fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {

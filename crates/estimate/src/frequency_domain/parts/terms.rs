@@ -8,7 +8,7 @@ use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use super::PartsOfFit;
-use crate::frequency_domain::Whitened;
+use crate::frequency_domain::whitened::{WeightedLines, Whitened};
 use crate::limits::MAX_PARTS;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
@@ -112,6 +112,7 @@ pub(super) struct LikelyMotion<'a> {
     displacement: ComplexMatrix,
     force: ComplexMatrix,
     records: &'a [SampledRows],
+    weighted: WeightedLines,
 }
 
 impl<'a> LikelyMotion<'a> {
@@ -125,7 +126,8 @@ impl<'a> LikelyMotion<'a> {
             let of_row = system.dynamic_stiffness(*omega) * displacement.row(row).transpose();
             force.row_mut(row).copy_from(&of_row.transpose());
         }
-        Some(Self { fit, system, displacement, force, records })
+        let weighted = WeightedLines::new(&fit.data, &fit.unknowns, &fit.values, covariance)?;
+        Some(Self { fit, system, displacement, force, records, weighted })
     }
 
     /// Returns the terms that can be tested; their number is limited by the size of the fit.
@@ -161,15 +163,12 @@ impl<'a> LikelyMotion<'a> {
     /// other; `None` if the response does not change.
     pub(super) fn columns(&self, term: OmittedTerm) -> Option<DMatrix<f64>> {
         let changes = self.changes(term)?;
-        let covariance = |row: usize| self.fit.noise.covariance(row).clone();
         let mut columns = Vec::new();
         for Change { force, displacement } in changes {
-            let data = self.fit.data.with_force(-force).with_displacement(displacement);
-            let values = &self.fit.values;
-            let white = Whitened::residual_of(&data, &self.fit.unknowns, values, covariance)?;
-            let length = white.residual.norm();
+            let white = self.weighted.residual(&-force, &displacement)?;
+            let length = white.norm();
             if length > 0.0 {
-                columns.push(white.residual / length);
+                columns.push(white / length);
             }
         }
         (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
