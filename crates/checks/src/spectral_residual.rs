@@ -1,7 +1,9 @@
 //! Tests of the weighted residual of spectra against noise.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
+use mechid_numerics::products::transposed_product;
 use mechid_signal::correlation::{Correlation, share_above_of};
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
@@ -45,6 +47,8 @@ pub struct SpectralResidual {
     force_decides: Option<(f64, f64)>,
     /// Few lines with most of the misfit of all records.
     concentration: Option<Concentration>,
+    /// Tests of the correlation, computed when they are first needed.
+    correlations: OnceLock<Vec<Finding>>,
 }
 
 /// Returns whether no test of the residuals warns, with p-values adjusted for their number.
@@ -93,6 +97,7 @@ impl SpectralResidual {
             rounding: false,
             force_decides: None,
             concentration: None,
+            correlations: OnceLock::new(),
         }
     }
 
@@ -103,12 +108,13 @@ impl SpectralResidual {
 
     /// Sets whether the residual is rounding.
     pub(super) fn with_rounding(self, rounding: bool) -> Self {
-        Self { rounding, ..self }
+        Self { rounding, correlations: OnceLock::new(), ..self }
     }
 
     /// Replaces the measured forces by the most likely forces.
     pub(super) fn with_likely_force(self, force: Option<DMatrix<Complex<f64>>>) -> Self {
-        Self { force: force.unwrap_or(self.force), ..self }
+        let force = force.unwrap_or(self.force);
+        Self { force, correlations: OnceLock::new(), ..self }
     }
 
     /// Sets the result of the power test on lines where force noise dominates.
@@ -141,7 +147,14 @@ impl SpectralResidual {
             let (p_value, source) = (PValue::new(p_value), NoiseSource::Force);
             findings.push(Finding::Misfit(Misfit { ratio, p_value, source, concentration: None }));
         }
+        findings.extend(self.correlations.get_or_init(|| self.correlation_tests()).iter().cloned());
+        findings
+    }
+
+    /// Tests the correlation from line to line and with the forces.
+    fn correlation_tests(&self) -> Vec<Finding> {
         let dof = self.data.dof();
+        let mut findings = Vec::new();
         let of_forces: Vec<Vec<Option<Correlation>>> =
             (0..dof).into_par_iter().map(|force| self.with_force(force)).collect();
         let whiteness = |residual: usize| {
@@ -313,16 +326,19 @@ impl SpectralResidual {
     pub fn with_force(&self, force: usize) -> Vec<Option<Correlation>> {
         let (lines, dof) = (self.data.len(), self.data.dof());
         let forces = self.force.column(force);
+        if forces.iter().all(|force| *force == Complex::ZERO) {
+            return vec![None; dof];
+        }
         let (lags, lag) = (LAGS.min(lines / LINES_PER_CORRELATION), self.lag());
-        let mut weights = DMatrix::zeros(2 * lags + 1, 2 * lines);
+        let mut weights = DMatrix::zeros(2 * lines, 2 * lags + 1);
         for (line, (f, omega)) in forces.iter().zip(self.data.omega()).enumerate() {
             // The phase increases by the same angle from lag to lag.
             let turn = Complex::cis(omega * lag);
             let mut weight = f.conj() * Complex::cis(-omega * lag * lags as f64);
-            for at in 0..weights.nrows() {
+            for at in 0..weights.ncols() {
                 // Re(w r) = Re w Re r − Im w Im r.
-                weights[(at, 2 * line)] = weight.re;
-                weights[(at, 2 * line + 1)] = -weight.im;
+                weights[(2 * line, at)] = weight.re;
+                weights[(2 * line + 1, at)] = -weight.im;
                 weight *= turn;
             }
         }
@@ -333,10 +349,10 @@ impl SpectralResidual {
             if column < dof {
                 self.values[row]
             } else {
-                self.deviations[row].powi(2) * weights[(0, at)]
+                self.deviations[row].powi(2) * weights[(at, 0)]
             }
         });
-        let products = &weights * &right;
+        let products = transposed_product(weights.as_view(), right.as_view());
         let channel_correlation = |channel: usize| {
             let (sums, white) = (products.column(channel), products.column(dof + channel));
             let covariance = self.covariance(&weights, white, channel)?;
@@ -344,8 +360,8 @@ impl SpectralResidual {
             let mean = covariance.trace();
             Some(Correlation {
                 coefficients: sums.iter().map(|product| product / size).collect(),
-                bound: 1.96 * (mean / weights.nrows() as f64).sqrt() / size,
-                statistic: sums.norm_squared() / mean * weights.nrows() as f64,
+                bound: 1.96 * (mean / weights.ncols() as f64).sqrt() / size,
+                statistic: sums.norm_squared() / mean * weights.ncols() as f64,
                 p_value: share_above_of(sums.norm_squared(), mean, covariance.norm_squared()),
             })
         };
@@ -359,7 +375,8 @@ impl SpectralResidual {
     }
 
     /// Returns the covariance A P Σ P Aᵀ of weighted sums A over the rows of a channel, with P = I
-    /// − QQᵀ and the variances Σ from the residuals. `white` is the first column of A Σ Aᵀ.
+    /// − QQᵀ and the variances Σ from the residuals. `weights` is Aᵀ, and `white` is the first
+    /// column of A Σ Aᵀ.
     ///
     /// Real and imaginary part of a line have the same variance; therefore the entries of A Σ Aᵀ
     /// depend only on the distance of two lags.
@@ -369,18 +386,19 @@ impl SpectralResidual {
         white: DVectorView<'_, f64>,
         channel: usize,
     ) -> Option<DMatrix<f64>> {
-        let count = weights.nrows();
+        let count = weights.ncols();
         let mut covariance = DMatrix::from_fn(count, count, |a, b| white[a.abs_diff(b)]);
         if self.explained.ncols() > 0 {
             let row = |line| self.row(line, channel);
             let rows: Vec<usize> =
                 (0..self.data.len()).map(row).flat_map(|row| [row, row + 1]).collect();
             let mut explained = self.explained.select_rows(&rows);
-            let loads = weights * &explained;
+            let loads = transposed_product(weights.as_view(), explained.as_view());
             for (mut row, index) in explained.row_iter_mut().zip(&rows) {
                 row *= self.deviations[*index].powi(2);
             }
-            let cross = weights * explained * loads.transpose();
+            let spread = transposed_product(weights.as_view(), explained.as_view());
+            let cross = spread * loads.transpose();
             let inner = &loads * &self.explained_spread * loads.transpose();
             covariance += inner - &cross - cross.transpose();
         }
