@@ -16,7 +16,8 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::finding::{Check, Finding, Names};
 use super::limits::{
-    DELAY_NEAR, DELAY_PREFERRED, DELAY_REACH, DELAY_REDUCTIONS, DELAY_RESOLVED, HARDLY_FOLLOWS,
+    DELAY_NEAR, DELAY_PREFERRED, DELAY_REACH, DELAY_REDUCTIONS, DELAY_REFINED, DELAY_RESOLVED,
+    HARDLY_FOLLOWS,
 };
 use super::limits::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
 use super::open_fit::{joined, minimum_near, residuals_of_fit};
@@ -76,7 +77,8 @@ fn delay_of_equations(
 /// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
 /// uncorrelated with the forces. If the residuals `without_delay` are uncorrelated with the forces,
 /// too, either at most a quarter of the power may remain, or the tests of the residual warn without
-/// the delay and pass with it. `dt` is the sampling interval in s; sinusoidal disturbances have
+/// the delay and pass with it. Less than the fraction `below` of the power must remain: 1, or what
+/// another explanation leaves. `dt` is the sampling interval in s; sinusoidal disturbances have
 /// been subtracted from the `records`. `None` if no delay of up to 16 samples (64 if the response
 /// hardly follows the force) satisfies this.
 ///
@@ -91,6 +93,7 @@ pub fn delay_of_open_records(
     unknowns: &Unknowns,
     fit: &OutputErrorFit,
     without_delay: &[SpectralResidual],
+    below: f64,
 ) -> Option<Finding> {
     let with_pulses = joined(records)?;
     let corrected = joined(&fit.without_pulse_errors(records).ok()?)?;
@@ -102,18 +105,27 @@ pub fn delay_of_open_records(
         |delayed: f64| distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
     let follows_force = !is_uncorrelated(without_delay);
     let near = delay_of_either_window(&corrected, dt, unknowns, &fit.estimate).unwrap_or(0.0);
-    let late = |samples: f64| with_pulses.with_later_force(samples * dt);
+    let late_lines = |data: &FrequencyData, samples: f64| data.with_later_force(samples * dt);
+    let late = |samples: f64| late_lines(&with_pulses, samples);
     if near.abs() > DELAY_NEAR {
         likelihood.search(&late(near))?;
     }
+    // With many lines, the search begins on a part of them.
+    let on_fewer = likelihood.on_fewer_lines(&with_pulses).and_then(|(lines, mut likelihood)| {
+        let cost = |samples: f64| likelihood.cost(&late_lines(&lines, samples));
+        minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_| true)
+    });
+    let (near, reach) = match on_fewer {
+        Some((near, _)) => (near, DELAY_REFINED),
+        None => (near, DELAY_REACH),
+    };
     let cost = |samples: f64| likelihood.cost(&late(samples));
     let promises = |delayed: f64| follows_force || is_significant(delayed);
-    let widths = [DELAY_REACH, DELAY_RESOLVED];
-    let (samples, delayed) = minimum_near(near, widths, cost, promises)?;
-    if !is_significant(delayed) {
+    let (samples, delayed) = minimum_near(near, [reach, DELAY_RESOLVED], cost, promises)?;
+    let remaining = delayed / undelayed;
+    if !is_significant(delayed) || remaining >= below {
         return None;
     }
-    let remaining = delayed / undelayed;
     let late = |record: &FrequencyData| record.with_later_force(samples * dt);
     let delayed_records: Vec<FrequencyData> = records.iter().map(late).collect();
     let with_delay = residuals_of_fit(&delayed_records, &likelihood)?;

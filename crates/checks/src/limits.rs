@@ -161,6 +161,9 @@ pub(crate) const DELAY_NEAR: f64 = 0.5;
 /// Half width of the first parabola through the sums of squares around a delay, in samples.
 pub(crate) const DELAY_REACH: f64 = 0.25;
 
+/// Half width of the first parabola around a delay found on a part of the lines, in samples.
+pub(crate) const DELAY_REFINED: f64 = 0.02;
+
 /// Maximum number of parabolic steps in the search for a delay or a corner frequency.
 pub(crate) const PARABOLAS: usize = 8;
 

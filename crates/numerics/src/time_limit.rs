@@ -6,8 +6,8 @@
 //! it may not be a minimum.
 //!
 //! A limit applies to the thread that calls [`within`], so that two analyses in one process do not
-//! affect each other. The searches of this workspace take their steps on the calling thread; only
-//! the sums within a step use other threads.
+//! affect each other. The searches of this workspace take their steps on the calling thread; the
+//! sums within a step use other threads, and [`join`] runs parts without a limit at the same time.
 //!
 //! ```
 //! use mechid_numerics::time_limit::{self, TimeLimit};
@@ -103,6 +103,18 @@ pub fn within<T>(limit: Option<TimeLimit>, work: impl FnOnce() -> T) -> T {
     work()
 }
 
+/// Runs two parts of some work, at the same time unless they have a limit: a limit applies to one
+/// thread.
+pub fn join<A: Send, B: Send>(
+    one: impl FnOnce() -> A + Send,
+    other: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    match ACTIVE.with_borrow(Option::is_some) {
+        true => (one(), other()),
+        false => rayon::join(|| within(None, one), || within(None, other)),
+    }
+}
+
 /// Returns whether the limit of the work on this thread is over; `false` without a limit. A search
 /// that calls this must stop if the answer is `true`, because the answer is recorded for [`ended`].
 pub fn is_over() -> bool {
@@ -147,6 +159,13 @@ mod tests {
         }
         // A limit beyond the range of the clock never ends.
         within(TimeLimit::from_seconds(f64::MAX), || assert!(!is_over()));
+    }
+
+    #[test]
+    fn a_limit_applies_to_both_parts_of_the_work() {
+        let both = || join(|| (0..9).take_while(|_| !is_over()).count(), is_over);
+        assert_eq!(within(Some(TimeLimit::from_polls(4)), both), (4, true));
+        assert_eq!(both(), (9, false));
     }
 
     #[test]

@@ -117,6 +117,8 @@ impl Acquisition {
         let mut last = (fit, records.to_vec());
         let Some(between) = self.between_samples else { return Ok(last) };
         let mut settled = pooling == Pooling::AllLines;
+        // Change of the last round, and its ratio to that of the round before.
+        let (mut change, mut decrease) = (f64::INFINITY, 1.0);
         for round in 0..ACQUISITION_ROUNDS {
             let system = last.0.estimate.system()?;
             let equivalent =
@@ -136,12 +138,16 @@ impl Acquisition {
                 _ => output_error_from(&data, unknowns, &last.0, of_round)
                     .or_else(|_| output_error_pooling(&data, unknowns, of_round)),
             }?;
-            let is_small = largest_change(&last.0.estimate, &fit.estimate) < ACQUISITION_SETTLED;
+            let before = change;
+            change = largest_change(&last.0.estimate, &fit.estimate);
             last = (fit, equivalent);
-            if is_small && settled {
+            // The first round with another noise model changes the estimate, but the equivalent
+            // force follows this change only in the proportion of the rounds before.
+            if settled && change * f64::min(decrease, 1.0) < ACQUISITION_SETTLED {
                 break;
             }
-            settled |= is_small;
+            decrease = if before.is_finite() { change / before } else { 1.0 };
+            settled |= change < ACQUISITION_SETTLED;
         }
         Ok(last)
     }
@@ -194,7 +200,8 @@ impl<'a> BandLimitedFit<'a> {
     }
 
     /// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best instead of
-    /// the band-limited force. `None` without kinds, or if no fit succeeds.
+    /// the band-limited force; a kind that leaves only noise ends the search. `None` without kinds,
+    /// or if no fit succeeds.
     ///
     /// # Source
     /// Maximum likelihood with the levels of the channels eliminated.
@@ -203,15 +210,39 @@ impl<'a> BandLimitedFit<'a> {
         kinds: &[Discretisation],
         dt: f64,
     ) -> Option<BetweenSamples> {
+        let mut best: Option<BetweenSamples> = None;
+        for kind in self.likeliest_first(kinds, dt) {
+            let fitted = self.between_samples_as(kind, dt);
+            best =
+                fitted.into_iter().chain(best).min_by(|a, b| a.remaining.total_cmp(&b.remaining));
+            if best.as_ref().is_some_and(|best| best.leaves_noise) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Returns the kinds in rising order of the residual power with the band-limited fit.
+    fn likeliest_first(&self, kinds: &[Discretisation], dt: f64) -> Vec<Discretisation> {
+        let power = |kind: Discretisation| {
+            let system = self.fit.estimate.system().ok()?;
+            let records = self.records.iter();
+            let equivalent = records.map(|record| equivalent_force(record, &system, dt, kind));
+            self.remaining(&self.fit, &equivalent.collect::<Option<Vec<_>>>()?)
+        };
+        let mut ranked: Vec<(f64, Discretisation)> =
+            kinds.iter().map(|kind| (power(*kind).unwrap_or(f64::INFINITY), *kind)).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ranked.into_iter().map(|(_, kind)| kind).collect()
+    }
+
+    /// Fits the records with one kind of force between samples `dt` (s) apart.
+    fn between_samples_as(&self, kind: Discretisation, dt: f64) -> Option<BetweenSamples> {
         let Self { records, unknowns, pooling, .. } = self;
-        let refitted = kinds.iter().filter_map(|kind| {
-            let acquisition =
-                Acquisition { between_samples: Some(*kind), ..Acquisition::default() };
-            let (fit, equivalent) =
-                acquisition.refitted(self.fit.clone(), records, dt, unknowns, *pooling).ok()?;
-            Some((*kind, self.remaining(&fit, &equivalent)?, fit, equivalent))
-        });
-        let (kind, remaining, fit, equivalent) = refitted.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let acquisition = Acquisition { between_samples: Some(kind), ..Acquisition::default() };
+        let refitted = acquisition.refitted(self.fit.clone(), records, dt, unknowns, *pooling);
+        let (fit, equivalent) = refitted.ok()?;
+        let remaining = self.remaining(&fit, &equivalent)?;
         let after = after_spectral_fit(&closed(&fit, &equivalent)?, &fit.estimate, Extent::Open);
         let leaves_noise = remaining < 1.0 && after.is_ok_and(|after| is_noise(&after.records));
         Some(BetweenSamples { kind, remaining, leaves_noise })

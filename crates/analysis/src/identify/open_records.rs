@@ -14,6 +14,7 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{Discretisation, ResponseQuantity};
+use mechid_numerics::time_limit;
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
 
@@ -156,9 +157,12 @@ pub(super) fn fit(
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let tested =
         Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
-    let likelier = tested.cause(dt, unknowns, noise.response, excitation)?;
-    let compared = agreement(&data, &fit, &residuals, excitation)?;
-    let Compared { parts, omitted } = compared.beside(likelier.as_ref().map(remaining));
+    let (likelier, compared) = time_limit::join(
+        || tested.cause(dt, unknowns, noise.response, excitation),
+        || agreement(&data, &fit, &residuals, excitation),
+    );
+    let likelier = likelier?;
+    let Compared { parts, omitted } = compared?.beside(likelier.as_ref().map(remaining));
     let quantity = records[0].held.response().1;
     let refit =
         |finding| refitted_with(finding, (&with_pulses, &fit), quantity, unknowns, noise.response);
@@ -261,25 +265,33 @@ impl Tested<'_> {
         excitation: Excitation<'_>,
     ) -> Result<Option<Finding>, AnalysisError> {
         let Self { records, closed, fit, residuals } = *self;
-        let late = delay_of_open_records(records, dt, unknowns, fit, residuals);
-        if let Excitation::Hits(_) = excitation {
-            return Ok(likelier(late, fault_of_hits(records, closed, dt, fit, residuals)));
-        }
+        let fault = match excitation {
+            Excitation::Hits(_) => fault_of_hits(records, closed, dt, fit, residuals),
+            Excitation::Lasting => self.fault(dt, pooling)?,
+        };
+        let below = fault.as_ref().map_or(1.0, remaining);
+        Ok(delay_of_open_records(records, dt, unknowns, fit, residuals, below).or(fault))
+    }
+
+    /// Finds a force between samples or AC coupling that explains the residual.
+    fn fault(&self, dt: f64, pooling: Pooling) -> Result<Option<Finding>, AnalysisError> {
+        let Self { records, closed, fit, residuals } = *self;
         let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
-        let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
         let compared =
             if kinds.is_empty() { None } else { BandLimitedFit::new(records, fit, pooling) };
-        let Some(compared) = compared else { return Ok(likelier(late, fault)) };
-        let between = compared.between_samples(&kinds, dt);
+        let between = compared.as_ref().and_then(|compared| compared.between_samples(&kinds, dt));
+        let finding = between.as_ref().map(BetweenSamples::finding);
+        if between.as_ref().is_some_and(|between| between.leaves_noise) {
+            return Ok(finding);
+        }
+        let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
+        let Some(compared) = compared else { return Ok(fault) };
         // The fit may be at a wrong minimum, so each of the two possible causes needs a new search.
         let again = |fault: &Finding| compared.after(uncoupled(fault, closed[0].measured())?);
         let remaining = fault.as_ref().and_then(again);
         let fault = fault.map(|fault| with_remaining(fault, remaining));
         let fault = fault.filter(|fault| self::remaining(fault) < 1.0);
-        let explains = |b: &BetweenSamples| b.leaves_noise || b.remaining < DELAY_REMAINING;
-        let between = between.filter(explains);
-        let between = between.as_ref().map(BetweenSamples::finding);
-        Ok(likelier(likelier(late, fault), between))
+        Ok(likelier(fault, finding.filter(|between| self::remaining(between) < DELAY_REMAINING)))
     }
 }
 

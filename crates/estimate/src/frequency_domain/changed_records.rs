@@ -46,6 +46,14 @@ impl<'a> ChangedRecords<'a> {
         Some(Self { unknowns, noise, spare: spare(data, unknowns), theta, amplitudes })
     }
 
+    /// Returns the same estimate for a part of the lines of the `data`, and these lines; `None` if
+    /// the data have few lines.
+    pub fn on_fewer_lines(&self, data: &FrequencyData) -> Option<(FrequencyData, Self)> {
+        let (data, noise) = thinned(data, self.unknowns, &self.noise)?;
+        let spare = spare(&data, self.unknowns);
+        Some((data, Self { noise, spare, ..self.clone() }))
+    }
+
     /// Number of real equations minus the number of unknowns.
     pub fn spare(&self) -> usize {
         self.spare

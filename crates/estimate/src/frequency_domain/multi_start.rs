@@ -42,9 +42,9 @@ pub(super) struct GlobalMinimum {
 /// found no better minimum. Local minima due to the noise change with the weights; the global one
 /// hardly moves.
 ///
-/// Searches after the first one begin on the lines of `thin`, the same problem with fewer lines, if
-/// there is one. A search continues on all lines if it ends near the best minimum so far or below
-/// that minimum.
+/// Searches begin on the lines of `thin`, the same problem with fewer lines, if there is one. The
+/// first search continues on all lines; another one does so if it ends near the best minimum so far
+/// or below that minimum.
 ///
 /// After the end of a time limit, the result is the lowest sum of squares so far, which may not be
 /// a minimum.
@@ -68,6 +68,7 @@ pub(super) fn search<P: Restartable>(
         let steps = if best.is_none() { SEARCH_STEPS } else { STEPS_MORE };
         let start = match (&mut thin, best) {
             (Some(thin), Some(best)) => search_thin(*thin, start, &best, &plausible),
+            (Some(thin), None) => Some(Start::Near(end_on_fewer(*thin, start, &plausible))),
             _ => linear_rounds(problem, start, &plausible).map(Start::Near),
         };
         ends.push(match start {
@@ -100,6 +101,17 @@ enum Start {
     /// End of a search on fewer lines, far above the best minimum, with the sum of squares that all
     /// lines would have.
     Far(Minimum),
+}
+
+/// Returns the end of a search on fewer lines, or the start if the search fails.
+fn end_on_fewer(
+    thin: &mut impl Restartable,
+    start: DVector<f64>,
+    plausible: &Plausible,
+) -> DVector<f64> {
+    let end = linear_rounds(thin, start.clone(), plausible)
+        .and_then(|start| minimise(thin, start, SEARCH_STEPS));
+    end.map_or(start, |end| end.parameters)
 }
 
 /// Searches on fewer lines.
