@@ -107,17 +107,26 @@ pub fn delay_of_open_records(
     let near = delay_of_either_window(&corrected, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     let late_lines = |data: &FrequencyData, samples: f64| data.with_later_force(samples * dt);
     let late = |samples: f64| late_lines(&with_pulses, samples);
-    if near.abs() > DELAY_NEAR {
-        likelihood.search(&late(near))?;
-    }
     // With many lines, the search begins on a part of them.
-    let on_fewer = likelihood.on_fewer_lines(&with_pulses).and_then(|(lines, mut likelihood)| {
-        let cost = |samples: f64| likelihood.cost(&late_lines(&lines, samples));
-        minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_| true)
+    let on_fewer = likelihood.on_fewer_lines(&with_pulses).and_then(|(lines, mut fewer)| {
+        if near.abs() > DELAY_NEAR {
+            fewer.search(&late_lines(&lines, near))?;
+        }
+        let cost = |samples: f64| fewer.cost(&late_lines(&lines, samples));
+        let (near, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_| true)?;
+        Some((near, fewer))
     });
     let (near, reach) = match on_fewer {
-        Some((near, _)) => (near, DELAY_REFINED),
-        None => (near, DELAY_REACH),
+        Some((near, fewer)) => {
+            likelihood.start_at(fewer);
+            (near, DELAY_REFINED)
+        }
+        None => {
+            if near.abs() > DELAY_NEAR {
+                likelihood.search(&late(near))?;
+            }
+            (near, DELAY_REACH)
+        }
     };
     let cost = |samples: f64| likelihood.cost(&late(samples));
     let promises = |delayed: f64| follows_force || is_significant(delayed);

@@ -54,6 +54,11 @@ impl<'a> ChangedRecords<'a> {
         Some((data, Self { noise, spare, ..self.clone() }))
     }
 
+    /// Makes the last estimate on fewer lines the initial estimate on all lines.
+    pub fn start_at(&mut self, fewer: Self) {
+        self.theta = fewer.theta;
+    }
+
     /// Number of real equations minus the number of unknowns.
     pub fn spare(&self) -> usize {
         self.spare

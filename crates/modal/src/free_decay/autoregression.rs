@@ -128,6 +128,26 @@ mod tests {
         assert_eq!(Autoregression::from_noise(white.channel(0)).order(), 0);
     }
 
+    /// The errors of e^{λk} and k e^{λk} are those of the sequences, sample by sample.
+    #[test]
+    fn whitened_exponential_functions_are_exponential_functions() {
+        let noise = Autoregression::from_noise(&first_order(4000, 5));
+        let pole = Complex::new(-0.02, 0.7);
+        let [value, slope] = noise.response(pole);
+        let of = |k: usize| (pole * k as f64).exp();
+        for (with_k, part) in [(false, 0), (false, 1), (true, 0), (true, 1)] {
+            let pick = |z: Complex<f64>| if part == 0 { z.re } else { z.im };
+            let factor = |k: usize| if with_k { k as f64 } else { 1.0 };
+            let samples: Vec<f64> = (0..60).map(|k| pick(factor(k) * of(k))).collect();
+            let white = noise.whitened(&samples, 0, 0);
+            for k in noise.order()..60 {
+                let slope = if with_k { slope } else { Complex::default() };
+                let expected = pick((factor(k) * value + slope) * of(k));
+                assert!((white[k] - expected).abs() < 1e-12, "{k}: {} {expected}", white[k]);
+            }
+        }
+    }
+
     #[test]
     fn whitening_in_pieces_is_whitening_at_once() {
         let x = first_order(300, 3);
