@@ -19,11 +19,10 @@ pub(crate) const STEPS_MORE: usize = 60;
 /// converges.
 pub(crate) const STEPS_RESAMPLED: usize = 15;
 
-/// Minimum number of lines per parameter on which searches after the first one begin.
+/// Minimum number of lines per parameter on which searches begin.
 pub(crate) const THIN_LINES: usize = 20;
 
-/// Largest ratio of the number of all lines to the number of lines on which searches after the
-/// first one begin.
+/// Largest ratio of the number of all lines to the number of lines on which searches begin.
 pub(crate) const THIN_STEP: usize = 10;
 
 /// Largest ratio of the sum of squares at the end of a search on fewer lines to the sum of squares

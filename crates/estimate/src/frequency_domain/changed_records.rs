@@ -68,9 +68,9 @@ impl<'a> ChangedRecords<'a> {
     pub fn search(&mut self, changed: &FrequencyData) -> Option<()> {
         let changed = corrected(changed, &self.amplitudes)?;
         let mut misfit = Misfit::new(&changed, self.unknowns, &self.noise).ok()?;
-        let starts = InitialEstimates::new(&changed, self.unknowns, &self.noise);
         let spare = self.spare as f64;
         let fewer = thinned(&changed, self.unknowns, &self.noise);
+        let starts = InitialEstimates::new(&changed, self.unknowns, &self.noise);
         let thin = fewer.as_ref().map(|(data, noise)| Misfit::new(data, self.unknowns, noise));
         let mut thin = thin.transpose().ok()?;
         let plausible = plausible(None, spare, spare);

@@ -13,6 +13,7 @@ use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::equation_error::weighted_equation_errors;
+use super::multi_start::thin_step;
 use crate::limits::INITIAL_ROUNDS;
 use crate::relations::Relations;
 use crate::{Estimate, Unknowns};
@@ -27,7 +28,7 @@ pub(super) struct InitialEstimates<'a> {
     /// Number of unknown transient loads; their initial estimates are zero.
     ends: usize,
     unknowns: &'a Unknowns,
-    noise: &'a NoiseSpectrum,
+    noise: Cow<'a, NoiseSpectrum>,
     equations: Vec<Equation>,
     /// Linear relations between entries; with relations all equations are solved together.
     linear: Option<Relations>,
@@ -65,13 +66,20 @@ impl<'a> InitialEstimates<'a> {
         };
         let equations =
             (0..unknowns.dof()).map(equation).filter(|e| !e.parameters.is_empty()).collect();
-        let under = match transient::len(data) {
+        let ends = transient::len(data);
+        let all = match ends {
             0 => Cow::Borrowed(data),
             _ => Cow::Owned(data.under_hann_window()),
         };
+        let step = thin_step(data, unknowns);
+        let thinned = || all.thinned(step).zip(noise.thinned(step)).filter(|_| step > 1);
+        let (data, noise) = match thinned() {
+            Some((data, noise)) => (Cow::Owned(data), Cow::Owned(noise)),
+            None => (all, Cow::Borrowed(noise)),
+        };
         Self {
-            data: under,
-            ends: transient::len(data),
+            data,
+            ends,
             unknowns,
             noise,
             equations,
@@ -252,18 +260,20 @@ impl<'a> InitialEstimates<'a> {
     /// [`InitialEstimates::triangle`].
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
+        // Columns that the noise of each displacement and force enters, with the power of the
+        // frequency (3: none) and the factor of its coefficients.
+        let mut enters: Vec<Vec<(usize, usize, f64)>> = vec![Vec::new(); 2 * n];
+        for (at, (_, p)) in equation.parameters.iter().enumerate() {
+            enters[p.column()].push((at, p.matrix() as usize, 1.0));
+        }
+        for (m, column, value) in self.known(equation.row) {
+            enters[column].push((last, m as usize, -value));
+        }
+        enters[n + equation.row].push((last, 3, 1.0));
         let mut gram = DMatrix::zeros(last + 1, last + 1);
         for (line, &omega) in self.data.omega().iter().enumerate() {
-            let powers = powers(omega).map(|power| power * weights[line]);
-            // Coefficients of the noise of each displacement and force in the columns.
-            let mut enters: Vec<Vec<(usize, Complex<f64>)>> = vec![Vec::new(); 2 * n];
-            for (at, (_, p)) in equation.parameters.iter().enumerate() {
-                enters[p.column()].push((at, powers[p.matrix() as usize]));
-            }
-            for (m, column, value) in self.known(equation.row) {
-                enters[column].push((last, -powers[m as usize] * value));
-            }
-            enters[n + equation.row].push((last, Complex::from(weights[line])));
+            let [m, c, k] = powers(omega);
+            let powers = [m, c, k, Complex::ONE].map(|power| power * weights[line]);
             // The noise of most channels is independent: most covariances are 0.
             let covariance = self.noise.covariance(line);
             let entering = || enters.iter().enumerate().filter(|(_, columns)| !columns.is_empty());
@@ -274,9 +284,10 @@ impl<'a> InitialEstimates<'a> {
                     if expected == Complex::ZERO {
                         continue;
                     }
-                    for (b, of_b) in right {
-                        for (a, of_a) in left.iter().filter(|(a, _)| a <= b) {
-                            gram[(*a, *b)] += (of_a.conj() * of_b * expected).re;
+                    for (b, power, factor) in right {
+                        let of_b = powers[*power] * expected * *factor;
+                        for (a, power, factor) in left.iter().filter(|(a, ..)| a <= b) {
+                            gram[(*a, *b)] += (powers[*power].conj() * of_b).re * factor;
                         }
                     }
                 }

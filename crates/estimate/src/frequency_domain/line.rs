@@ -1,6 +1,6 @@
 //! One spectral line at one set of parameters, in reusable buffers.
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Dim, Dyn, Matrix, StorageMut};
 
 use crate::elimination::solve_in_place;
 
@@ -115,8 +115,7 @@ impl Line {
             *to = x - modelled;
         }
         self.white_receptance.copy_from(&self.receptance);
-        lower.solve_lower_triangular_mut(&mut self.white)
-            && lower.solve_lower_triangular_mut(&mut self.white_receptance)
+        solve_lower(lower, &mut self.white) && solve_lower(lower, &mut self.white_receptance)
     }
 
     /// Whitens like [`Line::whiten`], with L from the covariance of displacements and forces, and
@@ -175,6 +174,28 @@ impl Line {
             }
         }
     }
+}
+
+/// Solves L X = B in place with the lower triangle of L; returns `false` if L is singular.
+/// Independent noise has a diagonal L, which needs only one division for each entry.
+pub(super) fn solve_lower<C: Dim, S: StorageMut<Complex<f64>, Dyn, C>>(
+    lower: &ComplexMatrix,
+    b: &mut Matrix<Complex<f64>, Dyn, C, S>,
+) -> bool {
+    let n = lower.nrows();
+    let is_diagonal =
+        (0..n).all(|column| (column + 1..n).all(|row| lower[(row, column)] == Complex::ZERO));
+    if !is_diagonal {
+        return lower.solve_lower_triangular_mut(b);
+    }
+    for (row, mut entries) in b.row_iter_mut().enumerate() {
+        let scale = lower[(row, row)].re;
+        if scale == 0.0 {
+            return false;
+        }
+        entries.unscale_mut(scale);
+    }
+    true
 }
 
 /// Returns the forces that have noise in a covariance of n displacements and n forces.

@@ -62,7 +62,11 @@ pub(super) fn search<P: Restartable>(
     plausible: Plausible,
 ) -> Result<GlobalMinimum, EstimateError> {
     let mut ends = Ends { plausible, searches: 0, distinct: Vec::new() };
-    for start in in_order(problem, starts.families()) {
+    let ordered = match &mut thin {
+        Some(thin) => in_order(*thin, starts.families()),
+        None => in_order(problem, starts.families()),
+    };
+    for start in ordered {
         log::debug!("search {}", ends.searches + 1);
         let best = ends.distinct.first().map(|end| end.minimum.clone());
         let steps = if best.is_none() { SEARCH_STEPS } else { STEPS_MORE };
@@ -139,9 +143,14 @@ pub(super) fn thinned(
     unknowns: &Unknowns,
     noise: &NoiseSpectrum,
 ) -> Option<(FrequencyData, NoiseSpectrum)> {
-    let parameters = unknowns.independent() + transient::len(data);
-    let step = (data.len() / (THIN_LINES * parameters).max(1)).min(THIN_STEP);
+    let step = thin_step(data, unknowns);
     (step > 1).then(|| data.thinned(step).zip(noise.thinned(step))).flatten()
+}
+
+/// Returns the ratio of the number of all lines to the number of lines on which searches begin.
+pub(super) fn thin_step(data: &FrequencyData, unknowns: &Unknowns) -> usize {
+    let parameters = unknowns.independent() + transient::len(data);
+    (data.len() / (THIN_LINES * parameters).max(1)).min(THIN_STEP)
 }
 
 /// Restarts the search from the best minima so far, moved by a few steps in resampled data.

@@ -156,12 +156,12 @@ fn with_known_noise(
 ) -> Result<OutputErrorFit, EstimateError> {
     let inflation = sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?;
     let mut misfit = Misfit::new(data, unknowns, noise)?;
-    let starts = InitialEstimates::new(data, unknowns, noise).with_nominal(nominal);
     let spare = spare(data, unknowns) as f64;
     // Weights from a sampled covariance are on average too large by the factor ν/(ν − n).
     let expected = spare * noise.mean_inverse_ratio(data.dof());
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
     let fewer = thinned(data, unknowns, noise);
+    let starts = InitialEstimates::new(data, unknowns, noise).with_nominal(nominal);
     let thin = fewer.as_ref().map(|(data, noise)| Misfit::new(data, unknowns, noise));
     let best = search(&mut misfit, thin.transpose()?.as_mut(), &starts, plausible)?;
     let scale = Scale {

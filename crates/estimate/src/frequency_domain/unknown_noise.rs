@@ -316,9 +316,9 @@ fn with_white_noise(
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         let fit = match last {
             None => {
-                let starts = InitialEstimates::new(data, unknowns, &noise).with_nominal(nominal);
                 let spare = spare(data, unknowns) as f64;
                 let fewer = thinned(data, unknowns, &noise);
+                let starts = InitialEstimates::new(data, unknowns, &noise).with_nominal(nominal);
                 let thin = fewer.as_ref().map(|(data, noise)| Misfit::new(data, unknowns, noise));
                 let plausible = plausible(None, spare, spare);
                 search(&mut misfit, thin.transpose()?.as_mut(), &starts, plausible)?

@@ -4,7 +4,7 @@ use mechid_model::{Parameter, SecondOrderSystem};
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::line::{Line, noisy_forces};
+use super::line::{Line, noisy_forces, solve_lower};
 use crate::Unknowns;
 use crate::relations::Relations;
 
@@ -145,7 +145,7 @@ impl WeightedLines {
         let parts = residual.as_mut_slice().chunks_exact_mut(2 * n);
         for (row, ((lower, receptance), part)) in self.lines.iter().zip(parts).enumerate() {
             white.tr_copy_from(&displacement.row(row));
-            if !lower.solve_lower_triangular_mut(&mut white) {
+            if !solve_lower(lower, &mut white) {
                 return None;
             }
             for (column, force) in receptance.column_iter().zip(force.row(row).iter()) {
