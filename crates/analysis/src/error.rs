@@ -505,7 +505,7 @@ pub enum AnalysisError {
     NonlinearMachine {
         /// The file of the machine.
         file: String,
-        /// Terms of the machine.
+        /// Nonlinear terms of the machine.
         terms: String,
     },
     /// The record cannot be decimated to the requested sampling rate.
@@ -557,9 +557,9 @@ pub enum AnalysisError {
         setting = message::number(*setting)
     )]
     EmptySweep {
-        /// First setting, in the unit of its kind.
+        /// First setting of the sweep, in the unit of the swept quantity.
         setting: f64,
-        /// The failure there.
+        /// Reason of the failure at this setting.
         reason: String,
     },
     /// An experiment cannot be simulated at a setting of a sweep.

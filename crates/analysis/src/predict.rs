@@ -160,8 +160,9 @@ const DIES_AWAY: f64 = 3.0;
 /// Minimum number of samples in a part of a record, and number of initial samples that must show
 /// the error.
 const SHORTEST: usize = 16;
-/// Minimum ratio of the initial error to the largest error; the error of an inaccurate machine
-/// grows with the response instead.
+/// Minimum ratio of the largest initial error to the largest error of the record that indicates a
+/// wrong initial state. The ratio is smaller for an inaccurate machine, because its error grows
+/// with the response.
 const AT_ONCE: f64 = 0.5;
 
 /// Returns whether the error of a channel decays from the beginning of a record, as a free response

@@ -13,9 +13,10 @@ use super::limits::DISTORTION_EXPLAINED;
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Finds the nonlinear term that explains most of the residual of a linear model, in whole periods
-/// of force (N) and response of one or several experiments on the lines of a band
-/// ([`Finding::Distortion`]); `None` unless it explains half of the residual power significantly.
+/// Finds the nonlinear term that explains most of the residual of a linear model
+/// ([`Finding::Distortion`]). The data are whole periods of force (N) and response of one or
+/// several experiments, on the lines of a band. Returns `None` if the term explains less than half
+/// of the residual power or is not significant.
 ///
 /// # Errors
 /// The errors of [`distortion`].

@@ -36,7 +36,8 @@ pub(crate) const CONDITION_STEPS: usize = 4;
 
 // Stepping.
 
-/// Maximum number of degrees of freedom whose steps are matrix products of fixed size.
+/// Maximum number of degrees of freedom of a system whose time steps are computed as products of
+/// matrices of fixed size.
 pub(crate) const FIXED_SIZE_DOF: usize = 2;
 
 /// Maximum number of secant steps for a nonlinear force in a step of fixed size. If they do not

@@ -121,7 +121,8 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
         }
     }
     if lines.next_of_data(&mut source)? {
-        Err(lines.malformed(format!("there are more than the {stored} entries stated")))
+        Err(lines
+            .malformed(format!("the file has more entries than the {stored} stated in its header")))
     } else {
         Ok(triplets(size, entries).expect("every entry was checked to be in the matrix"))
     }
@@ -356,7 +357,10 @@ mod tests {
             (format!("{banner}2 2 1\n1 1 nan\n"), "line 3: \"nan\" is not a finite number"),
             (format!("{banner}2 2 1\n1 1 1e999\n"), "is not a finite number"),
             (format!("{banner}2 2 2\n1 1 1.0\n"), "line 4: the file ends after 1 entry of 2"),
-            (format!("{banner}2 2 1\n1 1 1.0\n2 2 1.0\n"), "line 4: there are more than the 1"),
+            (
+                format!("{banner}2 2 1\n1 1 1.0\n2 2 1.0\n"),
+                "line 4: the file has more entries than",
+            ),
             (format!("{banner}2 2 99999999999999\n"), "there are more than 268435456 numbers"),
             (format!("{banner}99999999999 99999999999 1\n1 1 1\n"), "more than 268435456 numbers"),
             (

@@ -246,8 +246,8 @@ fn resolved(path: &Path) -> io::Result<PathBuf> {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
         };
-        // The target of this link does not exist yet. A link to a pipe is not changed here:
-        // `metadata` finds the pipe, although the text of the link is not a path.
+        // The target of this link does not exist yet. A link to a pipe is not followed here:
+        // `metadata` finds the pipe, and the text of such a link is not a path.
         if fs::metadata(&path).is_err()
             && let Ok(target) = fs::read_link(&path)
         {

@@ -224,8 +224,8 @@ impl ModalModel {
         response
     }
 
-    /// Returns the covariance E[δy δyᴴ], due to the errors of the modes, of the response to given
-    /// forces at ω (rad/s): outputs × outputs.
+    /// Returns the covariance E[δy δyᴴ] (outputs × outputs) of the response to given forces at ω
+    /// (rad/s). The errors δy are due to the errors of the modes.
     pub fn response_covariance(&self, omega: f64, forces: &[C]) -> DMatrix<C> {
         let outputs = self.outputs();
         let mut covariance = DMatrix::zeros(outputs, outputs);

@@ -52,10 +52,10 @@ pub fn fleet_record_column(py: Python<'_>, analysis: &str) -> PyResult<Option<St
     Ok(analysis.reading.record_column)
 }
 
-/// Computes the rows of some records, unless these rows exist; returns a report as JSON. The
-/// analysis is JSON, too. `isolation` has the interpreter of the worker processes, the memory per
-/// record, in GB, and the time per record, in s. Without it, the records are processed in this
-/// process.
+/// Computes the result rows of some records and writes them into a file in `folder`, unless this
+/// file exists. Returns a report as JSON. `analysis` is JSON, too. `isolation` has the interpreter
+/// of the worker processes, the memory limit per record, in GB, and the time limit per record, in
+/// s. Without `isolation`, the records are processed in this process.
 #[pyfunction]
 #[pyo3(signature = (records, analysis, folder, isolation))]
 pub fn fleet_part(

@@ -48,8 +48,8 @@ pub(crate) const FLOOR_LINES: usize = 64;
 /// Minimum number of equal levels of a noise floor, counted downwards from half the sampling rate.
 pub(crate) const FLOOR_LEVELS: usize = 3;
 
-/// Largest ratio of two levels that count as equal: more than four standard deviations of the
-/// ratio.
+/// Largest ratio of two levels that count as equal. Its logarithm is more than four standard
+/// deviations of the logarithm of such a ratio in noise.
 pub(crate) const FLOOR_RATIO: f64 = 3.0;
 
 /// Standard deviation of the logarithm of a level of 64 lines under Hann's window, whose

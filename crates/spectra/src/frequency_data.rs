@@ -27,8 +27,8 @@ pub struct FrequencyData {
     displacement: DMatrix<Complex<f64>>,
     measured: ResponseQuantity,
     noise: Option<NoiseSpectrum>,
-    /// Variances of the force noise, rows × n, in N², for data whose displacement noise is not
-    /// known.
+    /// Variances of the force noise, in N² (rows × n). They are used only if the noise of the
+    /// displacements is not known.
     force_variance: DMatrix<f64>,
     /// Basis of the transients: displacements that correspond to the terms 1 and s³ in the measured
     /// quantity. Each open record has two columns, which are zero on the rows of other records.
@@ -280,8 +280,8 @@ impl FrequencyData {
         &self.pulses
     }
 
-    /// Returns the variances of the force noise, rows × n, in N², for data whose displacement noise
-    /// is not known.
+    /// Returns the variances of the force noise, in N² (rows × n). They are used only if the noise
+    /// of the displacements is not known.
     pub fn force_variance(&self) -> &DMatrix<f64> {
         &self.force_variance
     }

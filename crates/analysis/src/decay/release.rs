@@ -84,7 +84,8 @@ fn crests(sums: &[f64]) -> Vec<f64> {
 /// limit of strong evidence.
 fn falls_throughout(values: &[f64]) -> bool {
     let count = values.len() as f64;
-    // Residual sum of squares of a constant for the first `constant` values and a line after them.
+    // Residual sum of squares of a model: the first `constant` values are constant, and a straight
+    // line follows.
     let residual = |constant: usize| {
         let x = |at: usize| at.saturating_sub(constant) as f64;
         let [mean_x, mean] = [(0..values.len()).map(x).sum::<f64>(), values.iter().sum::<f64>()]

@@ -56,8 +56,8 @@ pub(super) struct Change {
     /// Index of the first value after a step, or of the last value before a drift.
     pub begins: usize,
     pub p_value: f64,
-    /// `true` if no random permutation had a change at least as large; then the p-value is an upper
-    /// bound.
+    /// `true` if no random permutation of the values had a change at least as large as this one.
+    /// The p-value is then an upper bound.
     pub is_bound: bool,
     /// Difference of the levels of a step, or of the first and the last value of a drift.
     pub size: f64,

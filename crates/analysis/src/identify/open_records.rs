@@ -286,7 +286,8 @@ impl Tested<'_> {
         }
         let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
         let Some(compared) = compared else { return Ok(fault) };
-        // The fit may be at a wrong minimum, so each of the two possible causes needs a new search.
+        // The fit may be at a wrong minimum, so a new search is needed for each of the two possible
+        // causes: the force between samples (above) and AC coupling.
         let again = |fault: &Finding| compared.after(uncoupled(fault, closed[0].measured())?);
         let remaining = fault.as_ref().and_then(again);
         let fault = fault.map(|fault| with_remaining(fault, remaining));

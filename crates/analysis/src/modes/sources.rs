@@ -356,7 +356,7 @@ impl Places {
     }
 }
 
-/// Returns the error of a number of places that is not the number of responses.
+/// Returns the error for a number of places that differs from the number of responses.
 pub(crate) fn other_places(places: usize, responses: usize) -> AnalysisError {
     let responses = message::count(responses, "response");
     let why = format!("{} for {responses}", message::count(places, "place"));

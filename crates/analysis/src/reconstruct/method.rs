@@ -369,7 +369,7 @@ fn little_power_remark(motion: &Measurement, request: &Request) -> Option<String
     let (channel, share) = shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < FEW)?;
     let (samples, step) = (motion.sampling().len(), motion.sampling().omega0() / TAU);
     Some(format!(
-        "the given lines contain only {} % of the power of channel {} (without its mean); no force is computed on other lines. Lines are counted for a period of {samples} samples: they are {} Hz apart",
+        "the given lines contain only {} % of the power of channel {} (without its mean); no force is computed on other lines. A line number is the number of cycles in {samples} samples, so the line spacing is {} Hz",
         significant(100.0 * share, 3),
         channel + 1,
         significant(step, 5)

@@ -36,7 +36,7 @@ pub struct Review<'a> {
 pub struct RecordReview<'a> {
     /// The record.
     pub recorded: &'a Windowed,
-    /// Levels, histories and mean period of all samples.
+    /// Levels, histories and mean period, computed from all samples of the window.
     pub whole: Whole,
     /// Name of the record; `None` with one record.
     pub name: Option<&'a str>,

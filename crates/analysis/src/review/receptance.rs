@@ -118,8 +118,8 @@ fn measured(
     let of_lines = identified.drawn_spectra();
     if let Some(data) = of_lines.filter(|_| of_responses || fitted.drawn.is_none()) {
         let origin = match fitted.prediction {
-            Prediction::Steady => "measured on the lines used",
-            Prediction::Sampled { .. } => "averaged over segments, on the lines used",
+            Prediction::Steady => "measured on the lines of the fit",
+            Prediction::Sampled { .. } => "averaged over segments, on the lines of the fit",
         };
         return Ok((data.clone(), origin.into()));
     }

@@ -90,7 +90,7 @@ impl Command {
         }
     }
 
-    /// Returns the limit of the time of the command, in s; a fleet has a limit for each record
+    /// Returns the time limit of the command, in s. A fleet has a limit for each record
     /// instead.
     pub fn time_limit(&self) -> Option<f64> {
         match self {

@@ -180,7 +180,7 @@ impl Panels {
 }
 
 impl Panel {
-    /// Returns the number of entries of the triangle, stored as a square, and of the rows below it.
+    /// Returns the number of stored entries: the triangle as a full square, and the rows below it.
     fn entries(self) -> usize {
         self.width as usize * (self.width + self.below) as usize
     }
@@ -188,9 +188,9 @@ impl Panel {
 
 /// Returns the width of the panel from column `first` on that has the lowest cost per column.
 fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
-    // Let j be the second row of a column: except for the diagonal, all rows of the column are also
-    // rows of column j. If j is the next column for every column of a panel, the last column has
-    // the rows of all columns.
+    // Let j be the first row below the diagonal of a column. All rows of this column below the
+    // diagonal are also rows of column j. If j is the next column for every column of a panel, the
+    // last column of the panel has all rows that the panel has below its triangle.
     let follows = |j: &usize| columns.column(*j).0.iter().nth(1) == Some(j + 1);
     let chain = 1 + (first..n - 1).take(WIDTHS[0] - 1).take_while(follows).count();
     // The unit of cost is one entry; each row and each panel cost as much as several entries.

@@ -283,7 +283,8 @@ impl Reader {
         };
         let milliseconds = self.numbers(dataset)?;
         let Some(first) = milliseconds.first() else { return Ok(None) };
-        // The imaginary part of a date holds its digits beyond those of the real part.
+        // A date is the sum of two numbers: the imaginary part holds the digits that the real part
+        // cannot hold.
         let since = milliseconds.iter().map(|time| time - first);
         Ok(Some(since.map(|since| (since.re + since.im) / MILLISECONDS).collect()))
     }

@@ -217,7 +217,7 @@ impl Fields {
         self.ranges.iter().rposition(|range| !range.is_empty()).map_or(0, |last| last + 1)
     }
 
-    /// Returns a field; an empty one after the last.
+    /// Returns the field with this index; an empty text if there is no such field.
     pub fn get(&self, field: usize) -> &[u8] {
         self.ranges.get(field).map_or(&[], |range| &self.text[range.clone()])
     }

@@ -223,8 +223,8 @@ fn magnitude(value: f64) -> Option<i32> {
     exponent.is_finite().then(|| exponent.floor() as i32)
 }
 
-/// Returns the unit of a number that is printed with at most this many decimal places and
-/// significant digits.
+/// Returns the place value of the last digit of a number that is printed with at most this many
+/// decimal places and significant digits.
 fn decimal_unit(value: f64, decimals: i32, digits: i32) -> f64 {
     let exponent = magnitude(value).map_or(-decimals, |m| (m + 1 - digits).max(-decimals));
     10_f64.powi(exponent)

@@ -52,7 +52,7 @@ fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault
             continue;
         }
         if !is_mark(mark.text) {
-            return Err(mark.fault("a dataset begins with -1 in columns 5 and 6"));
+            return Err(mark.fault("a dataset must begin with -1 in columns 5 and 6"));
         }
         let id = lines.required("a dataset begins here and has no number")?;
         let dataset = dataset_number(&id)?;

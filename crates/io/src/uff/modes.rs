@@ -76,7 +76,7 @@ fn modes(lines: &mut Lines<'_>) -> Result<Vec<Nodal>, Fault> {
             continue;
         }
         if !is_mark(mark.text) {
-            return Err(mark.fault("a dataset begins with -1 in columns 5 and 6"));
+            return Err(mark.fault("a dataset must begin with -1 in columns 5 and 6"));
         }
         let id = lines.required("a dataset begins here and has no number")?;
         if dataset_number(&id)? == 55 {

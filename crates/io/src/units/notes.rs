@@ -94,7 +94,7 @@ pub(super) enum Note {
     Unit(Unit),
     /// Unit with further words that make it uncertain: `um pk-pk`.
     Qualified(Unit),
-    /// Text that is not understood; with the unit that it may contain.
+    /// Text that is not understood, and the unit that it may contain.
     Unclear(Option<Unit>),
     /// Place, direction or channel rather than a unit.
     Label,

@@ -96,7 +96,8 @@ impl LineInformation<'_> {
             turned.columns_mut(a * p, p).adjoint_mut();
         }
         let sandwiched = product(self.inverse, &turned);
-        // The matrices are Hermitian: tr S_a (S⁻¹ S_b S⁻¹) is the sum over products of their parts.
+        // The matrices are Hermitian, so tr S_a (S⁻¹ S_b S⁻¹) is a sum of products of real parts
+        // and of products of imaginary parts.
         let products = transposed_product(&parts(&derivatives), &parts(&sandwiched), 2 * p * p);
         let with_shapes = product(&x.adjoint(), &sandwiched);
         for (b, other) in directions.iter().enumerate() {

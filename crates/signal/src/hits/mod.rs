@@ -69,8 +69,9 @@ impl Default for HitRule {
 impl FromStr for HitRule {
     type Err = String;
 
-    /// Parses settings such as `trigger=0.5,double=5,weak=25,bounce=0.1,before=20,samples=512`, in
-    /// per cent, seconds and samples. Each is optional; an empty text gives the default rule.
+    /// Parses settings such as `trigger=0.5,double=5,weak=25,bounce=0.1,before=20,samples=512`. The
+    /// first three are in per cent, `bounce` is in seconds, and the last two are in samples. Each
+    /// setting is optional; an empty text gives the default rule.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut rule = Self::default();
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {

@@ -9,7 +9,7 @@ use crate::text::significant;
 pub struct Tested {
     /// Name of the check, in snake case.
     pub code: &'static str,
-    /// Probability of a larger statistic due to the errors of the modes alone.
+    /// Probability that the errors of the modes alone cause a larger statistic.
     pub p_value: f64,
     /// The finding if the test passes, in a sentence.
     pub passes: String,

@@ -247,8 +247,9 @@ impl<'a> LikelyMotion<'a> {
         Change { force, displacement }
     }
 
-    /// Returns a power of the motion on every row. The power is computed sample by sample over
-    /// whole records; the effect of the ends of a record is that of a transient.
+    /// Returns the spectrum of a power of the motion, one value per row. The power is computed from
+    /// all samples of each record. The initial and final conditions of a record add only a
+    /// transient to it.
     fn power_of(
         &self,
         power: Power,

@@ -200,7 +200,8 @@ fn scale(value: f64) -> f64 {
     if value == 0.0 { 1.0 } else { value.abs() }
 }
 
-/// Returns the sum of the logarithms of the determined eigenvalues, and their number.
+/// Returns the sum of the logarithms of the eigenvalues above [`RANK`] times the largest one, and
+/// the number of these eigenvalues.
 fn spectrum(gram: &DMatrix<f64>) -> (f64, usize) {
     let Ok(eigen) = mechid_numerics::linear_algebra::hermitian_eigen(gram.clone()) else {
         return (f64::NAN, 0);

@@ -260,7 +260,7 @@ fn the_gradient_includes_the_errors_of_pulses() {
     let of_bare = bare.evaluate(&at).unwrap().residual.norm_squared();
     assert!(cost(&at) < 0.99 * of_bare, "{} {of_bare}", cost(&at));
     for (index, name) in assembly.parameters().iter().map(|p| &p.name).enumerate() {
-        // The rounding error of the sum of squares is about 10⁻¹⁰ of its change by this step.
+        // The step changes the sum of squares by about 10¹⁰ times the rounding error of this sum.
         let length = linearised.jacobian.column(index).norm();
         let step = 1e-5 * linearised.residual.norm() / length;
         let moved = |by: f64| {
