@@ -146,7 +146,7 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
 }
 
 /// Faulty records next to a good one: one needs too much memory, one too much time, one is a named
-/// pipe and one a socket. Each record has its row, and the run ends.
+/// pipe, one a socket and one a link to a device that never ends. Each record has its row, and the run ends.
 #[cfg(target_os = "linux")]
 #[test]
 fn records_that_end_their_process_become_rows() {
@@ -178,6 +178,8 @@ fn records_that_end_their_process_become_rows() {
         .unwrap();
     assert!(Command::new("mkfifo").arg(day.join("pipe.csv")).status().unwrap().success());
     let _socket = UnixListener::bind(day.join("socket.csv")).unwrap();
+    // Only the administrator may create a device, but everyone may create a link to one.
+    std::os::unix::fs::symlink("/dev/zero", day.join("device.csv")).unwrap();
     let analysis = r#"{"channels": {"force": ["force"], "displacement": ["displacement"]},
         "reading": {"limits_factor": 1000, "memory_gb": 100}, "window": {"period": 256}}"#;
     fs::write(home.path().join("analysis.json"), analysis).unwrap();
@@ -197,6 +199,7 @@ fn records_that_end_their_process_become_rows() {
     let left_out = report["left_out"].to_string();
     assert!(left_out.contains("pipe.csv (a named pipe)"), "{left_out}");
     assert!(left_out.contains("socket.csv (a socket)"), "{left_out}");
+    assert!(left_out.contains("device.csv (a device)"), "{left_out}");
     // A second run keeps the rows and does not try the records again.
     let again: Value = serde_json::from_slice(&program(home.path(), run).stdout).unwrap();
     assert_eq!((&again["computed_records"], &again["failed"]), (&0.into(), &2.into()));
