@@ -40,6 +40,37 @@ pub const PREDICT_BYTES: usize = 800;
 /// responses).
 pub const PAIR_BYTES: usize = 128;
 
+/// Bytes of memory per number (line, force and response) of a table of frequency responses whose
+/// machine is identified: 1 to 3 degrees of freedom took 2,400 to 6,000 bytes per number, with the
+/// sensitivities.
+pub const TABLE_BYTES: usize = 3000;
+
+/// Additional bytes of memory per number of such a table and degree of freedom: the receptance of a
+/// line and the covariance of its noise; 20 and 40 degrees of freedom took 400 bytes.
+pub const TABLE_DOF_BYTES: usize = 400;
+
+/// Bytes of memory per number of such a table and unknown: three copies of the sensitivities of the
+/// real and the imaginary part.
+pub const TABLE_SENSITIVITY_BYTES: usize = 48;
+
+/// Largest memory of these sensitivities, in bytes; larger ones are not computed.
+pub const TABLE_SENSITIVITIES: usize = 3 << 27;
+
+/// Bytes of memory per pair of unknowns of a fit: the normal equations, their factor and the
+/// covariance of the unknowns. The search alone took 16 bytes with 4800 unknowns.
+pub const UNKNOWN_PAIR_BYTES: usize = 32;
+
+/// Bytes of memory per number of a table whose modes are identified: 1, 64 and 400 responses took
+/// 3,200, 2,300 and 1,300 bytes.
+pub const MODAL_TABLE_BYTES: usize = 3200;
+
+/// Bytes of memory per pair of unknowns of a fit of modes: 40 and 51 modes of 40 and 60 points took
+/// 24 and 36 bytes.
+pub const MODAL_PAIR_BYTES: usize = 40;
+
+/// Largest number of modes of a first estimate. If their memory is allowed, they are not counted.
+pub(crate) const MANY_MODES: usize = 72;
+
 /// Largest number of channels whose noise covariances need at most [`STRETCH_BYTES`] per sample and
 /// channel: the number of lines is half the number of samples.
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
@@ -128,7 +159,16 @@ pub(crate) fn check_memory(
     bytes: usize,
     allowed: usize,
 ) -> Result<(), AnalysisError> {
-    let needed = numbers.saturating_mul(bytes);
+    check_bytes(file, numbers, numbers.saturating_mul(bytes), allowed)
+}
+
+/// Refuses an analysis of `numbers` numbers that needs more than `allowed` bytes.
+pub(crate) fn check_bytes(
+    file: &str,
+    numbers: usize,
+    needed: usize,
+    allowed: usize,
+) -> Result<(), AnalysisError> {
     if needed <= allowed {
         return Ok(());
     }

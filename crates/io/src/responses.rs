@@ -6,7 +6,7 @@ use mechid_model::ResponseQuantity;
 use mechid_signal::Window;
 use nalgebra::Complex;
 
-use crate::limits::ReadOptions;
+use crate::limits::{Limits, ReadOptions};
 use crate::table::source::{Kind, Source};
 use crate::units::{label_notes, name_without_brackets};
 use crate::{
@@ -72,6 +72,9 @@ pub struct FrequencyResponses {
     /// Columns whose headers have a text that may be a unit: number and name of the column, the
     /// text, and the quantity needed.
     pub doubts: Vec<(String, StatedUnit, Quantity)>,
+    /// Memory, in bytes, that an analysis of the file may use ([`Limits::memory`]); `None` without
+    /// a limit, as for responses that are not from a file.
+    pub memory: Option<usize>,
 }
 
 /// Returns the coherence in a column of this name (`coherence_2_1`, `coherence [%]`); `None` for
@@ -180,7 +183,19 @@ impl FrequencyResponses {
     /// # Errors
     /// As [`FrequencyResponses::parse`], and [`IoError::Read`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        Self::from_source(Source::open(path.as_ref())?)
+        Self::read_with(path, &Limits::DEFAULT)
+    }
+
+    /// Reads as [`FrequencyResponses::read`], with other limits on the file and on the memory of
+    /// its analysis.
+    ///
+    /// # Errors
+    /// As [`FrequencyResponses::read`].
+    pub fn read_with(path: impl AsRef<Path>, limits: &Limits) -> Result<Self, IoError> {
+        let source = Source::open(path.as_ref())?;
+        let stored = source.stored.clone();
+        let responses = Self::from_source(source, limits)?;
+        Ok(Self { memory: Some(limits.memory(stored.bytes())), ..responses })
     }
 
     /// Reads the frequency responses in the bytes of a file; `file` is its name in messages.
@@ -190,11 +205,11 @@ impl FrequencyResponses {
     /// [`IoError::Empty`] for a universal file without frequency responses, and the errors of
     /// [`Table::parse`] and [`Table::column`].
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
-        Self::from_source(Source::new(file.into(), bytes)?)
+        Self::from_source(Source::new(file.into(), bytes)?, &Limits::DEFAULT)
     }
 
-    fn from_source(mut source: Source<'_>) -> Result<Self, IoError> {
-        let options = ReadOptions::default();
+    fn from_source(mut source: Source<'_>, limits: &Limits) -> Result<Self, IoError> {
+        let options = ReadOptions { skip_lines: 0, limits: *limits };
         let file = source.file.clone();
         let mut responses = match source.kind() {
             Kind::Uff => {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use mechid::analysis::Reading;
 use mechid::analysis::time_limit::within;
 use mechid::estimate::EstimateError;
 use mechid::io::{AveragedSegments, CoherenceFunction, FrequencyResponses, ResponseFunction};
@@ -32,10 +33,13 @@ struct Layout {
 
 #[pymethods]
 impl ResponseTable {
-    /// Reads a file.
+    /// Reads a file, whose analysis may use this memory.
     #[staticmethod]
-    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        work::watched(py, None, || Ok(()), move || FrequencyResponses::read(path)).map(Self)
+    #[pyo3(signature = (path, memory_gb))]
+    fn read(py: Python<'_>, path: PathBuf, memory_gb: Option<f64>) -> PyResult<Self> {
+        let limits = Reading { memory_gb, ..Reading::default() }.limits();
+        let read = move || FrequencyResponses::read_with(path, &limits);
+        work::watched(py, None, || Ok(()), read).map(Self)
     }
 
     /// Copies responses of frequencies × points × forces, their standard errors, and coherences of
@@ -80,6 +84,7 @@ impl ResponseTable {
             segments: segments.and_then(AveragedSegments::from_numbers),
             remarks: Vec::new(),
             doubts: Vec::new(),
+            memory: None,
         }))
     }
 

@@ -394,6 +394,7 @@ impl FrfTable {
             coherence: coherence.collect(),
             remarks: Vec::new(),
             doubts: Vec::new(),
+            memory: None,
         })
     }
 

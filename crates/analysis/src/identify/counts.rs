@@ -1,11 +1,19 @@
 //! Number of equations and memory that a fit needs, checked before the computation.
 
+use std::collections::BTreeSet;
+
 use mechid_estimate::Unknowns;
+use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_numerics::NumericsError;
 
 use super::open_records;
 use super::options::{Identify, Source};
+use super::response_settings::IdentifyResponses;
 use crate::AnalysisError;
+use crate::limits::{
+    TABLE_BYTES, TABLE_DOF_BYTES, TABLE_SENSITIVITIES, TABLE_SENSITIVITY_BYTES, UNKNOWN_PAIR_BYTES,
+    check_bytes,
+};
 use crate::measurement::Windowed;
 
 /// Refuses a fit with fewer equations than unknowns, and a fit whose spectra or transients need too
@@ -50,4 +58,47 @@ pub(super) fn check(
         records.iter().try_for_each(|record| record.check_transients(records))?;
     }
     records.iter().try_for_each(|record| record.check_spectra(lines(record)))
+}
+
+/// Refuses a fit to tables that needs more memory than a file of their size may use.
+///
+/// # Errors
+/// [`AnalysisError::Memory`], and the errors of the settings of the masses.
+pub(super) fn check_tables(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+) -> Result<(), AnalysisError> {
+    let Some((allowed, file)) = allowed_memory(tables) else { return Ok(()) };
+    let is_chosen = |function: &&ResponseFunction| {
+        let points = [&function.response, &function.reference];
+        how.points.is_empty() || points.iter().all(|point| how.points.contains(point))
+    };
+    let is_in_band =
+        |hz: &&f64| how.band.is_none_or(|band| (band.low_hz..=band.high_hz).contains(*hz));
+    let of_table = |table: &FrequencyResponses| {
+        let lines = table.frequency_hz.iter().filter(is_in_band).count();
+        lines * table.functions.iter().filter(is_chosen).count()
+    };
+    let numbers: usize = tables.iter().map(of_table).sum();
+    // By reciprocity, the points of the forces may also be points of responses. The direction −Z is
+    // the degree of freedom of +Z.
+    let functions = tables.iter().flat_map(|table| &table.functions).filter(is_chosen);
+    let points = functions.flat_map(|function| [&function.response, &function.reference]);
+    let dof = points.map(|point| point.replace('-', "+")).collect::<BTreeSet<_>>().len();
+    // Impossible settings are refused later.
+    let unknowns = how.mass.unknowns(dof).and_then(|all| how.structure.apply(all));
+    let unknowns = unknowns.map_or(0, |unknowns| unknowns.independent());
+    let sensitivities = numbers.saturating_mul(unknowns).saturating_mul(TABLE_SENSITIVITY_BYTES);
+    let of_lines = numbers.saturating_mul(TABLE_BYTES + dof * TABLE_DOF_BYTES);
+    let of_unknowns = unknowns.saturating_mul(unknowns).saturating_mul(UNKNOWN_PAIR_BYTES);
+    let sensitivities = if sensitivities <= TABLE_SENSITIVITIES { sensitivities } else { 0 };
+    let needed = of_lines.saturating_add(sensitivities).saturating_add(of_unknowns);
+    check_bytes(file, numbers, needed, allowed)
+}
+
+/// Returns the memory, in bytes, that the analysis of tables may use, and the name of the file that
+/// allows it; `None` if a table is not from a file.
+pub(crate) fn allowed_memory(tables: &[FrequencyResponses]) -> Option<(usize, &str)> {
+    let each = tables.iter().map(|table| Some((table.memory?, table.file.as_str())));
+    each.collect::<Option<Vec<_>>>()?.into_iter().max_by_key(|(memory, _)| *memory)
 }

@@ -30,7 +30,7 @@ pub(crate) mod added_decay;
 pub mod checks;
 mod coherence;
 mod compared;
-mod counts;
+pub(crate) mod counts;
 mod derivatives;
 mod determined;
 mod disagreement;

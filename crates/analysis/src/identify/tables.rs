@@ -9,7 +9,6 @@ use mechid_model::SecondOrderSystem;
 use mechid_spectra::FrequencyData;
 use serde::Serialize;
 
-use super::added_decay;
 use super::checks::CheckRow;
 use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
@@ -20,7 +19,7 @@ use super::rows::{
 use super::summary::{FitRow, verdict};
 use super::table_fit::{CheckedFit, TableFit};
 use super::tabulated::{Tabulated, joined};
-use super::{FittedLine, Unscaled};
+use super::{FittedLine, Unscaled, added_decay, counts};
 use crate::machine::Machine;
 use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph, significant};
@@ -36,6 +35,7 @@ use crate::{AnalysisError, time_limit};
 /// # Errors
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoResponse`] if a response is missing,
 /// [`AnalysisError::Setting`] for settings that are missing or that contradict the table,
+/// [`AnalysisError::Memory`] if the fit needs more memory than the files may use,
 /// [`AnalysisError::EmptyBand`], and [`AnalysisError::Estimate`] if the fit fails.
 ///
 /// # Source
@@ -45,6 +45,7 @@ pub fn identify_responses(
     how: &IdentifyResponses,
 ) -> Result<IdentifiedResponses, AnalysisError> {
     let added_decay = added_decay::common_rate(tables)?;
+    counts::check_tables(tables, how)?;
     let measured = tables.iter().map(|table| Tabulated::new(table, how));
     let mut measured: Vec<Tabulated> = measured.collect::<Result<_, _>>()?;
     let mut data = joined(&measured)?;

@@ -94,7 +94,8 @@ impl Reading {
         Ok(RecordFile::open(path, &options, rows)?)
     }
 
-    pub(super) fn limits(&self) -> Limits {
+    /// Returns the limits on the file and on the memory of its analysis.
+    pub fn limits(&self) -> Limits {
         let limits = Limits::DEFAULT.times(self.limits_factor.unwrap_or(1));
         match memory_bytes(self) {
             Some(bytes) => limits.with_memory(bytes),

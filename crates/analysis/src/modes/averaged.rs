@@ -136,6 +136,7 @@ impl Sharpened {
         settings: &ModalSettings,
     ) -> Result<Self, AnalysisError> {
         let data = tables.lines(band_hz, None)?;
+        tables.check_memory(&data)?;
         let estimate = identify_modes(&data, settings)?;
         let mut fit = Self { data, estimate, settled: !tables.is_smoothed() };
         for _ in 0..SHARPENING_ROUNDS {

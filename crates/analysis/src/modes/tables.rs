@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
-use mechid_modal::{DrivingPoint, IdentifiedMode};
+use mechid_modal::{DrivingPoint, IdentifiedMode, initial_mode_count};
 use mechid_model::ResponseQuantity;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix};
@@ -12,7 +12,9 @@ use super::averaged::Averaged;
 use super::sources::{Output, driving_points};
 use crate::AnalysisError;
 use crate::identify::added_decay;
+use crate::identify::counts::allowed_memory;
 use crate::identify::tabulated::with_positive_directions;
+use crate::limits::{MANY_MODES, MODAL_PAIR_BYTES, MODAL_TABLE_BYTES, check_bytes};
 
 /// Tables of frequency responses of one structure, and their points.
 #[derive(Debug)]
@@ -64,6 +66,31 @@ impl Tables {
         &self,
     ) -> impl Iterator<Item = (&FrequencyResponses, Option<&Averaged>)> + '_ {
         self.tables.iter().zip(self.averaged.iter().map(Option::as_ref))
+    }
+
+    /// Refuses a fit of modes to `data` of the tables that needs more memory than a file of their
+    /// size may use. The number of modes is that of the initial estimates.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Memory`].
+    pub fn check_memory(&self, data: &LineData) -> Result<(), AnalysisError> {
+        let Some((allowed, file)) = allowed_memory(&self.tables) else { return Ok(()) };
+        let (outputs, inputs) = (self.responses.len(), self.forces.len());
+        let numbers = data.len() * outputs;
+        let needed = |modes: usize| {
+            // A mode has a pole and complex vectors; residual terms have two complex matrices.
+            let of_modes = modes.saturating_mul(2 + 2 * (outputs + inputs));
+            let unknowns = of_modes.saturating_add(4 * outputs * inputs);
+            let pairs = unknowns.saturating_mul(unknowns).saturating_mul(MODAL_PAIR_BYTES);
+            numbers.saturating_mul(MODAL_TABLE_BYTES).saturating_add(pairs)
+        };
+        // The modes are only counted if the largest possible number needs too much memory.
+        let modes = match needed(MANY_MODES) <= allowed {
+            true => 0,
+            // If there are no initial estimates, the fit reports why.
+            false => initial_mode_count(data).unwrap_or(0),
+        };
+        check_bytes(file, numbers, needed(modes), allowed)
     }
 
     /// Returns the lowest and the highest frequency above zero, in Hz.

@@ -89,8 +89,11 @@ impl FitArgs {
             ElementData::from_records(&records, &how)?
         };
         if !elements.part.is_empty() {
-            let parts: Vec<FrequencyResponses> =
-                elements.part.iter().map(FrequencyResponses::read).collect::<Result<_, _>>()?;
+            let parts: Vec<FrequencyResponses> = elements
+                .part
+                .iter()
+                .map(|part| self.input.read_table(part))
+                .collect::<Result<_, _>>()?;
             data = data.with_parts(&parts, &how)?;
         }
         Ok(Some(mechid::identify_elements(&data, &how)?))

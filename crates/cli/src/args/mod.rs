@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::{Detrend, Measurement, Reading, RecordPlan, Window};
-use mechid::io::{FrequencyResponses, Geometry, input_name, record_details};
+use mechid::io::{FrequencyResponses, Geometry, IoError, input_name, record_details};
 use mechid::report::{ModeShapes, PageSettings};
 
 pub use self::channels::{ChannelArgs, ResponseArgs};
@@ -292,7 +292,12 @@ impl RecordArgs {
     pub fn read_responses(&self, more: &[PathBuf]) -> Result<Vec<FrequencyResponses>, CliError> {
         self.refuse_units()?;
         let files = std::iter::once(&self.record).chain(more);
-        Ok(files.map(FrequencyResponses::read).collect::<Result<_, _>>()?)
+        Ok(files.map(|file| self.read_table(file)).collect::<Result<_, _>>()?)
+    }
+
+    /// Reads a table of frequency responses within the limits of the options.
+    pub fn read_table(&self, file: &Path) -> Result<FrequencyResponses, IoError> {
+        FrequencyResponses::read_with(file, &self.reading().limits())
     }
 }
 

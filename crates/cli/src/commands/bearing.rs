@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::Args;
 use mechid::analysis::bearing::{BearingPlan, BearingSize, BearingTable, Coefficients};
 use mechid::analysis::{IdentifyBearing, Measurement};
-use mechid::io::FrequencyResponses;
 use mechid::report::FigureStyle;
 use mechid::{BearingData, identify_bearing};
 
@@ -159,7 +158,8 @@ impl BearingArgs {
         let data = |paths: &mut dyn Iterator<Item = &PathBuf>| -> Result<BearingData, CliError> {
             if self.tables.frf_table {
                 self.input.refuse_units()?;
-                let tables = paths.map(FrequencyResponses::read).collect::<Result<Vec<_>, _>>()?;
+                let read = |path: &PathBuf| self.input.read_table(path);
+                let tables = paths.map(read).collect::<Result<Vec<_>, _>>()?;
                 return Ok(BearingData::from_responses(&tables, &how)?);
             }
             let open = |path: &PathBuf| self.input.open_other(path, &channels, self.input.window());

@@ -287,7 +287,7 @@ impl ModesArgs {
     fn read_tables(&self) -> Result<Vec<FrequencyResponses>, CliError> {
         let files = std::iter::once(&self.input.record).chain(&self.more);
         let read = |file: &PathBuf| {
-            FrequencyResponses::read(file).map_err(|error| match error {
+            self.input.read_table(file).map_err(|error| match error {
                 IoError::Responses { file, available } => {
                     AnalysisError::NeitherRecordNorTable { file, available }
                 }

@@ -2,6 +2,7 @@
 //! limits memory and time of the process.
 #![cfg(target_os = "linux")]
 
+use std::f64::consts::PI;
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
@@ -122,6 +123,56 @@ fn more_unknowns_than_equations_are_refused_before_any_work() {
     for more in ["", "--extent open"] {
         let columns = "--force force --displacement displacement --sample-rate 1000";
         refused(home.path(), &format!("identify b.csv.gz {columns} {more}"));
+    }
+}
+
+/// Returns a table of the accelerances of a uniform chain with fixed ends, at all points to a force
+/// at the first point, with noise; all its modes lie below 40 Hz.
+fn chain_table(points: usize, lines: usize) -> String {
+    let names = |at| format!("h_{at}_1_real,h_{at}_1_imaginary");
+    let names: Vec<String> = (1..=points).map(names).collect();
+    let mut text = format!("frequency_hz,time_derivative,{}\n", names.join(","));
+    let mut state = 1_u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 40) as f64 / f64::from(1 << 24) - 0.5
+    };
+    let angle = |mode: usize| PI * mode as f64 / (points + 1) as f64;
+    for line in 1..=lines {
+        let hz = 45.0 * line as f64 / lines as f64;
+        text += &format!("{hz},2");
+        for point in 1..=points {
+            let of_mode = |mode: usize| {
+                let own = 40.0 * (angle(mode) / 2.0).sin();
+                let (real, imaginary) = (own * own - hz * hz, 0.02 * own * hz);
+                let gain = (angle(mode) * point as f64).sin() * angle(mode).sin() * hz * hz
+                    / real.hypot(imaginary).powi(2);
+                [-gain * real, gain * imaginary]
+            };
+            let parts = (1..=points).map(of_mode).fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+            text += &format!(",{:.4},{:.4}", parts[0] + noise(), parts[1] + noise());
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// An earlier version had no limit for tables: the modes of 60 points and three forces took 1.9 GB.
+#[test]
+fn a_table_of_many_points_is_refused_before_any_work() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &str| {
+        let allowed = limited(home.path(), arguments);
+        assert!(allowed.status.success(), "{}", String::from_utf8_lossy(&allowed.stderr));
+    };
+    fs::write(home.path().join("many.csv"), chain_table(60, 300)).unwrap();
+    refused(home.path(), "identify many.csv --frf-table");
+    refused(home.path(), "modes many.csv --memory-gb 0.05");
+    run("modes many.csv");
+    fs::write(home.path().join("few.csv"), chain_table(2, 200)).unwrap();
+    for command in ["identify few.csv --frf-table", "modes few.csv"] {
+        refused(home.path(), &format!("{command} --memory-gb 0.001"));
+        run(&format!("{command} --memory-gb 0.004"));
     }
 }
 

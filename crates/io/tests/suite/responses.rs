@@ -60,6 +60,7 @@ fn two_by_one(frequency_hz: Vec<f64>) -> FrequencyResponses {
         }),
         remarks: Vec::new(),
         doubts: Vec::new(),
+        memory: None,
     }
 }
 

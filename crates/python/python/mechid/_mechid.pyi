@@ -155,7 +155,7 @@ def identify(
 @final
 class ResponseTable:
     @staticmethod
-    def read(path: str | PathLike[str]) -> ResponseTable: ...
+    def read(path: str | PathLike[str], memory_gb: float | None) -> ResponseTable: ...
     @staticmethod
     def from_arrays(
         layout: str,

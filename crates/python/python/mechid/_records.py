@@ -1025,8 +1025,18 @@ class ResponseTable:
 
     @classmethod
     @careful
-    def read(cls, path: str | os.PathLike[str]) -> ResponseTable:
+    def read(
+        cls, path: str | os.PathLike[str], *, memory_gb: float | None = None
+    ) -> ResponseTable:
         """Read a text or a universal file (dataset 58) of frequency responses.
+
+        Parameters
+        ----------
+        path : str or path-like
+            The file.
+        memory_gb : float, optional
+            Maximum memory, in GB, for its numbers and their analysis; by default it follows from
+            the size of the file.
 
         Raises
         ------
@@ -1034,8 +1044,9 @@ class ResponseTable:
             If the file cannot be read, or has no frequency response.
         """
         table = cls.__new__(cls)
-        table._made = (os.fspath(path),)
-        table._inner = _mechid.ResponseTable.read(path)
+        memory = None if memory_gb is None else _number("memory_gb", memory_gb)
+        table._made = os.fspath(path), memory
+        table._inner = _mechid.ResponseTable.read(path, memory)
         return table
 
     @property
@@ -1059,8 +1070,8 @@ class ResponseTable:
 
 def _made_again(made: tuple[Any, ...]) -> ResponseTable:
     """Return a table that was pickled: from its arrays, or from its file."""
-    if len(made) == 1:
-        return ResponseTable.read(made[0])
+    if len(made) == 2:
+        return ResponseTable.read(made[0], memory_gb=made[1])
     table = ResponseTable.__new__(ResponseTable)
     table._made, table._inner = made, _mechid.ResponseTable.from_arrays(*made)
     return table
