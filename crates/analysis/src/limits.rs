@@ -71,6 +71,23 @@ pub const MODAL_PAIR_BYTES: usize = 40;
 /// Largest number of modes of a first estimate. If their memory is allowed, they are not counted.
 pub(crate) const MANY_MODES: usize = 72;
 
+/// Minimum number of equations per unknown on which other models of a table are tried first. If
+/// none of them explains these lines far better than the fitted model, they are not fitted to all
+/// lines.
+pub(crate) const TRIED_EQUATIONS: usize = 40;
+
+/// Minimum number of lines of each table on which other models are tried first; fewer lines would
+/// miss resonances.
+pub(crate) const TRIED_LINES: usize = 100;
+
+/// Number of lines of a table that decide whether it has more resonances than responses. More lines
+/// would show weaker resonances, in a time that grows with their number.
+pub(crate) const SURPLUS_LINES: usize = 2000;
+
+/// Largest ratio of the number of all lines of a table to the number of lines that are used to try
+/// other models.
+pub(crate) const THINNED_STEP: usize = 10;
+
 /// Largest number of channels whose noise covariances need at most [`STRETCH_BYTES`] per sample and
 /// channel: the number of lines is half the number of samples.
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;

@@ -61,6 +61,7 @@ pub mod summary;
 pub(crate) mod table_fit;
 pub mod tables;
 pub(crate) mod tabulated;
+pub(crate) mod thinned;
 mod unscaled;
 pub mod validation;
 

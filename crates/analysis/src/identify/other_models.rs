@@ -18,6 +18,8 @@ use nalgebra::{Complex, DMatrix};
 use super::disagreement::squared_change;
 use super::response_settings::IdentifyResponses;
 use super::tabulated::{Tabulated, joined};
+use super::thinned;
+use crate::AnalysisError;
 
 /// Maximum number of alternations between a delay and a fit with it.
 const DELAY_ROUNDS: usize = 2;
@@ -31,7 +33,34 @@ const MAX_LEVEL: f64 = 400.0;
 /// Returns the model that explains the responses of tables far better than the `result` from their
 /// `data`, if there is such a model: with a delay, with structural damping, for another measured
 /// quantity, or for magnitudes given as levels.
+///
+/// If the tables have many lines, the models are fitted to fewer lines first. Most tables have no
+/// better model, and a wrong model takes the longest to fit.
 pub(super) fn better_model_of(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+    data: &FrequencyData,
+    result: &Estimate,
+) -> Option<BetterModel> {
+    if let Some(fewer) = thinned::for_models(tables, how, data, result.unknowns())
+        && let Ok(data) = on_lines_of(&fewer, how)
+    {
+        better_model_on(&fewer, how, &data, result)?;
+    }
+    better_model_on(tables, how, data, result)
+}
+
+/// Returns the responses of tables as data for a fit.
+fn on_lines_of(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+) -> Result<FrequencyData, AnalysisError> {
+    let measured = tables.iter().map(|table| Tabulated::new(table, how));
+    joined(&measured.collect::<Result<Vec<_>, _>>()?)
+}
+
+/// Returns the model that explains the `data` far better than the `result`.
+fn better_model_on(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
     data: &FrequencyData,

@@ -9,6 +9,7 @@ use super::settings::Places;
 use super::sources::Recorded;
 use super::tables::Tables;
 use crate::identify::IdentifyResponses;
+use crate::identify::thinned::for_resonances;
 use crate::measurement::Measurement;
 use crate::text::compact;
 
@@ -28,7 +29,8 @@ pub(crate) fn surplus_of_tables(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
 ) -> Option<String> {
-    let mut tables = tables.to_vec();
+    let fewer = for_resonances(tables, how);
+    let mut tables = fewer.unwrap_or_else(|| tables.to_vec());
     if !how.points.is_empty() {
         let is_chosen = |f: &ResponseFunction| {
             [&f.response, &f.reference].iter().all(|p| how.points.contains(p))

@@ -23,9 +23,20 @@ fn viscous(omega: f64) -> Complex<f64> {
 /// A table of accelerances from 0.25 to 40 Hz with 0.5 % noise; if `is_stated`, the table states
 /// the noise.
 fn table(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> FrequencyResponses {
-    let frequency_hz: Vec<f64> = (1..=LINES).map(|line| 0.25 * line as f64).collect();
+    table_of_lines(LINES, receptance, seed, is_stated)
+}
+
+/// A table as above with another number of lines in the same band.
+fn table_of_lines(
+    lines: usize,
+    receptance: &Receptance<'_>,
+    seed: u64,
+    is_stated: bool,
+) -> FrequencyResponses {
+    let spacing_hz = 40.0 / lines as f64;
+    let frequency_hz: Vec<f64> = (1..=lines).map(|line| spacing_hz * line as f64).collect();
     let size = 0.005 / 2_f64.sqrt();
-    let noise = noise::white(Sampling::new(1.0, LINES).unwrap(), 2, size, seed).unwrap();
+    let noise = noise::white(Sampling::new(1.0, lines).unwrap(), 2, size, seed).unwrap();
     let exact = |hz: &f64| -(TAU * hz).powi(2) * receptance(TAU * hz);
     let values = frequency_hz
         .iter()
@@ -181,6 +192,32 @@ fn decibels_read_as_magnitudes_are_told() {
         }
         let told = Told::of(levels, IdentifyResponses::default());
         assert_eq!(told.cause(), Some(Cause::Decibels), "{gain}: {:?}", told.warnings);
+    }
+}
+
+/// Other models are tried on fewer lines of a long table first; they are found as on all lines.
+#[test]
+fn long_tables_are_told_apart_too() {
+    let structural = |omega: f64| {
+        let square = (TAU * 18.0_f64).powi(2);
+        (5.0 * Complex::new(square - omega * omega, 0.3 * square)).inv()
+    };
+    let late = |omega: f64| viscous(omega) * Complex::cis(-omega * 2e-3);
+    let velocity = |omega: f64| viscous(omega) / Complex::new(0.0, omega);
+    let long = |receptance: &Receptance<'_>, is_stated| {
+        let table = table_of_lines(10 * LINES, receptance, 1, is_stated);
+        Told::of(table, IdentifyResponses::default())
+    };
+    for is_stated in [false, true] {
+        let right = long(&viscous, is_stated);
+        assert!(right.warnings.is_empty(), "{:?}", right.warnings);
+        assert!(matches!(
+            long(&structural, is_stated).cause(),
+            Some(Cause::StructuralDamping { .. })
+        ));
+        assert!(matches!(long(&late, is_stated).cause(), Some(Cause::Delay { .. })));
+        let of_velocity = long(&velocity, is_stated).cause();
+        assert!(matches!(of_velocity, Some(Cause::Quantity { .. })), "{of_velocity:?}");
     }
 }
 
