@@ -80,8 +80,8 @@ pub(super) fn check_tables(
         lines * table.functions.iter().filter(is_chosen).count()
     };
     let numbers: usize = tables.iter().map(of_table).sum();
-    // By reciprocity, the points of the forces may also be points of responses. The direction −Z is
-    // the degree of freedom of +Z.
+    // Reciprocity makes the points of the forces points of responses, too. The direction −Z is the
+    // degree of freedom of +Z.
     let functions = tables.iter().flat_map(|table| &table.functions).filter(is_chosen);
     let points = functions.flat_map(|function| [&function.response, &function.reference]);
     let dof = points.map(|point| point.replace('-', "+")).collect::<BTreeSet<_>>().len();
