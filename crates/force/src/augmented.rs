@@ -219,18 +219,23 @@ impl Augmented {
         self.machine.out.nrows()
     }
 
-    /// Returns, for each sample, the squared innovations divided by their variances, summed over
-    /// the channels.
-    pub fn energies(&self, tuned: &Tuned) -> Option<Vec<f64>> {
+    /// Returns the innovations divided by their standard deviations, channels of a sample side by
+    /// side; `None` if one is not finite.
+    pub fn innovations(&self, tuned: &Tuned) -> Option<Vec<f64>> {
         let process = LowPass::new(tuned.model.order).ok()?;
         let space = self.space(&tuned.model, &process, tuned.noise, 10.0).ok()?;
         let passage = self.started(space).filter(&self.data);
-        let energies: Vec<f64> = passage
-            .innovations()
-            .chunks_exact(self.channels())
-            .map(|sample| sample.iter().map(|(e, variance)| e * e / variance).sum())
-            .collect();
-        energies.iter().all(|energy| energy.is_finite()).then_some(energies)
+        let innovations = passage.innovations().iter().map(|(e, variance)| e / variance.sqrt());
+        let innovations: Vec<f64> = innovations.collect();
+        innovations.iter().all(|e| e.is_finite()).then_some(innovations)
+    }
+
+    /// Returns, for each sample, the squared innovations divided by their variances, summed over
+    /// the channels.
+    pub fn energies(&self, tuned: &Tuned) -> Option<Vec<f64>> {
+        let innovations = self.innovations(tuned)?;
+        let samples = innovations.chunks_exact(self.channels());
+        Some(samples.map(|sample| sample.iter().map(|e| e * e).sum()).collect())
     }
 
     /// Returns a given model with its likelihood; the channel scales are the standard deviations of

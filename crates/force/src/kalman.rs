@@ -1,6 +1,7 @@
 //! Force and motion together, by Kalman filter and smoother.
 
 use mechid_model::SecondOrderSystem;
+use mechid_signal::correlation::whiteness;
 use mechid_signal::{Extent, Record, Spectrum};
 use nalgebra::DMatrix;
 
@@ -11,6 +12,7 @@ use crate::force_information::ErrorSpectrum;
 use crate::force_model::{ForceModel, LowPass};
 use crate::identified::IdentifiedForce;
 use crate::intermittent::quiet;
+use crate::limits::{INNOVATION_LAGS, INNOVATIONS_SETTLED};
 use crate::measurement::{Measurement, Start};
 use crate::noise::{Noise, channel_sizes};
 use crate::transfer::Transfer;
@@ -56,6 +58,10 @@ pub struct KalmanForce {
     pub seen_from_hz: Option<f64>,
     /// Log-likelihood of the measurement, dimensionless, without constants.
     pub log_likelihood: f64,
+    /// Probability that the prediction errors of a right model are at least as correlated from
+    /// sample to sample; `None` for a short record and for a force that acts only during a part of
+    /// the record.
+    pub whiteness_p_value: Option<f64>,
 }
 
 /// Identifies forces and motion together by the augmented Kalman filter with smoother.
@@ -70,7 +76,10 @@ pub struct KalmanForce {
 /// noise exceeds the response to a slow force. Without a displacement, the force and its standard
 /// error are therefore restricted to frequencies above [`KalmanForce::seen_from_hz`]
 /// ([`IdentifiedForce::band_hz`]), unless the measurement has its own band
-/// ([`Measurement::in_band`]). The standard error in a band is its value far from the ends of the
+/// ([`Measurement::in_band`]). A force whose spectrum is not one band, such as a weaker force in
+/// addition to a strong sinusoid, has correlated prediction errors
+/// ([`KalmanForce::whiteness_p_value`]); the standard error is then too small. The standard error in
+/// a band is its value far from the ends of the
 /// record, plus the excess of the error of the whole force at the instant over its median
 /// over the record.
 ///
@@ -124,18 +133,14 @@ pub fn kalman(
         Tuning::NoiseKnown(_) => augmented.most_likely(Some(1.0))?,
         Tuning::Given { model, .. } => augmented.given(model)?,
     };
-    let quiet_noise = if *tuning == Tuning::Likelihood {
-        quiet_part_noise(&augmented, &tuned, (system, measured, forced), &scale)
-    } else {
-        None
-    };
+    let (known, of) = (*tuning != Tuning::Likelihood, (system, measured, forced));
+    let quiet_noise = (!known).then(|| quiet_part_noise(&augmented, &tuned, of, &scale)).flatten();
     if let Some(noise) = quiet_noise {
         scale.iter_mut().for_each(|level| *level *= noise);
         augmented = Augmented::new(system, measured, forced, start, &scale)?;
         tuned = augmented.most_likely(Some(1.0))?;
     }
     let smoothed = smoothed(&augmented, system, measured, forced, &scale, &tuned)?;
-    let known = *tuning != Tuning::Likelihood;
     let residual = measured.exceeds(forced).then(|| {
         let motion = [&smoothed.displacement, &smoothed.velocity, smoothed.force.record()];
         Residual::from_motion(system, measured, motion, known.then_some(&smoothed.noise_std[..]))
@@ -146,13 +151,34 @@ pub fn kalman(
         0 | 1 => smoothed.force,
         _ => mixed(&augmented, &smoothed.force, system.dof(), forced, &points)?,
     };
+    let whiteness_p_value =
+        if quiet_noise.is_some() { None } else { whiteness_p_value(&augmented, &tuned) };
     let mut force = force.with_residual(residual);
     if let Some(band_hz) = measured.band_hz().or_else(|| measured.shown(smoothed.seen_from_hz)) {
         let process = LowPass::new(tuned.model.order)?;
         let errors = augmented.information().errors(&tuned.model, &process, tuned.noise);
         force = in_band(force, forced, band_hz, &errors)?;
     }
-    Ok(KalmanForce { force, ..smoothed })
+    Ok(KalmanForce { force, whiteness_p_value, ..smoothed })
+}
+
+/// Returns the probability that white innovations have at least the correlations of the innovations
+/// under a tuning: the smallest one of all channels, times their number. `None` for a record that is
+/// too short.
+///
+/// # Source
+/// Durbin & Koopman (2012), *Time Series Analysis by State Space Methods*, section 2.12 (diagnostic
+/// checks of innovations); Ljung & Box (1978), Biometrika 65, 297–303.
+fn whiteness_p_value(augmented: &Augmented, tuned: &Tuned) -> Option<f64> {
+    let innovations = augmented.innovations(tuned)?;
+    let channels = augmented.channels();
+    let of_channel = |channel: usize| -> Option<f64> {
+        let all = innovations.iter().skip(channel).step_by(channels).copied();
+        let settled: Vec<f64> = all.skip(INNOVATIONS_SETTLED).collect();
+        Some(whiteness(&settled, INNOVATION_LAGS).ok()?.p_value)
+    };
+    let p_values = (0..channels).map(of_channel).collect::<Option<Vec<f64>>>()?;
+    Some((channels as f64 * p_values.into_iter().fold(1.0, f64::min)).min(1.0))
 }
 
 /// Returns the noise of the part of the record in which no force acts, in the scales of the
@@ -301,5 +327,6 @@ fn smoothed(
         model: tuned.model.clone(),
         seen_from_hz: errors.lowest_hz(),
         log_likelihood: tuned.log_likelihood - sampling.len() as f64 * scaling,
+        whiteness_p_value: None,
     })
 }

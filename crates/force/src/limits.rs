@@ -159,6 +159,15 @@ pub(crate) const BAND_TOLERANCE: f64 = 1e-9;
 /// Change of an entry for a numerical derivative, in standard errors.
 pub(crate) const PARAMETER_STEP: f64 = 0.1;
 
+// Whiteness of innovations
+
+/// Number of lags of the whiteness test of the innovations.
+pub(crate) const INNOVATION_LAGS: usize = 25;
+
+/// Number of innovations at the beginning of a record that are not tested: they still depend on the
+/// unknown initial state.
+pub(crate) const INNOVATIONS_SETTLED: usize = 50;
+
 // Forces that act for a part of a record
 
 /// Number of parts into which a record is divided in the search for quiet parts.

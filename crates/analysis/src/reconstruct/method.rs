@@ -17,6 +17,7 @@ use mechid_signal::{Extent, Record, Spectrum};
 use super::motion::{complete, response};
 use super::options::Method;
 use crate::AnalysisError;
+use crate::limits::INNOVATION_LEVEL;
 use crate::machine::{Machine, NonlinearPart};
 use crate::text::significant;
 
@@ -441,9 +442,23 @@ fn smoothed(
     }
     let method = "augmented Kalman filter and smoother, tuned by likelihood";
     let (seen_from_hz, band_hz, counts_noise) = (smoothed.seen_from_hz, force.band_hz(), true);
-    let remarks = Vec::new();
+    let remarks = smoothed.whiteness_p_value.and_then(correlated_errors).into_iter().collect();
     Ok(Found {
         force,
         how: How { method, why, counts_noise, chosen, unexplained, seen_from_hz, band_hz, remarks },
+    })
+}
+
+/// Returns a remark if the prediction errors of the force model are significantly correlated from
+/// sample to sample.
+fn correlated_errors(p_value: f64) -> Option<String> {
+    (p_value < INNOVATION_LEVEL).then(|| {
+        format!(
+            "the prediction errors of the force model are correlated (p = {p_value:.1e}): one band does \
+             not describe the spectrum of the force, for example because a weaker force acts in addition \
+             to a sinusoid, or the machine differs from the one given. The standard error of the force is \
+             not reliable: reconstruct the forces in separate bands (`band_hz`), or state the noise \
+             (`noise`)"
+        )
     })
 }

@@ -14,6 +14,7 @@ mod error_rate;
 mod faults;
 #[cfg(feature = "parquet")]
 mod fleet;
+mod force_spectrum;
 mod hammer;
 mod headlines;
 mod modal;
