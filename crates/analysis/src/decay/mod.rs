@@ -102,7 +102,8 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
         Some(last) => record.window(0, last.samples)?,
         None => record,
     };
-    let estimate = free_decay(&record, &how.fit())?;
+    let begins_s = how.from_s.unwrap_or(0.0) + release as f64 * record.sampling().dt();
+    let estimate = free_decay(&record, &how.fit()).map_err(|error| error.from_earlier(begins_s))?;
     let first_sample = whole.first_sample + release;
     let mut summary = DecaySummary::new(measurement, &whole, kind, first_sample, &estimate, how)?;
     summary.remarks.extend(last.map(|last| {

@@ -52,7 +52,9 @@ fn deviations(measurement: &Measurement, how: &DecaySettings) -> Option<String> 
     let remarks = match decay(measurement, how) {
         Ok(modes) => modes.summary().model_remarks(),
         Err(AnalysisError::FreeDecay(
-            error @ (FreeDecayError::NoOscillation { .. } | FreeDecayError::Grows { .. }),
+            error @ (FreeDecayError::NoOscillation { .. }
+            | FreeDecayError::ExcitedAgain { .. }
+            | FreeDecayError::Grows { .. }),
         )) => vec![error.to_string()],
         Err(_) => Vec::new(),
     };

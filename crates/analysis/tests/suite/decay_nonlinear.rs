@@ -182,6 +182,42 @@ fn a_second_hit_and_the_largest_number_of_modes_are_said() {
     assert!(told(&found, "the maximum number of modes was found"), "{found}");
 }
 
+/// With little noise, an autoregression describes two decays of the same phase better than one
+/// decay does. The response is the sum of the closed-form responses to the hits.
+#[test]
+fn hits_in_phase_are_said() {
+    let sampling = Sampling::from_rate_hz(200.0, 3000).unwrap();
+    let omega = TAU * 5.0;
+    let struck = |hits: &[[f64; 2]], level: f64, seed: u64| {
+        let response = |t: f64, [at, size]: [f64; 2]| {
+            let after = t - at;
+            if after < 0.0 {
+                return 0.0;
+            }
+            size * (-0.01 * omega * after).exp() * (omega * after).sin()
+        };
+        let value = |t: f64| hits.iter().map(|hit| response(t, *hit)).sum::<f64>();
+        let exact = sampling.times().map(value).collect();
+        decay(&measured(sampling, exact, level, seed), &DecaySettings::default())
+    };
+    for (level, seed) in [1e-5, 1e-4, 1e-3, 1e-2].into_iter().zip(0..) {
+        for [first, second, size] in [[0.0, 8.0, 1.0], [0.0, 6.0, 0.7], [0.5, 6.5, 0.7]] {
+            let message = match struck(&[[first, 1.0], [second, size]], level, seed) {
+                Err(error) => error.to_string(),
+                Ok(found) => found.to_string(),
+            };
+            let at = message.split("excited again at about ").nth(1).unwrap_or_default();
+            let at: f64 =
+                at.split(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("{message}"));
+            assert!((at - second).abs() < 0.05, "{second} s: {message}");
+        }
+        for seed in 0..10 {
+            let found = struck(&[[0.5, 1.0]], level, 10 + seed).unwrap();
+            assert_eq!(found.summary().excited_again_s, None, "{found}");
+        }
+    }
+}
+
 /// The notes on several decays are those on each of them alone.
 #[test]
 fn decays_that_are_analysed_together_are_judged_one_by_one() {

@@ -50,6 +50,18 @@ pub enum FreeDecayError {
         /// Gain that a mode must exceed, a pure number.
         needed: f64,
     },
+    /// A response is excited again, so that it is not one free decay.
+    #[error(
+        "the response is excited again at about {seconds:.3} s, for example by a second hit: it is not one free \
+         decay. Use only the samples before this time (`to`) or after it (`from`)"
+    )]
+    ExcitedAgain {
+        /// Time of the second excitation, in s from the first sample of the record.
+        seconds: f64,
+        /// Probability of so large a prediction error in a response without a second excitation, a
+        /// pure number.
+        p_value: f64,
+    },
     /// A response returns to rest without oscillation.
     #[error("the response does not oscillate: {} it better than oscillations", returns(rates))]
     NoOscillation {
@@ -85,6 +97,20 @@ pub enum FreeDecayError {
     /// A record is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+}
+
+impl FreeDecayError {
+    /// Returns the error with times from an instant that is `seconds` (s) before the first sample
+    /// of the record.
+    #[must_use]
+    pub fn from_earlier(self, seconds: f64) -> Self {
+        match self {
+            Self::ExcitedAgain { seconds: after, p_value } => {
+                Self::ExcitedAgain { seconds: seconds + after, p_value }
+            }
+            other => other,
+        }
+    }
 }
 
 /// Describes decays without oscillation in words.

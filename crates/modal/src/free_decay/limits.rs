@@ -76,7 +76,8 @@ pub(crate) const MOST_DAMPING: f64 = 0.9;
 /// Highest frequency of a mode, relative to half the sampling rate.
 pub(crate) const POLE_HIGHEST: f64 = 0.98;
 
-/// Probability that noise alone has the gain that is required of a further decay.
+/// Probability that noise alone has the gain that is required of a further decay, or the prediction
+/// error that is required of a second excitation.
 pub(crate) const FALSE_DECAY: f64 = 1e-3;
 
 /// Number of successive decays without sufficient gain after which the search for further decays

@@ -23,7 +23,7 @@ pub use self::error::FreeDecayError;
 pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate, Onset};
 use self::fit::{Data, Fit};
 use self::limits::{FINE, FREE_DECAY_SURE, MAX_STEPS, MOST_MODES, MOST_SAMPLES, SAMPLES_PER_MODE};
-use self::restart::restart;
+use self::restart::{restart, shock};
 use self::select::Search;
 
 /// Settings of [`free_decay`].
@@ -63,13 +63,12 @@ impl Default for FreeDecay {
 /// use mechid_modal::free_decay::{FreeDecay, free_decay};
 /// use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 ///
-/// // 5 Hz, damping ratio 0.02, two channels that move against one another.
-/// let (omega, zeta) = (5.0 * std::f64::consts::TAU, 0.02f64);
-/// let x = |t: f64| (-zeta * omega * t).exp() * (omega * (1.0 - zeta * zeta).sqrt() * t).cos();
-/// let sampling = Sampling::new(0.01, 400)?;
-/// let channels = [1.0, -0.5].map(|size| sampling.times().map(|t| size * x(t)).collect::<Vec<_>>());
-/// let record = Record::from_channels(sampling, &channels)?;
-/// let measured = noise::add_white(&record, NoiseLevel::FractionOfRms(0.02), 1)?;
+/// // 5 Hz, damping ratio 0.02, two channels that move against one another. let (omega, zeta) =
+/// (5.0 * std::f64::consts::TAU, 0.02f64); let x = |t: f64| (-zeta * omega * t).exp() * (omega *
+/// (1.0 - zeta * zeta).sqrt() * t).cos(); let sampling = Sampling::new(0.01, 400)?; let channels =
+/// [1.0, -0.5].map(|size| sampling.times().map(|t| size * x(t)).collect::<Vec<_>>()); let record =
+/// Record::from_channels(sampling, &channels)?; let measured = noise::add_white(&record,
+/// NoiseLevel::FractionOfRms(0.02), 1)?;
 ///
 /// let estimate = free_decay(&measured, &FreeDecay::default())?;
 /// let [mode] = estimate.modes() else { panic!("{} modes", estimate.modes().len()) };
@@ -84,6 +83,7 @@ impl Default for FreeDecay {
 /// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if the requested number of modes
 /// is zero or too large, [`FreeDecayError::NoOscillation`] if decays without oscillation describe
 /// the response better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
+/// [`FreeDecayError::ExcitedAgain`] if there is a second excitation instead of one decay,
 /// [`FreeDecayError::Grows`] if most of the response grows, [`FreeDecayError::NotConverged`] if the
 /// record does not determine the number of modes.
 ///
@@ -114,6 +114,10 @@ pub fn free_decay(
             let selected = search.best(most).ok_or(failed.clone())?;
             check_oscillation(&data, &selected.best.fit, record.sampling().dt())?;
             if selected.best.fit.poles.is_empty() {
+                if let Some((sample, p_value)) = shock(&data, &selected.best.fit) {
+                    let seconds = record.sampling().time(sample);
+                    return Err(FreeDecayError::ExcitedAgain { seconds, p_value });
+                }
                 let needed = select::least_gain(samples, record.channels());
                 return Err(FreeDecayError::NoDecay {
                     samples,

@@ -1,10 +1,13 @@
 //! Detection of a second excitation during a decay.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::autoregression::Autoregression;
 use super::fit::{Data, Fit};
-use super::limits::RESTART_PLACES;
+use super::limits::{FALSE_DECAY, RESTART_PLACES};
 use super::poles::linear_columns;
+use super::select::Search;
 
 /// Returns the first sample of a second excitation, counted from 0, and the decrease of the
 /// Bayesian information criterion if the amplitudes before and after this sample are independent.
@@ -23,6 +26,39 @@ pub(super) fn restart(data: &Data, fit: &Fit) -> Option<(usize, f64)> {
     let unknowns = linear_columns(&fit.poles, data.constant) * data.channels() + 1;
     let decrease = gain - unknowns as f64 * (len as f64).ln();
     (decrease > 0.0).then_some((sample, decrease))
+}
+
+/// Returns the sample of a second excitation, counted from 0, in a response that coloured noise
+/// describes better than decays, and the p-value of its prediction errors. `None` if no prediction
+/// error is larger than chance allows, or if the response is no decay after this sample.
+///
+/// Without an excitation, the free response predicts the next sample from the preceding ones, as an
+/// autoregression does. A hit is an error of this prediction at one sample.
+///
+/// # Source
+/// Fox (1972), Journal of the Royal Statistical Society B 34, 350–363 (innovation outliers), with
+/// Bonferroni's bound for the number of samples.
+pub(super) fn shock(data: &Data, fit: &Fit) -> Option<(usize, f64)> {
+    let residual = data.residual(fit);
+    let first = fit.noise.iter().map(Autoregression::order).max()?;
+    if first == 0 {
+        return None;
+    }
+    let mut energies = vec![0.0; data.len().checked_sub(first)?];
+    for (column, noise) in residual.column_iter().zip(&fit.noise) {
+        let errors = noise.whitened(column.clone_owned().as_slice(), 0, 0);
+        let errors = &errors[first..];
+        let variance = errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64;
+        energies.iter_mut().zip(errors).for_each(|(energy, e)| *energy += e * e / variance);
+    }
+    let (at, largest) = energies.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let distribution = ChiSquared::new(data.channels() as f64).ok()?;
+    let p_value = (energies.len() as f64 * distribution.sf(*largest)).min(1.0);
+    let sample = first + at;
+    let later = data.samples.rows_range(sample..).into_owned();
+    let later = Data { samples: later, constant: data.constant };
+    let decays = || Some(!Search::new(&later).best(1)?.best.fit.poles.is_empty());
+    (p_value < FALSE_DECAY && decays()?).then_some((sample, p_value))
 }
 
 /// Returns the largest decrease of minus twice the log-likelihood and its sample.
