@@ -243,6 +243,6 @@ pub(crate) const REST_SAMPLES: usize = 4096;
 /// channel is at rest: the rest is rounding.
 pub(crate) const REST_DIGITS: f64 = 1e-9;
 
-/// Probability of the correlations of the prediction errors of a force model, if the model is right,
-/// below which a remark says that the standard error of the force is not reliable.
+/// Probability of the correlations of the prediction errors of a force model, if the model is
+/// right, below which a remark says that the standard error of the force is not reliable.
 pub const INNOVATION_LEVEL: f64 = 1e-3;

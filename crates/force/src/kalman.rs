@@ -78,10 +78,9 @@ pub struct KalmanForce {
 /// ([`IdentifiedForce::band_hz`]), unless the measurement has its own band
 /// ([`Measurement::in_band`]). A force whose spectrum is not one band, such as a weaker force in
 /// addition to a strong sinusoid, has correlated prediction errors
-/// ([`KalmanForce::whiteness_p_value`]); the standard error is then too small. The standard error in
-/// a band is its value far from the ends of the
-/// record, plus the excess of the error of the whole force at the instant over its median
-/// over the record.
+/// ([`KalmanForce::whiteness_p_value`]); the standard error is then too small. The standard error
+/// in a band is its value far from the ends of the record, plus the excess of the error of the
+/// whole force at the instant over its median over the record.
 ///
 /// Cost: linear in the record. With c channels and m = 2n + (order × forces) states, a pass takes
 /// about 2m³ + 2cm² operations per sample until the variances converge, then m² + 2cm; tuning takes
@@ -163,8 +162,8 @@ pub fn kalman(
 }
 
 /// Returns the probability that white innovations have at least the correlations of the innovations
-/// under a tuning: the smallest one of all channels, times their number. `None` for a record that is
-/// too short.
+/// under a tuning: the smallest one of all channels, times their number. `None` for a record that
+/// is too short.
 ///
 /// # Source
 /// Durbin & Koopman (2012), *Time Series Analysis by State Space Methods*, section 2.12 (diagnostic
