@@ -109,9 +109,10 @@ pub fn join<A: Send, B: Send>(
     one: impl FnOnce() -> A + Send,
     other: impl FnOnce() -> B + Send,
 ) -> (A, B) {
-    match ACTIVE.with_borrow(Option::is_some) {
-        true => (one(), other()),
-        false => rayon::join(|| within(None, one), || within(None, other)),
+    if ACTIVE.with_borrow(Option::is_some) {
+        (one(), other())
+    } else {
+        rayon::join(|| within(None, one), || within(None, other))
     }
 }
 

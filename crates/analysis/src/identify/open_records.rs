@@ -280,19 +280,21 @@ impl Tested<'_> {
         let compared =
             if kinds.is_empty() { None } else { BandLimitedFit::new(records, fit, pooling) };
         let between = compared.as_ref().and_then(|compared| compared.between_samples(&kinds, dt));
-        let finding = between.as_ref().map(BetweenSamples::finding);
-        if between.as_ref().is_some_and(|between| between.leaves_noise) {
-            return Ok(finding);
-        }
         let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
         let Some(compared) = compared else { return Ok(fault) };
+        let leaves_less = |fault: &Finding| {
+            between.as_ref().is_none_or(|b| !b.leaves_noise || remaining(fault) < b.remaining)
+        };
+        let fault = fault.filter(leaves_less);
         // The fit may be at a wrong minimum, so a new search is needed for each of the two possible
         // causes: the force between samples (above) and AC coupling.
         let again = |fault: &Finding| compared.after(uncoupled(fault, closed[0].measured())?);
-        let remaining = fault.as_ref().and_then(again);
-        let fault = fault.map(|fault| with_remaining(fault, remaining));
-        let fault = fault.filter(|fault| self::remaining(fault) < 1.0);
-        Ok(likelier(fault, finding.filter(|between| self::remaining(between) < DELAY_REMAINING)))
+        let after = fault.as_ref().and_then(again);
+        let fault = fault.map(|fault| with_remaining(fault, after));
+        let fault = fault.filter(|fault| remaining(fault) < 1.0);
+        let explains = |b: &BetweenSamples| b.leaves_noise || b.remaining < DELAY_REMAINING;
+        let between = between.filter(explains);
+        Ok(likelier(fault, between.as_ref().map(BetweenSamples::finding)))
     }
 }
 

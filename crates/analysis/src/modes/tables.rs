@@ -85,10 +85,11 @@ impl Tables {
             numbers.saturating_mul(MODAL_TABLE_BYTES).saturating_add(pairs)
         };
         // The modes are only counted if the largest possible number needs too much memory.
-        let modes = match needed(MANY_MODES) <= allowed {
-            true => 0,
+        let modes = if needed(MANY_MODES) <= allowed {
+            0
+        } else {
             // If there are no initial estimates, the fit reports why.
-            false => initial_mode_count(data).unwrap_or(0),
+            initial_mode_count(data).unwrap_or(0)
         };
         check_bytes(file, numbers, needed(modes), allowed)
     }

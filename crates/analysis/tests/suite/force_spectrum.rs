@@ -56,14 +56,14 @@ fn band(highest_hz: f64, rms: f64, seed: u64) -> Vec<[f64; 3]> {
 /// samples whose 95 % intervals contain the force.
 fn judged(sinusoids: &[[f64; 3]], seed: u64) -> (bool, f64) {
     let (force, run) = measured(sinusoids, seed);
-    let found = reconstruct(&run, &Machine::known(oscillator().system()), &Reconstruct::auto());
-    let found = found.unwrap();
-    let error = found.force().standard_error().unwrap().channel(0).to_vec();
-    let values = found.force().record().channel(0).to_vec();
+    let result = reconstruct(&run, &Machine::known(oscillator().system()), &Reconstruct::auto());
+    let result = result.unwrap();
+    let error = result.force().standard_error().unwrap().channel(0).to_vec();
+    let values = result.force().record().channel(0).to_vec();
     let holds = |k: &usize| (values[*k] - force.channel(0)[*k]).abs() < 1.96 * error[*k];
     let share = (0..force.len()).filter(holds).count() as f64 / force.len() as f64;
     let is_named = |remark: &String| remark.contains("prediction errors of the force model");
-    (found.summary().remarks.iter().any(is_named), share)
+    (result.summary().remarks.iter().any(is_named), share)
 }
 
 /// A force of 7 N RMS up to 100 Hz beside a sinusoid of 100 N: the fitted band ends near the

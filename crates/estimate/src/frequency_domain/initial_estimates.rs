@@ -67,15 +67,15 @@ impl<'a> InitialEstimates<'a> {
         let equations =
             (0..unknowns.dof()).map(equation).filter(|e| !e.parameters.is_empty()).collect();
         let ends = transient::len(data);
-        let all = match ends {
+        let lines = match ends {
             0 => Cow::Borrowed(data),
             _ => Cow::Owned(data.under_hann_window()),
         };
         let step = thin_step(data, unknowns);
-        let thinned = || all.thinned(step).zip(noise.thinned(step)).filter(|_| step > 1);
+        let thinned = || lines.thinned(step).zip(noise.thinned(step)).filter(|_| step > 1);
         let (data, noise) = match thinned() {
             Some((data, noise)) => (Cow::Owned(data), Cow::Owned(noise)),
-            None => (all, Cow::Borrowed(noise)),
+            None => (lines, Cow::Borrowed(noise)),
         };
         Self {
             data,
