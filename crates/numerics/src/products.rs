@@ -39,8 +39,8 @@ pub fn transposed_product(a: DMatrixView<'_, f64>, b: DMatrixView<'_, f64>) -> D
     products.into_iter().fold(zero, |sum, product| sum + product)
 }
 
-/// Returns AᵀWA (columns × columns, in the squared unit of A times the unit of W) of a tall matrix A
-/// and the diagonal of W.
+/// Returns AᵀWA (columns × columns, in the squared unit of A times the unit of W) of a tall matrix
+/// A and the diagonal of W.
 ///
 /// # Panics
 /// Panics if there is not one weight for every row.

@@ -165,12 +165,23 @@ pub fn coupled(record: &Record, hz: f64) -> Record {
 
 fn random_test(response_hz: Option<f64>, force_hz: Option<f64>, seed: u64) -> Measurement {
     let sampling = Sampling::from_rate_hz(512.0, 5120).unwrap();
+    coupled_test(&heavy(), sampling, [response_hz, force_hz], seed)
+}
+
+/// Random test whose response and force are behind high-passes with these corners in Hz.
+fn coupled_test(
+    oscillator: &Sdof,
+    sampling: Sampling,
+    [response_hz, force_hz]: [Option<f64>; 2],
+    seed: u64,
+) -> Measurement {
     let quantity = ResponseQuantity::Acceleration;
-    let rig = RandomTest { system: heavy().system(), sampling, quantity, force: 50.0 };
+    let rig = RandomTest { system: oscillator.system(), sampling, quantity, force: 50.0 };
     let [force, response] = rig.period(seed).unwrap();
     let force = force_hz.map_or(force.clone(), |hz| coupled(&force, hz));
     let response = response_hz.map_or(response.clone(), |hz| coupled(&response, hz));
-    let [force, response] = [force, response].map(|all| all.window(2561, 5120).unwrap());
+    let len = sampling.len();
+    let [force, response] = [force, response].map(|all| all.window(len / 2 + 1, len).unwrap());
     let noisy = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), seed + 1000).unwrap();
     Measurement::from_records(&force, &[(quantity, &noisy)]).unwrap()
 }
@@ -219,5 +230,23 @@ fn an_ac_coupled_response_is_named() {
         let quantity = Quantity::Response(ResponseQuantity::Acceleration);
         assert_eq!(channels, [Channel { quantity, index: 0 }], "{seed}");
         assert!((corner_hz - 3.0).abs() < 0.3, "{seed}: {corner_hz} Hz");
+    });
+}
+
+/// A force behind a high-pass of 0.5 Hz: a force that is held between its samples leaves only noise
+/// in some records, but less remains without the high-pass.
+#[test]
+fn an_ac_coupled_force_is_named() {
+    let omega = TAU * 12.0;
+    let oscillator = Sdof::new(5.0, 2.0 * 0.02 * omega * 5.0, 5.0 * omega * omega).unwrap();
+    let sampling = Sampling::from_rate_hz(256.0, 8192).unwrap();
+    (0..4_u64).into_par_iter().for_each(|seed| {
+        let test = coupled_test(&oscillator, sampling, [None, Some(0.5)], seed);
+        let found = identify(&[test], &Identify::default()).unwrap();
+        let Some(Cause::AcCoupling { channels, corner_hz }) = cause(&found) else {
+            panic!("{seed}: {}", found.summary().all_checks());
+        };
+        assert_eq!(channels, [Channel { quantity: Quantity::Force, index: 0 }], "{seed}");
+        assert!((corner_hz - 0.5).abs() < 0.05, "{seed}: {corner_hz} Hz");
     });
 }

@@ -186,10 +186,10 @@ fn axes_and_units_of_response_tables_are_used() {
     assert!(message.contains("speed of rotation"), "{message}");
 }
 
-/// Case F37: a pulse that begins with the record does not determine the machine. A check says so,
-/// and the interval of the mass contains the true value or zero.
+/// Case F37: a pulse that begins with the record does not determine the machine, because the
+/// transient has the same spectrum as the response to the pulse.
 #[test]
-fn a_pulse_at_the_beginning_is_not_a_precise_answer() {
+fn a_pulse_at_the_beginning_does_not_determine_the_machine() {
     let home = tempfile::tempdir().unwrap();
     let home = home.path();
     let (m, c, k) = (5.0_f64, 33.9_f64, 63_956.0_f64);
@@ -202,12 +202,7 @@ fn a_pulse_at_the_beginning_is_not_a_precise_answer() {
         let file = format!("{name}.csv");
         let columns = [&t, &f, response].map(|channel| (channel.as_slice(), 1.0));
         table(&home.join(&file), &["time,f,x"], &columns, ",");
-        let report = json(home, &format!("identify {file} --force f --displacement x"));
-        let checks = report["checks"].as_array().unwrap();
-        assert!(checks.iter().any(|check| check["verdict"] != "good"), "{checks:?}");
-        let interval = &report["parameters"][0]["interval"];
-        let [low, high] = [0, 1].map(|end| interval[end].as_f64().unwrap());
-        let holds = |value: f64| low <= value && value <= high;
-        assert!(holds(m) || holds(0.0), "{name}: {interval}");
+        let message = refused(home, &format!("identify {file} --force f --displacement x"));
+        assert!(message.contains("singular within rounding errors"), "{name}: {message}");
     }
 }

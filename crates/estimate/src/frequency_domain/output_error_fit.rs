@@ -259,6 +259,19 @@ fn entries_with_covariance(
     }
 }
 
+/// Returns the power of the response to the forces relative to that of the measured response. The
+/// transients cancel the excess of a power above 1. Above 1/ε the difference has only rounding
+/// errors, as a solution of normal equations with this condition number.
+fn cancelled_power(data: &FrequencyData, unknowns: &Unknowns, independent: &[f64]) -> f64 {
+    let [m, c, k] = unknowns.assemble(entries(unknowns, independent).as_slice());
+    let Ok(system) = SecondOrderSystem::new(m, c, k) else { return 0.0 };
+    let powers = data.omega().iter().zip(data.force().row_iter()).filter_map(|(omega, force)| {
+        let forced = system.dynamic_stiffness(*omega).lu().solve(&force.transpose())?;
+        Some(forced.norm_squared())
+    });
+    powers.sum::<f64>() / data.displacement().norm_squared()
+}
+
 pub(super) fn finish(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -269,6 +282,9 @@ pub(super) fn finish(
     let equations = misfit.linearise().ok_or(NumericsError::Overflow)?;
     let (covariance, condition) = equations.covariance().ok_or(NumericsError::Overflow)?;
     let (independent, tau) = parts(data, &best.minimum.parameters);
+    let cancelled = if tau.is_empty() { 0.0 } else { cancelled_power(data, unknowns, independent) };
+    let is_singular = cancelled * f64::EPSILON >= 1.0;
+    let condition = if is_singular { condition.max(cancelled) } else { condition };
     let count = independent.len();
     let of_ends = covariance.view((count, count), (tau.len(), tau.len()));
     let ends = EndLoads::new(data, tau, of_ends * scale.level);

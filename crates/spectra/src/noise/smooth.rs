@@ -219,8 +219,8 @@ impl Trial {
         Self::fitted(form, basis, initial, variances)
     }
 
-    /// Returns the fit with one more bump; the search starts at the present fit and the `heights` of
-    /// the bump for each channel. `None` if the form already contains the bump.
+    /// Returns the fit with one more bump; the search starts at the present fit and the `heights`
+    /// of the bump for each channel. `None` if the form already contains the bump.
     fn with(&self, bump: Bump, heights: &[f64], variances: &DMatrix<f64>) -> Option<Self> {
         let mut form = self.form.clone();
         form.bumps.push(bump);
