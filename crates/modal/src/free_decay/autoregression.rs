@@ -140,10 +140,10 @@ mod tests {
             let factor = |k: usize| if with_k { k as f64 } else { 1.0 };
             let samples: Vec<f64> = (0..60).map(|k| pick(factor(k) * of(k))).collect();
             let white = noise.whitened(&samples, 0, 0);
-            for k in noise.order()..60 {
+            for (k, white) in white.iter().enumerate().skip(noise.order()) {
                 let slope = if with_k { slope } else { Complex::default() };
                 let expected = pick((factor(k) * value + slope) * of(k));
-                assert!((white[k] - expected).abs() < 1e-12, "{k}: {} {expected}", white[k]);
+                assert!((white - expected).abs() < 1e-12, "{k}: {white} {expected}");
             }
         }
     }

@@ -158,8 +158,8 @@ impl Data {
         }
         let mut factor = TriangularFactor::new(width + 1);
         let later = common.columns(0, width) * self.whitening(poles, noise);
-        let parts = [later.as_view(), common.columns(width + channel, 1).into()];
-        let first_rows = [first.as_view(), white.view((0, channel), (from, 1)).into()];
+        let parts = [later.as_view(), common.columns(width + channel, 1)];
+        let first_rows = [first.as_view(), white.view((0, channel), (from, 1))];
         (factor.push(&parts) && factor.push(&first_rows)).then(|| factor.r().clone())
     }
 

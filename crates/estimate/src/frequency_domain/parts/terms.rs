@@ -126,7 +126,7 @@ impl<'a> LikelyMotion<'a> {
             let of_row = system.dynamic_stiffness(*omega) * displacement.row(row).transpose();
             force.row_mut(row).copy_from(&of_row.transpose());
         }
-        let weighted = WeightedLines::new(&fit.data, &fit.unknowns, &fit.values, covariance)?;
+        let weighted = WeightedLines::new(fit.data, &fit.unknowns, &fit.values, covariance)?;
         Some(Self { fit, system, displacement, force, records, weighted })
     }
 
