@@ -63,12 +63,13 @@ impl Default for FreeDecay {
 /// use mechid_modal::free_decay::{FreeDecay, free_decay};
 /// use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 ///
-/// // 5 Hz, damping ratio 0.02, two channels that move against one another. let (omega, zeta) =
-/// (5.0 * std::f64::consts::TAU, 0.02f64); let x = |t: f64| (-zeta * omega * t).exp() * (omega *
-/// (1.0 - zeta * zeta).sqrt() * t).cos(); let sampling = Sampling::new(0.01, 400)?; let channels =
-/// [1.0, -0.5].map(|size| sampling.times().map(|t| size * x(t)).collect::<Vec<_>>()); let record =
-/// Record::from_channels(sampling, &channels)?; let measured = noise::add_white(&record,
-/// NoiseLevel::FractionOfRms(0.02), 1)?;
+/// // 5 Hz, damping ratio 0.02, two channels that move against one another.
+/// let (omega, zeta) = (5.0 * std::f64::consts::TAU, 0.02f64);
+/// let x = |t: f64| (-zeta * omega * t).exp() * (omega * (1.0 - zeta * zeta).sqrt() * t).cos();
+/// let sampling = Sampling::new(0.01, 400)?;
+/// let channels = [1.0, -0.5].map(|size| sampling.times().map(|t| size * x(t)).collect::<Vec<_>>());
+/// let record = Record::from_channels(sampling, &channels)?;
+/// let measured = noise::add_white(&record, NoiseLevel::FractionOfRms(0.02), 1)?;
 ///
 /// let estimate = free_decay(&measured, &FreeDecay::default())?;
 /// let [mode] = estimate.modes() else { panic!("{} modes", estimate.modes().len()) };
