@@ -67,7 +67,10 @@ fn measured(program: &Path, folder: &Path, case: Case) -> Result<Cost, String> {
     let seconds = loop {
         memory = memory.into_iter().chain(largest_memory(&child)).reduce(f64::max);
         let seconds = begin.elapsed().as_secs_f64();
-        if child.try_wait().map_err(|e| e.to_string())?.is_some() {
+        if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
+            if !status.success() {
+                return Err(format!("{}: the program ended with {status}", case.name));
+            }
             break Some(seconds);
         }
         if seconds > MOST_SECONDS {
@@ -117,7 +120,7 @@ fn cases(folder: &Path) -> Result<Vec<Case>, String> {
         Case {
             name: "chain of 1,000 masses in full matrices, 200 steps",
             file: "dense.json",
-            arguments: words("simulate dense.json --quiet"),
+            arguments: words("simulate dense.json --output response.csv --quiet"),
         },
     ])
 }
@@ -186,6 +189,7 @@ fn dense_chain(path: &Path) -> Result<(), String> {
         "sampling": { "samples": 200, "rate_hz": 1000.0 },
         "excitation": [{ "dof": 1, "lines": "all", "amplitude": 50.0 }],
         "response": "from-rest",
+        "scheme": { "name": "newmark" },
         "outputs": [1, n],
     });
     fs::write(path, described.to_string()).map_err(|e| e.to_string())
