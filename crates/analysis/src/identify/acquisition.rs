@@ -114,12 +114,25 @@ impl Acquisition {
         unknowns: &Unknowns,
         pooling: Pooling,
     ) -> Result<(OutputErrorFit, Vec<FrequencyData>), AnalysisError> {
+        self.rounds(ACQUISITION_ROUNDS, fit, records, dt, unknowns, pooling)
+    }
+
+    /// Returns the fit after at most `most` rounds.
+    fn rounds(
+        &self,
+        most: usize,
+        fit: OutputErrorFit,
+        records: &[FrequencyData],
+        dt: f64,
+        unknowns: &Unknowns,
+        pooling: Pooling,
+    ) -> Result<(OutputErrorFit, Vec<FrequencyData>), AnalysisError> {
         let mut last = (fit, records.to_vec());
         let Some(between) = self.between_samples else { return Ok(last) };
         let mut settled = pooling == Pooling::AllLines;
         // Change of the last round, and its ratio to that of the round before.
         let (mut change, mut decrease) = (f64::INFINITY, 1.0);
-        for round in 0..ACQUISITION_ROUNDS {
+        for round in 0..most {
             let system = last.0.estimate.system()?;
             let equivalent =
                 records.iter().map(|record| equivalent_force(record, &system, dt, between));
@@ -129,7 +142,7 @@ impl Acquisition {
             };
             let data = joined(&equivalent)?;
             // The fits assume white noise until the equivalent force hardly changes.
-            let is_last = round + 1 == ACQUISITION_ROUNDS;
+            let is_last = round + 1 == most;
             let of_round = if settled || is_last { pooling } else { Pooling::AllLines };
             // The first round searches anew, because the band-limited force may have led to a wrong
             // minimum.
@@ -200,8 +213,8 @@ impl<'a> BandLimitedFit<'a> {
     }
 
     /// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best instead of
-    /// the band-limited force; a kind that leaves only noise ends the search. `None` without kinds,
-    /// or if no fit succeeds.
+    /// the band-limited force. If a kind leaves only noise, another one is fitted only if its first
+    /// round leaves less power. `None` without kinds, or if no fit succeeds.
     ///
     /// # Source
     /// Maximum likelihood with the levels of the channels eliminated.
@@ -212,14 +225,24 @@ impl<'a> BandLimitedFit<'a> {
     ) -> Option<BetweenSamples> {
         let mut best: Option<BetweenSamples> = None;
         for kind in self.likeliest_first(kinds, dt) {
-            let fitted = self.between_samples_as(kind, dt);
+            let noise = best.as_ref().filter(|best| best.leaves_noise);
+            let has_chance = noise
+                .is_none_or(|best| self.first_round(kind, dt).is_some_and(|p| p < best.remaining));
+            let fitted = has_chance.then(|| self.between_samples_as(kind, dt)).flatten();
             best =
                 fitted.into_iter().chain(best).min_by(|a, b| a.remaining.total_cmp(&b.remaining));
-            if best.as_ref().is_some_and(|best| best.leaves_noise) {
-                break;
-            }
         }
         best
+    }
+
+    /// Returns the fraction of the residual power that remains after the first round of a fit with
+    /// one kind of force.
+    fn first_round(&self, kind: Discretisation, dt: f64) -> Option<f64> {
+        let acquisition = Acquisition { between_samples: Some(kind), ..Acquisition::default() };
+        let (fit, pooling) = (self.fit.clone(), Pooling::AllLines);
+        let round = acquisition.rounds(1, fit, &self.records, dt, self.unknowns, pooling);
+        let (fit, equivalent) = round.ok()?;
+        self.remaining(&fit, &equivalent)
     }
 
     /// Returns the kinds in rising order of the residual power with the band-limited fit.

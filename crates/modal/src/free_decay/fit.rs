@@ -390,3 +390,56 @@ fn damped_step(
     let expected = side.norm_squared() - (side - jacobian * &step).norm_squared();
     step.iter().all(|v| v.is_finite()).then_some((step, expected))
 }
+
+#[cfg(test)]
+mod tests {
+    use mechid_signal::{Sampling, noise};
+
+    use super::*;
+
+    /// Record of two channels that covers several segments, with noise of different colours.
+    fn record(len: usize) -> DMatrix<f64> {
+        let white = noise::white(Sampling::new(1.0, len).unwrap(), 2, 1.0, 3).unwrap();
+        let mut samples = white.data().clone();
+        for (channel, share) in [(0, 0.8), (1, -0.5)] {
+            for row in 1..len {
+                samples[(row, channel)] += share * samples[(row - 1, channel)];
+            }
+        }
+        samples
+    }
+
+    /// The linear unknowns and the residual of every channel are those of a QR decomposition of all
+    /// whitened columns; one of the poles has decayed long before the end.
+    #[test]
+    fn coloured_channels_are_fitted_as_by_all_whitened_columns() {
+        let len = 2 * POLE_SEGMENT + 500;
+        let data = Data { samples: record(len), constant: true };
+        let poles = [Pole { growth: -1e-4, turn: 0.3 }, Pole { growth: -0.02, turn: 1.1 }];
+        let noise: Vec<Autoregression> = data
+            .samples
+            .column_iter()
+            .map(|column| Autoregression::from_noise(column.as_slice()))
+            .collect();
+        assert!(noise.iter().all(|noise| noise.order() > 0));
+        let fit = data.at(&poles, &noise, &data.whitened(&noise)).unwrap();
+        let basis = columns(&poles, true, 0, len, len);
+        for (channel, noise) in noise.iter().enumerate() {
+            let white = |values: DVector<f64>| -> DVector<f64> {
+                noise.whitened(values.as_slice(), 0, 0).into()
+            };
+            let whitened: Vec<DVector<f64>> =
+                (0..5).map(|column| white(basis.column(column).into_owned())).collect();
+            let (regressors, right) = (
+                DMatrix::from_columns(&whitened),
+                white(data.samples.column(channel).into_owned()),
+            );
+            let (q, r) = regressors.clone().qr().unpack();
+            let linear = r.solve_upper_triangular(&q.tr_mul(&right)).unwrap();
+            let square = (&right - regressors * &linear).norm_squared();
+            let fitted = &fit.channels[channel];
+            assert!((&fitted.linear - &linear).norm() < 1e-9 * linear.norm(), "{channel}");
+            assert!((fitted.square / square - 1.0).abs() < 1e-9, "{} {square}", fitted.square);
+        }
+    }
+}
