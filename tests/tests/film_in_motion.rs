@@ -85,8 +85,8 @@ fn settings() -> IdentifyBearing {
     IdentifyBearing { stator_mass: MASS, coefficients, ..IdentifyBearing::default() }
 }
 
-/// Bearing that a linear test finds at an amplitude in newtons per line; the noise is this part of
-/// the RMS of the motion.
+/// Bearing that a linear test finds at an amplitude in newtons per line; `part` is the ratio of the
+/// noise to the RMS of the motion.
 fn identified(lines: &[usize], amplitude: f64, part: f64) -> IdentifiedBearing {
     let test = |along: usize| {
         let repeats = if part > 0.0 { 8 } else { 1 };
@@ -184,7 +184,8 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
         of_odd.push(b);
     }
     assert!(page.contains(&table), "the page should have\n{table}");
-    // The bias grows with the amplitude with all lines, with its square with odd lines.
+    // With all lines, the bias grows with the amplitude; with odd lines, with the square of the
+    // amplitude.
     let order = |from: [f64; 3], to: [f64; 3]| (to[1] / from[1]).ln() / (to[0] / from[0]).ln();
     let (first, second) = (order(of_all[1], of_all[3]), order(of_odd[1], of_odd[3]));
     assert!((first - 1.0).abs() < 0.1 && (second - 2.0).abs() < 0.3, "{first} {second}");
@@ -206,8 +207,8 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
     is_in_the_book("bias.svg", &Figure::new("Bias of linear identification").panel(panel));
 }
 
-/// Motion of a rotor of this number of critical masses, released beside its equilibrium, with 200
-/// steps per turn of the shaft.
+/// Motion of a rotor of `masses` times the critical mass, released at a distance of `beside`
+/// clearances from its equilibrium, with 200 steps per turn of the shaft.
 fn let_go(masses: f64, beside: f64, turns: usize) -> Record {
     let rotor = free(masses * critical().0);
     let system = on_the_film(&rotor);

@@ -1,4 +1,5 @@
-//! The example records of the book's bearing test: `rig` runs on its film, `dry` is its baseline.
+//! The example records of the book's bearing test: `rig` is the test with the film, `dry` is the
+//! baseline test without it.
 //!
 //! ```text
 //! cargo run -p mechid-analysis --example bearing_record -- rig > examples/bearing-rig.csv
@@ -42,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let is_dry = std::env::args().nth(1).is_some_and(|which| which == "dry");
     let (rig, seed) = if is_dry { (rig()?.dry(), 2) } else { (rig()?, 1) };
     let sampling = Sampling::from_rate_hz(1024.0, LENGTH[0])?;
-    // 20 to 252 Hz in steps of 4 Hz; the shakers excite alternate lines.
+    // The lines are from 20 to 252 Hz in steps of 4 Hz; the shakers excite alternate lines.
     let lines: Vec<usize> = (5..=63).collect();
     let amplitude = if is_dry { 4.0 } else { 14.0 };
     let period = rig.period(sampling, &lines, amplitude, Shakers::Interleaved, seed)?;

@@ -51,7 +51,8 @@ enum Machine {
     Linear(SecondOrderSystem),
     /// Machine with a second mass, not measured, whose spring has this damping (N·s/m).
     Hidden(f64),
-    /// Machine with a cubic spring that adds this fraction of the linear force, in the RMS.
+    /// Machine with a cubic spring: this is the ratio of the RMS of its force to the RMS of the
+    /// linear spring force.
     Cubic(f64),
     /// The response is late by this number of samples.
     Late(usize),
@@ -60,7 +61,7 @@ enum Machine {
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
 fn oscillator(damping_ratio: f64) -> SecondOrderSystem {
-    // The resonance is line 12 of the period, exactly.
+    // The natural frequency is exactly that of line 12 of the period.
     let omega = 12.0 * sampling().omega0();
     let (m, k) = (10.0, 10.0 * omega * omega);
     Sdof::new(m, 2.0 * damping_ratio * m * omega, k).expect("positive mass").system()
@@ -85,7 +86,7 @@ impl Machine {
         }
     }
 
-    /// One period of displacement, velocity and acceleration under one period of a force.
+    /// Returns one period of displacement, velocity and acceleration for one period of a force.
     fn responses(&self, force: &Record, held: bool) -> Outcome<[Record; 3]> {
         let of = |system: &SecondOrderSystem, force: &Record| -> Outcome<[Record; 3]> {
             let all = match held {
@@ -105,7 +106,8 @@ impl Machine {
                 Ok([first(x)?, first(v)?, first(a)?])
             }
             Machine::Cubic(share) => {
-                // The steady state by iteration: the cube is a force on the right-hand side.
+                // The steady state is computed by iteration: the cubic spring force is a force on
+                // the right-hand side.
                 let system = oscillator(0.05);
                 let k = system.stiffness()[(0, 0)];
                 let linear = of(&system, force)?;

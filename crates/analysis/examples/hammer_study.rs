@@ -1,5 +1,6 @@
-//! Study of hammer tests of three masses, with five hits on each, two of them bad: bad hits that
-//! are found, good hits that are lost, and coverage of the intervals.
+//! Study of hammer tests of three masses, with five hits on each, two of them bad: percentage of
+//! bad hits that are detected, percentage of good hits that are excluded, and coverage of the
+//! intervals.
 //!
 //! ```text
 //! cargo run --release -p mechid-analysis --example hammer_study -- 1000 100
@@ -92,7 +93,7 @@ fn study(quantity: ResponseQuantity, force_noise: f64, points: usize, tests: u64
     let total = |at: usize| counts.iter().map(|counts| counts[at]).sum::<f64>();
     let (found, lost) = (100.0 * total(1) / total(0), 100.0 * total(3) / total(2));
     let modes = 100.0 * sum(&|run| run.holding[1]) / count;
-    // Hits on one mass give the modes alone.
+    // Hits on one mass determine the modes, but not M, C and K.
     let parameters = match points {
         1 => "–".to_owned(),
         _ => format!("{:.1}", 100.0 * sum(&|run| run.holding[0]) / count),
@@ -115,7 +116,7 @@ fn study(quantity: ResponseQuantity, force_noise: f64, points: usize, tests: u64
     }
 }
 
-/// The record of hits on one degree of freedom, with noise on the response.
+/// Returns the record of hits on one degree of freedom, with noise on the response.
 fn measure(rig: &HammerTest, noise: f64, dof: usize, seed: u64) -> Option<HammerRecord> {
     let seed = 3 * seed + dof as u64;
     let record = rig.measure(dof, 2, seed).ok()?;
@@ -124,8 +125,8 @@ fn measure(rig: &HammerTest, noise: f64, dof: usize, seed: u64) -> Option<Hammer
     Some(HammerRecord { response, ..record })
 }
 
-/// Returns the number of bad hits, how many of them are found, the number of good hits, and how
-/// many of them are excluded.
+/// Returns four numbers: the bad hits, the bad hits that are excluded, the good hits, and the good
+/// hits that are excluded.
 fn count_hits(rig: &HammerTest, noise: f64, seed: u64) -> Option<[f64; 4]> {
     let mut counts = [0.0; 4];
     for dof in 0..3 {

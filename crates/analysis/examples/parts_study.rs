@@ -4,9 +4,10 @@
 //! ```text
 //! cargo run --release -p mechid-analysis --example parts_study -- 200 [NAME]
 //! ```
-//! For each row: runs with a factor of exactly 1, runs with any warning, the median factor, the
-//! share of 95 % intervals of mass, damping and stiffness that contain the values of the machine,
-//! and the terms that are named as missing.
+//! The study prints, for each kind of test: the percentage of runs whose intervals are not widened
+//! (factor 1), the percentage of runs with any warning, the median factor, the percentages of 95 %
+//! intervals of mass, damping and stiffness that contain the true values, and the terms that the
+//! checks report as missing.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::collections::BTreeMap;
@@ -28,7 +29,7 @@ const PERIOD: usize = 512;
 /// Ratio of the bandwidth of the force to the sampling rate.
 const BAND: f64 = 0.35;
 
-/// What is recorded.
+/// Kind of test.
 #[derive(Debug, Clone, Copy)]
 enum Test {
     /// Open records of machines whose masses differ from the nominal mass by these fractions.
@@ -176,7 +177,8 @@ fn row(name: &str, test: Test, machine: &FaultyOscillator, band: f64, runs: u64)
     };
     let mut factors: Vec<f64> = all.iter().map(scale).collect();
     factors.sort_by(f64::total_cmp);
-    // Far below its natural frequency on its spring, the hidden mass moves with the machine.
+    // The band is far below the natural frequency of the hidden mass on its spring, so this mass
+    // moves with the machine.
     let mass = machine.mass + machine.hidden_mass;
     let truth = [("m", mass), ("c", machine.damping), ("k", machine.stiffness)];
     let is_estimated =

@@ -109,7 +109,7 @@ fn fits() -> [(&'static str, Identify); 4] {
     ]
 }
 
-/// 10 kg at 25 Hz.
+/// Returns an oscillator of 10 kg with a natural frequency of 25 Hz and this damping ratio.
 fn oscillator(ratio: f64) -> SecondOrderSystem {
     let omega = 25.0 * TAU;
     let oscillator = Sdof::new(10.0, 20.0 * ratio * omega, 10.0 * omega * omega);
@@ -123,7 +123,8 @@ fn two() -> SecondOrderSystem {
     SecondOrderSystem::new(mass, damping, stiffness).expect("an invertible mass")
 }
 
-/// Chain of eight masses with modes from 17 to 99 Hz and damping ratios from 1.2 to 4.7 %.
+/// Returns a chain of eight masses with modes from 17 to 99 Hz and damping ratios from 1.2 to 4.7
+/// %.
 fn eight() -> SecondOrderSystem {
     let stiffness = DMatrix::from_fn(8, 8, |i, j| match i.abs_diff(j) {
         0 => 4e5,

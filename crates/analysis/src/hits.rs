@@ -11,10 +11,11 @@ use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Minimum ratio of a sample to the largest force for a sample of a pulse.
+/// Minimum ratio of a force sample to the largest force, for a sample that counts as part of a
+/// pulse.
 const PULSE: f64 = 0.05;
 
-/// Maximum share of samples of a hammer test that belong to pulses.
+/// Maximum share of the samples that belong to pulses, in a record that counts as a hammer test.
 const RARE: f64 = 0.05;
 
 /// Maximum ratio of pull to push of a hammer; ringing filters cause some pull.
@@ -363,7 +364,7 @@ mod tests {
         }
     }
 
-    /// Sixty hits with one fault are one line, and few hits a line each.
+    /// Sixty hits with the same fault give one line of text. Few hits give one line each.
     #[test]
     fn many_bad_hits_of_one_kind_are_one_line() {
         let overload = Some(HitFault::Overload { level: 390.0 });

@@ -23,13 +23,13 @@ pub const WHOLE_BYTES: usize = 640;
 /// and one response took 920 bytes.
 pub const OPEN_BYTES: usize = 1100;
 
-/// Bytes of memory per number of such a record and degree of freedom: the sensitivities of a line
-/// grow with the number of unknowns, and 3, 4 and 10 degrees of freedom took 620, 630 and 650
-/// bytes.
+/// Bytes of memory per number and degree of freedom of a record whose transient is fitted. The
+/// sensitivities of a line grow with the number of unknowns: 3, 4 and 10 degrees of freedom took
+/// 620, 630 and 650 bytes.
 pub const OPEN_DOF_BYTES: usize = 650;
 
-/// Number of degrees of freedom above which the memory per number grows no more: the largest
-/// sensitivities are not computed.
+/// Number of degrees of freedom above which the memory per number of a record no longer grows,
+/// because the largest sensitivities are not computed.
 pub const OPEN_DOF: usize = 10;
 
 /// Bytes of memory per number of the window for a prediction, or the fit of a free decay.
@@ -45,15 +45,17 @@ pub const PAIR_BYTES: usize = 128;
 /// sensitivities.
 pub const TABLE_BYTES: usize = 3000;
 
-/// Additional bytes of memory per number of such a table and degree of freedom: the receptance of a
-/// line and the covariance of its noise; 20 and 40 degrees of freedom took 400 bytes.
+/// Additional bytes of memory per number of a table of frequency responses and degree of freedom:
+/// the receptance of a line and the covariance of its noise; 20 and 40 degrees of freedom took 400
+/// bytes.
 pub const TABLE_DOF_BYTES: usize = 400;
 
-/// Bytes of memory per number of such a table and unknown: three copies of the sensitivities of the
-/// real and the imaginary part.
+/// Bytes of memory per number of a table of frequency responses and unknown: three copies of the
+/// sensitivities of the real and the imaginary part.
 pub const TABLE_SENSITIVITY_BYTES: usize = 48;
 
-/// Largest memory of these sensitivities, in bytes; larger ones are not computed.
+/// Largest memory of the sensitivities of a table of frequency responses, in bytes; larger
+/// sensitivities are not computed.
 pub const TABLE_SENSITIVITIES: usize = 3 << 27;
 
 /// Bytes of memory per pair of unknowns of a fit: the normal equations, their factor and the
@@ -71,9 +73,9 @@ pub const MODAL_PAIR_BYTES: usize = 40;
 /// Largest number of modes of a first estimate. If their memory is allowed, they are not counted.
 pub(crate) const MANY_MODES: usize = 72;
 
-/// Minimum number of equations per unknown on which other models of a table are tried first. If
-/// none of them explains these lines far better than the fitted model, they are not fitted to all
-/// lines.
+/// Minimum number of equations per unknown in a table with fewer lines, on which other models are
+/// tried first. A model that does not explain these lines far better than the fitted model is not
+/// fitted to all lines.
 pub(crate) const TRIED_EQUATIONS: usize = 40;
 
 /// Minimum number of lines of each table on which other models are tried first; fewer lines would
@@ -101,12 +103,12 @@ pub const REST_DECAY: f64 = 7.0;
 /// the record; it limits the memory.
 pub const REST_RECORDS: usize = 8;
 
-/// Minimum relative uncertainty of the standard errors for a remark: 12 degrees of freedom have
-/// this uncertainty.
+/// Minimum relative uncertainty of the standard errors for a remark: 12 degrees of freedom give an
+/// uncertainty of about 20 %.
 pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
-/// Minimum share of the variance of a response that the modes of a test must explain, and predict
-/// where it was not fitted. With less, most of the response has another cause, and the entries of
-/// the shapes at this response are unreliable.
+/// Minimum share of the variance of a response that the modes of a test must explain and, in a
+/// validation, predict. With a smaller share, most of the response has another cause, and the
+/// entries of the shapes at this response are unreliable.
 pub const LEAST_EXPLAINED: f64 = 0.5;
 
 /// Minimum share of the samples in the smaller half of a test that is divided between two records.
@@ -226,23 +228,23 @@ pub const ACQUISITION_ROUNDS: usize = 8;
 pub const ACQUISITION_SETTLED: f64 = 0.02;
 
 /// Maximum number of effects of the noise of pulses (lines × patterns × outputs, real and imaginary
-/// parts) that the fit of a machine stores if hits without a gap are one record: 256 MiB. With
-/// more, every hit is a record with its own transient, which costs up to half of the information
-/// about light damping.
+/// parts) that the fit of a machine stores if hits without a gap are one record: 256 MiB. With more
+/// effects, every hit is a separate record with its own transient; this loses up to half of the
+/// information about light damping.
 pub(crate) const PULSE_EFFECTS: usize = 1 << 25;
 
 /// Number of periods of the slowest mode, at each end of a record, that decide whether the record
 /// begins and ends at rest.
 pub(crate) const REST_PERIODS: f64 = 2.0;
 
-/// Maximum number of these samples; more take more time, and the faster modes already show a
-/// motion.
+/// Maximum number of samples, at each end of a record, that decide whether it begins and ends at
+/// rest. More samples take more time, and the faster modes already show a motion.
 pub(crate) const REST_SAMPLES: usize = 4096;
 
 /// Ratio of the RMS of a channel at an end of a record to its largest value, at or below which the
 /// channel is at rest: the rest is rounding.
 pub(crate) const REST_DIGITS: f64 = 1e-9;
 
-/// Probability of the correlations of the prediction errors of a force model, if the model is
-/// right, below which a remark says that the standard error of the force is not reliable.
+/// P-value of the correlations of the prediction errors of a force model; below it, a remark says
+/// that the standard error of the force is not reliable.
 pub const INNOVATION_LEVEL: f64 = 1e-3;

@@ -24,7 +24,7 @@ pub struct Machine {
     pub name: String,
     /// M, C and K, and the covariance of their uncertain entries.
     pub uncertain: UncertainSystem,
-    /// Degrees of freedom of the variance behind the covariance.
+    /// Statistical degrees of freedom of the covariance.
     pub degrees_of_freedom: usize,
     /// The system with its nonlinear terms; `None` for a linear system.
     pub nonlinear: Option<NonlinearPart>,
@@ -33,7 +33,7 @@ pub struct Machine {
     pub names: Channels,
 }
 
-/// A system with nonlinear terms, as its channels record it.
+/// A system with nonlinear terms, and the delay and phase of the channels that record it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearPart {
     /// M, C and K with the terms and their coefficients, and the covariance of the uncertain

@@ -67,8 +67,8 @@ pub struct BackboneRow {
 pub struct ShapeEntry {
     /// Real and imaginary part.
     pub value: [f64; 2],
-    /// Standard errors of real and imaginary part, in the same unit; `None` for an exactly known
-    /// machine.
+    /// Standard errors of real and imaginary part, in the unit of the entry; `None` for an exactly
+    /// known machine.
     #[serde(default, deserialize_with = "saved_errors")]
     pub standard_error: Option<[f64; 2]>,
 }

@@ -20,8 +20,8 @@ use crate::text::{paragraph, significant, text_table};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Predict {
-    /// Number of initial samples used to estimate the initial state and excluded from the errors;
-    /// `None`: the machine is at rest before the first sample. For open records.
+    /// Number of initial samples of an open record that are used to estimate the initial state and
+    /// excluded from the errors; `None`: the machine is at rest before the first sample.
     pub settle: Option<usize>,
 }
 

@@ -126,7 +126,7 @@ mod tests {
             let times = if cell.contains("0 of") { 4 } else { 1 };
             assert_eq!(text.matches(&cell).count(), times, "{cell}");
         }
-        // Nothing changes where a page is wide enough.
+        // A table that is narrow enough for the page is not changed.
         let narrow: Vec<Vec<String>> = rows.iter().map(|row| row[..4].to_vec()).collect();
         assert_eq!(paged_table(&narrow, 2), text_table(&narrow));
     }

@@ -30,8 +30,8 @@ use crate::modes::ModalCheck;
 /// ```
 ///
 /// # Errors
-/// The errors of `work`; [`AnalysisError::TimeLimit`] instead if the limit has ended a search
-/// before; [`AnalysisError::Setting`] if the limit is negative or not finite.
+/// The errors of `work`; [`AnalysisError::TimeLimit`] if the limit ended a search before `work`
+/// failed; [`AnalysisError::Setting`] if the limit is negative or not finite.
 pub fn within<T, E: From<AnalysisError> + Display>(
     seconds: Option<f64>,
     work: impl FnOnce() -> Result<T, E>,

@@ -133,8 +133,8 @@ mod limits {
         assert_eq!((summary.failed, &*summary.failures[0].code), (2, "analysis.record-time"));
     }
 
-    /// If one of several records that are read together is too large for its process, only its row has
-    /// the error.
+    /// Several records are read together, and one of them is too large for the process: only the
+    /// row of this record has the error.
     pub fn the_record_that_ends_the_process_has_the_error() {
         let home = tempfile::tempdir().unwrap();
         let path = home.path().join("many.parquet");

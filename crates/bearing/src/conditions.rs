@@ -1,4 +1,4 @@
-//! Size, oil and speed of a bearing: the units of the dimensionless numbers.
+//! Size, oil and speed of a bearing: they convert between SI units and dimensionless numbers.
 
 use std::f64::consts::TAU;
 

@@ -37,7 +37,8 @@ pub enum BearingError {
         /// each).
         position: [f64; 2],
     },
-    /// The ends of the film did not settle within the iterations allowed.
+    /// The positions of the ends of the film did not converge within the maximum number of
+    /// iterations.
     #[error(
         "the ends of the film did not converge in {iterations} iterations \
          (last change {change:.1e} rad) with the journal at ({}, {}) times the clearance, \
@@ -48,20 +49,20 @@ pub enum BearingError {
     FilmNotConverged {
         /// Iterations made.
         iterations: usize,
-        /// Last change of an end of the film, in rad.
+        /// Change of the position of an end of the film in the last iteration, in rad.
         change: f64,
         /// Position of the journal along and across the load, divided by the clearance (a ratio
         /// each).
         position: [f64; 2],
     },
-    /// No equilibrium was found within the iterations allowed.
+    /// No equilibrium was found within the maximum number of iterations.
     #[error(
         "no equilibrium was found for the Sommerfeld number {sommerfeld} in {iterations} \
          iterations (last step {step:.1e} times the clearance); a finer mesh may help",
         sommerfeld = message::number(*sommerfeld)
     )]
     EquilibriumNotConverged {
-        /// Sommerfeld number asked for, dimensionless.
+        /// Sommerfeld number of the requested equilibrium, dimensionless.
         sommerfeld: f64,
         /// Iterations made.
         iterations: usize,

@@ -6,12 +6,14 @@ pub(crate) const NEWTON_STEPS: usize = 60;
 /// Longest step of the journal, in clearances; Newton's method may diverge with longer ones.
 pub(crate) const JOURNAL_STEP: f64 = 0.1;
 
-/// Smallest fraction of the thinnest film that remains after a step of the journal.
+/// Smallest ratio of the minimum film thickness after a step of the journal to that before the
+/// step.
 pub(crate) const STEP_FILM_FRACTION: f64 = 0.3;
 
-/// Steps below which each mesh has converged, from coarse to fine: of the journal relative to the
-/// thinnest film, and of the fronts in rad. Newton's method converges quadratically, so that the
-/// remaining error is about the square of the last step.
+/// Limits of the last step on each mesh, from coarse to fine; below them, the solution on this mesh
+/// has converged. The step of the journal is relative to the smallest film thickness, the step of
+/// the fronts is in rad. Newton's method converges quadratically, so that the remaining error is
+/// about the square of the last step.
 pub(crate) const MESH_TOLERANCES: [f64; 3] = [1e-2, 1e-3, 1e-6];
 
 /// Largest eccentricity for which the mesh is graded towards thin films.
@@ -23,5 +25,6 @@ pub(crate) const FRONT_STEP: f64 = 0.3;
 /// Smallest fraction of the converging arc that a film covers; a smaller film could vanish.
 pub(crate) const FILM_FRACTION: f64 = 0.6;
 
-/// Change of a front (rad) above which the pressure is computed anew.
+/// Change of a front (rad) above which the pressure is computed again; after a smaller change, it
+/// is corrected to first order.
 pub(crate) const PRESSURE_UPDATE: f64 = 0.02;

@@ -82,7 +82,7 @@ impl Threshold {
         let whirl_squared = (x * y - kxy * kyx) / determinant;
 
         let by_equivalent = SVector::from([cyy, -cyx, -cxy, cxx, -y, -kyx, -kxy, -x]) / trace;
-        // The entries are the derivatives of x y − kxy kyx − ω_w² det C = 0.
+        // The entries are the derivatives of x y − kxy kyx − ω_w² det C for constant k_eq and ω_w.
         let apart = SVector::from([
             -y,
             -kyx,

@@ -21,9 +21,9 @@ use super::weighted_fit::{Weighing, after_spectral_fit};
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     Between(Discretisation),
-    /// High-pass in one response or in all of them.
+    /// High-pass in one response, given by its index, or in all responses (`None`).
     Response(Option<usize>),
-    /// High-pass in one force or in all of them.
+    /// High-pass in one force, given by its index, or in all forces (`None`).
     Force(Option<usize>),
 }
 
@@ -43,8 +43,9 @@ impl Fault {
         faults
     }
 
-    /// Returns the data without the fault, or with the same fault in all channels; `amount` is the
-    /// corner frequency (rad/s) of a high-pass.
+    /// Returns data in which the fault has no effect: with the equivalent band-limited force, or
+    /// with the same high-pass in all channels. `amount` is the corner frequency (rad/s) of the
+    /// high-pass.
     fn removed(
         self,
         data: &FrequencyData,
@@ -121,7 +122,7 @@ impl Residuals<'_> {
         scored.collect()
     }
 
-    /// Scores a fault after `amount` of it has been removed.
+    /// Returns the score of a fault in data from which `amount` of this fault has been removed.
     ///
     /// # Source
     /// Rao's score test.
@@ -176,8 +177,8 @@ fn local_variance(deviations: &DVector<f64>, dof: usize) -> DVector<f64> {
     variance
 }
 
-/// Subtracts from the directions of each record the part that the parameters and the additional
-/// columns of this record explain.
+/// Subtracts from the directions of each record the components that the parameters and the
+/// additional columns of this record explain.
 fn without_explained(
     mut directions: Vec<DVector<f64>>,
     after: &[SpectralResidual],
@@ -256,9 +257,9 @@ pub fn fault_of_acquisition(
     Ok(best.map(|(_, finding)| finding))
 }
 
-/// Returns the kinds of a force between samples `dt` (s) apart, held or linear, that change the
-/// residual of an `estimate` significantly: a new fit shows which of them explains it. `records`
-/// are open records without their transients, and `after` the residuals.
+/// Returns the courses of the force between samples `dt` (s) apart, held or linear, that change the
+/// residual of an `estimate` significantly; a new fit must show which course explains the residual.
+/// `records` are open records without their transients, and `after` are the residuals.
 ///
 /// # Source
 /// Rao's score test.
@@ -347,7 +348,7 @@ fn driven(records: &[FrequencyData], dof: usize) -> Vec<usize> {
     (0..dof).filter(acts).collect()
 }
 
-/// Returns the amount of a fault after some refinements, and the records without it.
+/// Returns the amount of a fault after some refinements, and the records without this fault.
 fn removed(
     fault: Fault,
     score: Score,

@@ -17,12 +17,13 @@ use super::whiteness::{NoiseSpan, Residual, Whiteness};
 /// Tests every channel of a residual for whiteness and for correlation with the forces that act
 /// (N).
 ///
-/// `fitted` is the fitted signal on the same time axis; a residual of rounding always passes.
-/// `noise_span` is the number of lags over which noise on the response correlates the residual: 0
-/// if each sample contains the noise of one sample, 1 if it contains the noise of two consecutive
-/// samples ([`missing_force`](mechid_estimate::missing_force())), the window length minus one after
-/// a sliding polynomial. A residual correlated over that span and no further is reported as such.
-/// The test of the correlation with a force allows for the autocorrelation of the residual.
+/// `fitted` is the fitted signal on the same time axis; a residual that is only rounding always
+/// passes. `noise_span` is the number of lags over which noise on the response correlates the
+/// residual: 0 if each sample contains the noise of one sample, 1 if it contains the noise of two
+/// consecutive samples ([`missing_force`](mechid_estimate::missing_force())), the window length
+/// minus one after a sliding polynomial. A residual correlated over that span and no further is
+/// reported as such. The test of the correlation with a force allows for the autocorrelation of the
+/// residual.
 ///
 /// # Errors
 /// As [`whiteness_beyond`], and [`EstimateError::Signal`] or

@@ -38,8 +38,8 @@ const STEPS_PER_SAMPLE: isize = 2;
 /// motion fits the lines far better ([`Finding::Delay`]). `dt` is the sampling interval of the
 /// record in s; lines are weighted by the noise if `data` states it. `None` if no delay of up to 16
 /// samples (64 if the response hardly follows the force) reduces the residual power to less than a
-/// quarter, in least squares and, if the noise is stated, in maximum likelihood: noise on a
-/// resonance disturbs least squares.
+/// quarter, in least squares and, if the noise is stated, also in maximum likelihood, because noise
+/// at a resonance disturbs least squares.
 ///
 /// # Source
 /// Ours: least squares on the equation of motion with the force times e^(−iωτ).
@@ -53,7 +53,7 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
 }
 
 /// Returns the delay, in samples, with which the equations of motion fit best, and their residual
-/// power with it.
+/// power with this delay.
 fn delay_of_equations(
     equations: &DelayedForce<'_>,
     dt: f64,
@@ -77,12 +77,13 @@ fn delay_of_equations(
 /// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
 /// uncorrelated with the forces. If the residuals `without_delay` are uncorrelated with the forces,
 /// too, either at most a quarter of the power may remain, or the tests of the residual warn without
-/// the delay and pass with it. Less than the fraction `below` of the power must remain: 1, or what
-/// another explanation leaves. `dt` is the sampling interval in s; sinusoidal disturbances have
-/// been subtracted from the `records`. `None` if no delay of up to 16 samples (64 if the response
-/// hardly follows the force) satisfies this.
+/// the delay and pass with it. The fraction of the power that remains must be less than `below`: 1,
+/// or the fraction that remains with another explanation. `dt` is the sampling interval in s;
+/// sinusoidal disturbances have been subtracted from the `records`. `None` if no delay of up to 16
+/// samples (64 if the response hardly follows the force) satisfies this.
 ///
-/// The transients are estimated again for each delay; otherwise they would absorb a part of it.
+/// The transients are estimated again for each delay; otherwise they would contain a part of the
+/// effect of the delay.
 ///
 /// # Source
 /// Ours: equations of motion, with and without Hann's window, with the force times e^(−iωτ), then
@@ -160,7 +161,7 @@ fn delay_of_either_window(
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the
-/// dynamic stiffness of the estimate without a delay, and their residual power with it.
+/// dynamic stiffness of the estimate without a delay, and the residual power with this delay.
 fn delay_weighted(
     data: &FrequencyData,
     dt: f64,
@@ -206,7 +207,8 @@ fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
 }
 
 /// Finds a delay like [`delay_of_lines`] for a fit of the equation of motion, sample by sample, to
-/// a response and a force (N); in whole samples, from the first 32,768 samples of a long record.
+/// a response and a force (N). The delay is a whole number of samples; only the first 32,768
+/// samples of a long record are used.
 ///
 /// # Source
 /// Ours.

@@ -282,7 +282,7 @@ mod tests {
         }
     }
 
-    /// A drop-out is missed only where the force passes through its mean at both of its ends.
+    /// A drop-out is missed only if the force passes through its mean at both ends of the drop-out.
     #[test]
     fn drop_outs_of_forces_are_named() {
         let (mut all, mut named) = (0, 0);

@@ -78,7 +78,7 @@ findings! {
     Seam in seam,
     /// Deviation of single periods of the response from their mean.
     PeriodScatter in period_scatter,
-    /// The force differs from period to period, and the response with it.
+    /// The force differs from period to period, and so does the response.
     UnequalPeriods in unequal_periods,
     /// The force does not repeat after the claimed period.
     WrongPeriod in period,

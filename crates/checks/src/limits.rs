@@ -111,8 +111,8 @@ pub const ASYMMETRY: f64 = 1e-6;
 pub const UNMEASURED_FORCE: f64 = 0.1;
 
 /// Minimum deviation of the ratio of two mirrored entries from 1, in standard errors, for a gain to
-/// be reported. The ratios in damping and in stiffness must both have it; a smaller deviation may
-/// be due to noise.
+/// be reported. Both ratios, in damping and in stiffness, must have this deviation; a smaller
+/// deviation may be due to noise.
 pub const GAIN_SHOWS: f64 = 5.0;
 
 /// Maximum difference, in standard errors, between the ratios of mirrored entries in damping and in
@@ -282,8 +282,9 @@ pub(crate) const FIT_PRODUCTS: usize = 1 << 32;
 /// drop-out.
 pub const DROP_OUT_NEIGHBOURS: usize = 64;
 
-/// Minimum standard deviation of the samples on either side of a run of equal ones, in steps of the
-/// converter, for a channel to move: a structure that comes to rest moves through a few steps.
+/// Minimum standard deviation, in steps of the converter, of the samples on either side of a run of
+/// equal samples if the channel counts as moving; a structure that comes to rest moves by a few
+/// steps only.
 pub const DROP_OUT_MOTION: f64 = 10.0;
 
 /// Maximum probability of a run of equal samples that counts as a drop-out; real drop-outs have far
@@ -301,7 +302,8 @@ pub(crate) const CORNER_WIDTHS: [f64; 2] = [0.5, 0.01];
 /// high-pass.
 pub(crate) const HIGH_PASS_STEP: f64 = 1e-3;
 
-/// Maximum number of changes in the sentence about an omitted term; the result has all of them.
+/// Maximum number of changes in the sentence about an omitted term; the finding itself has all
+/// changes.
 pub(crate) const LISTED_CHANGES: usize = 3;
 
 /// Maximum length of a drop-out of a force, as a fraction of the record; a longer run of equal

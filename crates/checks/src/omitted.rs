@@ -39,7 +39,7 @@ pub struct ChangeByTerm {
     pub by: f64,
     /// Standard error of the change (unit of the parameter).
     pub standard_error: f64,
-    /// Change over the standard error of the parameter without the term (pure number).
+    /// Ratio of the change to the standard error of the parameter without the term (pure number).
     pub in_errors: f64,
 }
 
@@ -100,7 +100,7 @@ pub struct NamedChange {
     pub unit: String,
     /// Change (unit of the parameter).
     pub by: f64,
-    /// Change over the standard error of the parameter without the terms (pure number).
+    /// Ratio of the change to the standard error of the parameter without the terms (pure number).
     pub in_errors: f64,
 }
 

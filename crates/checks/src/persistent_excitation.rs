@@ -23,8 +23,9 @@ pub struct PersistentExcitation {
     pub needed: usize,
 }
 
-/// Returns the order of persistent excitation of each force, in the record in which it is highest,
-/// compared with the number of states and inputs, or with the number of unknowns.
+/// Returns a finding for each force: its highest order of persistent excitation in any of the
+/// records, compared with the `needed` order, which is the number of states and inputs or the
+/// number of unknowns.
 pub(super) fn excitation<'a>(
     records: impl Iterator<Item = &'a Record>,
     needed: usize,

@@ -24,9 +24,9 @@ use super::whiteness::{Residual, Whiteness};
 /// `force_dof`, as for [`Frf::data`]. `fitted` is the number of parameters (a pure number) fitted
 /// to these data; for several records fitted together, the share of this record.
 ///
-/// Both allow for the correlation of lines by the window and the overlap of the segments; lines of
-/// responses from other sources count as independent. The power is tested if there are more than
-/// two independent averages beyond the number of forces.
+/// Both tests allow for the correlation of lines by the window and for the overlap of the segments;
+/// lines of responses from other sources count as independent. The power is tested if there are
+/// more than two independent averages beyond the number of forces.
 ///
 /// # Errors
 /// As [`Frf::data`].
@@ -111,7 +111,7 @@ impl Expected {
 
 /// Residuals of responses over the lines, in units of their noise.
 struct Series<'a> {
-    /// Residual for each force and, within, each response.
+    /// Residuals over the lines, in the order of the forces and, for each force, of the responses.
     each: Vec<Vec<Complex<f64>>>,
     /// Numbers of the lines, sorted, and their indices in `each`.
     lines: Vec<(usize, usize)>,

@@ -426,8 +426,8 @@ mod tests {
 
     use super::*;
 
-    /// The correlations with a force are those of the sums written out: every product, and A P Σ P
-    /// Aᵀ.
+    /// The correlations with a force equal explicit sums of all products, with the explicit
+    /// covariance A P Σ P Aᵀ.
     #[test]
     fn correlations_with_a_force_are_those_of_the_sums_written_out() {
         let (lines, dof) = (30, 2);

@@ -9,7 +9,8 @@ use super::finding::{Check, Finding, Names};
 use super::limits::SIGNIFICANCE;
 use super::{Subject, Verdict};
 
-/// Response that does not follow the force: a fit explains no more of it than of noise.
+/// Response that does not follow the force: a fit explains no larger part of this response than of
+/// noise.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Unrelated {
@@ -74,14 +75,15 @@ mod tests {
 
     #[test]
     fn noise_is_named_and_a_weak_response_is_not() {
-        // 3 of 2000 equations explain 0.15 % of noise on average, the best of 1000 lines some 1 %.
+        // A fit of 3 parameters to 2000 equations explains on average 0.15 % of noise, at the best
+        // of 1000 lines about 1 %.
         assert!(unrelated_response(0.9985_f64.sqrt(), 2000, 3).is_some());
         assert!(unrelated_response(0.99_f64.sqrt(), 2000, 3).is_some());
         assert!(unrelated_response(1.2, 2000, 3).is_some());
-        // A response in as much noise as response is still one.
+        // A response with noise of the same power still follows the force.
         assert_eq!(unrelated_response(0.5_f64.sqrt(), 2000, 3), None);
         assert_eq!(unrelated_response(0.97_f64.sqrt(), 2000, 3), None);
-        // Nothing can be said without equations to spare.
+        // The test is impossible if there are not more equations than unknowns.
         assert_eq!(unrelated_response(0.5, 3, 3), None);
         assert_eq!(unrelated_response(f64::NAN, 100, 3), None);
     }

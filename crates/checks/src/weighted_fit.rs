@@ -254,8 +254,9 @@ impl<'a> Weighing<'a> {
         Some((values, linear))
     }
 
-    /// Returns the effect of the ends of a record on its residual: steps of an open record, or
-    /// transients of periods whose noise is the response to an unmeasured force.
+    /// Returns the columns that are projected out of the residual of a record. For an open record
+    /// these are steps between the final and initial values of each channel; for periods whose
+    /// noise is the response to an unmeasured force, they are the transients of this response.
     fn jumps(&self, at: usize, values: &DVector<f64>) -> Vec<DVector<f64>> {
         let entries = self.entries_of(values);
         let weighted = |data: FrequencyData| {

@@ -208,7 +208,7 @@ fn noise_stays_inside_the_standard_errors() {
         assert!((found - value).abs() < 4.0 * error, "{name} = {found} ± {error}, truth {value}");
         assert!(error < 0.02 * value, "{name} ± {error}");
     }
-    // The report tells a bad fit from a good one.
+    // The report distinguishes a bad fit from a good one.
     let report = mechid(folder.path(), &format!("{common} --periods 1 --band-hz 2:30"));
     assert!(report["fit"]["unexplained_motion"].as_f64().unwrap() > 0.02);
 }

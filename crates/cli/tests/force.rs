@@ -170,7 +170,8 @@ fn bad_requests_say_what_to_change() {
         let arguments = format!("force run.csv --system machine.json {arguments}");
         let long = arguments.contains("tikhonov");
         if long {
-            // The method takes at most 512 samples, two periods, so three are refused.
+            // The method accepts at most 512 samples, which are two periods, so three periods are
+            // refused.
             let experiment = std::fs::read_to_string(folder.join("experiment.json")).unwrap();
             let three = experiment.replace("\"periods\": 2", "\"periods\": 3");
             std::fs::write(folder.join("experiment.json"), three).unwrap();

@@ -1,5 +1,5 @@
-//! Cost of the identification of the bearing in the frequency domain, records included, and of the
-//! search of machines with many degrees of freedom, which the last lines print.
+//! Time of the identification of the bearing in the frequency domain, from its records. The last
+//! lines of the output show the time of the search for machines with many degrees of freedom.
 
 #![allow(clippy::print_stdout, reason = "the last lines are the result")]
 
@@ -21,7 +21,8 @@ use mechid_spectra::{FrequencyData, Lines, Pooling, RepeatedPeriods};
 use common::monte_carlo::{Estimator, Experiment};
 use common::{bearing, displacements, forces, synthesise};
 
-/// 1,024 samples of two forces and two displacements to C and K with their covariance.
+/// Times the identification of C and K, with their covariance, from 1,024 samples of two forces and
+/// two displacements.
 fn identify(c: &mut Criterion) {
     let system = bearing();
     let sampling = Sampling::new(0.05, 1024).unwrap();
@@ -51,7 +52,7 @@ fn identify(c: &mut Criterion) {
         group.bench_function(format!("{count} lines, from amplitudes"), |b| {
             b.iter(|| equation_error(black_box(&data), &unknowns).unwrap())
         });
-        // The reference: the transforms alone.
+        // The Fourier transforms alone are the reference.
         group.bench_function(format!("{count} lines, four transforms alone"), |b| {
             b.iter(|| {
                 (
@@ -64,7 +65,8 @@ fn identify(c: &mut Criterion) {
     group.finish();
 }
 
-/// One estimate of the bearing from 16 noisy periods of 256 samples, 127 lines.
+/// Times each estimator: one estimate of the bearing from 16 noisy periods of 256 samples, 127
+/// lines.
 fn estimators(c: &mut Criterion) {
     let system = bearing();
     let unknowns = Unknowns::known_mass(system.mass()).unwrap();
@@ -83,8 +85,8 @@ fn estimators(c: &mut Criterion) {
     group.finish();
 }
 
-/// The maximum-likelihood search for all entries of M, C and K of a fixed chain with every mass
-/// driven, from 4 periods.
+/// Times the maximum-likelihood search for all entries of M, C and K, from 4 periods of a fixed
+/// chain with a force on every mass.
 fn many_degrees_of_freedom(_: &mut Criterion) {
     const LINES: usize = 500;
     let mut before: Option<(usize, f64)> = None;

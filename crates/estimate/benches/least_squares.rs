@@ -1,4 +1,5 @@
-//! The row-blocked triangle against nalgebra's QR on the same matrix, and against one pass over it.
+//! Time of the triangular factorisation by row blocks, compared with nalgebra's QR of the same
+//! matrix and with one pass over the matrix.
 
 #![allow(clippy::print_stdout, reason = "the ratios are the result")]
 
@@ -17,7 +18,7 @@ fn random(rows: usize, columns: usize) -> DMatrix<f64> {
     DMatrix::from_fn(rows, columns, |_, _| source.random_range(-1.0..1.0))
 }
 
-/// Reads every number once: no least squares can be faster.
+/// Reads every number once: a least-squares method cannot be faster.
 fn one_pass(a: &DMatrix<f64>) -> f64 {
     let mut sums = [0.0; 8];
     for chunk in a.as_slice().as_chunks::<8>().0 {
@@ -49,7 +50,8 @@ fn triangles(criterion: &mut Criterion) {
 }
 
 fn row_blocks(matrix: &DMatrix<f64>) -> LeastSquares {
-    // The last column as right-hand side: the same triangle as QR of the matrix.
+    // The last column is the right-hand side, which gives the same triangular factor as the QR of
+    // the matrix.
     let unknowns = matrix.ncols() - 1;
     let mut rows = LeastSquares::new(unknowns, 1);
     rows.push_rows(matrix.columns(0, unknowns), matrix.columns(unknowns, 1))
@@ -75,7 +77,7 @@ fn ratios(_: &mut Criterion) {
         let ours = shortest(runs, || row_blocks(black_box(&matrix)));
         let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
         let single = alone.install(|| shortest(runs, || row_blocks(black_box(&matrix))));
-        // A clone for each run, made before the clock starts.
+        // Each run has its own clone, which is made before the clock starts.
         let theirs = (0..runs).map(|_| {
             let copy = std::cell::Cell::new(Some(matrix.clone()));
             shortest(1, || copy.take().map(DMatrix::qr))
@@ -94,8 +96,8 @@ fn ratios(_: &mut Criterion) {
     }
 }
 
-/// Least squares for all entries of M, C and K, with standard errors, compared with nalgebra's QR
-/// of the same rows, solved for all equations at once and without standard errors.
+/// Times least squares for all entries of M, C and K, with standard errors. The reference is
+/// nalgebra's QR of the same rows, solved for all equations at once and without standard errors.
 fn many_degrees_of_freedom(_: &mut Criterion) {
     const ROWS: usize = 2048;
     let mut before: Option<(usize, f64)> = None;

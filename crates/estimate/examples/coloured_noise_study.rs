@@ -1,13 +1,13 @@
-//! Coverage of the intervals of maximum likelihood, and scatter over the Cramér–Rao bound, under noise that
-//! is white, of the first order (0.9), 1/f, white with a narrow disturbance, or the response to an unmeasured
-//! force: seeded experiments of 1, 2, 4 and 8 periods.
+//! Coverage of the intervals of maximum likelihood, and ratio of the scatter to the Cramér–Rao
+//! bound, in seeded experiments of 1, 2, 4 and 8 periods. The noise is white, autoregressive of the
+//! first order (0.9), 1/f, white with a narrow disturbance, or the response to an unmeasured force.
 //!
 //! ```sh
 //! cargo run --release -p mechid-estimate --example coloured_noise_study -- 500 auto
 //! ```
 //!
-//! The arguments are the number of experiments, the noise model (`auto`, `white`, `smooth`, `neighbours:N` or
-//! `per-line`) and, if not all are wanted, the first letters of a noise.
+//! The arguments are the number of experiments, the noise model (`auto`, `white`, `smooth`,
+//! `neighbours:N` or `per-line`) and, to run one noise only, the first letters of its name.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]
 
@@ -31,7 +31,7 @@ const LEVEL: f64 = 0.05;
 const NARROW: f64 = 3.0;
 /// Number of experiments from which the covariance of a noise is estimated.
 const MANY: u64 = 4000;
-/// Number of samples before the first, after which a recursion is steady.
+/// Number of discarded samples before the first one; after them a recursion is stationary.
 const BEFORE: usize = 2000;
 
 /// Colour of a noise.
@@ -44,8 +44,8 @@ enum Colour {
     OneOverF,
     /// White noise, and [`NARROW`] times its RMS in a resonance of the width of four lines.
     Narrow,
-    /// Response of the machine to a force of the first order (0.9) on its last mass, and white
-    /// noise of a tenth of its size.
+    /// Response of the machine to an autoregressive force of the first order (0.9) on its last
+    /// mass, plus white noise with a tenth of the RMS of the response.
     UnmeasuredForce,
 }
 
@@ -107,8 +107,8 @@ impl Colour {
     }
 }
 
-/// A chain of masses with a damping ratio of about 3 %, by the position of its modes among the
-/// lines.
+/// Chains of masses with a damping ratio of about 3 %, named after the position of their modes
+/// among the lines.
 enum Machine {
     /// One mass, whose mode is at line 12 of 100.
     LowMode,
@@ -157,7 +157,7 @@ struct Study {
     lines: Lines,
     unknowns: Unknowns,
     colour: Colour,
-    /// Ratio of the RMS of the noise on each channel to that of the samples drawn.
+    /// Ratio of the RMS of the noise on each channel to the RMS of the random samples.
     scale: Vec<f64>,
     force: Record,
     exact: Record,
@@ -198,12 +198,12 @@ impl Study {
         self.unknowns.free().iter().map(entry).collect()
     }
 
-    /// The experiment number `seed`.
+    /// Returns the periods of the experiment with this seed.
     fn measure(&self, seed: u64) -> Result<RepeatedPeriods> {
         let (len, dof) = (self.exact.len(), self.scale.len());
         let mut motion = self.exact.data().clone();
         if let Colour::UnmeasuredForce = self.colour {
-            // One force moves all channels.
+            // One force moves all channels, so that all have the same factor.
             let by = self.scale[dof - 1];
             let all = self.exact.sampling().with_len(4 * len)?;
             motion += by * response(&self.test.system, all, seed)?.rows(len, len);
@@ -237,7 +237,7 @@ impl Study {
                 if !is_free || fit.noise == [NoiseModel::White] {
                     return Ok(fit);
                 }
-                // As `identify` does.
+                // The command `identify` estimates the noise in the same way.
                 let noise = periods.noise_beside(pooling, &fit.estimate.system()?)?;
                 match noise.models() {
                     [NoiseModel::UnmeasuredForce { .. }] => {
@@ -276,7 +276,8 @@ impl Study {
     }
 }
 
-/// Displacements of a steady state under a force of the first order on the last mass.
+/// Returns the stationary displacements under an autoregressive force of the first order on the
+/// last mass.
 fn response(system: &SecondOrderSystem, sampling: Sampling, seed: u64) -> Result<DMatrix<f64>> {
     let mut force = DMatrix::zeros(sampling.len(), system.dof());
     let drawn = Colour::UnmeasuredForce.samples(sampling.len(), seed);

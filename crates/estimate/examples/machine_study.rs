@@ -1,8 +1,8 @@
-//! Coverage of intervals and scatter over the Cramér–Rao bound of machines of named elements, and the time of
-//! a rotor of 200 degrees of freedom.
+//! Coverage of intervals, and ratio of the scatter to the Cramér–Rao bound, for machines of named
+//! elements; also the time for a rotor of 200 degrees of freedom.
 //!
-//! `cargo run --release -p mechid-estimate --example machine_study -- joint 200` for 200 seeds of the rows
-//! whose names contain "joint"; without words 20 seeds of every row.
+//! `cargo run --release -p mechid-estimate --example machine_study -- joint 200` runs 200 seeds of
+//! the rows whose names contain "joint". Without arguments, 20 seeds of every row are run.
 
 #![allow(dead_code, unused_imports, reason = "the modules are those of the tests")]
 #![allow(clippy::print_stdout, reason = "a study prints")]
@@ -56,7 +56,8 @@ fn row(name: &str, seeds: u64, start: Instant, judged: &Judged) {
     );
 }
 
-/// A rotor of 52 degrees of freedom, identified with Young's modulus times a factor.
+/// Returns the experiment on a rotor of 52 degrees of freedom; the model has the true Young's
+/// modulus times the factor `modulus`.
 fn shaken(modulus: f64) -> impl Fn(u64) -> Option<LikelihoodEstimate> {
     let [right, model] = [1.0, modulus].map(|factor| rotor::Rotor::new(13, factor));
     move |seed| Some(rotor::fit(&rotor::shaken(&right, 120, seed), &model).ok()?.likelihood)
@@ -66,7 +67,8 @@ fn of_noise(noise: NoiseSource) -> impl Fn(u64) -> Option<LikelihoodEstimate> {
     move |seed| chain::fit(seed, &Settings { noise, ..Settings::default() })
 }
 
-/// Two masses under a hammer whose force has noise, which the fit knows or ignores.
+/// Returns the experiment on two masses under a hammer. The measured force has noise, which the fit
+/// knows or ignores.
 fn struck(is_known: bool) -> impl Fn(u64) -> Option<LikelihoodEstimate> {
     move |seed| Some(pulses::experiment(0.1, is_known, seed)?.0)
 }
@@ -116,14 +118,14 @@ fn studies() -> Vec<Study> {
     ]
 }
 
-/// Share of experiments in which a test that should report a fault does so, at a level of 1 %.
+/// Prints the number of experiments in which a test reports a fault at a level of 1 %.
 fn told(name: &str, seeds: u64, p_value: impl Fn(u64) -> Option<f64>) {
     let count = (0..seeds).filter(|seed| p_value(*seed).is_some_and(|p| p < 0.01)).count();
     println!("{name}: told in {count} of {seeds}");
 }
 
-/// Returns the probability that the parts of the data differ as much by noise alone, over all
-/// comparisons.
+/// Returns the p-value of the comparisons of parts of the data: the probability that noise alone
+/// makes the parts differ this much, adjusted for the number of comparisons.
 fn parts(estimate: &MachineEstimate) -> Option<f64> {
     let p_values = estimate.parts.iter().map(|parts| parts.p_value);
     Some(p_values.min_by(f64::total_cmp)? * estimate.parts.len() as f64)
@@ -132,7 +134,8 @@ fn parts(estimate: &MachineEstimate) -> Option<f64> {
 /// p-value of an experiment by its seed.
 type PValue = Box<dyn Fn(u64) -> Option<f64>>;
 
-/// How often parts of right and of wrong data disagree.
+/// Prints the number of experiments in which parts of the data disagree, for correct and for wrong
+/// models.
 fn parts_rows(seeds: u64, is_wanted: impl Fn(&str) -> bool) {
     let chain = |noise: NoiseSource| {
         move |seed| {
@@ -158,8 +161,8 @@ fn parts_rows(seeds: u64, is_wanted: impl Fn(&str) -> bool) {
     }
 }
 
-/// How often a misfit leads to a stated coefficient of the rotor, and the coverage of intervals that
-/// include its effect.
+/// Prints the number of experiments in which a misfit is attributed to a stated coefficient of the
+/// rotor, and the coverage of the intervals that include the error of this coefficient.
 fn stated_row(name: &str, modulus: f64, seeds: u64) {
     let [right, model] = [1.0, modulus].map(|factor| rotor::Rotor::new(13, factor));
     let instruments = model.instruments(vec![model.shaker().0], Speed::Constant(300.0));
@@ -207,8 +210,8 @@ fn time_of_large_rotor() {
     );
 }
 
-/// Searches of the chain in open records of 8,192 samples with five forces and two sensors, from springs and
-/// dampers that are wrong by a common factor.
+/// Searches for the chain in open records of 8,192 samples with five forces and two sensors. All
+/// initial springs and dampers are wrong by the same `factor`.
 fn search_row(name: &str, factor: f64, seeds: u64) {
     let mass = DMatrix::from_diagonal(&chain::MASSES.to_vec().into());
     let [damping, stiffness] = [&chain::DAMPINGS, &chain::STIFFNESSES].map(chain::chain);

@@ -5,8 +5,8 @@
 //! cargo run --release -p mechid-estimate --example search_study
 //! ```
 //!
-//! Two numbers after the name choose machines of the series, from the first up to the second; without them
-//! the search of 10 and 20 masses is timed as well.
+//! Two numbers after the name select the machines of the series from the first number to the
+//! second. Without numbers, the search for 10 and 20 masses is timed, too.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]
 
@@ -23,7 +23,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const PERIODS: usize = 4;
-/// Lines and noise of the machines whose search is timed.
+/// Number of lines, and ratio of noise to response, of the machines whose search is timed.
 const TIMED_LINES: usize = 500;
 const TIMED_NOISE: f64 = 0.01;
 
@@ -115,7 +115,7 @@ fn time() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Some periods of a test, with white noise on the response.
+/// Returns repeated periods of a test, with white noise on the response.
 fn measure(
     test: &Test,
     measured: ResponseQuantity,

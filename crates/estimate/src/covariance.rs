@@ -22,7 +22,7 @@ pub struct Product {
     pub residual: DMatrix<f64>,
     /// Distinct rows h, one below the other, in inverse SI units of the regressors.
     pub rows: DMatrix<f64>,
-    /// Indices of the equation and of the row h of every parameter.
+    /// Index of the equation and index of the row h, one pair for each parameter.
     pub places: Vec<(usize, usize)>,
     /// Flags of the parameters: `true` if the data do not determine the parameter.
     pub open: Vec<bool>,

@@ -156,7 +156,7 @@ impl SavitzkyGolay {
     }
 
     /// Differentiates acceleration and force twice: M ẍ″ + C ẍ′ + K ẍ = F″ has the same matrices as
-    /// the equation of motion. It needs no integration, so there is no drift.
+    /// the equation of motion. The method needs no integration, so there is no drift.
     ///
     /// Returns (ẍ, ẍ′, ẍ″) as displacement, velocity and acceleration, and F″ as force, for
     /// [`crate::time_domain::equation_of_motion`].

@@ -64,7 +64,8 @@ mod tests {
             prop_assume!(condition < 1e6);
             prop_assert!(solve_in_place(&mut a.clone(), &mut inverse));
             let expected = a.lu().solve(&DMatrix::identity(3, 3)).unwrap();
-            // Both are right to the condition number times rounding.
+            // The error of either inverse is at most about the condition number times the rounding
+            // error.
             prop_assert!((inverse - &expected).norm() < 1e-14 * condition * expected.norm());
         }
     }

@@ -93,7 +93,7 @@ impl EquationOfMotion {
     /// Adds the rows of `other`, such as those of another record.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if it has another number of degrees of freedom,
+    /// [`NumericsError::Size`] if `other` has another number of degrees of freedom,
     /// [`NumericsError::Overflow`].
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
         check_size("degrees of freedom", self.dof, other.dof)?;

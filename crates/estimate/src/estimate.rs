@@ -107,11 +107,11 @@ impl Estimate {
         })
     }
 
-    /// Returns the squared Mahalanobis distance dᵀ Cov⁻¹ d, a pure number: d is the difference of
-    /// the parameters of another estimate from those of this one, and Cov is the covariance of this
-    /// one. If the estimates differ by noise alone, the mean of the distance is about the number of
-    /// parameters. `None` if the covariance has no inverse, as with related entries, or if the
-    /// other estimate has other parameters.
+    /// Returns the squared Mahalanobis distance dᵀ Cov⁻¹ d, a pure number: d is the difference
+    /// between the parameters of the two estimates, and Cov is the covariance of this estimate. If
+    /// the estimates differ by noise alone, the mean of the distance is about the number of
+    /// parameters. `None` if the covariance has no inverse, as with related entries, or if the two
+    /// estimates have different unknowns.
     ///
     /// # Source
     /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
@@ -247,8 +247,8 @@ impl Estimate {
     }
 
     /// Returns the same estimate with standard errors multiplied by `scale` (a pure number): the
-    /// Birge ratio of data that differ by more than their noise. The degrees of freedom become
-    /// those of `scale`, if these are fewer.
+    /// Birge ratio of data that differ by more than their noise. If `scale` has fewer degrees of
+    /// freedom than this estimate, the result has those of `scale`.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.

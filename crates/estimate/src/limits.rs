@@ -65,7 +65,7 @@ pub(crate) const MAX_RESTARTS: u64 = 60;
 pub(crate) const RESTART_RESTARTED: usize = 3;
 
 /// Ratio of a diagonal entry of a triangular factor to the length of its column below which the
-/// regressors are linearly dependent.
+/// regressors count as linearly dependent.
 pub(crate) const GRAM_DEPENDENT: f64 = 1e-14;
 
 /// Ridge added to every regressor of related entries, relative to its length, so that dependent
@@ -157,8 +157,8 @@ pub(crate) const SHARPENING_ROUNDS: usize = 20;
 /// Step, in standard errors of the parameters, below which the corrections of the window bias end.
 pub(crate) const SHARPENING_SETTLED: f64 = 0.02;
 
-/// Minimum modal assurance criterion of two real eigenvalues that form an overdamped pair, if there
-/// are several pairs.
+/// Minimum modal assurance criterion of the shapes of two real eigenvalues that form an overdamped
+/// pair, if there are several pairs.
 pub(crate) const SAME_SHAPE: f64 = 0.9;
 
 /// Level of the confidence interval of the squared natural frequency: a mode is a rigid-body mode

@@ -10,7 +10,7 @@ use crate::{IoError, Quantity, Unit};
 /// Position in a file, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// A line, as a text editor counts them.
+    /// Line number, as in a text editor.
     Line(u64),
     /// A sample of a column, where the file has no lines.
     Sample(usize),
@@ -108,8 +108,8 @@ impl ComplexArray {
     }
 }
 
-/// Returns the distances between neighbouring elements along dimensions in order, the fastest
-/// first.
+/// Returns the distance between neighbouring elements along each dimension; the first index varies
+/// fastest.
 fn strides<'a>(lengths: impl Iterator<Item = &'a usize>) -> Vec<usize> {
     let next = |stride: &mut usize, len: &usize| {
         let this = *stride;
@@ -131,7 +131,7 @@ pub(crate) struct Column {
     pub values: Result<Vec<f64>, Unusable>,
     /// Time axis of the column in the file.
     pub axis: Axis,
-    /// Description in the file in addition to the name.
+    /// Description that the file gives in addition to the name.
     pub about: String,
     /// Text that states the unit, from a line of units, a label or an attribute; empty if there is
     /// none.
@@ -154,7 +154,7 @@ pub(crate) enum Override {
     Scale(f64),
 }
 
-/// The time axis that a file gives a column.
+/// Time axis of a column, as its file states it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Axis {
     /// No axis in the file: a time column or a sample rate is needed.
@@ -170,7 +170,7 @@ pub(crate) enum Axis {
     Column(usize),
 }
 
-/// Reason why a column cannot be used; reported when the column is asked for.
+/// Reason why a column cannot be used; it is reported only if the column is needed.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Unusable {
     Empty {
@@ -299,7 +299,7 @@ impl Lines {
 /// An error in a binary or universal file.
 #[derive(Debug)]
 pub(crate) struct Fault {
-    /// Offset of its byte.
+    /// Offset of the byte with the error.
     pub at: usize,
     pub cause: Cause,
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::limits::DETAILS_BYTES;
 
-/// Names of details, in lower case, as headers spell them, and as a page shows them.
+/// Names of details: as headers spell them, in lower case, and as a page shows them.
 const NAMES: [(&str, &str); 26] = [
     ("comment", "Comment"),
     ("comments", "Comment"),

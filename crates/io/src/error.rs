@@ -314,7 +314,7 @@ pub enum IoError {
     NonUniformTime {
         /// The file.
         file: String,
-        /// End of the step that differs most from the median.
+        /// Sample at the end of the step that differs most from the median step.
         at: Place,
         /// The step that differs most from the median, in seconds.
         step: f64,
@@ -427,7 +427,7 @@ pub enum IoError {
     Json {
         /// The file.
         file: String,
-        /// Path of the field, followed by a colon; empty for the whole.
+        /// Path of the field, followed by a colon; empty if the error concerns the whole text.
         field: String,
         /// Cause, with line and column.
         source: serde_json::Error,
@@ -440,7 +440,7 @@ pub enum IoError {
         /// Cause.
         what: String,
     },
-    /// A covariance in the report is not known.
+    /// An entry of the covariance in the report is null, because the record did not determine it.
     #[error("{}", Message(format_args!("{file}: the covariance of {parameters} is not known (null), \
          because the record of the identification did not determine {parameters}. Identify the machine \
          again from a record with more excitation, or delete \"covariance\" from the file; the machine \
@@ -482,7 +482,7 @@ pub enum IoError {
         /// The point.
         point: String,
     },
-    /// A spectral line does not exist in a period.
+    /// A chosen spectral line does not exist in the spectrum of a period.
     #[error("{}", Message(format_args!("lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
          frequency of a period of {}", message::count(*len, "sample"))))]
     LineOutside {

@@ -30,8 +30,8 @@ impl FileStamp {
     }
 }
 
-/// Returns the kind of a path that cannot be a record: `a named pipe`, `a socket`, `a device`.
-/// Opening one waits until another process writes into it, possibly forever.
+/// Returns the kind of a path that cannot be a record: `a named pipe`, `a socket`, `a device`. A
+/// program that opens such a path waits until another process writes into it, possibly forever.
 pub fn special_kind(path: impl AsRef<Path>) -> Option<&'static str> {
     let kind = fs::metadata(path).ok()?.file_type();
     if kind.is_file() || kind.is_dir() {

@@ -12,7 +12,7 @@ use crate::{IoError, standard, uff};
 pub struct Geometry {
     /// Points, each with a unique name.
     pub points: Vec<GeometryPoint>,
-    /// Pairs of indices of points that a line joins.
+    /// Lines: the indices of the two points that each line joins.
     pub lines: Vec<[usize; 2]>,
 }
 
@@ -117,9 +117,9 @@ impl<'a> Direction<'a> {
         self.point.parse().ok()
     }
 
-    /// Returns a pure number: 1 if two names are the same point in the same direction, and −1 if
-    /// they are the same point in opposite directions; `None` for other names. A name without a
-    /// direction is only equal to itself.
+    /// Returns a pure number: 1 if both names denote the same point and the same direction, and −1
+    /// if they denote the same point and opposite directions; `None` for other names. A name
+    /// without a direction matches only the same name.
     ///
     /// ```
     /// use mechid_io::Direction;
@@ -280,7 +280,7 @@ impl Geometry {
     /// Returns the displacement along x, y, z of each point of a shape (real and imaginary parts,
     /// pure numbers) whose entries have these names, such as `1+Z`; an entry whose name has no axis
     /// is a displacement of its point along z. Rotations (`1+RZ`) do not displace their point.
-    /// `None` if an entry has no point.
+    /// `None` if the geometry does not have the point of an entry.
     ///
     /// # Source
     /// Ours.

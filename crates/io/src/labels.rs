@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use crate::contents::{Column, Contents};
 use crate::table::is_time;
 
-/// Names of a field or an attribute that state a unit without the word `unit`, in lower case and
-/// with letters only.
+/// Names of fields and attributes that state a unit but do not contain the word `unit`; in lower
+/// case, letters only.
 const UNITS: [&str; 2] = ["eu", "uom"];
 
 /// Parts of names in which `unit` means the unit of an axis, or a device.

@@ -19,7 +19,7 @@ pub(crate) const SIMULATION_MEMORY: usize = 1 << 30;
 pub(crate) const DETAILS_BYTES: u64 = 64 << 10;
 
 /// Memory of each record in the lists of the records of a file, in bytes: two strings for its
-/// identifier, its rows, and its part of a tree and of growing lists. The texts in the strings are
+/// identifier, its rows, and its share of a tree and of growing lists. The texts in the strings are
 /// counted separately.
 #[cfg(feature = "parquet")]
 pub(crate) const RECORD_BYTES: usize = 256;
@@ -64,9 +64,9 @@ pub struct Limits {
     /// Numbers in memory at one time, over all columns; 2²⁸ (2 GiB) by default. A long text that is
     /// read in chunks ([`RecordFile`](crate::RecordFile)) may have any number of rows.
     pub numbers: usize,
-    /// Largest size of a text in gzip, in bytes per byte of the compressed file, in addition to 64
-    /// MiB; 100 by default. Gzip reduces the printed numbers of a measured record to about a
-    /// quarter.
+    /// Number of bytes that a text in gzip may have for each byte of the compressed file, in
+    /// addition to 64 MiB; 100 by default. Gzip reduces the printed numbers of a measured record to
+    /// about a quarter.
     pub text_per_byte: usize,
     /// Bytes of the name of a column, a unit or a record; 4 KiB by default.
     pub name_bytes: usize,
@@ -111,8 +111,8 @@ impl Limits {
         }
     }
 
-    /// Returns these limits with this memory, in bytes, for a file of any size, and with the number
-    /// of numbers and unpacked bytes that fit into it.
+    /// Returns these limits with a memory of `bytes` bytes for a file of any size. The limits of
+    /// numbers and of unpacked bytes are raised to what fits into this memory.
     #[must_use]
     pub fn with_memory(self, bytes: usize) -> Self {
         Self {

@@ -26,7 +26,7 @@ pub fn read_machine(path: impl AsRef<Path>) -> Result<InstrumentedMachine, IoErr
 }
 
 /// Reads the description of a machine from a JSON text, as [`read_machine`] does; `file` is its
-/// name in messages, and `folder` has the files of its matrices.
+/// name in messages, and `folder` contains the files of its matrices.
 ///
 /// # Errors
 /// As [`read_machine`].
@@ -54,7 +54,7 @@ fn machine(
     json::deserialized(file, described)
 }
 
-/// Reads the matrix in a file as JSON.
+/// Reads the matrix in a file and returns it as JSON.
 fn matrix(path: &Path) -> Result<Value, IoError> {
     let name = path.to_string_lossy().to_ascii_lowercase();
     if !name.ends_with(".mtx") && !name.ends_with(".mtx.gz") {

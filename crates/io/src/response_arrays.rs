@@ -21,8 +21,8 @@ const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
 ///
 /// # Errors
 /// [`IoError::Description`] if no array has a dimension of the length of the frequencies, for an
-/// array with too many dimensions, for one that is not finite, for one whose units contradict each
-/// other, and for two arrays with the same response.
+/// array with too many dimensions, with values that are not finite or with units that contradict
+/// each other, and for two arrays with the same response.
 pub(crate) fn add_functions(
     table: &Table,
     arrays: &[ComplexArray],
@@ -102,7 +102,7 @@ fn add_array(
     Ok(())
 }
 
-/// Information about the responses of an array in its name and its attributes.
+/// Information that the name and the attributes of an array give about its responses.
 #[derive(Debug)]
 struct Header {
     /// Name of the array, for messages.
@@ -197,8 +197,8 @@ fn leaf(name: &str) -> &str {
 }
 
 /// Removes a unit at the end of the words of a name and returns it: `g`, `N` as `g/N`, `mm`, `s2`,
-/// `N` as `mm/s2/N`. If the name states a quantity, the unit may also be one that is not a unit of
-/// frequency responses.
+/// `N` as `mm/s2/N`. If the name states a quantity, the unit need not be a unit of frequency
+/// responses.
 fn take_unit_words(words: &mut Vec<String>, has_quantity: bool) -> Option<String> {
     let joined = |count: usize| {
         let first = words.len().checked_sub(count).filter(|first| *first > 0)?;

@@ -150,8 +150,9 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     Ok(())
 }
 
-/// Returns how many of the last values, in rising order, mirror the first ones: the lines above
-/// half the sampling rate. The table may lack the line at 0 Hz.
+/// Returns the number of values at the highest frequencies that mirror the values at the lowest
+/// frequencies: those of the lines above half the sampling rate. The table may lack the line at 0
+/// Hz.
 fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
     /// Maximum relative difference between a value and its mirror image, from the rounding of
     /// printed numbers.

@@ -22,7 +22,7 @@ enum Part {
     Magnitude,
     /// Magnitude, in dB.
     Level,
-    /// Phase, with the size of its unit in radians if it is stated.
+    /// Phase, with the size of its unit in rad if the unit is stated.
     Phase(Option<f64>),
     StandardError,
 }
@@ -369,7 +369,7 @@ fn function<'a>(
     Ok(ResponseFunction { response, reference, quantity: first.quantity, values, standard_error })
 }
 
-/// Reads a response with this magnitude, perhaps in dB, and the phase of another column.
+/// Reads a response with this magnitude, perhaps in dB, and the phase in another column.
 fn polar<'a>(
     table: &Table,
     first: &Heading,
@@ -439,8 +439,8 @@ fn without_phase(table: &Table, heading: &Heading) -> IoError {
     }
 }
 
-/// Replaces values by their inverses and carries their standard errors over; fails with the number
-/// of the first value that has no inverse, counted from 1.
+/// Replaces values by their inverses, and their standard errors by those of the inverses; fails
+/// with the number of the first value that has no inverse, counted from 1.
 pub(crate) fn invert(
     values: &mut [Complex<f64>],
     mut errors: Option<&mut [f64]>,

@@ -21,8 +21,8 @@ const MOST_ROWS: usize = Limits::DEFAULT.numbers / NUMBERS_PER_ROW;
 /// matrices.
 const DENSE_DOF: usize = 64;
 
-/// Maximum share of entries unequal to zero in full matrices that are stored as sparse ones; with
-/// more, the factors of an irregular pattern may have all entries.
+/// Maximum fraction of non-zero entries of full matrices that are stored as sparse ones; with more,
+/// the factors of a matrix with an irregular pattern may be full.
 const SPARSE_SHARE: f64 = 0.1;
 
 /// Maximum number of degrees of freedom of a machine in sparse matrices for computations that need
@@ -159,7 +159,7 @@ impl NonlinearDescription {
     }
 }
 
-/// Reads the nonlinear terms in a JSON file (`-`: standard input), if it has any.
+/// Reads the nonlinear terms in a JSON file (`-`: standard input), if the file has any.
 ///
 /// # Errors
 /// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`].

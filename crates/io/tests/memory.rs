@@ -109,8 +109,8 @@ fn memory_does_not_grow_with_the_record() {
     });
     // Five columns of the long record are 8 MB.
     assert!(long < 2_000_000, "{long} bytes");
-    // The record is twenty times as long. Only the width of the numbers may grow, and the number of
-    // blocks that the threads read and parse at the same time.
+    // The record is twenty times as long. Only the width of the printed numbers may grow, and the
+    // number of blocks that the threads read and parse at the same time.
     assert!(
         long < short + short / 20 + 2 * BLOCK,
         "{short} bytes for the short record, {long} for the long one"

@@ -1,8 +1,8 @@
 //! Identifies a machine from a file, with intervals and checks, and reconstructs the force, in four
 //! statements.
 //!
-//! Prints the identified parameters and modes with their intervals and checks, the predicted part of a
-//! second window, and the force with its standard error.
+//! Prints the identified parameters and modes with their intervals and checks, the percentage of
+//! the response of a second window that is predicted, and the force with its standard error.
 //!
 //! `cargo run --package mechid --example 01_identify_a_record`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]

@@ -32,7 +32,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     };
     let machine = JournalBearing::new(MASS, film, KyxSign::Plus)?.system();
 
-    // Lines 10 to 300 of 2 Hz are assigned in turn to the shakers in x and y.
+    // Lines 10 to 300, which are 2 Hz apart, are assigned in turn to the shakers in x and y.
     let sampling = Sampling::new(1.0 / 2048.0, 1024)?;
     let used: Vec<usize> = (10..=300).collect();
     let shakers = lines::interleaved(&used, 2)?

@@ -254,7 +254,7 @@ impl Canvas {
             self.body.push_str(r#" font-weight="bold""#);
         }
         // The length is written only where it is reliable: italics are not measured, renderers
-        // differ for scripts, and one or two letters do not need it.
+        // differ for superscripts and subscripts, and one or two letters do not need it.
         let plain = !style.italic && runs(text).len() == 1;
         if plain && text.chars().nth(2).is_some() {
             let length = num(text_width(text, style.size, style.weight));

@@ -145,7 +145,7 @@ const MANY: usize = 400;
 const ERRORS: f64 = 2.0;
 
 /// Shades ± 2 standard errors; for levels in decibels, these are standard errors of the magnitude.
-/// An edge without a logarithm is at the bottom.
+/// An edge that is zero or negative has no logarithm and is drawn at the bottom.
 fn error_band(
     panel: &Panel,
     layout: &PanelLayout,

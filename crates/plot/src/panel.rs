@@ -270,7 +270,7 @@ impl Panel {
             let rising = !self.curves.iter().flat_map(Curve::ordinates).any(|value| value < 0.0);
             return (if rising { 0.0 } else { low }, high);
         }
-        // Values that are rounding errors of the largest would spread a logarithmic axis.
+        // Values that are rounding errors of the largest value would extend a logarithmic axis.
         let low = if self.y.scale == Scale::Log10 { low.max(ROUNDING * high) } else { low };
         padded(self.y.scale, low, high, 0.06)
     }

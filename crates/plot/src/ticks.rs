@@ -241,10 +241,10 @@ mod tests {
             labels(&linear(1.9, 4.1, 11.0, None)),
             ["2.0", "2.2", "2.4", "2.6", "2.8", "3.0", "3.2", "3.4", "3.6", "3.8", "4.0"]
         );
-        // Steps of 50 would end at 200.
+        // With steps of 50, the last tick would be at 200, so the steps are finer.
         let to_the_end = linear(0.0, 249.0, 11.0, None);
         assert_eq!(to_the_end.major.last().unwrap().1, "240");
-        // A narrow axis has no space for them.
+        // A narrow axis has no space for finer steps.
         assert_eq!(labels(&linear(0.0, 249.0, 4.0, None)), ["0", "100", "200"]);
         // ±50 is outside the axis, and 0 alone would not show its scale.
         assert_eq!(labels(&linear(-44.7, 44.7, 2.0, None)), ["−40", "−20", "0", "20", "40"]);

@@ -100,7 +100,7 @@ impl Machine {
         let (rate, input) = py.detach(|| {
             let n = system.dof();
             let mut input = DMatrix::zeros(2 * n, n);
-            // If the step is one second, the units of the step are SI units.
+            // The unit of time of `StateTransition` is the step, so a step of 1 s gives SI units.
             input.view_mut((n, 0), (n, n)).copy_from(&StateTransition::force_input(system, 1.0));
             (StateTransition::rate(system, 1.0), input)
         });

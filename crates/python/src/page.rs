@@ -16,9 +16,9 @@ pub struct PageTexts {
     title: Option<String>,
     /// Names and values of further information.
     about: Vec<(String, String)>,
-    /// File of the record, whose head may state more; empty if there is none.
+    /// File of the record, whose head may have further information; empty if there is none.
     record: PathBuf,
-    /// File of the points of the channels.
+    /// File with the positions of the channels.
     geometry: Option<PathBuf>,
     /// If true, the force is reconstructed, too.
     reconstruct_force: bool,

@@ -51,8 +51,8 @@ pub fn watched<T: Send + 'static, E: Failure + Send + 'static>(
         None => shared(py)?,
     };
     let (done, mut end) = sync_channel(1);
-    // A thread that waits for a part of other work may take on this work: the time limit of that
-    // does not apply here.
+    // A thread that waits for a part of another computation may run this computation; the time
+    // limit of the other computation does not apply here.
     let work = move || time_limit::within(None, work);
     pool.spawn(move || {
         // After Ctrl-C there is no receiver any more, so a failed send is ignored.

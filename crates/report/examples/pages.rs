@@ -20,7 +20,7 @@ const FORCES: usize = 2;
 const MODES: [(f64, f64); 5] =
     [(8.0, 0.01), (31.0, 0.008), (70.0, 0.006), (124.0, 0.005), (194.0, 0.005)];
 
-/// Shape of a mode of a simply supported beam at a place from 0 to 1.
+/// Shape of a mode of a simply supported beam at a position from 0 to 1 along the beam.
 fn shape(mode: usize, place: f64) -> f64 {
     ((mode + 1) as f64 * std::f64::consts::PI * place).sin()
 }

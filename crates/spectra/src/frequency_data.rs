@@ -199,10 +199,10 @@ impl FrequencyData {
     }
 
     /// Returns the same data with white noise of known standard deviation (N) on the samples of
-    /// each force channel, for a record of this many samples. It is for data that do not show the
-    /// noise of the force. With it, the spectrum of the response noise is estimated from the
-    /// residual, and the force is not assumed to be exact. Noise stated by
-    /// [`FrequencyData::with_noise`] has priority.
+    /// each force channel, for a record of this many samples. Use it if the data do not show the
+    /// noise of the force: the spectrum of the response noise is then estimated from the residual,
+    /// and the force is not assumed to be exact. Noise stated by [`FrequencyData::with_noise`] has
+    /// priority.
     ///
     /// # Errors
     /// [`NumericsError::Size`] unless there is one deviation per degree of freedom,

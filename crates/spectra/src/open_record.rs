@@ -9,6 +9,6 @@ use mechid_signal::Sampling;
 pub struct OpenRecord {
     /// Time axis of the record.
     pub sampling: Sampling,
-    /// Rows of its lines.
+    /// Rows of the lines of the record.
     pub rows: Range<usize>,
 }

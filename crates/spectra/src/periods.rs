@@ -387,7 +387,7 @@ mod tests {
 
     use super::*;
 
-    /// Judge: the rounded samples themselves.
+    /// The reference is the error of the rounded samples.
     #[test]
     fn rounding_alike_is_found_from_the_scatter() {
         const SAMPLES: usize = 4000;
@@ -404,8 +404,8 @@ mod tests {
                 let own =
                     all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (PERIODS - 1) as f64;
                 scatter += own / SAMPLES as f64;
-                // The mean has the scatter of a period divided by their number, and the part that
-                // is equal in all.
+                // The variance of the mean is the scatter of a period divided by the number of
+                // periods, plus the part that is equal in all periods.
                 together += ((mean - exact).powi(2) - own / PERIODS as f64) / SAMPLES as f64;
             }
             let found = common_rounding(scatter);

@@ -1,6 +1,7 @@
 //! Choice of one of every n rows.
 
-/// Fraction of the golden ratio, whose multiples are spread evenly and without a period.
+/// Fractional part of the golden ratio; its multiples, modulo 1, are spread evenly and without a
+/// period.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Returns one of every `step` rows of `len`, in ascending order; none for a step of 0. The

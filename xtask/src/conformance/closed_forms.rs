@@ -12,7 +12,7 @@ use super::{Judge, Row};
 /// Number of masses of the chain.
 const MASSES: usize = 60;
 
-/// A chain of equal masses on equal springs, one end held and the other free.
+/// A chain of equal masses on equal springs, one end fixed and the other free.
 pub(super) fn chain() -> Result<Judge, String> {
     let (mass, stiffness) = (2.0, 5000.0);
     let springs = DMatrix::from_fn(MASSES, MASSES, |i, j| match i.abs_diff(j) {

@@ -60,7 +60,7 @@ pub(super) fn means(published: &Published, results: &Results) -> Judge {
     }
 }
 
-/// Printed modes of the two-mass system; the settings of the identified ones are not printed.
+/// Printed modes of the two-mass system; the settings of the identified modes are not printed.
 pub(super) fn modes(published: &Published) -> Result<Judge, String> {
     let mut rows = Vec::new();
     for number in published.tables().filter(|number| MODAL.contains(number)) {

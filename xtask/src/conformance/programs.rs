@@ -20,7 +20,8 @@ use super::{Judge, Row};
 
 /// Step of the records, in s.
 const DT: f64 = 0.01;
-/// Steps that are compared; the records have one more, which schemes that look ahead need.
+/// Number of steps that are compared; the records have one more step, which schemes that look ahead
+/// need.
 const STEPS: usize = 60;
 
 /// Value of another program, with the words that identify its quantity.
@@ -50,7 +51,7 @@ fn parsed<T: std::str::FromStr>(word: &str) -> Result<T, String> {
     word.parse().map_err(|_| format!("{word} in the values of another program"))
 }
 
-/// Forces on three masses: two sinusoids on the second, from zero on.
+/// Forces on three masses: the sum of two sines on the second mass, and no force on the others.
 fn force(sampling: Sampling) -> Result<Record, String> {
     let forces: Vec<f64> =
         sampling.times().map(|t| 30.0 * (18.0 * t).sin() + 12.0 * (47.0 * t).sin()).collect();

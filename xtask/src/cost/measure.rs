@@ -25,7 +25,7 @@ impl Growth {
     }
 
     /// Returns the exponent of the size in the time, by least squares on the logarithms of the
-    /// larger half of the sizes, at least three: small sizes have other costs.
+    /// larger half of the sizes, at least three: at small sizes, other costs are larger.
     pub fn slope(&self) -> f64 {
         let from = self.sizes.len() - (self.sizes.len() / 2 + 1).max(3).min(self.sizes.len());
         let logs = |values: &[f64]| values[from..].iter().map(|v| v.ln()).collect::<Vec<_>>();

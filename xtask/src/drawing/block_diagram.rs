@@ -17,9 +17,9 @@ const ARROW: Stroke = Stroke::solid(Color::DARK, 1.2);
 /// Meaning of a box, shown by its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// Something given or measured.
+    /// Given or measured quantity.
     Data,
-    /// Something computed from what comes in.
+    /// Computation from the inputs of the box.
     Process,
     /// Result of the diagram.
     Result,
@@ -149,7 +149,7 @@ impl BlockDiagram {
     }
 }
 
-/// Places of the columns and rows.
+/// Positions of the columns and rows.
 struct Grid {
     /// Centre and width of each column.
     columns: Vec<(f64, f64)>,

@@ -120,8 +120,8 @@ fn simulation(diagram: &mut BlockDiagram, machine: Machine) -> Simulation {
     Simulation { truth, excitation, response }
 }
 
-/// Part of a diagram that estimation adds: the force it uses, the parameters it identifies, and
-/// their row.
+/// Boxes that the estimation adds to a diagram: the force that it uses, the parameters that it
+/// identifies, and their row.
 struct Estimation {
     force: BoxId,
     parameters: BoxId,

@@ -22,7 +22,7 @@ const NUMBERS: [&str; 14] = [
     "5.8.1", "5.8.6", "5.9.1", "E1",
 ];
 
-/// All of them, in the order of the dissertation.
+/// Returns all drawings, in the order of the dissertation.
 pub fn all() -> Vec<Drawing> {
     use Domain::{Frequency, Time};
     use ForceEquation::{Continuous, Discretised};

@@ -2,7 +2,7 @@
 
 use mechid::plot::{Canvas, Color, Point, Stroke};
 
-/// Lines of parts.
+/// Stroke of the outlines of parts.
 pub const PART: Stroke = Stroke::solid(Color::DARK, 1.6);
 /// Thin lines: hatching, axes, dimensions.
 pub const THIN: Stroke = Stroke::solid(Color::DARK, 0.9);

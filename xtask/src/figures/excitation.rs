@@ -7,7 +7,7 @@ use super::Plan;
 use super::series::BEARING;
 use crate::thesis::case::{Case, Machine};
 
-/// The dissertation does not state the NPI of these figures; it scales both axes without a change
+/// The dissertation does not state the NPI of these figures; NPI scales both axes without a change
 /// of the shape.
 const NPI: f64 = 2.0;
 

@@ -63,7 +63,7 @@ fn panels(case: Case, dof: usize, name: &str) -> Result<[Panel; 2], String> {
     let sizes = size(&truth);
     let (low, high) =
         sizes.iter().fold((f64::INFINITY, 0.0f64), |(low, high), h| (low.min(*h), high.max(*h)));
-    // Schemes with a zero at the Nyquist frequency leave the picture there.
+    // The curves of schemes with a zero at the Nyquist frequency leave the picture there.
     let mut magnitude = Panel::new(omega(), Axis::log10(name, "m/N").range(low / 5.0, high * 2.0))
         .curve(exact_look(Curve::line("exact", &truth.omega, &sizes)));
     let mut phase = Panel::new(omega(), Axis::linear("Phase", "°").step(90.0))

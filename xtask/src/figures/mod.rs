@@ -1,7 +1,7 @@
 //! The dissertation's figures that show data, each with the numbers it is drawn from.
 //!
-//! A figure that depends on the slips of the original programs shows both: on the left the slips
-//! replayed, on the right removed, on the same scale.
+//! A figure that depends on the slips of the original programs shows both, on the same scale: on
+//! the left with the slips, on the right without them.
 
 mod csv;
 mod excitation;
@@ -35,7 +35,7 @@ pub fn numbers() -> Vec<&'static str> {
     plans().iter().map(|plan| plan.number).collect()
 }
 
-/// Computes the figures `wanted` asks for, in parallel; `tick` is called after each.
+/// Computes the figures that `wanted` selects, in parallel; `tick` is called after each.
 ///
 /// # Errors
 /// Number of the first figure that fails, and the message of the library.

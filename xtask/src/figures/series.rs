@@ -77,7 +77,7 @@ impl Domain {
     }
 }
 
-/// Equation that gives the force back.
+/// Equation with which the force is reconstructed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Equation {
     Continuous,
@@ -131,7 +131,7 @@ fn identified(sequences: &Sequences, listed: &[f64]) -> Result<SecondOrderSystem
         .map_err(|error| error.to_string())
 }
 
-/// Gives panels side by side one range of ordinates.
+/// Gives panels side by side the same range of ordinates.
 pub(crate) fn same_ordinates(panels: Vec<Panel>) -> Vec<Panel> {
     let values = |panel: &Panel| {
         let curves = panel.data().iter().flat_map(|curve| curve.y().iter().copied());

@@ -18,7 +18,7 @@ struct Sweep {
     nt: usize,
     npi: Vec<f64>,
     methods: Vec<Method>,
-    /// NPI the dissertation recommends, if it names a window.
+    /// Range of NPI that the dissertation recommends, if it names one.
     window: Option<(f64, f64)>,
 }
 
@@ -126,7 +126,7 @@ impl Sweep {
     }
 }
 
-/// Place of a method in the palette: the same in every figure.
+/// Index of the style of a method, the same in every figure.
 pub(crate) fn slot(method: Method) -> usize {
     Method::ALL.iter().position(|other| *other == method).unwrap_or(Method::ALL.len())
 }

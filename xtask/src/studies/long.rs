@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::{Plan, page, results};
 
-/// Maximum number of shares of the time that a study may take before it is stopped.
+/// Maximum time of a study, in shares of the time budget; a study that takes longer is stopped.
 const PATIENCE: u32 = 4;
 /// Time between two checks of a running study.
 const LOOK: Duration = Duration::from_millis(200);

@@ -48,7 +48,8 @@ pub(super) fn write(root: &Path, coverages: &[Coverage]) -> Result<(), String> {
     rewrite(&place(root), "power", &power_sentence()?)
 }
 
-/// Replaces the tables of a page that have the header of a new one; returns how many.
+/// Replaces the tables of a page that have the header of a new table; returns the number of
+/// replaced tables.
 ///
 /// # Errors
 /// The message of the file that fails; a page without any of these tables.

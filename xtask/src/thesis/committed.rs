@@ -35,7 +35,8 @@ fn parts(svg: &str) -> Vec<&str> {
     parts
 }
 
-/// Returns the files of these kinds in a folder of the repository that no task writes.
+/// Returns a sentence for each file of these kinds in a folder of the repository that is not in
+/// `made`, the files that the tasks write.
 ///
 /// # Errors
 /// A message with the folder that cannot be read.

@@ -1,10 +1,11 @@
 //! Appendix B: estimates on records refined by straight lines.
 //!
-//! The text names neither the integrator nor the interpolated quantities. This is the plain
-//! reading: Newmark, Nt = 128, displacement, velocity and force refined together. It does not give
-//! the printed numbers, nor does any other reading we tried. The shape of the printed columns, K
-//! and C falling steeply from NPI 6 to 10, belongs to a first period from rest, not to the periodic
-//! steady state of the other tables; no such run gave the digits either.
+//! The text names neither the integrator nor the interpolated quantities. The most direct
+//! interpretation is used here: Newmark, Nt = 128, displacement, velocity and force refined
+//! together. It does not give the printed numbers; no other interpretation that we tried gives
+//! them, either. The shape of the printed columns, K and C falling steeply from NPI 6 to 10, is
+//! that of a first period from rest, not of the periodic steady state of the other tables; but no
+//! such run gave the printed digits, either.
 
 use mechid::estimate::Unknowns;
 use mechid::estimate::time_domain::TimeDomain;

@@ -104,7 +104,7 @@ pub struct MeanError {
     pub mean_error_percent: String,
 }
 
-/// Printed tables, all of them.
+/// All printed tables.
 #[derive(Debug, Clone)]
 pub struct Published {
     /// Every cell, in the order of the files.

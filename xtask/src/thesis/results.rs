@@ -13,9 +13,9 @@ use super::slips::Slip;
 /// Identity of one estimation: the settings of a printed row, and its column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Key {
-    /// Time or frequency.
+    /// `true` for the frequency domain, `false` for the time domain.
     pub frequency: bool,
-    /// The bearing, or the single degree of freedom.
+    /// `true` for the bearing, `false` for the single degree of freedom.
     pub bearing: bool,
     /// Tables 5.3.1 and 5.3.2 leave the coefficient of the force free in two columns.
     pub free_force: bool,

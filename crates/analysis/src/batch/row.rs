@@ -107,7 +107,7 @@ pub struct FindingRow {
 }
 
 impl SavedAnalysis {
-    /// Identifies the record that `source` opens. The row names it `record`. Every failure,
+    /// Identifies the record that `source` opens. In the row, its name is `record`. Every failure,
     /// including a panic, becomes the error of the row. The same record and analysis always give
     /// the same row.
     pub fn row(

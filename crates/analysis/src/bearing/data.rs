@@ -202,7 +202,7 @@ impl BearingData {
         })
     }
 
-    /// Returns the data with the rows of `other` added.
+    /// Returns these data followed by the rows of `other`.
     fn and(mut self, other: Self) -> Result<Self, AnalysisError> {
         self.data = self.data.and(&other.data)?;
         self.noise = self.noise.and(other.noise);
@@ -243,7 +243,7 @@ fn mean_with_noise(
 }
 
 /// Returns the responses of the displacement and the acceleration from two tables, and the source
-/// of the noise in words; `None` if one of the tables does not state its noise.
+/// of the noise in words. The source is `None` if one of the tables does not state its noise.
 fn matching_responses(
     displacement: &FrequencyResponses,
     acceleration: &FrequencyResponses,

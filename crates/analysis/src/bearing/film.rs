@@ -32,7 +32,8 @@ pub(super) struct Film {
     covariance: DMatrix<f64>,
     /// Test of M = 0.
     pub inertia: Option<LikelihoodRatio>,
-    /// All twelve coefficients of the rig, for the stiffness line by line.
+    /// All twelve coefficients of the rig before the baseline is subtracted, for the dynamic
+    /// stiffness line by line.
     pub rig: DVector<f64>,
     /// All twelve coefficients of the baseline, with their covariance.
     pub baseline: Option<(DVector<f64>, DMatrix<f64>)>,
@@ -95,8 +96,8 @@ impl Film {
             let chosen = coefficients == Coefficients::Automatic && film.inertia.is_some();
             film.critical = fisher
                 .filter(|_| chosen)
-                // `widen` multiplies the covariance by `before_choice`, so the statistic is divided
-                // by it.
+                // `widen` multiplies the covariance by `before_choice`, which divides the statistic
+                // by the same factor. The critical value is therefore divided by it, too.
                 .map(|fisher| EACH as f64 * fisher.inverse_cdf(1.0 - SIGNIFICANCE) / before_choice);
             film.widen(before_choice);
             return Ok(film);
@@ -110,7 +111,8 @@ impl Film {
         Ok(film)
     }
 
-    /// Takes the eight coefficients of fits in which the mass is `common` to tests and baseline.
+    /// Replaces the coefficients by eight from fits in which tests and baseline have the same known
+    /// mass, `common`.
     fn take_eight(
         &mut self,
         rig: OutputErrorFit,
@@ -122,7 +124,7 @@ impl Film {
         self.values = rig_values.rows(0, eight).into_owned();
         self.covariance = match &baseline {
             None => rig_covariance.view((0, 0), (eight, eight)).into_owned(),
-            // The mass that both tests have in common is uncertain, too.
+            // The common mass is an estimate, and its uncertainty contributes to this covariance.
             Some(_) => without_mass(&self.covariance)?,
         };
         self.rig = rig_values;
@@ -223,7 +225,8 @@ impl Fitted {
         }
     }
 
-    /// Returns a mass far below rounding: the checks of a fit need an invertible mass.
+    /// Returns a mass too small to change the fit: the checks of a fit need an invertible mass
+    /// matrix.
     fn least_mass(&self) -> Matrix2<f64> {
         let least = self.values.rows(EACH, EACH).amax() * f64::EPSILON * f64::EPSILON;
         Matrix2::from_diagonal_element(least)
@@ -248,7 +251,7 @@ impl Fitted {
     }
 }
 
-/// Returns the covariance of eight coefficients, conditional on zero masses.
+/// Returns the covariance of the coefficients of K and C, conditional on M = 0.
 ///
 /// # Source
 /// The conditional normal distribution: Anderson, *An Introduction to Multivariate Statistical

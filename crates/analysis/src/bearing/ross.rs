@@ -50,7 +50,7 @@ fn in_axes_of_ross(bearing: &BearingSummary) -> [f64; 12] {
 fn turned(value: impl Fn(usize) -> f64) -> [f64; 12] {
     std::array::from_fn(|at| {
         let (from, sign) = TURNED[at % 4];
-        // The sum with 0 avoids a negative zero.
+        // The addition of 0 replaces −0 by 0.
         sign * value(at / 4 * 4 + from) + 0.0
     })
 }

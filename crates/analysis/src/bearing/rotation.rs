@@ -22,9 +22,10 @@ const MOST_SPEEDS: usize = 10_000;
 /// Maximum difference of the Bayesian information criterion from its minimum for a plausible speed.
 const PLAUSIBLE: f64 = 6.0;
 
-/// Returns the range of speeds, in Hz, that explain the misfit: after the exclusion of the lines at
-/// the multiples of the speed, the residual of a film is close to the noise. `None` if there is no
-/// such speed. The range has the speeds with nearly the smallest Bayesian information criterion.
+/// Returns the range of speeds, in Hz, that explain the misfit: if the lines at the multiples of
+/// the speed are excluded, the residual of a fitted film is close to the noise. `None` if there is
+/// no such speed. The range contains the speeds whose Bayesian information criterion is close to
+/// the smallest one.
 ///
 /// For each speed, a film is fitted to the other lines by least squares on the equation of motion,
 /// so that the excluded lines do not influence the film.
@@ -56,7 +57,8 @@ pub(super) fn speed_of_misfit(tests: &BearingData) -> Option<[f64; 2]> {
                 [used.len(), excluded, rows.len()].map(|count| (4 * count) as f64);
             speeds.push((used * power + excluded * total.ln(), hz));
         }
-        // The step moves the highest multiple by half the line spacing.
+        // With this step of the speed, its highest multiple in the band moves by half the line
+        // spacing.
         hz *= 1.0 + 0.5 * spacing_hz / highest;
     }
     let best = speeds.iter().map(|(criterion, _)| *criterion).reduce(f64::min)?;

@@ -109,12 +109,12 @@ mod tests {
         assert!((low - expected[0]).abs() < 1e-9 && (high - expected[1]).abs() < 1e-9);
     }
 
-    /// If a test at 5 % chooses the model, usual intervals contain the true value too rarely, and
-    /// these in 95 % of the cases.
+    /// If a test at 5 % chooses the model, usual intervals contain the true value in less than 95 %
+    /// of the cases. The conditional intervals contain it in 95 %.
     #[test]
     fn intervals_after_a_choice_hold() {
         let rng = &mut ChaCha8Rng::seed_from_u64(7);
-        // Two coefficients beside four tested ones, all correlated.
+        // One coefficient and four tested coefficients are correlated.
         let mix = DMatrix::from_fn(5, 5, |i, j| if i == j { 1.0 } else { 0.2 * (i as f64 - 1.0) });
         let covariance = &mix * mix.transpose();
         for size in [0.0, 1.0, 3.0] {

@@ -26,7 +26,7 @@ pub struct StiffnessLine {
 
 type Complex2 = Matrix2<Complex<f64>>;
 
-/// Minimum sine of the angle between two displacements in independent directions.
+/// Minimum sine of the angle between two displacements whose directions count as independent.
 const INDEPENDENT: f64 = 0.1;
 
 /// Maximum relative difference of two frequencies that count as equal.
@@ -56,8 +56,8 @@ pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLin
     Ok(lines)
 }
 
-/// Returns H from some rows at about one frequency; `None` if the displacements have one direction
-/// only.
+/// Returns H from rows at nearly the same frequency; `None` if their displacements have the same
+/// direction.
 fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLine> {
     let data = &tests.data;
     let middle = rows.iter().map(|row| data.omega()[*row]).sum::<f64>() / rows.len() as f64;
@@ -73,8 +73,8 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
         forces += force * d.adjoint();
         power += d * d.adjoint();
     }
-    // For two displacements the root of the determinant is |det [d₁ d₂]|. Divided by the mean of
-    // their squared lengths, this value is at most the sine of the angle between them.
+    // For two displacements the square root of the determinant is |det [d₁ d₂]|. Divided by the
+    // mean of their squared lengths, this value is at most the sine of the angle between them.
     let lengths = power[(0, 0)].re + power[(1, 1)].re;
     if power.determinant().norm().sqrt() < INDEPENDENT * 0.5 * lengths {
         return None;

@@ -29,8 +29,8 @@ pub const LARGEST_AMPLITUDE: f64 = 0.05;
 /// Half the width of an interval at 95 %, in standard errors.
 const NORMAL: f64 = 1.96;
 
-/// Minimum relative change of the width of an interval due to the choice of the model; a larger
-/// change gets a remark.
+/// Relative change of the width of an interval due to the choice of the model; only a larger change
+/// gets a remark.
 const MOVED: f64 = 0.02;
 
 /// Units of k, c and m.

@@ -230,7 +230,7 @@ impl Decayed {
     /// entries of the shapes in comparisons and in files.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] if their number is not that of the channels.
+    /// [`AnalysisError::Setting`] if the number of points differs from the number of channels.
     pub fn with_points(mut self, points: Vec<String>) -> Result<Self, AnalysisError> {
         let channels = self.summary.channels.len();
         if points.len() != channels {

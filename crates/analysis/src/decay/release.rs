@@ -158,21 +158,22 @@ mod tests {
         release(&Record::from_fn(sampling, value).unwrap()) as f64 * 1e-3
     }
 
-    /// A decay of 10 Hz and 2 % that begins at 1 s.
+    /// Returns a decay that begins at 1 s, with a natural frequency of 10 Hz and a damping ratio of
+    /// 2 %.
     fn after(t: f64) -> f64 {
         (-0.02 * TAU * 10.0 * (t - 1.0)).exp() * (TAU * 10.0 * (t - 1.0)).cos()
     }
 
     #[test]
     fn the_decay_begins_where_the_response_is_let_go() {
-        // At rest before, pulled before, and driven before.
+        // Before the release, the structure is at rest, pulled by a static load, or driven.
         let at_rest = release_of(|t| 5.0 + if t < 1.0 { 0.0 } else { after(t) });
         let pulled = release_of(|t| if t < 1.0 { 1.0 } else { after(t) });
         let driven = release_of(|t| if t < 1.0 { (TAU * 10.0 * t).cos() } else { after(t) });
         for found in [at_rest, pulled, driven] {
             assert!((1.0..1.1).contains(&found), "{found}");
         }
-        // Held for a short time.
+        // The static load acts only for a short time before the release.
         let shortly = release_of(|t| if t < 0.1 { 1.0 } else { after(t + 0.9) });
         assert!((0.1..0.25).contains(&shortly), "{shortly}");
         assert_eq!(release_of(|_| 0.0), 0.0);

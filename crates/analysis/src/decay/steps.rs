@@ -27,8 +27,8 @@ pub(super) struct LastShown {
 /// Returns the end of the part of a decay in which all channels span more than a few quantisation
 /// steps; `None` if they always do.
 ///
-/// After it, the rounding error is not white noise: a sinusoid of a few steps becomes a square wave
-/// that stops.
+/// After this part, the rounding error is not white noise: a sinusoid of a few steps becomes a
+/// square wave that stops.
 ///
 /// # Source
 /// Widrow & Kollár, *Quantization Noise* (2008), for the conditions of a white rounding error; the
@@ -88,7 +88,8 @@ mod tests {
 
     use super::*;
 
-    /// A decay from 1, of 20 Hz and 1 %, rounded to `steps` steps.
+    /// Returns a decay with the initial amplitude 1, 20 Hz and a damping ratio of 1 %, rounded to
+    /// steps of 1 / `steps`.
     fn decay(steps: f64, noise_steps: f64) -> Record {
         let sampling = Sampling::new(1.0 / 512.0, 4096).unwrap();
         let exact = |t: f64| (-0.01 * TAU * 20.0 * t).exp() * (TAU * 20.0 * t).cos();
@@ -103,14 +104,14 @@ mod tests {
         for steps in [128.0, 1024.0, 8192.0] {
             let found = last_shown(&decay(steps, 0.0)).unwrap();
             assert!((found.step * steps - 1.0).abs() < 1e-6);
-            // Twice the amplitude is the range.
+            // The range is twice the amplitude.
             let end = (2.0 * steps / STEPS).ln() / (0.01 * TAU * 20.0);
             let found = found.samples as f64 / 512.0;
             assert!((found - end).abs() < 0.2, "{steps}: {found} {end}");
         }
         assert_eq!(coarse(&decay(20.0, 0.0)), [(0, 39)]);
         assert_eq!(coarse(&decay(1024.0, 0.0)), []);
-        // Noise of a few steps keeps all of it.
+        // With noise of a few steps, the whole decay is used.
         assert_eq!(last_shown(&decay(1024.0, 4.0)), None);
         let sampling = Sampling::new(0.01, 500).unwrap();
         let smooth = Record::from_fn(sampling, |t| (-t).exp() * (9.0 * t).cos()).unwrap();

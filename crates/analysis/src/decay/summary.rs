@@ -78,7 +78,7 @@ pub struct DecayModeRow {
     pub amplitude: Uncertain,
     /// Phase of this amplitude, in degrees.
     pub phase_deg: f64,
-    /// Ratio of the sum of squares of this mode to that of all modes.
+    /// Ratio of the sum of squares of this mode to the sum of squares of all modes.
     pub energy_share: f64,
     /// `false` if the interval of the growth rate is not below zero.
     pub decays: bool,

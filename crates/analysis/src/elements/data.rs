@@ -99,8 +99,8 @@ impl ElementData {
         }
     }
 
-    /// Returns the data with the tests of `other` added; the noise is known if it is known for
-    /// both.
+    /// Returns these data followed by the tests of `other`. The noise of the result is known if it
+    /// is known for both.
     pub(super) fn followed_by(mut self, other: Self) -> Result<Self, SpectraError> {
         let before = self.tests.len();
         self.lines = self.lines.followed_by(&other.lines)?;

@@ -30,7 +30,7 @@ pub enum ElementNote {
     FromPrior {
         /// Name of the parameter.
         parameter: String,
-        /// Share of the prior, 0 to 1.
+        /// Share of the prior in the information, from 0 to 1.
         share: f64,
     },
     /// M, C and K do not make a system.

@@ -227,7 +227,8 @@ fn slope(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Noise of standard deviation 1, the sum of twelve uniform numbers less six.
+    /// Returns noise of standard deviation 1: each value is the sum of twelve uniform random
+    /// numbers, minus six.
     fn noise(len: usize, seed: u64) -> Vec<f64> {
         let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
         let mut uniform = || {
@@ -252,7 +253,8 @@ mod tests {
             "{step:?}"
         );
         assert!(step.p_value < SIGNIFICANT && (step.size - 3.0).abs() < 1.0, "{step:?}");
-        // None of the orders has such a step: ten tests with a p-value of at most 1/10,000 each.
+        // No random order has such a step. The p-value of each test is therefore at most 1/10,000;
+        // the adjustment for ten tests multiplies it by ten.
         assert!(step.is_bound && (step.p_value - 1e-3).abs() < 1e-9, "{step:?}");
         let levels = baseline(&values, &changes);
         assert!((levels[0]).abs() < 0.6 && (levels[59] - 3.0).abs() < 0.6);
@@ -267,8 +269,8 @@ mod tests {
         let changes = find(&values, 10);
         let drift = changes.last().unwrap();
         assert_eq!(drift.kind, ChangeKind::Drift, "{changes:?}");
-        // The drift rises by 0.15 standard deviations of the noise per record: the noise hides its
-        // beginning within some records.
+        // The drift rises by only 0.15 standard deviations of the noise per record. The noise hides
+        // its beginning, so the test tolerates an error of some records.
         assert!(drift.begins.abs_diff(50) <= 12, "{drift:?}");
         assert!((drift.size - 0.15 * (119 - drift.begins) as f64).abs() < 2.0, "{drift:?}");
         let levels = baseline(&values, &changes);
@@ -281,7 +283,8 @@ mod tests {
     fn p_values_of_noise_are_even() {
         let below =
             (0..400).filter(|seed| largest(&noise(40, seed + 1)).unwrap().p_value < 0.1).count();
-        // The expected number is 40 ± 6; the limits are four standard deviations away.
+        // The expected number is 40, with a standard deviation of 6; the limits are four standard
+        // deviations from it.
         assert!((16..=64).contains(&below), "{below} of 400");
     }
 

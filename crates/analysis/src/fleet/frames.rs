@@ -14,7 +14,7 @@ pub fn write(into: &mut impl Write, message: &[u8]) -> io::Result<()> {
     into.flush()
 }
 
-/// Reads a message; `None` at the end.
+/// Reads a message; `None` at the end of the stream.
 pub fn read(from: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
     let mut len = [0; 4];
     match from.read_exact(&mut len) {

@@ -103,7 +103,7 @@ impl Fleet {
         let mut files: Vec<PathBuf> = Vec::new();
         for record in records {
             refuse_results(record, folder)?;
-            // Removes `./`, because the path with it and the path without it name the same record.
+            // Removes `./`, because a path names the same record with and without `./`.
             let is_named = |part: &Component<'_>| *part != Component::CurDir;
             let files_of = files_of(record)?.into_iter();
             files.extend(files_of.map(|file| file.components().filter(is_named).collect()));

@@ -121,7 +121,7 @@ struct Running {
 }
 
 impl Worker {
-    /// Creates a worker without a process yet.
+    /// Creates a worker; its process starts with the first record.
     ///
     /// # Errors
     /// Those of [`Isolation::check`].
@@ -238,7 +238,8 @@ impl Worker {
         let listener = thread::Builder::new().spawn(move || {
             let (mut said, mut errors) = (Vec::new(), errors);
             let _ = errors.by_ref().take(LONGEST_MESSAGE).read_to_end(&mut said);
-            // The rest is read, too, because a full pipe would block the process.
+            // The rest of the error stream is read and discarded, because a full pipe would block
+            // the process.
             let _ = io::copy(&mut errors, &mut io::sink());
             String::from_utf8_lossy(&said).into_owned()
         });
@@ -276,7 +277,7 @@ impl Running {
 
     /// Returns the reason for the end of a process that may use this memory, in bytes.
     fn cause_of_end(mut self, memory_bytes: u64) -> AnalysisError {
-        // No further orders: the process ends at the end of its input.
+        // Closing the input ends the process.
         self.orders = None;
         let begun = Instant::now();
         while matches!(self.child.try_wait(), Ok(None)) && begun.elapsed() < FAREWELL {

@@ -46,7 +46,8 @@ pub(crate) struct AverageOfHits {
     before: f64,
 }
 
-/// Averages the responses to some hits, each cut to the length of the shortest.
+/// Averages the responses to some hits; the window of each hit is cut to the length of the shortest
+/// window.
 ///
 /// With an exponential window exp(−σt) on force and response, M, C and K become exactly M, C + 2σM
 /// and K + σC + σ²M: every eigenvalue is shifted by −σ, and the response at iω equals the response

@@ -34,7 +34,7 @@ pub struct FrfTable {
     pub last_sample: usize,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
-    /// All records, including the first.
+    /// All averaged records, including `file`.
     pub records: Vec<AveragedRecord>,
     /// Name of the estimator.
     pub estimator: &'static str,
@@ -417,7 +417,7 @@ impl FrfTable {
         self.responses.iter().flat_map(|r| &r.real).any(|value| value.is_nan())
     }
 
-    /// Returns the segments as files state them.
+    /// Returns the segments in the form in which files of frequency responses state them.
     fn averaged(&self) -> AveragedSegments {
         let SegmentRow { samples, hop, window, count, .. } = self.segments;
         AveragedSegments { samples, hop, count, window, sample_rate_hz: self.sample_rate_hz }
@@ -505,7 +505,7 @@ impl Response {
         }
     }
 
-    /// Returns index and value of the largest magnitude.
+    /// Returns the index and the value of the largest magnitude.
     fn peak(&self) -> (usize, f64) {
         let larger = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
         self.magnitude.iter().copied().enumerate().fold((0, 0.0), larger)

@@ -154,8 +154,9 @@ impl Acquisition {
             let before = change;
             change = largest_change(&last.0.estimate, &fit.estimate);
             last = (fit, equivalent);
-            // The first round with another noise model changes the estimate, but the equivalent
-            // force follows this change only in the proportion of the rounds before.
+            // The first round with another noise model may change the estimate much. The next
+            // change is smaller: it is about this change times `decrease`, the ratio of earlier
+            // successive changes.
             if settled && change * f64::min(decrease, 1.0) < ACQUISITION_SETTLED {
                 break;
             }

@@ -115,8 +115,8 @@ pub(crate) fn rows(
     Ok(rows.iter().map(row).collect())
 }
 
-/// Returns the finding that the fit attributes the residual to unmeasured forces, if only the
-/// residual indicates these forces.
+/// Returns the finding that the fit attributes the residual to unmeasured forces, if the noise
+/// level is not known and these forces were inferred from the residual alone.
 fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding> {
     let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
     let is_seen = fitted.misfit.is_none() && fitted.noise.iter().any(is_of_forces);

@@ -14,13 +14,14 @@ use crate::text::significant;
 /// Maximum number of parameters and modes that a message lists.
 const NAMED: usize = 6;
 
-/// Refuses a fit of a linear system that is singular to rounding, that explains no more of the
-/// response than chance does, or in which the interval of every parameter contains zero.
+/// Refuses a fit of a linear system that is singular within rounding errors, that explains no more
+/// of the response than chance does, or in which the interval of every parameter contains zero.
 ///
 /// A fit that is not singular is not refused if a fault of the channels or another model explains
 /// the failure. If all intervals contain zero, the modes of several degrees of freedom may still be
-/// determined; with one degree of freedom, response and mode are indistinguishable from noise. An
-/// estimate that noise biases may explain none of a response that is mostly signal.
+/// determined; with one degree of freedom, response and mode are indistinguishable from noise. A
+/// biased estimate is not refused for an unexplained response, because it may explain none of a
+/// response that is mostly signal.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].

@@ -477,7 +477,7 @@ mod tests {
         serde_json::from_str(json).map_err(|error| error.to_string())
     }
 
-    /// What a person writes and what is saved is the same.
+    /// Settings can be written in several forms, and the saved form gives the same settings again.
     #[test]
     fn settings_are_written_in_several_ways() {
         for (written, saved) in [

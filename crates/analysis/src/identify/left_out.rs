@@ -150,7 +150,7 @@ pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, 
 mod tests {
     use super::*;
 
-    /// A second at 100 Hz: lines are 1 Hz apart.
+    /// Returns which of the lines 1 to 12 of a record of 1 s are kept; the lines are 1 Hz apart.
     fn kept(lines: Option<&str>, frequencies: &[&str]) -> Result<Vec<usize>, AnalysisError> {
         let lines = lines.map(|text| text.parse().unwrap());
         let frequencies = frequencies.iter().map(|text| text.parse().unwrap()).collect();
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(kept(None, &[]).unwrap().len(), 12);
         assert_eq!(kept(Some("1:9,11"), &[]).unwrap(), [10, 12]);
         assert_eq!(kept(None, &["5"]).unwrap(), [1, 2, 3, 4, 6, 7, 8, 9, 10, 11, 12]);
-        // Between two lines both show it.
+        // A frequency between two lines affects both.
         assert_eq!(kept(None, &["5.3"]).unwrap(), [1, 2, 3, 4, 7, 8, 9, 10, 11, 12]);
         assert_eq!(kept(None, &["5:2"]).unwrap(), [1, 2, 8, 9, 10, 11, 12]);
         assert_eq!(kept(None, &["4:multiples"]).unwrap(), [1, 2, 3, 5, 6, 7, 9, 10, 11]);

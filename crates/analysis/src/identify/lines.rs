@@ -132,7 +132,7 @@ mod tests {
             choose_lines(&force, 64, &choice)
         };
         assert_eq!(choose(None, None).unwrap(), [3, 5, 7]);
-        // The choice stands as it is, undriven lines and all.
+        // Given lines are used as they are, including the lines that the force does not drive.
         assert_eq!(choose(Some("1:6"), None).unwrap(), [1, 2, 3, 4, 5, 6]);
         assert_eq!(choose(None, Some("4:7")).unwrap(), [5, 7]);
         assert_eq!(

@@ -322,7 +322,8 @@ pub(super) fn estimated(
         let (estimate, residuals) = match stepped {
             [] => (start, Vec::new()),
             _ => {
-                // A constant inside a law may differ much from its given value.
+                // The constants inside the laws may differ much from their given values. A second
+                // start therefore uses estimates of these constants.
                 let shape = ShapeConstants { laws: true, ..how.search };
                 let has_constants = |term: &Term| !term.law().constants().is_empty();
                 let is_open = !how.search.laws && terms.iter().any(has_constants);

@@ -81,7 +81,7 @@ pub(super) struct OpenFit {
     pub(super) ends_show: bool,
 }
 
-/// Returns whether the records are short enough to be tried.
+/// Returns whether the records are short enough to be tried as open records.
 pub(super) fn suit(records: &[Windowed], unknowns: &Unknowns) -> bool {
     let whole = records.iter().all(|record| record.held.held_to().is_none());
     let lines: usize = records.iter().map(|record| record.held.force.len() / 2).sum();

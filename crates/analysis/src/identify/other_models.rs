@@ -238,9 +238,9 @@ fn magnitude(z: Complex<f64>, level: f64) -> Complex<f64> {
     Complex::from_polar((level / DECIBELS).exp(), z.arg() + turn)
 }
 
-/// Returns the levels (dB) that were read as magnitudes, up to a common sign: from line to line the
-/// level or the sign of the level changes, whichever needs the smaller change of the logarithm of
-/// the response. Where the sign changes, the phase that was read jumps by π.
+/// Returns the levels (dB) that were read as magnitudes, up to a common sign: from line to line,
+/// the level keeps or reverses its sign, whichever gives the smaller change of the logarithm of the
+/// response. A reversal of the sign appears in the data as a phase jump of π.
 fn levels(values: &[Complex<f64>]) -> Vec<f64> {
     let mut sign = 1.0;
     let mut levels: Vec<f64> = values.iter().map(|z| z.norm()).collect();

@@ -262,7 +262,7 @@ impl IdentificationSummary {
         doubts
     }
 
-    /// Returns the result as a person reads it.
+    /// Returns the result as text for a reader.
     fn text(&self) -> String {
         let mut text = self.heading();
         text.push('\n');

@@ -308,7 +308,7 @@ fn noise_remarks(
 }
 
 /// Returns the standard errors (points × forces) at some rows of a table; `None` unless every
-/// response states its own.
+/// response has a standard error.
 fn standard_errors(
     functions: &[Vec<&ResponseFunction>],
     rows: &[usize],

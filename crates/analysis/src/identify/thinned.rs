@@ -7,8 +7,9 @@ use mechid_spectra::FrequencyData;
 use super::response_settings::IdentifyResponses;
 use crate::limits::{SURPLUS_LINES, THINNED_STEP, TRIED_EQUATIONS, TRIED_LINES};
 
-/// Returns the tables with fewer lines on which other models are tried before all lines; `None` if
-/// the tables have few lines. `data` are the responses on all lines.
+/// Returns the tables with fewer lines; other models are tried on these lines first, and on all
+/// lines only if they fit better. `None` if the tables have few lines. `data` are the responses on
+/// all lines.
 pub(super) fn for_models(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -29,8 +30,8 @@ pub(crate) fn for_resonances(
     thinned(tables, how, SURPLUS_LINES, THINNED_STEP)
 }
 
-/// Returns every k-th line of tables, with the largest k up to `most` that leaves each table a
-/// number of lines in the band; `None` if that is every line.
+/// Returns every k-th line of tables. k is the largest number up to `most` with which each table
+/// has at least `lines` lines in the band. `None` if k is at most 1.
 fn thinned(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -101,7 +102,7 @@ mod tests {
         assert_eq!([50, 160, 199].map(|lines| tried(lines, None)), [None; 3]);
         assert_eq!(tried(400, None), Some(100));
         assert_eq!(tried(40_000, None), Some(4000));
-        // The lines in the band count.
+        // Only the lines in the band count.
         let band = Some(Band { low_hz: 1.0, high_hz: 250.0 });
         assert_eq!(tried(1000, band), Some(500));
         let how = IdentifyResponses::default();

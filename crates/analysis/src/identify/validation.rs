@@ -83,7 +83,7 @@ pub(super) fn hold(fitted: Hold, prediction: Prediction) -> Hold {
 }
 
 impl Validation {
-    /// Compares the prediction with the record.
+    /// Compares the predicted responses with the measured responses of a record.
     pub(crate) fn new(
         recorded: &Windowed,
         model: &Model,

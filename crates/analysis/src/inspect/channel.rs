@@ -156,7 +156,7 @@ impl Measured {
     }
 }
 
-/// Maximum difference of equal amplitudes, relative to the largest.
+/// Maximum difference of amplitudes that count as equal, relative to the largest amplitude.
 const EQUAL: f64 = 1e-9;
 
 /// Spectrum about the mean: of whole periods if the channel is periodic or a period is given,

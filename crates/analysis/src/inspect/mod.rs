@@ -161,9 +161,9 @@ impl Inspection<'_> {
         Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })
     }
 
-    /// Measures the columns of a text while its samples are counted, so that it is read only once.
-    /// This requires that the window ends with the record, and that neither the length of the
-    /// record nor a mean is needed beforehand.
+    /// Measures the columns of a text file while its samples are counted, so that the file is read
+    /// only once. This requires that the window ends with the record, and that neither the length
+    /// of the record nor a mean is needed beforehand.
     fn while_reading(
         &self,
         file: &RecordFile,

@@ -261,7 +261,7 @@ impl Measurement {
             into.copy_from_slice(values);
             labels.push((format!("\"{name}\""), stated_unit(name, "", Some(role.quantity))));
         }
-        // Refuses values that are not finite.
+        // `Record::new` refuses values that are not finite.
         let record = Record::new(sampling, data)?;
         let units = ToSi::new("the record", labels.into_iter(), &roles)?;
         let data = record.into_data();

@@ -214,7 +214,7 @@ pub(crate) fn doubtful_time(
     if !(is_slow || is_fast) || table.says_unit_of_time(column) {
         return None;
     }
-    // This is the largest unit of time that gives a plausible sampling rate.
+    // The result is the largest unit of time that gives a plausible sampling rate.
     let small = [("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
     let small = small.into_iter().find(|(_, size)| rate_hz / size > SLOW_HZ);
     let (unit, factor) = if is_slow { small.unwrap_or(("ms", 1e-3)) } else { ("days", DAY_S) };
@@ -271,15 +271,15 @@ mod tests {
         coarse_time(&table, &time, sampling)
     }
 
-    /// Reference: the uncertainty is half a unit of the last digit at either end, over the duration
-    /// of the record.
+    /// The expected uncertainty is half a unit of the last digit at each end, divided by the
+    /// duration of the record.
     #[test]
     fn instants_that_leave_the_rate_open_are_told() {
-        // The instants have three decimals, so that the uncertainty is a millisecond in 7.8125 s.
+        // The instants have three decimals, so the uncertainty is one millisecond in 7.8125 s.
         let coarse = told(512.0, 4000, 3).unwrap();
         assert!(coarse.contains("0.013 %"), "{coarse}");
         assert_eq!(told(512.0, 4096, 7), None);
-        // Steps of a millisecond are no rounding.
+        // Instants in steps of exactly one millisecond are not rounded.
         assert_eq!(told(1000.0, 4096, 3), None);
         assert_eq!(told(25_600.0, 40_000, 6), None);
     }

@@ -136,7 +136,8 @@ pub(super) fn modes_of_tables(
     } else {
         vec![None; estimate.modes().len()]
     };
-    // Standard errors are never reduced below those for independent errors of the outputs.
+    // The scale is at least 1: standard errors are never smaller than those for independent errors
+    // of the outputs.
     let scale =
         |ratio: Option<f64>| tables.error_inflation() * ratio.unwrap_or(1.0).max(1.0).sqrt();
     let scales: Vec<f64> = scatter.into_iter().map(scale).collect();

@@ -23,7 +23,7 @@ pub(super) struct FreeMotion {
 
 impl FreeMotion {
     /// Fits the amplitudes, and a constant for each channel, by least squares. The data are the
-    /// first `settle` samples of the measured channels minus a response from rest.
+    /// first `settle` samples of the measured channels, minus the predicted response from rest.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if these samples do not determine every amplitude.

@@ -26,8 +26,7 @@ pub struct ModeSet {
 }
 
 /// Frequencies and shapes alone, such as those of a finite-element model. Unknown fields are
-/// refused here, because they may be misspelt. A result of mechid, in contrast, has many fields
-/// that a comparison does not use.
+/// refused, because they may be misspelt.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlainModes {

@@ -114,7 +114,7 @@ impl Response {
         let mut lines = DMatrix::zeros(spectrum.len(), outputs);
         let mut power = vec![0.0; outputs];
         let mut any = false;
-        // The last line of an even record has no phase.
+        // The highest line of a record with an even number of samples has no phase.
         for n in 0..sampling.len().div_ceil(2) {
             let (omega, [low, high]) = (spectrum.omega(n), system.band_hz);
             if !(low * TAU..=high * TAU).contains(&omega) {

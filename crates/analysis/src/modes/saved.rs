@@ -1,4 +1,4 @@
-//! A saved result with modes: what `--json` prints, as pages and comparisons read it.
+//! A saved result with modes: the output of `--json`, in the form that pages and comparisons read.
 
 use std::path::Path;
 
@@ -251,7 +251,7 @@ impl SavedModes {
         !self.outputs.is_empty() && self.inputs.len() > self.outputs.len()
     }
 
-    /// Returns the names of the responses, those of their columns; empty for a machine.
+    /// Returns the names of the response columns; empty for a machine.
     pub fn columns(&self) -> Vec<String> {
         self.responses().iter().map(|response| response.column.clone()).collect()
     }

@@ -301,8 +301,9 @@ impl Columns {
     }
 }
 
-/// Returns, for each input, the output at its point: in its direction if there is one, otherwise
-/// against it. An input or output without a stated point is `None`.
+/// Returns, for each input, the output at its point: the output in the same direction if there is
+/// one, otherwise the output in the opposite direction. An input or output without a stated point
+/// is `None`.
 pub(super) fn driving_points(
     inputs: &[Option<String>],
     outputs: &[Option<String>],
@@ -338,7 +339,8 @@ impl Places {
     /// points.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] if the number of stated points is not that of the responses.
+    /// [`AnalysisError::Setting`] if the number of stated points differs from the number of
+    /// responses.
     pub(super) fn response_places(
         &self,
         outputs: &[Output],

@@ -45,7 +45,7 @@ pub struct ModesSummary {
     /// Modal assurance criterion of every pair of shapes, a pure number from 0 to 1; one row per
     /// mode.
     pub mac: Vec<Vec<f64>>,
-    /// Standard error of each of these, a pure number; one row per mode.
+    /// Standard error of each modal assurance criterion, a pure number; one row per mode.
     pub mac_standard_error: Vec<Vec<f64>>,
     /// Rejected candidates for modes.
     pub dropped: Vec<DroppedRow>,
@@ -62,7 +62,7 @@ pub struct ModesSummary {
     pub variance_predicted: Option<f64>,
     /// Checks of the data and of the fit.
     pub checks: Vec<ModalCheck>,
-    /// Stabilisation diagram and mode indicator, if they were asked for.
+    /// Stabilisation diagram and mode indicator, if they were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagrams: Option<Diagrams>,
     /// Frequency responses of modes and residual terms with the covariance of the modes, in SI

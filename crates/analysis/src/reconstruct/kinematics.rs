@@ -25,7 +25,8 @@ pub struct KinematicConsistency(Vec<Pair>);
 const ALIKE: f64 = 0.7;
 
 /// Ratio of the integrated rate to the measured change, or its inverse, above which a remark is
-/// made; the error of the trapezoidal rule gives such a ratio only below 2.4 samples per period.
+/// made; the error of the trapezoidal rule alone gives such a ratio only with fewer than 2.4
+/// samples per cycle.
 const ANOTHER_UNIT: f64 = 3.0;
 
 impl KinematicConsistency {

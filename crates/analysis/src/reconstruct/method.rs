@@ -341,8 +341,8 @@ fn filtered(
     })
 }
 
-/// Returns the measurement with the band of the reconstructed force. A reconstruction with a
-/// perturbed machine then has the same band.
+/// Returns the measurement restricted to the band of the reconstructed force, so that a
+/// reconstruction with a perturbed machine has the same band.
 fn in_band_of(motion: &Measurement, force: &IdentifiedForce) -> Result<Measurement, AnalysisError> {
     Ok(match force.band_hz() {
         Some(band_hz) => motion.clone().in_band(band_hz)?,

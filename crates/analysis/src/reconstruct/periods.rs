@@ -13,7 +13,8 @@ const ALIKE: f64 = 0.1;
 /// does.
 const NOT_WHITE: f64 = 0.3;
 
-/// Returns a remark on the channel whose periods differ most from their mean, if they do.
+/// Returns a remark on the channel whose periods differ most from their mean; `None` if the
+/// differences are small or white noise.
 pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     let record = held.motion.record();
     let samples = record.len();

@@ -32,7 +32,8 @@ pub(super) fn begins_and_ends_at_rest(system: &ModalSystem, motion: &Measurement
     [0, len - samples].iter().all(|first| rests(system, motion, *first, samples).unwrap_or(false))
 }
 
-/// Returns whether some samples show no free motion of the modes; `None` if they do not decide.
+/// Returns whether the given samples show no free motion of the modes; `None` if they are not
+/// sufficient to decide.
 fn rests(system: &ModalSystem, motion: &Measurement, first: usize, samples: usize) -> Option<bool> {
     let unknowns = 2 * system.model.terms.len();
     let mut equations = LeastSquares::new(unknowns, 1);

@@ -64,7 +64,7 @@ pub struct ForceRow {
     /// Name of the force in the test that identified the system, or `force 1` of the first degree
     /// of freedom.
     pub name: String,
-    /// `true` if a force was to be reconstructed here.
+    /// `true` if the reconstruction of this force was requested.
     pub sought: bool,
     /// RMS value, in the unit of the channel.
     pub rms: f64,

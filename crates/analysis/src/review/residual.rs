@@ -10,7 +10,7 @@ use crate::identify::fitted;
 use crate::identify::prediction::Compared;
 use crate::measurement::Block;
 
-/// Maximum ratio of a residual that is rounding to the response.
+/// Maximum ratio of a residual to the response that counts as rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Measured and predicted motion of one record, and correlations of the residual of the fit.

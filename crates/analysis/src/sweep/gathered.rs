@@ -148,8 +148,8 @@ impl Decimated {
     /// Creates an empty sum for a record whose buffered samples are `held`.
     ///
     /// # Errors
-    /// [`AnalysisError::DecimatedPeriod`] if one of several periods is not a whole number of the
-    /// used samples, and the errors of choosing lines.
+    /// [`AnalysisError::DecimatedPeriod`] if there are several periods and the length of a period
+    /// is not a whole number of used samples, and the errors of choosing lines.
     pub fn new(
         estimator: Estimator,
         factor: usize,

@@ -64,7 +64,7 @@ impl FromStr for Settings {
                 [first, step, last] => [first, step, last],
                 _ => return Err("a range is written first:step:last, such as 1:0.5:16".into()),
             };
-            // The small addition keeps the last setting despite the rounding of the steps.
+            // The small addition prevents that rounding of the steps removes the last setting.
             let steps = ((last - first) / step + 1e-9).floor();
             let positive = |v: f64| v > 0.0 && v.is_finite();
             if !(positive(first) && positive(step) && positive(last) && steps >= 0.0) {
@@ -90,7 +90,7 @@ mod tests {
         let settings = |text: &str| text.parse::<Settings>().map(|Settings(all)| all);
         assert_eq!(settings("1:0.5:3"), Ok(vec![1.0, 1.5, 2.0, 2.5, 3.0]));
         assert_eq!(settings("8, 2:2:4"), Ok(vec![8.0, 2.0, 4.0]));
-        // 0.1 is not a binary fraction: the last setting must not fall to rounding.
+        // 0.1 has no exact binary form. Rounding must not remove the last setting.
         assert_eq!(settings("0.1:0.1:0.3").map(|s| s.len()), Ok(3));
         for text in ["", "a", "0", "-1", "1:2", "3:1:1", "1:0:2", "1:1:inf", "1:1e-9:2", "NaN"] {
             assert!(settings(text).is_err(), "{text}");

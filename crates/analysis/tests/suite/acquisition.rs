@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 const HELD: Discretisation = Discretisation::ZeroOrderHold;
 
-/// Oscillator of 3 kg at 8 Hz with a damping ratio of 0.05.
+/// Returns an oscillator of 3 kg at 8 Hz with a damping ratio of 0.05.
 fn light() -> Sdof {
     let omega = TAU * 8.0;
     Sdof::new(3.0, 2.0 * 0.05 * omega * 3.0, 3.0 * omega * omega).unwrap()
@@ -49,7 +49,7 @@ pub fn cause(found: &Identified) -> Option<Cause> {
     causes.next()
 }
 
-/// Number of parameters whose 95 % interval contains the true value.
+/// Returns the number of parameters whose 95 % interval contains the true value.
 fn held(found: &Identified, truth: [f64; 3]) -> usize {
     let holds = |(name, exact): (&str, f64)| {
         let [low, high] = found.estimate().parameter(name).unwrap().interval(0.95).unwrap();
@@ -64,8 +64,8 @@ fn open(between: Option<Discretisation>, coupled: &[&str]) -> Identify {
     Identify::from(Source::Open(OpenFit { acquisition, ..OpenFit::default() }))
 }
 
-/// If the intervals are right, fewer than 20 of 24 intervals of 95 % contain the true value with a
-/// probability of 0.006.
+/// If the intervals are right, the probability that fewer than 20 of 24 intervals of 95 % contain
+/// the true value is 0.006.
 #[test]
 fn a_simulated_force_is_named_and_allowed_for() {
     let truth = [light().mass(), light().damping(), light().stiffness()];
@@ -83,8 +83,8 @@ fn a_simulated_force_is_named_and_allowed_for() {
         let holding: usize = holding.sum();
         assert!(holding >= 20, "{between}, {kind}: {holding}");
         let usual = identify(&[simulated(between, kind, 0)], &Identify::default()).unwrap();
-        // The fit with the wrong force is off by many of its own errors; the intervals include
-        // that.
+        // The fit with the wrong force has an error of many standard errors from the noise; the
+        // intervals include this error.
         assert_eq!(held(&usual, truth), 3, "{usual}");
         let note = "from the parameters of the model that explains the residual";
         assert!(usual.to_string().contains(note), "{usual}");
@@ -125,8 +125,8 @@ fn tower(samples: usize) -> (Measurement, [f64; 5]) {
     (Measurement::from_records(&force, &[(kind, &noisy)]).unwrap(), masses)
 }
 
-/// The weights of the five channels settle slowly or not at all while the force is taken as
-/// band-limited; that must not end the fit.
+/// With a band-limited force, the weights of the five channels converge slowly or not at all. This
+/// must not end the fit.
 #[test]
 fn a_chain_under_a_simulated_force_is_fitted() {
     let (measured, masses) = tower(2048);
@@ -186,9 +186,9 @@ fn coupled_test(
     Measurement::from_records(&force, &[(quantity, &noisy)]).unwrap()
 }
 
-/// If the intervals are right, fewer than 20 of 24 intervals of 95 % contain the true value with a
-/// probability of 0.006. Without the corner frequency the model lacks a term: the intervals still
-/// contain the true values, but are wider.
+/// If the intervals are right, the probability that fewer than 20 of 24 intervals of 95 % contain
+/// the true value is 0.006. Without the corner frequency, the model lacks the high-pass; the
+/// intervals are wider and still contain the true values.
 #[test]
 fn an_ac_coupled_response_is_allowed_for() {
     let truth = [heavy().mass(), heavy().damping(), heavy().stiffness()];
@@ -218,7 +218,8 @@ fn an_ac_coupled_response_is_allowed_for() {
     assert!(wrong.to_string().contains("no fitted channel a9"), "{wrong}");
 }
 
-/// The response is behind a high-pass of 3 Hz: every record names it, with the corner frequency.
+/// The response is behind a high-pass of 3 Hz. The check of every record names the AC coupling and
+/// its corner frequency.
 #[test]
 fn an_ac_coupled_response_is_named() {
     (0..4_u64).into_par_iter().for_each(|seed| {
@@ -233,8 +234,9 @@ fn an_ac_coupled_response_is_named() {
     });
 }
 
-/// A force behind a high-pass of 0.5 Hz: a force that is held between its samples leaves only noise
-/// in some records, but less remains without the high-pass.
+/// The force channel is behind a high-pass of 0.5 Hz. In some records a force that is held between
+/// its samples also explains the residual up to noise, but correcting the high-pass leaves less
+/// residual power.
 #[test]
 fn an_ac_coupled_force_is_named() {
     let omega = TAU * 12.0;
@@ -251,8 +253,9 @@ fn an_ac_coupled_force_is_named() {
     });
 }
 
-/// A linear force passes the tests of the residual in some of these records although it leaves 90 %
-/// of the residual power; the held force leaves less than 1 %.
+/// In some of these records, the fit with a force that is linear between its samples passes the
+/// tests of the residual, although it leaves 90 % of the residual power. The fit with the held
+/// force leaves less than 1 %.
 #[test]
 fn a_held_force_is_not_taken_for_a_linear_one() {
     let omega = TAU * 5.0;

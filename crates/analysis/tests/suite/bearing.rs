@@ -21,7 +21,7 @@ fn sampling() -> Sampling {
     Sampling::from_rate_hz(1024.0, PERIOD).unwrap()
 }
 
-/// Lines from 24 to 200 Hz, 8 Hz apart.
+/// Returns the lines from 24 to 200 Hz, 8 Hz apart.
 fn lines() -> Vec<usize> {
     (6..=50).step_by(2).collect()
 }
@@ -250,8 +250,8 @@ fn tables_are_checked_before_the_fit() {
 }
 
 /// If the force is measured without noise and the weights are accurate, a record and its tables
-/// give the same results. Noise on the force affects both responses alike, which the tables do not
-/// state.
+/// give the same results. Noise on the force causes correlated errors of both responses, and the
+/// tables do not state this correlation.
 #[test]
 fn records_and_their_tables_agree() {
     let rig = rig(3.0);

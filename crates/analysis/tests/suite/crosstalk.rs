@@ -14,8 +14,8 @@ use nalgebra::DMatrix;
 
 const PERIOD: usize = 256;
 
-/// One shaker and a second force channel that shows `part` of its force; both channels have noise
-/// of `level` times the force.
+/// Returns a test with one shaker and a second force channel that contains `part` of its force;
+/// both channels have noise of `level` times the force.
 fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
     let system = chain(2, Support::Held, 0.02, 3);
@@ -71,8 +71,8 @@ fn a_force_that_follows_another_has_no_responses_and_is_told() {
     }
 }
 
-/// A second shaker with a twentieth of the force counts as a force of its own; so does one that is
-/// half coherent with the first.
+/// A second shaker with a twentieth of the force of the first counts as an independent force; so
+/// does a second shaker that is half coherent with the first.
 #[test]
 fn a_weak_shaker_of_its_own_is_kept() {
     let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();

@@ -68,9 +68,9 @@ fn modes_and_their_release_are_found() {
     assert!(text.contains("2 modes; ± is one standard error"), "{text}");
 }
 
-/// Two decays after different releases, each of which hardly moves one of the modes of the other:
-/// together they give both modes. Of 20 pairs, 80 intervals of 95 % of frequency and damping ratio
-/// contain the true value 76 times on average, with a standard deviation of 2.
+/// Two decays after different releases: each release hardly excites one of the two modes, and both
+/// decays together give both modes. Of 20 pairs, 80 intervals of 95 % of frequency and damping
+/// ratio contain the true value 76 times on average, with a standard deviation of 2.
 #[test]
 fn several_decays_have_common_modes() {
     let truth = [(6.0_f64, 0.01_f64), (30.0, 0.02)];
@@ -193,7 +193,8 @@ fn what_cannot_be_analysed_is_refused() {
     assert!(matches!(decay(&none, &default), Err(AnalysisError::NoMotion)));
 }
 
-/// The same record without noise, quantised: the last cycles of the decay are a square wave.
+/// The record has no noise and is quantised, so that the last cycles of the decay are a square
+/// wave.
 #[test]
 fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
     for bits in [8, 10, 12] {

@@ -110,7 +110,8 @@ fn linear_decays_have_no_backbone_no_harmonic_and_no_second_hit() {
     let sets: [&[[f64; 3]]; 4] = [
         &[[5.0, 0.01, 1.0]],
         &[[5.0, 0.01, 1.0], [17.0, 0.02, 0.5]],
-        // The next case has two close modes, the last two nearly equal frequencies.
+        // The next case has two close modes. The last case has two modes with nearly equal
+        // frequencies.
         &[[5.0, 0.01, 1.0], [5.1, 0.008, 0.7]],
         &[[5.0, 0.004, 1.0], [5.05, 0.02, 0.8], [23.0, 0.01, 0.4]],
     ];
@@ -218,7 +219,7 @@ fn hits_in_phase_are_said() {
     }
 }
 
-/// The notes on several decays are those on each of them alone.
+/// The notes on several decays together are the same as the notes on each decay alone.
 #[test]
 fn decays_that_are_analysed_together_are_judged_one_by_one() {
     let sampling = Sampling::from_rate_hz(200.0, 1600).unwrap();

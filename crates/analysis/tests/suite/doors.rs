@@ -249,7 +249,7 @@ fn a_record_given_twice_is_refused() {
     refused(frf_of_records(&pair, &FrfSettings::default()).unwrap_err());
     refused(modes(&repeated, &ModesSettings::default()).unwrap_err());
 
-    // Other samples, and another part of the same record, are other tests.
+    // Records with other samples, and another part of the same record, count as other tests.
     let noisy = noise::add_white(&x, NoiseLevel::FractionOfRms(1e-9), 1).unwrap();
     identify(&[test(&x, "a"), test(&noisy, "b")].map(periods), &Identify::default()).unwrap();
     let part = |start: usize| {

@@ -96,8 +96,8 @@ fn intervals_hold_beside_forces_in_steps() {
     assert!((0.65..1.35).contains(&mean), "{mean}");
 }
 
-/// Reference: the generator. The modes of such a machine are correct, and only the sign of its mass
-/// is impossible.
+/// Reference: the generator. The modes are correct; only the negative mass shows the wrong sign of
+/// the response.
 #[test]
 fn a_response_of_the_wrong_sign_is_told() {
     for seed in 0..8 {
@@ -106,8 +106,8 @@ fn a_response_of_the_wrong_sign_is_told() {
     }
 }
 
-/// Reference: two families of tests with an error rate of 1 % each. More than 8 of 150 records warn
-/// with a probability below 0.01.
+/// Reference: two families of tests with an error rate of 1 % each. The probability of warnings in
+/// more than 8 of 150 records is below 0.01.
 #[test]
 fn records_without_a_fault_seldom_warn() {
     let warned = |seed: &u64| !warnings(None, [true, true], *seed).is_empty();

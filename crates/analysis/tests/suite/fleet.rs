@@ -325,7 +325,7 @@ fn trends_find_what_stands_out_and_nothing_else() {
     assert!(outliers.contains(&"speed-3766.csv"));
     // One of two thousand normal values lies beyond 3.5 standard deviations.
     assert!(outliers.len() <= 4, "{outliers:?}");
-    // The interval is the one that the record's row states.
+    // The interval is that of the row of the record.
     let interval = mass.points[0].interval.unwrap();
     let error = mass.points[0].standard_error.unwrap();
     assert!(interval[1] - interval[0] > 3.9 * error);

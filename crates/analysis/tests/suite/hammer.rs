@@ -88,8 +88,8 @@ fn with_both_forces(rig: &HammerTest, dof: usize, noise_n: f64, part: f64) -> Me
     Measurement::from_records(&force, &[(rig.quantity, &response)]).unwrap()
 }
 
-/// Reference: the same test with zeros in this channel. If the channel shows a few per cent of the
-/// blow, that is a force.
+/// Reference: the same test with zeros in the force channel of the mass that is not struck. If this
+/// channel contains a few per cent of the other force, it counts as a force.
 #[test]
 fn a_column_that_shows_noise_alone_is_no_second_hammer() {
     let rig = rig(ACCELERATION);
@@ -186,8 +186,8 @@ fn ac_coupled_responses_to_hits_are_named() {
 }
 
 /// Noise of 0.5 % of the peak on the samples of a pulse is common to all lines of the hit: it makes
-/// the standard errors hardly larger, and no check of the residual warns of it. Of 24 intervals of
-/// modes, fewer than 20 contain the true value with a probability of 0.006.
+/// the standard errors hardly larger, and no check of the residual warns of it. The probability
+/// that fewer than 20 of 24 intervals of modes contain the true value is 0.006.
 #[test]
 fn noise_of_the_force_is_common_to_all_lines_of_a_hit() {
     let fits = |noise_n: f64| -> Vec<Identified> {
@@ -320,7 +320,7 @@ fn hits_that_are_left_out_are_told_with_their_reasons() {
 }
 
 /// A tap of 3 % of the usual force between two hits is too light to be a double hit. If the force
-/// left the tap out, the response to it would be attributed to the hit before.
+/// did not include the tap, the response to the tap would be attributed to the hit before it.
 #[test]
 fn light_taps_between_hits_are_listed_and_cost_no_good_hit() {
     let rig = rig(ACCELERATION);
@@ -553,8 +553,8 @@ fn lightly_damped() -> HammerTest {
     }
 }
 
-/// Reference: the closed form. With a transient of its own for each hit, participations and
-/// transients can replace each other, and a false mode makes the masses wrong by a third.
+/// Reference: the closed form. If each hit had a separate transient, participations and transients
+/// could replace each other; a false mode would then change the masses by a third.
 #[test]
 fn hits_in_close_succession_give_modes_and_masses() {
     let rig = lightly_damped();

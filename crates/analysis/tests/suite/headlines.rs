@@ -144,8 +144,8 @@ fn strokes_of_unequal_strength_are_no_periods() {
     assert!(tells(&equal, Subject::Misfit), "{equal}");
 }
 
-/// Noise of a load cell differs from period to period, but no response follows it, so it must not
-/// be reported.
+/// Noise of a load cell differs from period to period, but causes no response, so it must not be
+/// reported as a difference of the periods.
 #[test]
 fn noise_on_the_force_is_no_difference_of_the_periods() {
     let (force, response) = steady(10);
@@ -203,8 +203,8 @@ fn the_lines_of_a_fit_are_given_on_request() {
             // Three parameters from 198 numbers: the fit is more accurate than the measurement.
             assert!(line.fitted_standard_error[0] < error, "{line:?}");
         }
-        // The mean of 198 squared errors, whose standard errors have nine degrees of freedom each,
-        // lies in 1 ± 0.6 with 4σ.
+        // The mean of 198 squared errors, each over a squared standard error with nine degrees of
+        // freedom, is about 1 ± 0.6 (four standard deviations).
         assert!((0.5..1.7).contains(&of_noise), "{of_noise}");
         assert!(of_fit < 5.0, "{of_fit}");
         assert!(

@@ -201,8 +201,8 @@ fn a_wrong_gain_and_a_wrong_sign_are_named() {
     assert!(signs.contains(&"driving_point") && signs.contains(&"reciprocity"), "{found}");
 }
 
-/// A sensor of noise alone, a thousandth of the others, is named once; on right data every sensor
-/// passes, and no check has the words of a failure.
+/// A sensor that measures only noise, a thousandth of its former level, is named once. On correct
+/// data every sensor passes, and the text of no check has the words of a failure.
 #[test]
 fn a_sensor_that_moves_in_no_mode_is_named() {
     let right = plain([1.0; 3], 5);
@@ -226,8 +226,9 @@ fn a_sensor_that_moves_in_no_mode_is_named() {
     assert!(failed[0].code == "idle_response" && failed[0].text.contains("2+Z"), "{found}");
 }
 
-/// Reference: the closed form, with all displacements 1 ms late. Complex shapes take the place of
-/// the delay; the check of the driving points finds it, and the masses are those of the structure.
+/// Reference: the closed form, with all displacements 1 ms late. The estimated shapes are complex
+/// because of the delay. The check of the driving points finds the delay, and the masses are those
+/// of the structure.
 #[test]
 fn a_delay_of_displacements_is_named_and_does_not_change_the_masses() {
     let delay = 1e-3;
@@ -331,10 +332,11 @@ fn with_properties(table: &FrequencyResponses) -> Modes {
     modes_of_responses(std::slice::from_ref(table), &settings).unwrap()
 }
 
-/// Reference: the masses of [`SHAPES`], whose damping is proportional. On right tables both
-/// properties agree, the intervals of the masses hold, the errors are smaller, and the standard
-/// errors of scaled shapes and of the MAC are the scatter; a phase of one sensor contradicts real
-/// shapes, a wrong gain reciprocity, and neither is imposed then.
+/// Reference: the masses of [`SHAPES`], whose damping is proportional. On correct tables both
+/// properties pass their checks, the intervals of the masses contain the true values, and their
+/// standard errors become smaller. The standard errors of scaled shapes and of the MAC agree with
+/// the scatter. A phase error of one sensor contradicts real shapes, and a wrong gain contradicts
+/// reciprocity; a contradicted property is not imposed.
 #[test]
 fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them() {
     let noisy = |seed: u64, change: &dyn Fn(usize) -> C| {
@@ -369,11 +371,12 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
         }
     }
     assert!(failed_checks <= 1, "{failed_checks} of 40");
-    // Three standard deviations of the share of 60.
+    // The limit is three standard deviations of the number of 60 intervals that contain the true
+    // value.
     assert!(inside >= 52, "{inside} of 60");
     let rms =
         |ratios: &[f64]| (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
-    // Three standard deviations of the RMS of 420 and of 60 ratios.
+    // The limits are three standard deviations of the RMS of 420 and of 60 ratios.
     assert!(of_shapes.len() == 420 && (0.9..1.1).contains(&rms(&of_shapes)), "{of_shapes:?}");
     assert!(of_mac.len() == 60 && (0.73..1.27).contains(&rms(&of_mac)), "{of_mac:?}");
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
@@ -440,7 +443,8 @@ fn a_comparison_names_the_mode_that_changed() {
     assert_eq!(error.code(), "analysis.no-common-point");
 }
 
-/// A field that is misspelt, and names that are not those of the entries, are refused.
+/// A misspelt field is refused, and so are names whose number differs from the number of entries of
+/// the shapes.
 #[test]
 fn frequencies_and_shapes_alone_are_read_strictly() {
     let set = |text: &str| ModeSet::from_json("model", serde_json::from_str(text).unwrap());

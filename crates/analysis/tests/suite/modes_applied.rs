@@ -189,8 +189,8 @@ fn rest_at_both_ends_is_detected() {
     }
 }
 
-/// A hammer strikes downwards, the sensors count upwards: modal masses and reciprocity are those of
-/// the same test with both in one direction.
+/// The hammer strikes downwards, and the positive direction of the sensors is upwards. Modal masses
+/// and reciprocity are those of the same test with both in one direction.
 #[test]
 fn forces_against_the_direction_of_their_sensors_give_masses_and_reciprocity() {
     let forces = pulses();

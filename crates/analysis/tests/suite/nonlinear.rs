@@ -377,8 +377,8 @@ fn one_shaker_at_a_time(cubic: f64, seed: u64) -> Vec<Measurement> {
     vec![shaken(0), shaken(1)]
 }
 
-/// Reference: the machine in closed form. One record does not determine it, both together do, with
-/// the term and without.
+/// Reference: the machine in closed form. One record does not determine the machine; both together
+/// determine it, with the nonlinear term and without it.
 #[test]
 fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
     let term = "cubic stiffness of x1 (hardening)";
@@ -441,8 +441,8 @@ fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
     }
 }
 
-/// Reference: the oscillator of the window, with a cubic spring that contributes as much as the
-/// linear one. A window without a stated period is an open record; what needs periods is refused.
+/// Reference: the oscillator of the window, with a cubic spring force as large as the linear one. A
+/// window without a stated period is an open record; settings that need periods are refused.
 #[test]
 fn a_window_without_a_period_is_an_open_record() {
     let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
@@ -461,7 +461,8 @@ fn a_window_without_a_period_is_an_open_record() {
     let of_candidates = Nonlinear { candidates, ..Nonlinear::default() };
     let refused =
         |seed| identify(&[random_motion(3e7, seed)], &Identify::nonlinear(of_candidates.clone()));
-    // The ends of some windows meet by chance.
+    // In some windows the last sample is close to the first by chance, so only some windows are
+    // recognised as not periodic.
     let is_named = |seed: &u64| {
         let error = refused(*seed).map_or_else(|error| error.to_string(), |_| String::new());
         error.contains("its end does not meet its beginning")
@@ -469,8 +470,8 @@ fn a_window_without_a_period_is_an_open_record() {
     assert!((0..6).filter(is_named).count() > 0);
 }
 
-/// Judge: noise alone has no oscillator. Least squares on all lines of a sweep is so biased by its
-/// noise that it explains none of the response.
+/// Reference: records of noise alone contain no oscillator. On all lines of a sweep, noise biases
+/// least squares so strongly that the fit explains none of the response.
 #[test]
 fn a_nonlinear_fit_that_explains_nothing_is_refused() {
     let record = |seed: u64, unit: f64| {
@@ -570,9 +571,9 @@ fn terms_are_found_in_open_records() {
     assert!(refused(how).contains("`candidates`"));
 }
 
-/// Judge: the machine of the periods, whose quadratic spring the model lacks, and the sweep with
-/// friction that it lacks. The change by the terms that explain the residual is part of the
-/// intervals; the model with all terms has no such finding.
+/// References: the machine of the periods, whose quadratic spring is missing in the model, and the
+/// machine of the sweep, whose friction is missing. The intervals include the change of the
+/// parameters by the missing terms. A model with all terms has no finding of missing terms.
 #[test]
 fn intervals_of_a_model_that_lacks_a_term_hold() {
     let (force, x) = steady_state();

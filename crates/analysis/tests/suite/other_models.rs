@@ -93,7 +93,8 @@ fn told(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> Told {
     Told::of(table(receptance, seed, is_stated), IdentifyResponses::default())
 }
 
-/// At a rate of 1 in 100, more than 5 of 120 correct tables warn with a probability of 0.004.
+/// At a rate of 1 in 100, the probability of warnings in more than 5 of 120 correct tables is
+/// 0.004.
 #[test]
 fn right_tables_pass() {
     let warned = (0..60).flat_map(|seed| [false, true].map(|stated| told(&viscous, seed, stated)));
@@ -195,7 +196,8 @@ fn decibels_read_as_magnitudes_are_told() {
     }
 }
 
-/// Other models are tried on fewer lines of a long table first; they are found as on all lines.
+/// Other models are tried on fewer lines of a long table first; they are found on these lines as
+/// they are on all lines.
 #[test]
 fn long_tables_are_told_apart_too() {
     let structural = |omega: f64| {

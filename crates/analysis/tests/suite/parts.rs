@@ -62,7 +62,8 @@ fn parts_of_a_linear_machine_agree_and_nothing_is_scaled() {
     }
 }
 
-/// One of two records has 2 % more mass: k and c agree, and m is 1 % off in each record.
+/// One of two records has 2 % more mass. The records agree in k and c, and the mass of each differs
+/// by 1 % from the mean.
 #[test]
 fn a_weight_added_for_one_record_is_named_and_in_the_interval() {
     let linear = FaultyOscillator::linear();

@@ -60,8 +60,8 @@ fn is_open(identified: &Identified) -> bool {
     fitted.drawn.is_some() && fitted.coherence.is_none()
 }
 
-/// If the intervals are right, fewer than 42 of 50 intervals of 95 % contain the true value with a
-/// probability of 0.002. Of correct records, 1 in 50 may warn.
+/// If the intervals are right, the probability that fewer than 42 of 50 intervals of 95 % contain
+/// the true value is 0.002. At most 1 in 50 correct records may warn.
 #[test]
 fn a_random_test_needs_no_settings() {
     const RUNS: u64 = 50;
@@ -97,7 +97,7 @@ fn several_records_have_ends_of_their_own() {
         assert_eq!(coherence.frequency_hz[at], table.frequency_hz[skipped + at]);
         assert!((value - table.coherence[0].values[skipped + at]).abs() < 1e-12);
     }
-    // Three times the data reduce the error by about √3.
+    // With three times the data, the error is smaller by a factor of about √3.
     let gain = error(&one) / error(&all);
     assert!((1.2..2.4).contains(&gain), "{gain}");
 }
@@ -265,15 +265,16 @@ fn with_force_noise(force: Option<Vec<f64>>) -> Identify {
     }
 }
 
-/// If the intervals are right, fewer than 88 % of 180 intervals of 95 %, in correlated groups of
-/// three, contain the true value with a probability below 0.01. If the noise of 1 % is ignored, a
-/// third of them miss it.
+/// If the intervals are right, the probability that fewer than 88 % of 180 intervals of 95 % (in
+/// correlated groups of three) contain the true value is below 0.01. If the noise of 1 % is
+/// ignored, a third of the intervals do not contain it.
 #[test]
 fn noise_on_the_force_is_read_above_its_band() {
     let (share, warned, all) = judged(&rig(), 0.01, &with_force_noise(None), 30);
     assert!(share >= 0.88, "{share}");
     assert!(warned <= 3, "{warned} of 30 warn");
-    // The noise is 1 % of 84 N, the part of 100 N within the band; 256 lines give it to about 1/16.
+    // The noise is 1 % of 84 N, the RMS within the band of a force of 100 N. 256 lines determine
+    // its power to about 1/16.
     let levels = all.iter().map(|found| found.summary().fit.force_noise[0].levels_n[0].unwrap());
     let mean = levels.sum::<f64>() / 30.0;
     assert!((mean / 0.837 - 1.0).abs() < 0.03, "{mean}");
@@ -405,7 +406,7 @@ fn intervals_of_modes_of_averaged_responses_hold() {
         both.sum::<usize>()
     };
     let held: usize = (0..20_u64).into_par_iter().map(held).sum();
-    // Of 80 intervals 76 hold on average, with a standard deviation of 2.
+    // On average 76 of 80 intervals contain the true value, with a standard deviation of 2.
     assert!(held >= 70, "{held}");
 }
 
@@ -569,8 +570,8 @@ fn six_random_forces_need_no_settings() {
     assert_eq!(warned, 0);
 }
 
-/// With six sensors and forces an earlier version did not correct the window, without a word: the
-/// damping ratios of such chains were several standard errors too high.
+/// With six sensors and forces an earlier version did not correct the bias of the window and gave
+/// no warning: the damping ratios of such chains were several standard errors too high.
 #[test]
 fn intervals_of_frequency_responses_of_six_sensors_hold() {
     let chain = chain(512.0, 32_768);

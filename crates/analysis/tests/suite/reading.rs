@@ -243,7 +243,7 @@ fn frequency_responses_take_fewer_responses_than_forces() {
     );
     let same = why("f1,f1", "x", Estimator::H1);
     assert!(same.contains("do not act independently"), "{same}");
-    // As many periods as forces give no average.
+    // With only as many periods as forces, no average is possible.
     let short = open("f1,f2", "x");
     let window = Window { start: 1, period: Some(PERIOD), periods: Some(2) };
     let few = frf(&short.window(window).unwrap(), &how(Estimator::H1)).unwrap_err().to_string();

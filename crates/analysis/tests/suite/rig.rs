@@ -108,7 +108,8 @@ fn noise_in_idle_channels_is_no_cause_for_warnings() {
             all += 1;
         }
     }
-    // At a rate of 1 in 50, more than four of fifty records warn with a probability of 0.003.
+    // At a rate of 1 in 50, the probability of warnings in more than four of fifty records is
+    // 0.003.
     assert!(warned <= 4, "{warned} of {RUNS} warn");
     let coverage = held as f64 / f64::from(all);
     assert!((0.93..0.97).contains(&coverage), "{coverage}");
@@ -125,17 +126,18 @@ fn noise_in_idle_channels_is_no_force_of_frequency_responses() {
     let (mut warned, mut kept) = (0, 0);
     for seed in 0..RUNS {
         let found = identify(&records(seed, [0.005, 0.002]), &from_frf()).unwrap();
-        // All lines of the acting shakers are used, and hardly ever those of a channel with only
-        // noise.
+        // All lines of the acting shakers are used. The lines of a channel with only noise are used
+        // in very few cases.
         kept += found.summary().fit.equations / (2 * 70) - DOFS;
         let of_idle = |remark: &&String| remark.contains("only noise in force");
         assert_eq!(found.summary().remarks.iter().filter(of_idle).count(), DOFS, "{found}");
         warned += u64::from(found.checks().iter().any(|check| check.is_conspicuous()));
     }
-    // If one in a thousand of 240 channels is kept, more than three are kept with a probability of
-    // 10⁻⁴.
+    // If one in a thousand channels is kept, the probability that more than three of 240 are kept
+    // is 10⁻⁴.
     assert!(kept <= 3, "{kept} channels are kept");
-    // At a rate of 1 in 50, more than four of forty records warn with a probability of 0.001.
+    // At a rate of 1 in 50, the probability of warnings in more than four of forty records is
+    // 0.001.
     assert!(warned <= 4, "{warned} of {RUNS} warn");
 }
 

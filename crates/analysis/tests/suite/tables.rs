@@ -70,8 +70,9 @@ fn exact_tables_give_the_machine_whatever_was_measured() {
     }
 }
 
-/// Averages of equal coherence have noise in proportion to the response; others have the same noise
-/// on all lines. Without a stated noise the residual shows which, and the intervals hold.
+/// Averages with the same coherence on all lines have noise in proportion to the response; other
+/// tables have the same noise on all lines. If the table does not state its noise, the residual
+/// shows the kind of noise, and the intervals contain the true values.
 #[test]
 fn intervals_hold_whatever_the_noise_of_a_table_follows() {
     let system = Sdof::new(5.0, 34.0, 64_000.0).unwrap().system();
@@ -108,10 +109,11 @@ fn intervals_hold_whatever_the_noise_of_a_table_follows() {
                 .any(|model| matches!(model, NoiseModel::Proportional { .. }));
             kinds[usize::from(is_relative)] += 1;
         }
-        // Of 180 intervals 171 hold on average, with a standard deviation of 3.
+        // On average 171 of 180 intervals contain the true value, with a standard deviation of 3.
         assert!(held >= 161, "{white} {relative}: {held} of 180, {kinds:?}");
         assert!(kinds[usize::from(relative > 0.0)] >= 55, "{white} {relative}: {kinds:?}");
-        // At 1 % for all checks of a table, more than four of 60 have a probability of 4e-4.
+        // At a rate of 1 % for all checks of a table together, the probability of warnings for more
+        // than four of 60 tables is 4e-4.
         assert!(warned <= 4, "{white} {relative}: {warned}");
     }
 }
@@ -145,10 +147,11 @@ fn intervals_of_late_responses_include_the_delay() {
     }
 }
 
-/// Mobilities that are read as accelerances, and a mass that changes by 2 % within the band: the
-/// standard errors from the noise are far too small. They are scaled, and contain the change to the
-/// right quantity: the intervals reach the machine or, of two, one of them. Those from the noise
-/// alone do not.
+/// Mobilities that are read as accelerances, and a mass that changes by 2 % within the band: in
+/// both cases the standard errors from the noise alone are far too small. The result has larger
+/// standard errors, which include the change of the parameters for the correct quantity. Its
+/// intervals reach the values of the machine, or the range between the values of the two machines;
+/// some intervals from the noise alone do not.
 #[test]
 fn intervals_of_a_wrong_model_are_as_wide_as_its_error() {
     let system = oscillator();
@@ -270,11 +273,13 @@ fn a_record_and_its_table_agree() {
     for found in [of_text.estimate(), of_universal.estimate()] {
         for (a, b) in of_record.estimate().parameters().zip(found.parameters()) {
             let apart = (a.value - b.value).abs() / a.standard_error;
-            // The two fits estimate the noise from 15 deviations on different lines; either way an
-            // estimate moves at random by 1/√15 of its standard error.
+            // The two fits estimate the noise from 15 deviations, on different lines. Their weights
+            // therefore differ at random, which moves an estimate by about 1/√15 of its standard
+            // error.
             assert!(apart < 0.8, "{a} against {b}");
             // The standard errors of the record are 7 % larger, because they allow for uncertain
-            // weights. Both are known to about 15 %, because few lines decide.
+            // weights. Both standard errors are known to about 15 %, because they depend on few
+            // lines.
             let ratio = a.standard_error / b.standard_error;
             assert!((0.8..1.35).contains(&ratio), "{ratio}");
         }
@@ -315,7 +320,7 @@ fn points_in_names_of_channels_are_kept() {
     }
     let [text, universal] = points("3+Z", "12+Z,7-X", &["1+Y".into(), "2+Y".into()]);
     assert_eq!((&text, &universal.0[1]), (&named[0], &"2+Y/1+Y".to_owned()));
-    // One name that is no point, such as that of a force, leaves all of them numbered.
+    // If one name is not a point, as the name of the force here, all channels are numbered.
     let [text, universal] = points("hammer", "12+Z,7-X", &[]);
     assert_eq!((&text.0[1], &universal.0[1]), (&"2/1".to_owned(), &"2+X/1+X".to_owned()));
 }
@@ -374,12 +379,13 @@ fn coverage(
         inside(found.estimate())
     });
     let share = all.sum::<usize>() as f64 / (runs as usize * truth.len()) as f64;
-    // On right data the standard errors are those of the noise.
+    // On correct data the standard errors follow from the noise alone and are not scaled.
     assert!(50 * scaled.get() <= runs, "{} of {runs}", scaled.get());
     share
 }
 
-/// The share of 500 runs with 12 parameters scatters by about 0.4 %.
+/// The share of intervals that contain the true value, in 500 runs with 12 parameters, scatters by
+/// about 0.4 %.
 #[test]
 fn intervals_from_standard_errors_hold() {
     let measure = |mut table: FrequencyResponses, seed: u64| {
@@ -446,7 +452,8 @@ fn what_a_table_lacks_is_told() {
         "table has no response at 2 to a force at 1: every point needs a response to every force, and \
          every force needs a response at its point (choose `points`)"
     );
-    // With a single point the table is complete, although the machine is another one.
+    // With only one point chosen, the table is complete; the model then has one degree of freedom
+    // instead of two.
     let alone = IdentifyResponses { points: vec!["2".into()], ..usual.clone() };
     assert_eq!(identify_responses(&[gap], &alone).unwrap().estimate().dof(), 1);
     let mut coherent = table.clone();

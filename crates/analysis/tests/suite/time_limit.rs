@@ -21,8 +21,8 @@ fn example(file: &str) -> String {
     format!("{}/../../examples/{file}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Ends some work after several numbers of polls. A result must say so if, and only if, a search
-/// ended early; a failure must be due to the limit, because the whole work succeeds.
+/// Ends the `work` after each of several numbers of polls. A result must say so if, and only if, a
+/// search ended early; a failure must be due to the limit, because the whole work succeeds.
 fn says_so<T: Serialize>(work: impl Fn() -> Result<T, AnalysisError>) {
     let json = |result: &T| serde_json::to_string(result).unwrap();
     let whole = json(&work().unwrap());
@@ -162,7 +162,7 @@ fn the_limit_of_a_record_is_in_its_row() {
         row.findings.into_iter().map(|finding| finding.code).collect()
     };
     assert!(codes(&limited).contains(&"time_limit".to_owned()));
-    // The limit of the calling code is not that of the record.
+    // A time limit set by the calling code does not apply to the row of a record.
     let around = within(Some(TimeLimit::from_polls(0)), || codes(&analysis));
     assert!(!around.contains(&"time_limit".to_owned()));
 }

@@ -1,5 +1,5 @@
-//! Modes of a machine when no force acts on some degrees of freedom and no mass is known: other
-//! results are not given.
+//! Modes of a machine if no force acts on some degrees of freedom and no mass is known. Results
+//! other than the modes are not given.
 
 use std::f64::consts::TAU;
 
@@ -199,8 +199,8 @@ fn struck(seed: u64) -> (HammerTest, Measurement) {
     (rig, test)
 }
 
-/// If the intervals are right, fewer than 40 of 48 intervals of 95 % contain the true value in one
-/// of a thousand such tests.
+/// If the intervals are right, the probability that fewer than 40 of 48 intervals of 95 % contain
+/// the true value is 0.001.
 #[test]
 fn a_hammer_at_one_point_gives_the_modes() {
     let band = LineChoice::Band(Band { low_hz: 2.0, high_hz: 150.0 });
@@ -211,7 +211,8 @@ fn a_hammer_at_one_point_gives_the_modes() {
     assert!(total == 48 && held >= 40, "{held} of {total}");
 }
 
-/// The response can be predicted for the same forces as in the test, but not for others.
+/// The response can be predicted for forces at the same points as in the test, but not at other
+/// points.
 #[test]
 fn a_record_is_predicted_if_its_forces_are_those_that_acted() {
     let found = identify(&[record(3, 0.001)], &from_frf()).unwrap();

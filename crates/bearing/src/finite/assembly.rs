@@ -132,8 +132,8 @@ impl Assembly {
 impl Element {
     fn new(film: &Film, relative: Vector2<f64>, column: usize, row: usize) -> Self {
         let rows = film.rows();
-        // The last row has no pressure, so its front has no equation. Its front is that of the row
-        // before.
+        // The last row has no pressure, so it has no equation for its front. It uses the front of
+        // the row before.
         let next = (row + 1).min(rows - 1);
         let [start, end] = &film.fronts;
         let fronts = [start[row], end[row], start[next], end[next]];

@@ -176,7 +176,8 @@ mod tests {
         .map(|(bore, s)| (FiniteBearing::new(bore, 1.0).unwrap().with_mesh(mesh).unwrap(), s))
     }
 
-    /// The judge of the derivatives: the load of films that follow a small displacement.
+    /// The derivatives agree with finite differences of the load: the films are solved again after
+    /// a small displacement.
     #[test]
     fn tangents_are_the_derivatives_of_the_discrete_load() {
         for (bearing, sommerfeld) in bearings() {
@@ -205,7 +206,7 @@ mod tests {
     }
 
     /// Conditions of Swift and Stieber: no pressure below zero, no slope at the free ends of the
-    /// film, and beyond them a bore that diverges.
+    /// film, and each end at or outside the limits of the converging arc.
     #[test]
     fn films_meet_the_conditions_of_their_ends() {
         for (bearing, sommerfeld) in bearings() {

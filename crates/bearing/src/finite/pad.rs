@@ -62,7 +62,7 @@ impl Bore {
     }
 }
 
-/// An arc of the bore between two grooves, or all of it.
+/// An arc of the bore between two grooves, or the whole bore.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pad {
     /// Angles of its first and last edge, in rad; infinite for a bore without grooves.
@@ -86,10 +86,11 @@ impl Pad {
         if within { 1.0 - x.hypot(y) } else { thickness(first).min(thickness(last)) }
     }
 
-    /// Returns the angles between which the film converges, in rad; `None` if they are less than a
-    /// thousandth apart.
+    /// Returns the angles between which the film converges, in rad; `None` if their difference is
+    /// at most 0.001 rad.
     ///
-    /// A pad of at most half the circumference, or a full bore, has one such arc.
+    /// A pad that covers at most half the circumference, or the whole of it, has one converging
+    /// arc.
     pub(super) fn converging(&self, position: Vector2<f64>) -> Option<[f64; 2]> {
         let relative = self.relative(position);
         let thinnest = relative[1].atan2(relative[0]);

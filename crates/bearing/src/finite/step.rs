@@ -15,7 +15,7 @@ pub(super) struct Step {
     /// Derivatives of the load with respect to displacement and velocity, along the static load
     /// and across.
     pub(super) tangent: Matrix2x4<f64>,
-    /// Changes of the pressure by node.
+    /// Changes of the pressure, one entry per node.
     pressure: Vec<[f64; SIDES]>,
     /// Changes of the free fronts × [`SIDES`].
     fronts: DMatrix<f64>,
@@ -92,8 +92,8 @@ impl Step {
         finite.then_some(Self { load, tangent, pressure, fronts, unknown, outflow })
     }
 
-    /// Changes the film to satisfy its equations with the journal moved by `moved` to `position`;
-    /// returns the largest change of a front (rad).
+    /// Changes the film such that it satisfies its linearised equations after the journal has moved
+    /// by `moved` to `position`; returns the largest change of a front (rad).
     ///
     /// # Errors
     /// [`BearingError::SingularFilm`] as for [`Step::new`].

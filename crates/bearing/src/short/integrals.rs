@@ -22,8 +22,8 @@ impl Integrals {
         let e = eccentricity;
         let q = (1.0 - e) * (1.0 + e);
         let root = q.sqrt();
-        // `last` is the angle γ at the end, `first` is γ at the start, half a turn before. γ passes
-        // ±π where θ does.
+        // `last` is the angle γ for θ = α, the end of the range; `first` is γ for θ = α − π, its
+        // start. γ passes ±π where θ does.
         let (sin, cos) = end.sin_cos();
         let last = (root * sin).atan2(cos - e);
         let first = (-root * sin).atan2(-cos - e);
@@ -62,7 +62,7 @@ mod tests {
 
     use super::*;
 
-    /// Simpson's rule, which knows no closed form.
+    /// Simpson's rule, as an independent reference for the closed form.
     fn by_quadrature(e: f64, end: f64, sines: i32, cosines: i32) -> f64 {
         let intervals = 20_000;
         let step = PI / f64::from(intervals);

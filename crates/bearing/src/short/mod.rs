@@ -78,8 +78,9 @@ impl ShortBearing {
     pub fn equilibrium(&self, sommerfeld: f64) -> Result<Equilibrium, BearingError> {
         require("Sommerfeld number", sommerfeld, "positive and finite", sommerfeld > 0.0)?;
         let wanted = 1.0 / (4.0 * PI * self.length_over_diameter.powi(2) * sommerfeld);
-        // The load increases with the eccentricity, so bisection finds the eccentricity. The scale
-        // of the bisection resolves both ends of the interval from 0 to 1.
+        // The load increases with the eccentricity, so bisection finds the eccentricity. The
+        // bisection uses the logit of the eccentricity, because this scale resolves values near 0
+        // and near 1.
         let [mut low, mut high] = [-36.0_f64, 36.0];
         let at = |logit: f64| 1.0 / (1.0 + (-logit).exp());
         for _ in 0..64 {

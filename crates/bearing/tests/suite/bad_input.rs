@@ -1,4 +1,4 @@
-//! Impossible bearings: each is refused with its numbers.
+//! Invalid bearings: each gives an error that states the invalid values.
 
 use mechid_bearing::{
     BearingError, Bore, Conditions, FiniteBearing, Mesh, ShortBearing, ShortFilm, Threshold,

@@ -14,7 +14,8 @@ fn numbers(equilibrium: &Equilibrium) -> [f64; 10] {
     list
 }
 
-/// Largest difference, of the position and of each kind of coefficient over its largest entry.
+/// Returns the largest difference of the positions (in clearances), of the stiffnesses and of the
+/// damping coefficients; the latter two are divided by the largest entry of their matrix.
 fn distance(a: &[f64; 10], b: &[f64; 10]) -> f64 {
     [0..2, 2..6, 6..10]
         .map(|range| {
@@ -41,7 +42,8 @@ fn extrapolated(bearing: &FiniteBearing, sommerfeld: f64, mesh: Mesh) -> [f64; 1
     std::array::from_fn(|i| fine[i] + (fine[i] - coarse[i]) / 3.0)
 }
 
-/// Errors fall fourfold with every halving of the mesh: of the position and of all coefficients.
+/// If the mesh intervals are halved, the errors of the position and of all coefficients are divided
+/// by four.
 #[test]
 fn everything_converges_with_the_square_of_the_step() {
     let groove = 20_f64.to_radians();
@@ -60,7 +62,7 @@ fn everything_converges_with_the_square_of_the_step() {
         });
         let order = (distance(&a, &b) / distance(&b, &c)).log2();
         assert!((order - 2.0).abs() < 0.2, "{bearing:?}: order {order}");
-        // The default mesh is as good as its documentation says.
+        // The default mesh has the accuracy that its documentation states.
         let limit = std::array::from_fn(|i| c[i] + (c[i] - b[i]) / 3.0);
         let default = numbers(&bearing.equilibrium(sommerfeld).unwrap());
         assert!(distance(&default, &limit) < 0.002, "{}", distance(&default, &limit));
@@ -85,13 +87,13 @@ fn short_bearings_tend_to_ocvirk() {
 }
 
 /// For L/D → ∞ the whole circumference has pressure, as in Sommerfeld's solution: the journal moves
-/// at right angles to the load, with W = 2π ε / ((2 + ε²) √(1 − ε²)) per unit of length, and the
-/// ends reduce the load in proportion to D/L.
+/// at right angles to the load, with W = 2π ε / ((2 + ε²) √(1 − ε²)) per unit of length,
+/// dimensionless as in the solver. The flow at the ends reduces the load in proportion to D/L.
 #[test]
 fn long_bearings_tend_to_sommerfeld() {
     let e: f64 = 0.4;
     let sommerfeld = (2.0 + e * e) * (1.0 - e * e).sqrt() / (12.0 * PI * PI * e);
-    // dW/dε / W; the film turns with half the speed of the shaft.
+    // The slope is dW/dε / W. The mean rotation of the oil has half the speed of the shaft.
     let slope = 1.0 / e - 2.0 * e / (2.0 + e * e) + e / (1.0 - e * e);
     let squeeze = (2.0 + e * e) / (e * (1.0 - e * e));
     let expected = [0.0, e, 0.0, slope, -1.0 / e, 0.0, 2.0 / e, 0.0, 0.0, squeeze];
@@ -107,7 +109,7 @@ fn long_bearings_tend_to_sommerfeld() {
 }
 
 /// An equilibrium is found from light loads to heavy ones and from short bearings to long ones;
-/// with a growing load the journal turns towards its direction.
+/// with a growing load, the attitude angle decreases.
 #[test]
 fn equilibria_are_found_over_the_range_of_practice() {
     let elliptical = |preload: f64| Bore::elliptical(preload, 0.35).unwrap();

@@ -1,4 +1,4 @@
-//! Bearings judged by published tables, closed forms, quadrature and a naive solver.
+//! Bearings compared with published tables, closed forms, quadrature and a naive solver.
 
 mod bad_input;
 mod limits;

@@ -1,9 +1,11 @@
 //! A naive solver of the same problem: finite differences on a mesh that does not move, with the
-//! pressure set to zero wherever it would be negative (Christopherson), swept until it rests.
+//! pressure set to zero wherever it would be negative (Christopherson). The iteration ends when the
+//! pressure no longer changes.
 
 use mechid_bearing::{Bore, FiniteBearing};
 
-/// Load (along, across) of one pad with edges at ±80° from `middle`, over 6 μ Ω R² (R/c)².
+/// Returns the load of one pad, along and across the static load, divided by 6 μ Ω R² (R/c)². The
+/// edges of the pad are at ±80° from `middle`.
 fn load_of_pad(middle: f64, relative: [f64; 2], half_length: f64) -> [f64; 2] {
     let (along, across) = (160_usize, 24_usize);
     let half = 80_f64.to_radians();
@@ -22,7 +24,7 @@ fn load_of_pad(middle: f64, relative: [f64; 2], half_length: f64) -> [f64; 2] {
             let source = (thickness(x + 0.5) - thickness(x - 0.5)) / da;
             let [west, east, side] = [west / (da * da), east / (da * da), here / (dz * dz)];
             for j in 0..across {
-                // The middle of the bearing mirrors.
+                // The pressure is symmetric about the middle of the bearing.
                 let below = if j == 0 { pressure[i][1] } else { pressure[i][j - 1] };
                 let sum = west * pressure[i - 1][j]
                     + east * pressure[i + 1][j]
@@ -60,7 +62,7 @@ fn the_equilibrium_carries_its_load_by_the_naive_solver_too() {
         let expected = ratio / (3.0 * PI * sommerfeld);
         let along = (lower[0] + upper[0]) / expected - 1.0;
         let across = (lower[1] + upper[1]) / expected;
-        // A half per cent for a mesh of one degree.
+        // The limit is 0.5 % because the mesh has intervals of one degree.
         assert!(along.abs() < 0.005 && across.abs() < 0.005, "{preload} {along} {across}");
     }
 }

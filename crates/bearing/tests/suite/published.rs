@@ -42,8 +42,8 @@ fn deviation(ours: &[f64], printed: &[f64]) -> f64 {
     differences.fold(0.0, f64::max) / largest
 }
 
-/// Required are 2 %. The rows of the elliptical bearing agree within the printed digits, those of
-/// the bearing with two grooves within 1 %; the book gives the reason.
+/// The required accuracy is 2 %. The rows of the elliptical bearing agree within the printed
+/// digits, those of the bearing with two grooves within 1 %; the book gives the reason.
 #[test]
 fn coefficients_agree_with_lund_and_thomsen() {
     for row in rows() {
@@ -53,7 +53,7 @@ fn coefficients_agree_with_lund_and_thomsen() {
         let damping = deviation(&[bxx, bxy, byy], &row.damping);
         let bound = if row.name.starts_with("elliptical") { 0.005 } else { 0.01 };
         assert!(stiffness < bound && damping < bound, "{}: {stiffness} {damping}", row.name);
-        // The exact film has a symmetric damping matrix; the mesh nearly.
+        // The damping matrix of the exact film is symmetric; on the mesh, it is nearly symmetric.
         assert!((bxy - byx).abs() < 1e-3 * bxx, "{}: {bxy} {byx}", row.name);
     }
 }
@@ -110,7 +110,7 @@ fn the_table_of_the_book_is_from_a_run() {
     assert!(page.contains(&table), "the page should have\n{table}");
 }
 
-/// A worked size: forward to a film with units and back.
+/// Coefficients of a bearing of a given size are converted to SI units and back.
 #[test]
 fn units_go_there_and_back() {
     let conditions = Conditions {

@@ -137,7 +137,7 @@ fn tangents_are_the_derivatives_of_the_force() {
     }
 }
 
-/// Only the rotation distinguishes the directions of the film.
+/// If position and velocity are turned by an angle, the force turns by the same angle.
 #[test]
 fn the_film_turns_with_the_axes() {
     let film = ShortFilm::new(CONDITIONS).unwrap();
@@ -156,8 +156,8 @@ fn the_film_turns_with_the_axes() {
     }
 }
 
-/// A journal that circles at half the speed of rotation takes the oil along, without pressure at
-/// any eccentricity. For this reason oil whirl has half the frequency of rotation.
+/// If the journal whirls at half the speed of rotation, the film has no pressure, at any
+/// eccentricity. For this reason oil whirl has half the frequency of rotation.
 #[test]
 fn whirl_at_half_the_speed_meets_no_force() {
     let film = ShortFilm::new(CONDITIONS).unwrap();

@@ -12,7 +12,8 @@ fn film(coefficients: &Coefficients) -> OilFilm {
     OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy }
 }
 
-/// Largest real part of an eigenvalue, and the frequency that belongs to it.
+/// Returns the largest real part of the eigenvalues, and the frequency of the eigenvalue with this
+/// part.
 fn least_stable(film: OilFilm, mass: f64) -> [f64; 2] {
     let rotor = JournalBearing::new(mass, film, KyxSign::Plus).unwrap().system();
     let modes = rotor.modes().unwrap();
@@ -98,8 +99,8 @@ fn standard_errors_are_those_of_the_scatter() {
     for ([sum, squares], expected) in sums.into_iter().zip(expected) {
         let mean = sum / f64::from(draws);
         let scatter = (squares / f64::from(draws) - mean * mean).sqrt();
-        // The limit is four standard errors of the scatter of this many draws, plus the second
-        // order.
+        // The limit is four standard errors of the scatter of this number of draws, plus the error
+        // of second order of the delta method.
         assert!((scatter / expected - 1.0).abs() < 0.025, "{scatter} {expected}");
     }
 }

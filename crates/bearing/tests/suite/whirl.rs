@@ -34,7 +34,7 @@ impl Rotor {
         [u, v, (fx + LOAD) / self.mass, fy / self.mass]
     }
 
-    /// Runge and Kutta's fourth-order method, of the smooth force at its own state.
+    /// Returns the state after a step of the fourth-order Runge–Kutta method.
     fn step(&self, state: State, dt: f64) -> State {
         let moved = |by: State, h: f64| std::array::from_fn(|i| state[i] + h * by[i]);
         let a = self.slope(state);
@@ -44,8 +44,8 @@ impl Rotor {
         std::array::from_fn(|i| state[i] + dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]))
     }
 
-    /// Growth (1/s) of the amplitude of a small whirl at `omega_w`, from two stretches of whole
-    /// periods.
+    /// Returns the growth rate (1/s) of the amplitude of a small whirl at `omega_w`, from the
+    /// powers in two consecutive intervals of whole periods.
     fn growth(&self, omega_w: f64) -> f64 {
         let rest = Self::equilibrium();
         let (steps, periods) = (200, 10);
@@ -60,7 +60,7 @@ impl Rotor {
             }
             sum
         };
-        // The other motions of the rotor decay meanwhile.
+        // During these periods, the other motions of the rotor decay.
         power(periods);
         let (before, after) = (power(periods), power(periods));
         (after / before).ln() / (2.0 * f64::from(periods) * TAU / omega_w)
@@ -102,7 +102,7 @@ fn whirl_of_an_unstable_rotor_stays_within_the_clearance() {
         for k in 0..turns * 200 {
             state = rotor.step(state, dt);
             let [x, y] = [state[0] - rest[0], state[1] - rest[1]];
-            // The last quarter of the run.
+            // Only the last quarter of the run is evaluated.
             if k > turns * 150 {
                 largest = largest.max(x.hypot(y) / CONDITIONS.clearance);
                 let now = y.atan2(x);

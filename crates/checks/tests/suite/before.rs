@@ -292,8 +292,8 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
     };
 }
 
-/// If the claimed period is wrong by four samples, its neighbours are as wrong as itself: the check
-/// names the right period and no period in between, also with noise on the force.
+/// If the claimed period is wrong by four samples, the neighbouring periods are wrong, too: the
+/// check names the right period and no period in between, also with noise on the force.
 #[test]
 fn a_period_some_samples_off_is_replaced_by_the_right_one_only() {
     let sampling = Sampling::new(0.01, 256).unwrap();

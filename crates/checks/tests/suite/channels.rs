@@ -301,23 +301,24 @@ fn motions_that_do_not_belong_together_are_told() {
             let response = exact_harmonic_periodic(&system, &force).unwrap();
             let response = noisy_response(&response, 0.01, seed);
             let [x, v, a] = motions(&response);
-            // Millimetres a second.
+            // The velocity is in mm/s.
             let wrong = Record::new(force.sampling(), v.1.data() * 1e3).unwrap();
             let said = kinematics(&[x, (v.0, &wrong), a]).unwrap();
             let gains: Vec<f64> = said.iter().map(Finding::value).collect();
             assert_eq!(said.len(), 2 * system.dof());
-            // At a quarter of the sampling rate the trapezoidal rule is 4/π too small.
+            // At a quarter of the sampling rate the trapezoidal rule is too small by a factor of
+            // 4/π.
             let near = |gain: f64, expected: f64| (0.98..1.3).contains(&(gain / expected));
             let halves = gains.split_at(system.dof());
             assert!(halves.0.iter().all(|gain| near(*gain, 1e-3)), "{gains:?}");
             assert!(halves.1.iter().all(|gain| near(*gain, 1e3)), "{gains:?}");
             assert_eq!((said[0].subject(), said[0].verdict()), (Subject::Kinematics, Verdict::Bad));
-            // Columns swapped, and a sign.
+            // Two columns are interchanged; then the acceleration has the wrong sign.
             let said = kinematics(&[(x.0, v.1), (v.0, x.1)]).unwrap();
             assert_eq!(said.len(), system.dof(), "{said:?}");
             let turned = Record::new(force.sampling(), -a.1.data()).unwrap();
             let said = kinematics(&[x, (a.0, &turned)]).unwrap();
-            // And the second difference 8/π² of what it should be.
+            // At a quarter of the sampling rate the second difference is 8/π² of the correct value.
             let near = |finding: &Finding| (-1.02..-0.78).contains(&finding.value());
             assert!(said.iter().all(near), "{said:?}");
             assert_eq!(said.len(), system.dof());

@@ -1,4 +1,4 @@
-//! Checks on data with and without the fault that they look for.
+//! Checks on data with and without the fault that they detect.
 
 mod before;
 mod channels;

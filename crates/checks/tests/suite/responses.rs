@@ -1,4 +1,4 @@
-//! How often the checks after a fit of frequency responses and of spectra are right.
+//! Error rates of the checks after a fit of frequency responses and of spectra.
 
 use mechid_checks::{Finding, Subject, Verdict, after_response_fit, after_spectral_fit, linearity};
 use mechid_estimate::frequency_domain::output_error;
@@ -17,7 +17,8 @@ use mechid_spectra::{Lines, Pooling, RepeatedPeriods};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Verdicts on misfit, whiteness from line to line, and linearity; true for good.
+/// Results of the checks of misfit, whiteness from line to line, and linearity; `true` if all
+/// verdicts of a check are good.
 fn verdicts(checks: &[Finding]) -> [bool; 3] {
     [Subject::Misfit, Subject::Whiteness, Subject::Linearity].map(|subject| {
         let mut of = checks.iter().filter(|c| c.subject() == subject).peekable();
@@ -54,8 +55,8 @@ impl Random {
         };
         let clean = course(&force);
         let motion = match self.estimator {
-            // This estimator assumes equal relative noise on both: noise with the spectrum of the
-            // motion.
+            // This estimator assumes equal relative noise on force and motion, so the noise has the
+            // spectrum of the motion.
             FrfEstimator::Hv => {
                 let other = noise::white(sampling, 1, 100.0, 2 * seed + 1).unwrap();
                 let data = clean.data() + linear(&other).data() * self.noise[0];
@@ -113,7 +114,7 @@ fn a_wrong_machine_is_found_out_after_a_fit_of_responses() {
     for (name, mass, course, shown_by) in [
         ("a mass wrong by 2 %", Some(10.2), linear as fn(&Record) -> Record, [0, 1].as_slice()),
         ("a second mode", None, with_a_second_mass, &[0, 1]),
-        // Under a random force it looks like a stiffer one and noise.
+        // Under a random force a cubic spring looks like a stiffer linear spring with noise.
         ("a cubic spring", None, hardening, &[2]),
     ] {
         let random = random(mass);
@@ -147,7 +148,8 @@ fn hardening(force: &Record) -> Record {
     Record::from_channel(force.sampling(), x).unwrap()
 }
 
-/// A second mass, a tenth of the first, hangs on it at 20 rad/s and is not measured.
+/// A second mass, a tenth of the first, is attached to the first by a spring, with a natural
+/// frequency of 20 rad/s, and is not measured.
 fn with_a_second_mass(force: &Record) -> Record {
     let of = |a: f64, b: f64, c: f64| DMatrix::from_row_slice(2, 2, &[a, b, b, c]);
     let (m, c, k) = (of(10.0, 0.0, 1.0), of(180.0, -2.0, 2.0), of(5400.0, -400.0, 400.0));
@@ -223,7 +225,7 @@ fn eight_sensors(cubic: f64, seed: u64) -> Finding {
     };
     let force = on_all(&noisy(&drive, 0.02, 3 * seed + 1));
     let motion = noisy(&motion, 0.002, 3 * seed + 2);
-    // All known but two springs.
+    // All entries are known except the first two diagonal entries of the stiffness.
     let mut unknowns = Unknowns::known_mass(system.mass()).unwrap();
     for matrix in [Matrix::Damping, Matrix::Stiffness] {
         for row in 0..8 {
@@ -248,9 +250,9 @@ fn eight_sensors(cubic: f64, seed: u64) -> Finding {
     linearity(&estimate.unwrap(), &force, &motion, kind, [0.5, 25.0]).unwrap()
 }
 
-/// Judge: the generator. Noise on a force appears in all responses: eight sensors are not eight
-/// independent observations. At a level of 1 %, more than 3 of 60 runs warn with a probability of
-/// 0.003.
+/// The reference is the generator. Noise on a force appears in all responses: eight sensors are not
+/// eight independent observations. At a level of 1 %, more than 3 of 60 runs warn with a
+/// probability of 0.003.
 #[test]
 fn noise_on_the_forces_of_eight_sensors_is_no_nonlinearity() {
     let warned = |cubic: f64, runs: u64| {

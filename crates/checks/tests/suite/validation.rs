@@ -60,7 +60,7 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
     // The noise of 1 % does not repeat, and determines the largest of three deviations.
     assert!((0.007..0.011).contains(&of(&good, Subject::Periodicity).value()));
 
-    // Two equations, four unknowns; then four for four.
+    // One line gives two equations for four unknowns; two lines give four equations.
     let poor = look(0.2, 5..=5, 512, 0.0);
     assert_eq!((poor[0].verdict(), poor[1].subject()), (Verdict::Bad, Subject::Periodicity));
     let tight = look(0.2, 5..=6, 512, 0.0);
@@ -167,7 +167,8 @@ fn residuals_are_judged_channel_by_channel() {
         "{checks:?}"
     );
 
-    // As rounding, the same residual has no meaning, and a force that never changes is left out.
+    // Relative to a far larger fitted signal the same residual is only rounding, and a constant
+    // force is not tested.
     let large = Record::new(sampling, fitted.data() * 1e10).unwrap();
     let still = Record::new(sampling, DMatrix::from_element(2000, 1, 3.0)).unwrap();
     let checks = after_fit(&residual, &large, &still, 20, 0).unwrap();
@@ -177,7 +178,7 @@ fn residuals_are_judged_channel_by_channel() {
     assert!(matches!(after_fit(&residual, &other, &force, 20, 0), Err(EstimateError::Signal(_))));
 }
 
-/// Judge: the closed form of the problems, which shares nothing with the estimators.
+/// The reference is the closed form of the problems, which does not use the estimators.
 #[test]
 fn the_steady_state_is_predicted_line_by_line() {
     let system = bearing();

@@ -1,4 +1,5 @@
-//! Whole commands on large input: their time and their peak memory, as the system sees them.
+//! Whole commands on large input: their time and their peak memory, as the operating system reports
+//! them.
 //!
 //! Commands that are compared run alternately. The last lines show each result beside its goal. If
 //! `MECHID_BENCH_PYTHON` names a Python interpreter that has `pyarrow`, the reading time is also
@@ -18,7 +19,7 @@ use mechid::io::csv_text;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// Time between two looks at the memory of a command.
+/// Time between two readings of the memory of a command.
 const TICK: Duration = Duration::from_millis(2);
 
 /// Returns whether every command runs only once, on small input, as under `cargo test`.
@@ -26,7 +27,7 @@ fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }
 
-/// Least time and largest memory of some runs of a command.
+/// Minimum time and maximum memory over several runs of a command.
 #[derive(Debug, Clone, Copy)]
 struct Cost {
     seconds: f64,

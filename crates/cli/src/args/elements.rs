@@ -14,11 +14,12 @@ use crate::error::CliError;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Machine of named elements")]
 pub struct ElementArgs {
-    /// Find the unknown coefficients of the machine in this description: degrees of freedom,
-    /// elements (masses, springs and dampers, bearings, known matrices), sensors anywhere, and
-    /// inputs (forces, motion of the support, unbalance). The columns of the record must have the
-    /// names of the sensors and inputs. With --period the record is read as whole periods, with
-    /// --hits as the hits of a hammer, otherwise as an open record (any part of a response)
+    /// Find the unknown coefficients of the machine in this description. The description has
+    /// degrees of freedom, elements (masses, springs and dampers, bearings, known matrices),
+    /// sensors at any positions, and inputs (forces, motion of the support, unbalance). The columns
+    /// of the record must have the names of the sensors and inputs. With --period the record is
+    /// read as whole periods, with --hits as the hits of a hammer, otherwise as an open record (any
+    /// part of a response)
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
           "acceleration", "domain", "lines", "without_lines", "method", "extent",
           "between_samples", "ac_coupling", "mass", "structure", "struck", "nonlinear", "candidates",

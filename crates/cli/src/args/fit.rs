@@ -23,7 +23,7 @@ use super::{ChannelArgs, RecordArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::Files;
 
-/// Records, what in them, and how to identify the machine.
+/// Records, the columns and lines to use, and the settings of the identification.
 #[derive(Debug, Args)]
 pub struct FitArgs {
     #[command(flatten)]

@@ -64,9 +64,9 @@ impl PlotArgs {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Mode shapes")]
 pub struct ShapeArgs {
-    /// Places of the channels: a universal file (datasets 15 or 2411, and 82), or a table with rows
-    /// name,x,y,z in m and line,name,name [default: a row or a grid, from channel names such as 1+Z
-    /// and 1.2+Z]
+    /// Positions of the channels: a universal file (datasets 15 or 2411, and 82), or a table with
+    /// rows name,x,y,z in m and line,name,name [default: a row or a grid, from channel names such
+    /// as 1+Z and 1.2+Z]
     #[arg(long, value_name = "FILE")]
     geometry: Option<PathBuf>,
     /// Write geometry and complex shapes into this universal file (datasets 164, 15, 82, 55; SI
@@ -234,8 +234,8 @@ pub struct RecordArgs {
     /// (--memory-gb)
     #[arg(long, value_name = "FACTOR", value_parser = at_least_one)]
     pub raise_limits: Option<usize>,
-    /// Maximum memory for the numbers of a file and the work on them, in GB [default: 0.27 GB plus
-    /// 512 bytes per byte of the file, at most 8.6 GB]
+    /// Maximum memory for the numbers of a file and for the computation, in GB [default: 0.27 GB
+    /// plus 512 bytes per byte of the file, at most 8.6 GB]
     #[arg(long, value_name = "GB", value_parser = positive)]
     pub memory_gb: Option<f64>,
     /// Time column: name or number, counted from 1; in the unit that its name (time_ms, Time [s])
@@ -301,7 +301,7 @@ impl RecordArgs {
     }
 }
 
-/// Parses a column and a text behind the last equals sign.
+/// Parses a column and the text after the last equals sign.
 fn column_and_text(text: &str) -> Result<(String, String), String> {
     match text.rsplit_once('=') {
         Some((column, value)) if !column.is_empty() && !value.is_empty() => {

@@ -62,8 +62,8 @@ pub struct FrfArgs {
     /// frequency, or a universal file (.unv, .uff) of datasets 151, 164 and 58
     #[arg(long, value_name = "FILE.csv|FILE.unv", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// Place and direction of each degree of freedom in a universal file [default: the names of the
-    /// channels if all are places such as 12+Z, otherwise 1+X,2+X,…]
+    /// Point and direction of each degree of freedom in a universal file [default: the names of the
+    /// channels if all are points such as 12+Z, otherwise 1+X,2+X,…]
     #[arg(
         long,
         value_name = "POINT,…",

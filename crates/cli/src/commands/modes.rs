@@ -83,8 +83,8 @@ pub struct ModesArgs {
     /// Frequencies to use, in Hz [default: the band that the forces excite]
     #[arg(long, value_name = "LOW:HIGH")]
     band_hz: Option<Band>,
-    /// Number of modes to report: those that explain most [default: as many as the record shows;
-    /// for a machine, all]
+    /// Number of modes to report: those that explain most of the responses [default: as many as the
+    /// record shows; for a machine, all]
     #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     modes: Option<usize>,
     /// Maximum number of modes
@@ -407,7 +407,7 @@ impl ModesArgs {
         ]
     }
 
-    /// Returns the options that several free decays do not have, and whether each was given.
+    /// Returns the options that are refused for several free decays, and whether each was given.
     fn decay_refusals(&self) -> Vec<(&'static str, bool)> {
         let mut options = self.record_options();
         options.retain(|(name, _)| *name != "response_at");

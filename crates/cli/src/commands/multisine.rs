@@ -123,7 +123,7 @@ enum Uncorrelated {
     Hadamard,
 }
 
-/// Maximum count of numbers in a written record: about 2 GB of text.
+/// Maximum number of values in a written record: about 2 GB of text.
 const LARGEST: usize = 100_000_000;
 
 impl MultisineArgs {

@@ -17,10 +17,10 @@ use crate::outcome::{Files, Outcome};
 /// those of the modal test, by name or in order, and the prediction is limited to the band of the
 /// test.
 ///
-/// With --period the prediction is the steady state under the mean of the periods. Otherwise it
-/// covers the whole window from its first sample on, from rest or from the initial state that
-/// --settle fits. Between the samples the force is band-limited. Response columns are compared with
-/// the prediction. The window is held in memory.
+/// With --period the prediction is the steady-state response to the mean period of the force.
+/// Otherwise it covers the whole window from its first sample on, from rest or from the initial
+/// state that --settle fits. Between the samples the force is band-limited. Response columns are
+/// compared with the prediction. The window is held in memory.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify rig.csv --force f --displacement x --period 1024 --nonlinear 'k3: x1^3' --json \\

@@ -58,9 +58,9 @@ pub struct PageArgs {
     output: PathBuf,
     #[command(flatten)]
     about: AboutArgs,
-    /// Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411,
-    /// and 82), or a table with rows name,x,y,z in m and line,name,name [default: a row, by the
-    /// names of the channels]
+    /// Positions of the channels, at which the mode shapes are drawn: a universal file (datasets 15
+    /// or 2411, and 82), or a table with rows name,x,y,z in m and line,name,name [default: a row,
+    /// by the names of the channels]
     #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "machine")]
     geometry: Option<PathBuf>,
     #[command(flatten)]

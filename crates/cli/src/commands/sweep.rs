@@ -74,7 +74,7 @@ pub struct SweepArgs {
     pub report: ReportArgs,
 }
 
-/// Quantity that is swept, and its values: one of these.
+/// Quantity that is swept, and its values; exactly one option is given.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 struct SettingArgs {

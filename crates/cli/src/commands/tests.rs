@@ -1,4 +1,4 @@
-//! The help of every subcommand keeps what the program promises.
+//! Checks of the help of every subcommand, such as its examples and the units of its options.
 
 use std::any::TypeId;
 

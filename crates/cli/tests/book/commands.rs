@@ -45,8 +45,8 @@ impl Workspace {
                 Ok(Run::Book(folder.into()))
             }
             ["mdbook", "build", folder] => Err(format!("no book.toml in {folder}")),
-            // A measurement needs an idle computer, so it is not run; the Python checks read its
-            // types.
+            // A measurement of times needs an idle computer, so it is not run; the Python checks
+            // test only the types of the script.
             ["python", script]
                 if script.starts_with("crates/python/examples/")
                     && self.root.join(script).is_file() =>
@@ -120,7 +120,7 @@ impl Workspace {
         }
     }
 
-    /// Makes a crate of the reader beside a clone of the workspace, and adds a crate of the
+    /// Creates a crate, as a reader would, beside a clone of the workspace, and adds a crate of the
     /// workspace as a dependency.
     fn begins_a_crate(&self, words: &[&str]) -> Result<Run, String> {
         let [name, options @ ..] = words else { return Err("no name".into()) };

@@ -15,7 +15,7 @@ impl Written {
     }
 }
 
-/// Returns the numbers of three or more digits in a text, without signs; except years.
+/// Returns the numbers of three or more digits in a text, without their signs and without years.
 pub fn written(text: &str) -> Vec<Written> {
     let plain = |c: char| c.is_ascii_digit() || matches!(c, '.' | ',');
     let words = text.split(|c: char| !plain(c)).map(|word| word.replace(',', ""));

@@ -171,8 +171,8 @@ impl Step {
     }
 }
 
-/// Returns true if the answer is the one shown. There a line `...` represents any lines, and `[..]`
-/// any part of one line.
+/// Returns true if the answer is the one shown. In the shown answer, a line `...` represents any
+/// lines, and `[..]` any part of one line.
 pub fn fits(shown: &str, answer: &str) -> bool {
     let lines: Vec<&str> = answer.lines().collect();
     fits_lines(&shown.lines().collect::<Vec<_>>(), &lines)

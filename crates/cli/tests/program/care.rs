@@ -1,4 +1,4 @@
-//! Records that no machine gives, or that name nothing: each ends with a warning or a refusal.
+//! Records that no machine produces, and records with faults: each gives a warning or is refused.
 
 use std::fmt::Write as _;
 use std::fs;

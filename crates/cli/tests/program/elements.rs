@@ -209,9 +209,9 @@ fn unbalance_over_the_speed_gives_a_bearing() {
     assert!(message.contains("give a table over the speed (--speed-table)"), "{message}");
 }
 
-/// Every faulty description gives a message of one line with the name of the faulty part.
-/// The runs are those of the shaft in the example; a shaft that is too soft by 1 % is named, and the
-/// intervals include what it changes.
+/// Every faulty description gives a message of one line with the name of the faulty part. The runs
+/// are those of the shaft in the example; a shaft that is too soft by 1 % is named, and the
+/// intervals include its effect.
 #[test]
 fn a_wrong_part_of_a_rotor_is_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -348,7 +348,8 @@ fn two_loggers_on_a_shake_table() {
         let hz = report["modes"][0]["natural_frequency_hz"]["value"].as_f64().unwrap();
         assert!((hz - 21.98).abs() < 0.1, "{hz}");
         let [delay, error] = unknown(&report, "top.delay");
-        // The error of the noise; parts of the data that disagree multiply it.
+        // The standard error from noise alone: the report multiplies it by `error_scale` if parts
+        // of the data disagree.
         let of_noise = error / report["error_scale"].as_f64().unwrap();
         assert!((delay - 0.015).abs() < 3e-4 && of_noise < 1e-4, "{delay} ± {error}");
         // Other parts move, too, and the residual shows it.

@@ -161,7 +161,7 @@ fn sample_by_sample_the_noise_stated_is_counted() {
     assert_eq!(report["noise_uncertainty"], true);
     let (report, _) = both(folder.path(), ALL, OF_MACHINE);
     assert_eq!(report["noise_uncertainty"], false);
-    // The mean of 270 periods is taken of noise and motion.
+    // Noise and motion are averaged over 270 periods.
     let periods = SAMPLES / PERIOD;
     let (_, written) =
         both(folder.path(), &format!("{stated} --period {PERIOD}"), "standard_error");
@@ -242,7 +242,7 @@ fn periods_and_windows_of_a_long_text_are_those_of_all_of_it() {
         let size = truth.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
         close(&found, column, &|k| truth[k], 1e-11 * size);
     }
-    // This method needs an open record as a whole.
+    // This method needs the whole open record in memory.
     let (report, _) =
         both(folder.path(), "--displacement x --start 270001 --method tikhonov", "standard_error");
     assert_eq!(report["samples"], 123);

@@ -42,7 +42,7 @@ fn column(folder: &Path, file: &str, name: &str) -> Vec<f64> {
     Table::read(folder.join(file)).unwrap().column(name).unwrap().to_vec()
 }
 
-/// Reference: the last of several periods from rest, after which the transient has decayed.
+/// Reference: the last of several periods from rest; the transient has decayed before this period.
 #[test]
 fn the_periodic_response_of_a_large_machine_is_what_a_long_run_comes_to() {
     let home = tempfile::tempdir().unwrap();

@@ -115,7 +115,7 @@ fn more_unknowns_than_equations_are_refused_before_any_work() {
         assert!(message.contains("equations do not determine 1500 unknowns"), "{more}: {message}");
     }
     refused(home.path(), &format!("frf a.csv {columns}"));
-    // 300,000 numbers of a fit of transients, in a small file: 1100 bytes each.
+    // A fit with transients needs 1100 bytes for each of the 300,000 numbers in this small file.
     let mut packed = GzEncoder::new(Vec::new(), Compression::best());
     packed.write_all(b"force,displacement\n").unwrap();
     (0..150_000).for_each(|row| writeln!(packed, "{},{}", row % 7, row % 5).unwrap());

@@ -74,7 +74,7 @@ fn a_hammer_that_roves_gives_the_shapes() {
 }
 
 /// Reference: the machine behind the examples, which has proportional damping and is reciprocal.
-/// The hits on one point are in one half of the records: a half lacks one of the forces.
+/// The hits on each point are in one half of the records, so each half lacks one of the forces.
 #[test]
 fn known_properties_are_imposed() {
     let folder = examples();
@@ -93,7 +93,7 @@ fn known_properties_are_imposed() {
     };
     for mode in 0..2 {
         assert!(error(&imposed, mode) < error(&free, mode), "{mode}");
-        // A real shape per force has two phases.
+        // All entries of a real shape have the same phase or opposite phases.
         let shape = &imposed["modes"][mode]["shape"];
         let part = |entry: usize| {
             let value = &shape[entry]["value"];
@@ -188,8 +188,8 @@ fn faults_of_a_test_are_told_in_a_line_each() {
     );
 }
 
-/// Modes that noise alone gives, but that were asked for, are called what they are; so are struck
-/// points that were not stated.
+/// A requested mode that is only noise is reported as such; so are struck points that were not
+/// stated.
 #[test]
 fn what_was_asked_for_may_be_noise() {
     let folder = examples();
@@ -280,8 +280,8 @@ fn a_table_gives_the_modes_of_the_record() {
     assert!(message.contains("name the columns of a record"), "{message}");
 }
 
-/// Reference: the shapes that the decay has without points. The points of the sensors name them in
-/// the result and in comparisons; without forces, too.
+/// Reference: the shapes that the decay has without points. In the result and in comparisons, the
+/// entries are named by the points of the sensors, even without forces.
 #[test]
 fn results_without_forces_are_compared_at_the_points_of_their_sensors() {
     let folder = examples();

@@ -288,7 +288,7 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
 }
 
 /// Every page has the command that writes it again; a force has the name of its column, and a file
-/// no folder outside the command.
+/// is shown without its folder, except in the command.
 #[test]
 fn pages_name_their_command_and_call_files_and_forces_by_their_names() {
     let folder = tempfile::tempdir().unwrap();

@@ -115,8 +115,8 @@ fn labels_of_functions_of_time_are_units() {
     }
 }
 
-/// A universal file states which channel is a force, and at which point: nothing needs a name. A
-/// force and the response at its point have the same name.
+/// A universal file states which channel is a force, and at which point, so the user need not name
+/// channels. A force and the response at its point have the same name.
 #[test]
 fn channels_of_a_universal_file_need_no_names() {
     let home = tempfile::tempdir().unwrap();

@@ -141,7 +141,7 @@ fn sensors_that_are_dead_or_exchanged_are_told() {
     }
 }
 
-/// The cross stiffness k21 is 5 % too large. A remark appears only if this exceeds the stated
+/// The cross stiffness k21 is 5 % too large. A remark appears only if this error exceeds the stated
 /// uncertainty of the machine.
 #[test]
 fn what_the_machine_is_known_to_is_expected() {
@@ -194,7 +194,7 @@ fn noise_is_that_of_the_record_before_periods_are_averaged() {
     let (found, stated) = (error(&lines), error(&format!("{lines} --noise 4e-8,4e-8")));
     // The level is known to 4 % from 195 lines of two channels.
     assert!((found / stated - 1.0).abs() < 0.16, "{found}, stated {stated}");
-    // Shrinkage reports the level as --noise takes it, before periods are averaged.
+    // Shrinkage reports the level in the form of --noise: before periods are averaged.
     let found = report(folder.path(), &format!("{BOTH} --period 512"));
     let chosen = found["chosen"].as_array().unwrap().iter();
     let levels = chosen.filter(|c| c["name"].as_str().unwrap().starts_with("noise of channel"));

@@ -4,8 +4,8 @@ use std::{fs, path::Path, process};
 
 use super::{NAMES, USUAL, mechid, page, rig};
 
-/// Returns the text that a browser shows of the page in a frame of this width, in px, and its
-/// complaints; `None` if there is no browser.
+/// Returns the text that a browser shows of the page in a frame of this width, in px, and the
+/// errors that it reports; `None` if there is no browser.
 ///
 /// The page is in a frame, because the window of a browser has a minimum width.
 fn browse(folder: &Path, width: u32) -> Option<(String, String)> {

@@ -32,7 +32,8 @@ pub struct ChangedRecords<'a> {
 }
 
 impl<'a> ChangedRecords<'a> {
-    /// Starts at the result of a `fit` to the unchanged `data`; `None` if the fit has no transient.
+    /// Takes the initial estimate from a `fit` to the unchanged `data`; `None` if the fit has no
+    /// transient.
     pub fn from_fit(
         data: &FrequencyData,
         unknowns: &'a Unknowns,
@@ -46,8 +47,8 @@ impl<'a> ChangedRecords<'a> {
         Some(Self { unknowns, noise, spare: spare(data, unknowns), theta, amplitudes })
     }
 
-    /// Returns the same estimate for a part of the lines of the `data`, and these lines; `None` if
-    /// the data have few lines.
+    /// Returns some of the lines of `data`, and the same estimate for these lines; `None` if the
+    /// data have few lines.
     pub fn on_fewer_lines(&self, data: &FrequencyData) -> Option<(FrequencyData, Self)> {
         let (data, noise) = thinned(data, self.unknowns, &self.noise)?;
         let spare = spare(&data, self.unknowns);

@@ -146,8 +146,8 @@ mod tests {
 
     use super::*;
 
-    /// The power is that of a solution of the equations, whatever is known and how late the force
-    /// is.
+    /// For all sets of known entries and all delays, the power is that of the solution of the
+    /// equations.
     #[test]
     fn the_power_is_that_of_a_fit_with_the_delay() {
         let lines = 12;

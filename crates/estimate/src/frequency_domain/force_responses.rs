@@ -96,8 +96,8 @@ pub(super) fn remove(transients: &[RecordColumns<DMatrix<f64>>], columns: &mut D
 }
 
 /// Returns the covariance of the residuals of every record with pulses: independent errors of the
-/// lines with the power `level`, plus the errors of the pulses. The part that the transients
-/// explain is removed from the errors of the pulses. `None` if an effect is not finite.
+/// lines with the power `level`, plus the errors of the pulses. The component that the transients
+/// explain is removed from the effects of the pulse errors. `None` if an effect is not finite.
 pub(super) fn pulse_covariances(
     data: &FrequencyData,
     responses: &ForceResponses,

@@ -129,7 +129,7 @@ impl<'a> InitialEstimates<'a> {
     }
 
     /// Returns the estimates of every round of weighting, beginning with the weights of `start`;
-    /// the end of a time limit ends the rounds.
+    /// there are no more rounds after the time limit.
     fn reweighted(&self, kind: Kind, start: &DVector<f64>) -> Vec<DVector<f64>> {
         let mut rounds: Vec<DVector<f64>> = Vec::new();
         for _ in 0..INITIAL_ROUNDS {
@@ -260,8 +260,8 @@ impl<'a> InitialEstimates<'a> {
     /// [`InitialEstimates::triangle`].
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
-        // Columns that the noise of each displacement and force enters, with the power of the
-        // frequency (3: none) and the factor of its coefficients.
+        // For each displacement, then for each force: the columns that contain its noise. A column
+        // has an index, the index of its power of the frequency (3: no power), and a real factor.
         let mut enters: Vec<Vec<(usize, usize, f64)>> = vec![Vec::new(); 2 * n];
         for (at, (_, p)) in equation.parameters.iter().enumerate() {
             enters[p.column()].push((at, p.matrix() as usize, 1.0));
@@ -274,7 +274,7 @@ impl<'a> InitialEstimates<'a> {
         for (line, &omega) in self.data.omega().iter().enumerate() {
             let [m, c, k] = powers(omega);
             let powers = [m, c, k, Complex::ONE].map(|power| power * weights[line]);
-            // The noise of most channels is independent: most covariances are 0.
+            // Most covariances are 0, because the noise of most channels is independent.
             let covariance = self.noise.covariance(line);
             let entering = || enters.iter().enumerate().filter(|(_, columns)| !columns.is_empty());
             for (j, right) in entering() {

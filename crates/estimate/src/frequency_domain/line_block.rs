@@ -92,8 +92,8 @@ impl LineBlock {
 }
 
 impl BlockFactors {
-    /// Returns the triangular factor of the regressors, each line weighted by the size of its W:
-    /// columns × columns of the block. `None` if a value is not finite.
+    /// Returns the triangular factor of the regressors, each line weighted by the Frobenius norm of
+    /// its W: columns × columns of the block. `None` if a value is not finite.
     pub(super) fn triangle(&self, dof: usize) -> Option<DMatrix<f64>> {
         let diagonal = (0..dof).map(|i| self.weights.column(kronecker::real_part(i, i)));
         let power = diagonal.fold(DVector::zeros(self.block.lines.len()), |sum, part| sum + part);

@@ -42,9 +42,9 @@ pub(super) struct GlobalMinimum {
 /// found no better minimum. Local minima due to the noise change with the weights; the global one
 /// hardly moves.
 ///
-/// Searches begin on the lines of `thin`, the same problem with fewer lines, if there is one. The
-/// first search continues on all lines; another one does so if it ends near the best minimum so far
-/// or below that minimum.
+/// If `thin`, the same problem with fewer lines, is given, each search begins there. The first
+/// search continues on all lines; a later search continues only if it ends near the best minimum so
+/// far, or below this minimum.
 ///
 /// After the end of a time limit, the result is the lowest sum of squares so far, which may not be
 /// a minimum.
@@ -102,12 +102,12 @@ pub(super) fn search<P: Restartable>(
 /// Start of a search on all lines.
 enum Start {
     Near(DVector<f64>),
-    /// End of a search on fewer lines, far above the best minimum, with the sum of squares that all
-    /// lines would have.
+    /// Minimum on fewer lines, far above the best minimum. Its sum of squares is scaled to the
+    /// number of all lines.
     Far(Minimum),
 }
 
-/// Returns the end of a search on fewer lines, or the start if the search fails.
+/// Returns the parameters at which a search on fewer lines ends, or `start` if the search fails.
 fn end_on_fewer(
     thin: &mut impl Restartable,
     start: DVector<f64>,
@@ -209,23 +209,24 @@ impl Plausible {
     }
 }
 
-/// Ends of the searches.
+/// Points at which the searches ended.
 struct Ends {
     plausible: Plausible,
     searches: usize,
-    /// Ends with different sums of squares, the smallest first, including those not converged.
+    /// Points with different sums of squares, the smallest first. They include the points at which
+    /// a search ended without convergence.
     distinct: Vec<End>,
 }
 
-/// Common end of one or more searches.
+/// Point at which one or more searches ended.
 struct End {
     minimum: Minimum,
     count: usize,
 }
 
 impl Ends {
-    /// Counts a search and its end, if there is one. Returns whether this end is a new one and the
-    /// best so far.
+    /// Counts a search and stores the point at which it ended, if there is one. Returns whether
+    /// this point is new and the best so far.
     fn push(&mut self, ended: Option<Minimum>) -> bool {
         self.searches += 1;
         let Some(minimum) = ended else { return false };
@@ -245,7 +246,7 @@ impl Ends {
         rank == 0
     }
 
-    /// Returns whether the noise explains the best end.
+    /// Returns whether the noise explains the smallest sum of squares.
     fn explained(&self) -> bool {
         self.distinct.first().is_some_and(|end| self.plausible.explains(end.minimum.cost))
     }
@@ -255,8 +256,8 @@ impl Ends {
         matches!(&self.distinct[..], [end] if end.count == self.searches && end.minimum.converged)
     }
 
-    /// Returns whether the noise explains the difference between the two best ends, or the best end
-    /// has not converged.
+    /// Returns whether the noise explains the difference between the two smallest sums of squares,
+    /// or the best search has not converged.
     fn many(&self) -> bool {
         let Some(best) = self.distinct.first() else { return true };
         let bound = best.minimum.cost * self.plausible.factor;
@@ -264,13 +265,13 @@ impl Ends {
         close || !best.minimum.converged
     }
 
-    /// Returns the best end if it has not converged.
+    /// Returns the best point if its search has not converged.
     fn open(&self) -> Option<DVector<f64>> {
         let best = &self.distinct.first()?.minimum;
         (!best.converged).then(|| best.parameters.clone())
     }
 
-    /// Returns one of the best ends, in turn.
+    /// Returns one of the best points, in turn.
     fn turn(&self, at: usize) -> Option<DVector<f64>> {
         let count = if self.many() { RESTART_RESTARTED.min(self.distinct.len()) } else { 1 };
         let end = self.distinct.get(at.checked_rem(count)?)?;

@@ -37,9 +37,9 @@ struct Equation {
     columns: Vec<usize>,
 }
 
-/// Coordinates u = T θ, equation by equation. In them the regressors are orthonormal; the scale
-/// gives the Gram matrix a unit diagonal. For related entries these are coordinates of the
-/// independent unknowns.
+/// Coordinates u = T θ, equation by equation. In these coordinates the regressors are orthonormal;
+/// the scale gives the Gram matrix a unit diagonal. For related entries these are coordinates of
+/// the independent unknowns.
 pub(super) struct Coordinates {
     /// Number of columns of the layout.
     columns: usize,
@@ -152,10 +152,10 @@ impl Layout {
         finite.then_some(NormalEquations { gram, gradient, coordinates })
     }
 
-    /// Returns the triangular factor R of the regressors φ, with each line weighted by the size of
-    /// its W, and replaces them by R⁻ᵀφ. For `related` entries the regressors may be linearly
-    /// dependent, as at a degree of freedom without force: the relations still determine the
-    /// entries.
+    /// Returns the triangular factor R of the regressors φ, with each line weighted by the
+    /// Frobenius norm of its W, and replaces φ by R⁻ᵀφ. For `related` entries the regressors may be
+    /// linearly dependent, as at a degree of freedom without force: the relations still determine
+    /// the entries.
     ///
     /// # Source
     /// Demmel, Grigori, Hoemmen & Langou (2012), SIAM J. Sci. Comput. 34, A206–A239 (QR of tall

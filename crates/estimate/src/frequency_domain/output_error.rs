@@ -1,4 +1,5 @@
-//! Maximum likelihood: modelled against measured displacement, weighted by the noise.
+//! Maximum likelihood: the smallest difference between modelled and measured displacement, weighted
+//! by the noise.
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::check_size;
@@ -22,10 +23,10 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements. It
 /// minimises the weighted distance between measured displacement and G(ω) F by Gauss–Newton steps
 /// from several initial estimates: [`equation_error`] with several weights, and total least squares
-/// weighted by the dynamic stiffness of the round before. If they lead to different minima, the
-/// search is repeated from the best ones after a few steps in resampled data, and the best minimum
-/// is the result. To first order in the noise the estimate is unbiased and has the least scatter.
-/// The weights come from [`FrequencyData::noise`]:
+/// weighted by the dynamic stiffness of the round before. If the searches end at different minima,
+/// further searches start from the best minima after a few steps in resampled data. The best
+/// minimum is the result. To first order in the noise the estimate is unbiased and has the least
+/// scatter. The weights come from [`FrequencyData::noise`]:
 ///
 /// - noise on displacement alone (exact force): the output-error estimator;
 /// - noise on force, too: errors in variables, with the true force eliminated row by row;

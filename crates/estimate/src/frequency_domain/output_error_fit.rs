@@ -259,9 +259,10 @@ fn entries_with_covariance(
     }
 }
 
-/// Returns the power of the response to the forces relative to that of the measured response. The
-/// transients cancel the excess of a power above 1. Above 1/ε the difference has only rounding
-/// errors, as a solution of normal equations with this condition number.
+/// Returns the ratio of the power of the modelled response to the forces to the power of the
+/// measured response. If the ratio is above 1, the modelled transients cancel the excess. If it is
+/// above 1/ε, the sum of both is only rounding error, as in a solution of normal equations with
+/// this condition number.
 fn cancelled_power(data: &FrequencyData, unknowns: &Unknowns, independent: &[f64]) -> f64 {
     let [m, c, k] = unknowns.assemble(entries(unknowns, independent).as_slice());
     let Ok(system) = SecondOrderSystem::new(m, c, k) else { return 0.0 };

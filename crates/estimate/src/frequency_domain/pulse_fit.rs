@@ -54,8 +54,8 @@ impl PulseFit {
     /// dependent.
     ///
     /// The residual is r + P b − J Δθ: P are the effects of the amplitudes b, which have unit
-    /// variance, and J are the sensitivities. The part that the transients explain is removed from
-    /// all of them.
+    /// variance, and J are the sensitivities. The components that the transients explain are
+    /// removed from r, P and J.
     ///
     /// # Source
     /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), sections 2.1.4 (Woodbury) and 5.3

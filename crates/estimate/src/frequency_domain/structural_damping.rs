@@ -80,8 +80,8 @@ mod tests {
 
     use super::*;
 
-    /// Exact responses of two masses whose springs have one loss factor give it back, whatever was
-    /// measured.
+    /// The fit to exact responses of two masses, whose springs have the same loss factor, returns
+    /// this loss factor for every measured quantity.
     #[test]
     fn exact_responses_give_the_loss_factor() {
         let mass = DMatrix::from_row_slice(2, 2, &[3.0, 0.0, 0.0, 5.0]);

@@ -331,7 +331,7 @@ fn with_white_noise(
         let common = if known_force { sizes[0] / levels[0] } else { 1.0 };
         let settled =
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
-        // The level of rounding errors does not converge.
+        // If the residual is only rounding, its level does not converge.
         let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= RESIDUAL_ROUNDING * x);
         // With a wrong model, the level of a channel may decrease in every round, until the number
         // of rounds ends the search. The fit is then a minimum for its weights, and the residual

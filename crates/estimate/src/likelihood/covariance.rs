@@ -15,7 +15,7 @@ use super::search::Minimum;
 pub(super) struct Information {
     /// Indices of the parameters that are not at a bound.
     pub(super) free: Vec<usize>,
-    /// Lengths of their columns.
+    /// Lengths of the columns of these parameters in the Jacobian.
     pub(super) scale: DVector<f64>,
     /// Right singular vectors, free × free, by falling singular values.
     pub(super) directions: DMatrix<f64>,
@@ -26,11 +26,12 @@ pub(super) struct Information {
     pub(super) covariance: DMatrix<f64>,
     /// Ratio of the covariance to the inverse information.
     pub(super) inflation: f64,
-    /// Flag of each parameter that is determined.
+    /// Flags of all parameters: `true` if the parameter is determined.
     pub(super) is_determined: Vec<bool>,
 }
 
-/// Minimum component of a direction along a parameter if the direction depends on this parameter.
+/// Minimum component of a direction along a parameter; a direction with a smaller component does
+/// not depend on the parameter.
 const PART: f64 = 1e-6;
 
 impl Information {

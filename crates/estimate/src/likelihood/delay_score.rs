@@ -33,7 +33,7 @@ pub struct DelayScore {
 /// Factors QR of the derivatives of residual and priors with respect to the parameters that are not
 /// at a bound.
 struct Factors {
-    /// Indices of these parameters.
+    /// Indices of the parameters that are not at a bound.
     free: Vec<usize>,
     /// Orthonormal basis Q of the derivatives.
     basis: DMatrix<f64>,

@@ -33,7 +33,7 @@ pub enum LikelihoodError {
     /// Every coefficient is known.
     #[error("every coefficient is known: at least one must be unknown")]
     NoParameter,
-    /// The number of unknowns is at least that of the measured numbers.
+    /// There are at least as many unknowns as measured numbers.
     #[error(
         "{} cannot determine {}: use more lines or sensors, or state coefficients",
         message::count(*numbers, "measured number"),

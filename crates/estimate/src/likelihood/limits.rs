@@ -29,10 +29,10 @@ pub(super) const WEAK: f64 = 0.3;
 /// all other lines.
 pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 
-/// Maximum excess, in units of the noise, of the sum of squares of a search over that of the search
-/// with the lowest minimum. Both are the sums after the first steps. Above the limit the search
-/// ends. With the noise of [`FIRST_RELATIVE_NOISE`], the end of such a search is less likely by a
-/// factor e²⁵; most measurements have less noise.
+/// Maximum excess, in units of the noise, of the sum of squares of a search over the sum of squares
+/// of the search with the lowest minimum. Both sums are those after the first steps. A search above
+/// the limit ends. With the noise of [`FIRST_RELATIVE_NOISE`], the result of such a search is less
+/// likely by a factor e²⁵; most measurements have less noise.
 pub(super) const HOPELESS_RISE: f64 = 50.0;
 
 /// Numbers (real and imaginary parts of the lines) per unknown in the first steps of every search:

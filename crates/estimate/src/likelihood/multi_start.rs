@@ -13,7 +13,7 @@ use super::search::{Bounds, Effort, LeastSquaresProblem, Minimum, minimise};
 pub(super) struct SearchEnd {
     pub(super) minimum: Minimum,
     pub(super) searches: usize,
-    /// Ends of the first steps of these searches, if they converged.
+    /// Points that these searches reached after their first steps, if the first steps converged.
     near: Vec<Minimum>,
 }
 
@@ -56,12 +56,12 @@ pub(super) fn starts(
 }
 
 /// Searches from one initial estimate after another: first with weights relative to the response,
-/// then with the weights of the noise. A search is compared with earlier searches after its first
-/// steps. It stops there if its sum of squares is far above that of the search with the lowest
-/// minimum, or if its parameters are those of an earlier search; all these values are those after
-/// the first steps. No further search begins when enough searches have ended at the lowest minimum;
-/// `agreeing` returns the required number of searches for a sum of squares. After the end of a time
-/// limit, the result is the lowest sum of squares so far, which may not be a minimum.
+/// then with the weights of the noise. After the first steps, a search is compared with the earlier
+/// searches after their first steps. The search ends if its sum of squares is far above that of the
+/// search with the lowest minimum, or if its parameters are those of an earlier search. No further
+/// search begins when enough searches have ended at the lowest minimum; `agreeing` returns the
+/// required number of searches for a sum of squares. After the end of a time limit, the result is
+/// the lowest sum of squares so far, which may not be a minimum.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search converges.

@@ -53,7 +53,8 @@ pub(super) fn end<M: ResponseModel>(
 struct Profile<'a, 'b, M: ResponseModel> {
     fit: &'a Fit<'b, M>,
     parameter: usize,
-    /// All parameters at the last value: the initial estimates for the next one.
+    /// All parameters of the last point of the profile; they are the initial estimates for the next
+    /// point.
     from: Vec<f64>,
     /// Rise of the sum of squares at the limit of the interval.
     rise: f64,

@@ -297,9 +297,9 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(jacobian)
     }
 
-    /// Calls `visit` with the residual of each record. It has the lines, their responses, the
-    /// factors L of their covariance, and the linear unknowns of the record. `None` if a response
-    /// does not exist or a visit fails.
+    /// Calls `visit` with the residual of each record. This residual has the lines with their
+    /// responses and the factors L of their covariance, and the linear unknowns of the record.
+    /// `None` if a response does not exist or a visit fails.
     pub(super) fn for_each_record(
         &self,
         parameters: &[f64],
@@ -311,9 +311,9 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(())
     }
 
-    /// Returns columns X, over all rows of the lines, with the effect of the errors of pulses: the
-    /// covariance of the residual is the identity minus X Xᵀ. `None` if the response does not
-    /// exist.
+    /// Returns the columns X, over all rows of the lines, that describe the effect of the errors of
+    /// pulses: the covariance of the residual is the identity minus X Xᵀ. `None` if the response
+    /// does not exist.
     pub(super) fn explained_by_pulses(&self, parameters: &[f64]) -> Option<DMatrix<f64>> {
         let mut columns = DMatrix::zeros(self.len(), self.amplitudes());
         let mut first = 0;
@@ -365,8 +365,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
 }
 
 impl<L> RecordResidual<'_, L> {
-    /// Removes the part that the transient of this record explains from columns over all rows of
-    /// the residual.
+    /// Removes the component that the transient of this record explains from columns over all rows
+    /// of the residual.
     pub(super) fn remove_transient(&self, columns: &mut DMatrix<f64>) {
         let Some((basis, _)) = &self.transient else { return };
         let rows = |block: &Block<L>| columns.rows(block.first_row, block.residual.len()).into();

@@ -52,7 +52,7 @@ impl Bounds {
     }
 }
 
-/// End of a search.
+/// Point at which a search ended.
 #[derive(Debug, Clone)]
 pub(super) struct Minimum {
     pub(super) parameters: Vec<f64>,
@@ -65,9 +65,10 @@ pub(super) struct Minimum {
     pub(super) at_bound: Vec<bool>,
 }
 
-/// Maximum ratio of the length of a step to the length of the parameters for the end of a search;
-/// the other criterion is [`Effort::tolerance`]. Both lengths are scaled by the columns of the
-/// Jacobian. For data without noise, this ratio ends the search.
+/// Maximum ratio of the length of the last step of a search to the length of the parameter vector;
+/// a step up to this ratio ends the search. The other criterion is [`Effort::tolerance`]. Both
+/// lengths are scaled by the columns of the Jacobian. For data without noise, this ratio ends the
+/// search.
 const STEP_TOLERANCE: f64 = 1e-12;
 /// First damping, relative to the unit diagonal of the Gram matrix.
 const FIRST_DAMPING: f64 = 1e-8;
@@ -193,7 +194,7 @@ pub(super) fn minimise(
         let next = descend(problem, bounds, &local, &parameters, cost, &mut damping);
         let Some((next, evaluation)) = next else {
             // No damped step reduces the cost: this is a minimum up to rounding, unless the time
-            // for damped steps was over.
+            // limit ended the damped steps.
             let converged = !time_limit::is_over();
             return Some(Minimum { steps, converged, ..ended(&local, &parameters, cost) });
         };

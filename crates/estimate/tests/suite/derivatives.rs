@@ -1,4 +1,4 @@
-//! Motions from one measured quantity, judged by closed forms.
+//! Motions from one measured quantity, compared with closed forms.
 
 use mechid_estimate::derivatives::{
     SavitzkyGolay, spectral_from_acceleration, spectral_from_displacement,
@@ -60,7 +60,7 @@ fn polynomials_are_differentiated_exactly_up_to_the_ends() {
     for (times, expected) in expected.iter().enumerate() {
         let got = filter.differentiate(&record, times).unwrap();
         for (t, y) in sampling.times().zip(got.channel(0)) {
-            // Rounding of values of 20 over the step squared.
+            // The error is the rounding of values of about 20, divided by the square of the step.
             assert!((y - expected(t)).abs() < 1e-10, "derivative {times} at {t}");
         }
     }

@@ -13,7 +13,7 @@ use crate::common::{
     bearing, displacements, forces, oscillator, relative_error, sampling, synthesise,
 };
 
-/// Five masses in a chain with a follower force: nothing symmetric, all modes stable.
+/// Five masses in a chain with a follower force: no symmetric matrix, all modes stable.
 fn chain() -> SecondOrderSystem {
     let k = DMatrix::from_fn(5, 5, |i: usize, j: usize| match i.abs_diff(j) {
         0 => 900.0 + 100.0 * i as f64,
@@ -66,7 +66,8 @@ fn exact_steady_states_give_the_machine_back() {
                     (found.damping(), system.damping()),
                     (found.stiffness(), system.stiffness()),
                 ] {
-                    // Condition number up to 1e4 times the rounding of the transforms.
+                    // The error is the rounding of the transforms times the condition number, which
+                    // is up to 1e4.
                     let error = relative_error(&found, expected);
                     assert!(error < 1e-10, "{n} degrees of freedom, {measured}: {error:e}");
                 }
@@ -107,7 +108,7 @@ fn two_experiments_are_one_estimate() {
 
 #[test]
 fn an_unforced_direction_needs_a_known_mass() {
-    // As in the dissertation: force on the second direction only.
+    // The force acts on the second direction only, as in the dissertation.
     let system = bearing();
     let (force, _, lines) = records(&system, ResponseQuantity::Displacement);
     let zero = vec![0.0; force.len()];

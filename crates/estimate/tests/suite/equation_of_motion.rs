@@ -1,4 +1,5 @@
-//! The linear fit of the equation of motion, judged by explicit normal equations and by hand.
+//! The linear fit of the equation of motion, compared with explicit normal equations and with
+//! values computed by hand.
 
 use mechid_estimate::{EquationOfMotion, EstimateError, Unknowns};
 use mechid_model::Matrix;
@@ -17,8 +18,8 @@ struct Data {
 }
 
 impl Data {
-    /// Random motions (not those of a system: any motion has a force), and the force of the system,
-    /// disturbed.
+    /// Random motions, which need not be motions of the system, and the forces that give these
+    /// motions, with noise.
     fn new(mck: [&DMatrix<f64>; 3], rows: usize, noise: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let n = mck[0].nrows();
@@ -182,8 +183,8 @@ fn ill_conditioned_rows_keep_the_accuracy_normal_equations_lose() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// The same rows twice: the values stay, and the variance is halved, apart from the number of
-    /// spare rows.
+    /// If all rows occur twice, the values do not change, and the variance is halved, apart from
+    /// the change in the number of degrees of freedom.
     #[test]
     fn a_duplicated_record_halves_the_variance(seed in 0u64..1000, rows in 20usize..300) {
         let [m, c, k] = &film();

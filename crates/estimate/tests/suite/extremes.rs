@@ -1,4 +1,5 @@
-//! Values and sizes far beyond measured ones: an error that names the cause, or the right number.
+//! Values and sizes far beyond those of measurements: the result is correct, or an error names the
+//! cause.
 
 use mechid_estimate::derivatives::SavitzkyGolay;
 use mechid_estimate::{EquationOfMotion, EstimateError, Unknowns};
@@ -62,7 +63,7 @@ fn data_too_small_or_too_large_to_be_squared_are_told_as_such() {
         }
     }
     assert_eq!(equations(1e155, 1e155), Err(EstimateError::Numerics(NumericsError::Overflow)));
-    // The squares of each can be summed alone, but not together.
+    // The sum of the squares of either set of rows is finite, but the sum of both overflows.
     let mut rows = LeastSquares::new(1, 1);
     let large = DMatrix::from_element(1, 1, 1.2e154);
     rows.push_rows(large.as_view(), large.as_view()).unwrap();

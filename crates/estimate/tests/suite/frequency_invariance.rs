@@ -1,5 +1,5 @@
-//! Changes that must not matter: units, the order of the degrees of freedom, the direction of the
-//! axes, a second copy of the data.
+//! Changes that must not affect the result: units, the order of the degrees of freedom, the
+//! direction of the axes, a second copy of the data.
 
 use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{Estimate, Unknowns};
@@ -90,7 +90,8 @@ proptest! {
             let expected = &map * values(before);
             let covariance = &map * before.covariance() * map.transpose();
             for at in 0..12 {
-                // In standard errors: the search ends within 1e-5 of one, rounding far below.
+                // The error is in standard errors. The search ends within 1e-5 standard errors of
+                // the minimum; rounding is far smaller.
                 let error = (values(after)[at] - expected[at]).abs();
                 prop_assert!(error < 1e-4 * covariance[(at, at)].sqrt());
                 for other in 0..12 {

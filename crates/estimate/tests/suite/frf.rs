@@ -73,8 +73,8 @@ fn exact_steady_states_have_the_closed_form_receptance() {
     }
 }
 
-/// Force noise makes H1 too small by S/(S+N), motion noise H2 too large by (S+N)/S; the
-/// coherence is their ratio and Hv their mean.
+/// Noise on the force multiplies H1 by S/(S+N), and noise on the motion multiplies H2 by (S+N)/S.
+/// The coherence is the ratio H1/H2, and Hv is the geometric mean of both.
 #[test]
 fn the_estimators_err_to_their_sides() {
     let system = oscillator();
@@ -102,7 +102,7 @@ fn the_estimators_err_to_their_sides() {
         let force_share = 1.0 / (1.0 + 4.0 * 100f64.powi(2) / 128.0 / 2500.0);
         let motion_share = 1.0 / (1.0 + 4.0 * 0.002f64.powi(2) / 128.0 / amplitude.powi(2));
         let [low, high, mean] = [&h1, &h2, &hv].map(|h| h.response(at)[(0, 0)]);
-        // 2,000 averages: a scatter below 3 % at coherences above 0.4.
+        // With 2,000 averages and a coherence above 0.4 the scatter is below 3 %.
         assert!((low / exact - force_share).norm() < 0.1, "{at} {low} {exact}");
         assert!((high / exact * motion_share - 1.0).norm() < 0.1 / motion_share, "{at}");
         assert!((h1.coherence()[(at, 0)] - force_share * motion_share).abs() < 0.1);
@@ -137,7 +137,7 @@ fn the_stated_variance_is_that_of_repeated_measurements() {
     assert!((stated / power - 1.0).abs() < 0.1, "{}", stated / power);
 }
 
-/// Noise on the force makes 1/H2 scatter like noise on the motion makes H1 scatter.
+/// Noise on the force scatters 1/H2 in the same way as noise on the motion scatters H1.
 #[test]
 fn the_stated_variance_of_h2_is_that_of_repeated_measurements() {
     let system = oscillator();
@@ -181,7 +181,8 @@ fn responses_without_noise_give_the_machine_weighted_by_their_coherence() {
     }
 }
 
-/// 100 noisy records with a hum on three lines: the coherence shows it, least squares does not.
+/// 100 noisy records with a hum on three lines. The coherence shows the hum; least squares with
+/// equal weights ignores it.
 #[test]
 fn weights_by_coherence_leave_less_error() {
     let system = oscillator();
@@ -192,7 +193,7 @@ fn weights_by_coherence_leave_less_error() {
         let noisy = noise::add_white(&motion, NoiseLevel::FractionOfRms(0.1), seed).unwrap();
         let hum = |k: usize| {
             let turn = std::f64::consts::TAU * (k as f64 / 128.0);
-            // Its phase jumps from period to period.
+            // The phase of the hum changes from period to period.
             let phase = ((k / 128) as f64 * 2.4 + seed as f64).sin() * 9.0;
             [3.0, 6.0, 9.0].iter().map(|n| 0.02 * (n * turn + phase * n).cos()).sum::<f64>()
         };
@@ -226,7 +227,7 @@ fn weights_by_coherence_leave_less_error() {
     assert!(weighted < 0.5 * least_squares, "{weighted} {least_squares}");
 }
 
-/// Judge: Welch's formula with the correlation of the window written out.
+/// The reference is Welch's formula with explicit values of the correlation of the window.
 #[test]
 fn windows_and_overlap_are_the_callers() {
     let sampling = Sampling::new(0.02, 4096).unwrap();
@@ -285,7 +286,8 @@ fn random_excitation_is_averaged_under_a_window() {
         FrfEstimator::H1,
     )
     .unwrap();
-    // 127 half-overlapping segments under Hann's window are worth 120 (Welch, 1967).
+    // Under Hann's window, 127 segments with an overlap of one half are equivalent to 120
+    // independent segments (Welch, 1967).
     assert!((frf.averages() - 120.3).abs() < 0.5, "{}", frf.averages());
     let found = output_error(&frf.data(&[0]).unwrap(), &Unknowns::unknown_mass(1).unwrap());
     let found = found.unwrap().estimate;
@@ -302,7 +304,7 @@ fn coherence_weighs_the_lines() {
     let omega: Vec<f64> = (1..=60).map(|n| 0.05 * n as f64).collect();
     let exact: Vec<_> = omega.iter().map(|w| system.receptance(*w).unwrap()).collect();
     let averages = 50.0;
-    // Bad lines: every third has a coherence of 0.05, the others of 0.98.
+    // Every third line has a coherence of 0.05, the others have 0.98.
     let gamma = |at: usize| if at.is_multiple_of(3) { 0.05 } else { 0.98 };
     let measured = exact.iter().enumerate().map(|(at, h)| {
         let size = ((1.0 / gamma(at) - 1.0) / (averages - 2.0f64)).sqrt();
@@ -394,7 +396,7 @@ fn segments_may_come_a_few_at_a_time() {
         let lines = Lines::new(force.sampling().with_len(128).unwrap(), all.clone()).unwrap();
         let mut average =
             FrfAverage::new(lines, [2, 2], ResponseQuantity::Displacement, segments).unwrap();
-        // Three segments at a time, the last stretch cut where the record ends.
+        // The record is pushed three segments at a time; the last piece ends with the record.
         for start in (0..force.len()).step_by(3 * hop) {
             let len = (2 * hop + 128).min(force.len() - start);
             let [f, x] = [&force, &motion].map(|record| record.window(start, len).unwrap());
@@ -437,8 +439,9 @@ fn some_responses_are_those_estimated_on_their_lines_alone() {
     assert_eq!(some.data(&[0, 1]).unwrap().len(), 2 * places.len());
 }
 
-/// Judge: the generator of the channels. With independent forces at both places the second one is
-/// scaled down, replaced by noise, and made proportional to the first.
+/// The reference is the generator of the channels. Independent forces act on both degrees of
+/// freedom; then the second force is scaled down, replaced by noise, and made proportional to the
+/// first.
 #[test]
 fn a_channel_of_noise_is_idle_and_a_weak_force_is_not() {
     let system = bearing();
@@ -451,7 +454,7 @@ fn a_channel_of_noise_is_idle_and_a_weak_force_is_not() {
                 force.column_mut(dof).scale_mut(part);
                 Record::new(motion.sampling(), force).unwrap()
             };
-            // Each period is a steady state of its own: computed line by line, period by period.
+            // Each period is a separate steady state, which is computed line by line.
             let response = |force: &Record| {
                 let mut x = DMatrix::zeros(force.len(), 2);
                 for p in 0..periods {

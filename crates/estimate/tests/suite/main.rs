@@ -1,6 +1,7 @@
-//! The estimators, judged by closed forms, exact discretisations and seeded experiments.
+//! The estimators, compared with closed forms, exact discretisations and seeded experiments.
 //!
-//! One program of many modules: each test program of its own would compile nalgebra anew.
+//! All modules are in one test program, because every further test program would compile nalgebra
+//! again.
 
 mod common;
 mod derivatives;

@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use crate::common::monte_carlo::{Estimator, Experiment};
 use crate::common::{bearing, displacements, forces, oscillator};
 
-/// Equation-error estimate of all entries from a steady state with the displacement off by `noise`.
+/// Equation-error estimate of all entries from a steady state. Each displacement has an error of
+/// `noise` times the norm of all displacements.
 fn identified(system: &SecondOrderSystem, noise: f64) -> Estimate {
     let lines: Vec<usize> = (1..=60).collect();
     let fastest = system.modes().unwrap().last().unwrap().natural_frequency();
@@ -29,8 +30,8 @@ fn identified(system: &SecondOrderSystem, noise: f64) -> Estimate {
     equation_error(&data, &Unknowns::unknown_mass(system.dof()).unwrap()).unwrap()
 }
 
-/// Printed in Appendix E, where the two damping ratios are interchanged and the column of
-/// shapes, headed y1/y2, holds y2/y1.
+/// The modes are printed in Appendix E, where the two damping ratios are interchanged, and the
+/// column of shapes with the heading y1/y2 has y2/y1.
 #[test]
 fn the_system_of_steffen_and_rade_has_its_published_modes() {
     let modes = identified(&steffen_rade(), 0.0).modes().unwrap();
@@ -39,7 +40,8 @@ fn the_system_of_steffen_and_rade_has_its_published_modes() {
         (3.1157, 0.1869, Complex::new(1.1567, 0.3474)),
         (3.9384, 0.4275, Complex::new(-0.6821, 0.2752)),
     ]) {
-        // Half a unit of the last printed digit, and truncation instead of rounding.
+        // The tolerance is a unit of the last printed digit, because some digits are truncated
+        // instead of rounded.
         assert!((mode.damped_frequency_hz.value - frequency).abs() < 1e-4);
         assert!((mode.damping_ratio.value - damping).abs() < 1e-4);
         let shape = mode.mode.shape();
@@ -113,7 +115,8 @@ fn standard_errors_follow_from_differences_of_the_modes() {
             found.extend(mode.shape_standard_error.iter().flat_map(|z| [z.re, z.im]));
             let scale = expected.max().sqrt();
             for (found, expected) in found.iter().zip(expected.iter()) {
-                // Differences of relative step 1e-6 are good to about 1e-7 of the largest.
+                // The errors of differences with a relative step of 1e-6 are about 1e-7 of the
+                // largest gradient.
                 assert!((found - expected.sqrt()).abs() < 1e-5 * scale, "{found} {expected}");
             }
         }
@@ -145,8 +148,8 @@ fn uncertain(values: [f64; 3], errors: [f64; 3]) -> UncertainSystem {
     UncertainSystem::new(system.unwrap(), parameters, covariance).unwrap()
 }
 
-/// Judge: ζ = c / (2 √(km)), ω₀ = √(k/m), λ = (−c ± √(c² − 4km)) / 2m and their derivatives by hand,
-/// below and above critical damping.
+/// The reference is ζ = c / (2 √(km)), ω₀ = √(k/m), λ = (−c ± √(c² − 4km)) / 2m and their
+/// derivatives by hand, below and above critical damping.
 #[test]
 fn poles_and_damping_ratio_are_those_of_the_closed_form_above_critical_damping_too() {
     let (m, k) = (2.0f64, 800.0f64);
@@ -258,8 +261,8 @@ fn warnings(damping: f64, noise: f64, runs: u64) -> (usize, usize) {
     (found.len(), warned.count())
 }
 
-/// Judge: growth −c / 2m. False alarms at a level of 1 %: 1.5 ± 1.2 of 150 estimates of a machine
-/// that neither grows nor decays.
+/// The reference is the growth rate −c / 2m. At a level of 1 %, 1.5 ± 1.2 of 150 estimates of a
+/// machine that neither grows nor decays give a false alarm.
 #[test]
 fn growth_is_told_where_noise_does_not_explain_it() {
     let (growing, warned) = warnings(1e-6, 0.05, 150);

@@ -61,8 +61,8 @@ fn row(experiment: &Experiment, scatter: &Scatter, name: &str) -> String {
     )
 }
 
-/// The comparison in the book (`studies/estimators.md`), computed: all rows if they are to be
-/// written there, otherwise the rows that no other test has.
+/// Computes the rows of the comparison in the book (`studies/estimators.md`): all rows if they are
+/// to be written to the book, otherwise only the rows that no other test computes.
 fn table() -> Vec<Option<String>> {
     let is_written = std::env::var_os("MECHID_BLESS").is_some();
     let mut rows = Vec::new();

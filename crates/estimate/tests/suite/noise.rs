@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 
-/// Records of `periods` periods of a steady state, the motion in the quantity asked for.
+/// Records of `periods` periods of a steady state, with the motion in the requested quantity.
 struct Setup {
     lines: Lines,
     force: Record,
@@ -246,7 +246,7 @@ fn parameters_that_are_not_excited_are_named() {
         RepeatedPeriods::new(&setup.lines, &force, &motion, ResponseQuantity::Displacement)
             .unwrap();
     let unknowns = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, 10.0)).unwrap();
-    // The second equation then reads 0 = 0; a known mass would have to move.
+    // Without a known entry for the motion of the first mass, the second equation would read 0 = 0.
     let unknowns = unknowns.fix(Matrix::Mass, 1, 0, 1.0).unwrap();
     let (first, second) = periods.halves().unwrap();
     let refused = [
@@ -306,7 +306,8 @@ fn noise_that_cannot_weigh_is_refused() {
     assert!(matches!(size, NumericsError::Size { expected: 1, got: 40, .. }), "{size:?}");
 }
 
-/// Judge: the lines of the seven periods taken as one record, between those of one period.
+/// The reference is the noise on the lines of the seven periods as one record, between the lines of
+/// one period.
 #[test]
 fn periods_may_come_a_few_at_a_time() {
     let setup = setup(&bearing(), 7, ResponseQuantity::Velocity);

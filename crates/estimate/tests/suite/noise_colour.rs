@@ -174,8 +174,9 @@ fn the_noise_model_is_chosen_from_the_scatter() {
     }
 }
 
-/// Judge: the closed-form response to an unmeasured force whose period is four times as long as the
-/// record. If this noise is assumed to have a smooth spectrum, the tests of the residual warn.
+/// The reference is the closed-form response to an unmeasured force whose period is four times as
+/// long as the record. If this noise is assumed to have a smooth spectrum, the tests of the
+/// residual warn.
 #[test]
 fn an_unmeasured_force_is_found_and_is_no_cause_for_warnings() {
     const RUNS: u64 = 24;
@@ -185,7 +186,7 @@ fn an_unmeasured_force_is_found_and_is_no_cause_for_warnings() {
         let force = Record::from_channel(all, autoregressive(4 * len, seed)).unwrap();
         let exact = exact_harmonic_periodic(&rig.system, &force).unwrap();
         let x = exact.displacement().column(0);
-        // The white noise beside it has a tenth of its size.
+        // The added white noise has a tenth of the RMS of this response.
         let unit = x.norm() / (x.len() as f64).sqrt();
         let part = x.rows(len, len).into_owned() / unit;
         part.iter().zip(white(len, seed + 1_000)).map(|(x, e)| x + 0.1 * e).collect()

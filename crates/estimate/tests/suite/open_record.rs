@@ -102,8 +102,8 @@ fn intervals_hold_with_two_forces_at_a_time() {
     assert!(ratios.iter().all(|r| (0.65..1.4).contains(r)), "{ratios:?}");
 }
 
-/// With 0.1 % damping the response decays over 6,400 samples: most of the residual is due to the
-/// ends of the record.
+/// With 0.1 % damping the response decays over 6,400 samples: most of the residual is the transient
+/// of the record.
 #[test]
 fn a_record_taken_as_a_period_misleads() {
     let rig = one(0.001, ResponseQuantity::Displacement);

@@ -28,8 +28,8 @@ struct Case<'a> {
     as_pulse: bool,
 }
 
-/// Errors of m, c and k of the response to the hits in steady state, each over the true value, with
-/// their standard errors.
+/// Errors of m, c and k from the steady-state response to periodic hits, and their standard errors,
+/// each divided by the true value.
 fn errors(seed: u64, case: &Case<'_>) -> Vec<[f64; 2]> {
     let system = oscillator();
     let fastest = system.modes().unwrap().last().unwrap().natural_frequency();
@@ -107,7 +107,7 @@ fn the_covariance_knows_that_the_lines_of_a_pulse_err_together() {
 }
 
 /// Two hits in one record: the noise of the force exceeds that of the response near the resonance,
-/// where lines that err apart would have little weight.
+/// where lines with independent errors would have little weight.
 #[test]
 fn errors_of_pulses_are_found_with_the_parameters() {
     let of = |as_pulse: bool| {

@@ -48,7 +48,8 @@ impl Experiment {
         Self { force, course, transition }
     }
 
-    /// Displacement and velocity of experiment number `seed`, periodic like the push.
+    /// Displacement and velocity of experiment number `seed`; they are periodic, as is the random
+    /// disturbance.
     fn measure(&self, seed: u64) -> [Record; 2] {
         let sampling = self.force.sampling();
         let push = noise::white(sampling, 2, 1.0, seed).unwrap();
@@ -149,8 +150,8 @@ fn of_way(way: Interpolation) -> Experiment {
     }
 }
 
-/// Verdicts of the checks of whiteness and of cross-correlation after a fit of eight steps per
-/// interval, with M known or not; true for good.
+/// Results of the checks of whiteness and of cross-correlation after a fit of eight steps per
+/// interval, with M known or not; `true` if the verdict is good.
 fn checked([x, v, force]: [&Record; 3], mass: Option<f64>, way: Interpolation) -> [bool; 2] {
     let mass = mass.map(|mass| DMatrix::from_element(1, 1, mass));
     let unknowns = match mass {
@@ -244,7 +245,8 @@ fn of_columns(force: &Record, motion: &DMatrix<f64>) -> Response {
     Response::new(x, v, none).unwrap()
 }
 
-/// A second mass, a tenth of the first, hangs on it at 20 rad/s and is not measured.
+/// A second mass, a tenth of the first, is attached to the first by a spring, with a natural
+/// frequency of 20 rad/s, and is not measured.
 fn with_a_second_mass(force: &Record) -> Response {
     let of = |a: f64, b: f64, c: f64| DMatrix::from_row_slice(2, 2, &[a, b, b, c]);
     let system =

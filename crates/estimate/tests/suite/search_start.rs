@@ -1,5 +1,5 @@
-//! Whether the search by maximum likelihood finds the best minimum, and its start if most lines are
-//! only noise.
+//! Tests that the search by maximum likelihood finds the best minimum, even if most lines are only
+//! noise.
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{output_error, output_error_near};
@@ -14,8 +14,9 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::common::{oscillator, relative_error};
 
-/// Accelerances whose upper half is only noise, as above the band of a random excitation: by their
-/// coherence these lines have hardly any weight, at the start of the search and at its end.
+/// Accelerances whose upper half is only noise, as above the band of a random excitation: because
+/// of their low coherence these lines have hardly any weight, in the initial estimates and in the
+/// search.
 #[test]
 fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
     let system = oscillator();
@@ -49,8 +50,9 @@ fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
     }
 }
 
-/// Displacements under a random force that ends at a third of the band: above it there is noise
-/// divided by hardly any force, which would give a far too soft machine for every segment length.
+/// Displacements under a random force that ends at a third of the band: above this frequency the
+/// responses are noise divided by a very small force, which would make the identified machine far
+/// too soft for every segment length.
 #[test]
 fn lines_of_next_to_no_force_do_not_lead_the_search_astray() {
     let system = oscillator();

@@ -1,8 +1,7 @@
 //! A measured oscillator: the Schroeder record of the Silverbox benchmark.
 //!
-//! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear
-//! system identification", ECC 2013. The data stand beside the project, not in it; without
-//! them this test says so and passes.
+//! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear system
+//! identification", ECC 2013. The data are not part of the project; without them this test passes.
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{equation_error, output_error};
@@ -14,7 +13,8 @@ use mechid_spectra::{FrequencyData, Lines};
 #[test]
 fn the_measured_oscillator_has_its_known_frequency_and_damping() {
     let Some(record) = schroeder() else { return };
-    // One period after a steady beginning; the offset of the sensors is that of the whole record.
+    // The window is one period after the transient has decayed; the offset of the sensors is the
+    // mean of the whole record.
     let period = record.without_mean().window(10584, 1024).unwrap();
     let channel =
         |c: usize| Record::from_channel(period.sampling(), period.channel(c).to_vec()).unwrap();
@@ -27,7 +27,7 @@ fn the_measured_oscillator_has_its_known_frequency_and_damping() {
     let found = equation_error(&data, &unknowns).unwrap().system().unwrap();
     let mode = &found.modes().unwrap()[0];
     let natural_hz = mode.natural_frequency() / std::f64::consts::TAU;
-    // The published benchmark values with the digits they are given in.
+    // The tolerances are those of the printed digits of the published values.
     assert!((natural_hz - 72.38).abs() < 0.05, "{natural_hz} Hz");
     assert!((mode.damping_ratio() - 0.0471).abs() < 0.0005, "ζ = {}", mode.damping_ratio());
 

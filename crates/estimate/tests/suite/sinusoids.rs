@@ -25,7 +25,7 @@ fn rig(quantity: ResponseQuantity) -> RandomTest {
     RandomTest { system, sampling, quantity, force: 100.0 }
 }
 
-/// Force and noisy response, 0.5 % of its RMS value.
+/// Force, and response with noise of 0.5 % of its RMS value.
 fn noisy(rig: &RandomTest, seed: u64) -> [Record; 2] {
     let [force, response] = rig.measure(seed).unwrap();
     let level = NoiseLevel::FractionOfRms(0.005);
@@ -46,8 +46,9 @@ fn gap(one: &OutputErrorFit, other: &OutputErrorFit) -> f64 {
     squares.sum::<f64>() / one.estimate.parameters().len() as f64
 }
 
-/// Judge: the generator, and the fit to the same record without the sinusoids. The frequency of a sinusoid of
-/// amplitude A among N samples of noise σ is known to √24 σ/(A N^1.5 Δt) rad/s at best.
+/// The references are the generator, and the fit to the same record without the sinusoids. The
+/// frequency of a sinusoid of amplitude A among N samples of noise σ is known to √24 σ/(A N^1.5 Δt)
+/// rad/s at best.
 #[test]
 fn run_out_between_lines_does_no_harm() {
     for quantity in ResponseQuantity::ALL {
@@ -77,8 +78,8 @@ fn run_out_between_lines_does_no_harm() {
     }
 }
 
-/// Judge: by chance, fewer than one of 20 records has a sinusoid. A resonance of 0.1 % damping is
-/// narrower than a line.
+/// Fewer than one of 20 records has a sinusoid by chance. A resonance of 0.1 % damping is narrower
+/// than a line.
 #[test]
 fn records_without_sinusoids_have_none() {
     let light = Sdof::new(10.0, 2.0 * 0.001 * 10.0 * 157.0, 10.0 * 157.0 * 157.0).unwrap();

@@ -60,7 +60,7 @@ fn machines() -> Vec<(&'static str, SecondOrderSystem, f64)> {
     ]
 }
 
-/// The definition of exact in these tests: 1e-8.
+/// Maximum relative error of an estimate that counts as exact in these tests.
 const EXACT: f64 = 1e-8;
 
 #[test]
@@ -161,7 +161,7 @@ fn the_bias_of_euler_is_that_of_one_plus_a_dt_and_shrinks_with_npi() {
             assert!(bias < 0.7 * last, "NPI {npi}: {bias}");
             last = bias;
         }
-        // At NPI = 1 a period of 256 samples: of the order of ωn Δt = 2π/256.
+        // At NPI = 1, with a period of 256 samples, the error is of the order of ωn Δt = 2π/256.
         assert!((1e-3..0.1).contains(&last));
     }
 }

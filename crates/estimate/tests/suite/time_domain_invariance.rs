@@ -1,4 +1,4 @@
-//! Changes that must not matter to a time-domain estimate: units, numbering, the directions of the
+//! Changes that must not affect a time-domain estimate: units, numbering, the directions of the
 //! axes.
 
 use mechid_estimate::time_domain::TimeDomain;
@@ -41,7 +41,8 @@ fn unknowns(mass: &DMatrix<f64>, known: bool) -> Unknowns {
     if known { Unknowns::known_mass(mass).unwrap() } else { Unknowns::unknown_mass(2).unwrap() }
 }
 
-/// Rounding times the condition number of the regressors (below 1e3), compared with noise of 1e-3.
+/// Maximum relative difference between equal estimates: rounding times the condition number of the
+/// regressors (below 1e3), compared with noise of 1e-3.
 const SAME: f64 = 1e-8;
 
 proptest! {
@@ -106,8 +107,8 @@ proptest! {
         }
     }
 
-    /// The same period twice: the same values, and half the variance apart from the number of spare
-    /// rows.
+    /// If the same period is used twice, the values do not change, and the variance is halved,
+    /// apart from the change in the number of degrees of freedom.
     #[test]
     fn a_record_twice(seed in 0u64..1000) {
         let data = measured(seed);

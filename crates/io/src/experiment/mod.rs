@@ -76,7 +76,7 @@ pub struct Experiment {
     /// Degrees of freedom whose response is recorded, counted from 1; see [`Experiment::outputs`].
     #[serde(default)]
     outputs: Option<Vec<usize>>,
-    /// Memory of a simulation, in units of GB; `None` for the default limit.
+    /// Limit of the memory of a simulation, in units of GB; `None` for the default limit.
     #[serde(skip)]
     memory_gb: Option<f64>,
 }
@@ -266,7 +266,8 @@ impl Experiment {
     /// `part`) Δt, where `part` is a pure number.
     ///
     /// # Errors
-    /// As [`Experiment::force`], and [`IoError::Description`] for a force that is unknown there.
+    /// As [`Experiment::force`], and [`IoError::Description`] for a force that is unknown between
+    /// samples.
     pub fn force_within_steps(&self, part: f64) -> Result<Record, IoError> {
         self.sampled(Some(part))
     }
@@ -294,7 +295,7 @@ impl Experiment {
     /// name in messages.
     ///
     /// # Errors
-    /// [`IoError::Description`] if there are more or fewer, and the errors of
+    /// [`IoError::Description`] if there are more or fewer numbers, and the errors of
     /// [`Experiment::system`].
     pub fn per_dof(&self, what: &str, given: &PerDof) -> Result<Vec<f64>, IoError> {
         let dof = self.dof()?;

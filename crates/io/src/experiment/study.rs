@@ -38,15 +38,16 @@ pub struct ExperimentStudy {
     description: Value,
     fields: Vec<StudyField>,
     runs: usize,
-    /// Memory of the simulation of a run, in units of GB; `None` for the default limit.
+    /// Limit of the memory of the simulation of a run, in units of GB; `None` for the default
+    /// limit.
     memory_gb: Option<f64>,
 }
 
 /// Choice of the runs of a study.
 #[derive(Debug)]
 pub enum StudyRuns {
-    /// Number of runs that differ in their noise alone: the seed increases by 1 from run to run,
-    /// beginning at the described one.
+    /// Number of runs that differ only in their noise: the seed increases by 1 from run to run,
+    /// beginning with the seed of the description.
     Seeds(usize),
     /// Table with a row for each run, and a column for each field that changes.
     Table(Box<Table>),
@@ -57,7 +58,7 @@ pub enum StudyRuns {
 pub struct StudyField {
     /// Path in the description, such as `noise.seed`.
     pub name: String,
-    /// Number of each run, in the unit of the field.
+    /// Value of the field in each run, in the unit of the field.
     pub values: Vec<f64>,
 }
 
@@ -138,7 +139,7 @@ impl ExperimentStudy {
         self.runs
     }
 
-    /// The fields that change, with their numbers.
+    /// The fields that change, with their values in each run.
     pub fn fields(&self) -> &[StudyField] {
         &self.fields
     }
@@ -146,7 +147,7 @@ impl ExperimentStudy {
     /// Returns the experiment of a run, counted from 1.
     ///
     /// # Errors
-    /// [`IoError::Json`] if its numbers do not form a valid experiment, and those of
+    /// [`IoError::Json`] if the numbers of the run do not form a valid experiment, and those of
     /// [`Experiment::parse`] for the Matrix Market files that it names.
     ///
     /// # Panics
@@ -182,8 +183,8 @@ fn fields(table: &Table) -> Result<Vec<StudyField>, IoError> {
     columns.iter().map(field).collect()
 }
 
-/// Returns the value of a field, by its path. The last part may be missing in the description:
-/// whether the field exists is checked when the experiment is read.
+/// Returns the value of a field, by its path. The description may lack the last name of the path,
+/// such as an optional field; the reader of the experiment refuses a field that does not exist.
 fn field_value<'a>(description: &'a mut Value, path: &str) -> Option<&'a mut Value> {
     let (parents, last) = path.rsplit_once('.').map_or((None, path), |(p, l)| (Some(p), l));
     let mut parent = description;

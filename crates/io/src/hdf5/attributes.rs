@@ -60,7 +60,8 @@ impl Attributes {
         Self(values)
     }
 
-    /// Returns the numbers with their names, without the attributes of MATLAB itself.
+    /// Returns the numbers with their names, without the attributes that MATLAB writes for its own
+    /// use.
     pub fn numbers(&self) -> impl Iterator<Item = (&str, f64)> {
         self.0.iter().filter_map(|(name, value)| match value {
             Value::Number(number) if !name.starts_with("MATLAB") => Some((name.as_str(), *number)),
@@ -83,7 +84,8 @@ impl Attributes {
     }
 
     /// Returns the factor that multiplies the stored numbers, and the offset that is then added;
-    /// `None` without such attributes, and the reason if they are not clear.
+    /// `None` if they do not change the numbers. The error is the reason why the attributes are not
+    /// clear.
     pub fn scaling(&self) -> Result<Option<(f64, f64)>, String> {
         let named = |names: &[&str]| {
             self.0.iter().find(|(name, _)| names.contains(&name.to_lowercase().as_str()))

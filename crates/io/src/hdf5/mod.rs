@@ -178,8 +178,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the values of a data set and applies the factor and the offset of its attributes. Only
-    /// an exceeded limit refuses the file; damaged data make only this data set unusable, because
+    /// Reads the values of a data set and applies the factor and the offset of its attributes. A
+    /// file that exceeds a limit is refused; damaged data make only this data set unusable, because
     /// it may not be needed.
     fn content(&mut self, dataset: &Dataset, attributes: &Attributes) -> Result<Content, Trouble> {
         let scaling = attributes.scaling().map_err(Trouble::Unusable)?;

@@ -155,7 +155,7 @@ fn referred(dataset: &Dataset) -> Option<u32> {
 
 /// Instants of the rows of a timetable.
 enum RowTimes {
-    /// Instants, in s from the first one on.
+    /// Instants, in s after the first one.
     Instants(Vec<f64>),
     /// A time step, in s.
     Step(f64),
@@ -271,7 +271,7 @@ impl Reader {
         Ok(step.map_or(RowTimes::Unknown, RowTimes::Step))
     }
 
-    /// Returns the instants of a duration or a date, in s from the first one on.
+    /// Returns the instants of an array of durations or dates, in s after the first one.
     fn seconds(&mut self, objects: &Objects, object: u32) -> Result<Option<Vec<f64>>, Fault> {
         let property = match objects.class(object) {
             Some("duration") => "millis",

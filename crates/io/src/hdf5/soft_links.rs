@@ -19,7 +19,8 @@ const HEADER: usize = 8;
 /// Bytes of an entry with addresses of eight bytes.
 const ENTRY: usize = 40;
 
-/// Position in an entry of the address of the object, and of the kind of the entry.
+/// Offset, within an entry, of the address of its object; `KIND` is the offset of the kind of the
+/// entry.
 const ADDRESS: usize = 8;
 const KIND: usize = 16;
 

@@ -16,7 +16,7 @@ const MAX_CHANNELS: usize = 4096;
 /// Contents of a data set.
 pub(super) enum Content {
     Numbers(Array),
-    /// Complex numbers, the last index fastest, with the lengths of the dimensions.
+    /// Complex numbers, whose last index varies fastest, with the lengths of the dimensions.
     Complex {
         lengths: Vec<usize>,
         values: Vec<Complex<f64>>,
@@ -37,7 +37,7 @@ pub(super) fn characters(dataset: &Dataset) -> Option<String> {
     String::from_utf16(&dataset.read_u16().ok()?).ok()
 }
 
-/// Estimated memory of an open object, in numbers.
+/// Estimated memory of an open object, as a number of array elements.
 const OBJECT_NUMBERS: u64 = 64;
 
 /// Numbers of a data set, in the order of the file.

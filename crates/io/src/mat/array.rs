@@ -115,7 +115,8 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
     lengths.iter().map(length).collect()
 }
 
-/// Returns the kind of an object; for tables, time series and instants also how to save them.
+/// Returns the kind of an object; for tables, time series and instants, the text also states how to
+/// save them.
 fn object(elements: &mut Elements<'_>) -> &'static str {
     // The kind of the object comes next, then its class.
     let mut words = [(); 2].map(|()| elements.next().ok().flatten().map(|word| text(word.data)));
@@ -183,7 +184,8 @@ fn complex(
     if count == 0 {
         return Ok(Value::Other("nothing"));
     }
-    // The parts are copied once more when they are combined into complex numbers.
+    // The real and imaginary parts are copied once more when they are combined into complex
+    // numbers.
     let room = budget.take_numbers(count.saturating_mul(2));
     room.map_err(|limit| Fault::too_large(real.at, limit))?;
     let [re, im] = [real, imaginary].map(|part| part.numbers(endian).unwrap_or_default());

@@ -61,7 +61,8 @@ fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
             COMPRESSED => {
                 let inflated = inflated(element.data, at, budget.unpacked_bytes())?;
                 budget.take_bytes(inflated.len()).map_err(|limit| Fault::too_large(at, limit))?;
-                // Errors inside are reported at the position of the compressed variable.
+                // Errors inside a compressed variable are reported at the position of this
+                // variable.
                 let inside = |fault: Fault| Fault { at, ..fault };
                 let mut elements = Elements::new(&inflated, at, endian);
                 let inner = elements.next().map_err(inside)?;

@@ -1,4 +1,4 @@
-//! The footer of a file, which is checked before the decoder allocates the memory that it states.
+//! Check of the footer of a file, before the decoder allocates the memory that the footer states.
 //!
 //! The decoder reserves memory for every child that an element of the schema claims, and recurses
 //! into nested elements without a limit: two kilobytes can claim gigabytes, or exhaust the stack.

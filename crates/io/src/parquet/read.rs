@@ -226,8 +226,8 @@ impl<R: ChunkReader + 'static> Columns<R> {
     }
 
     /// Passes a column to `take` for every range of rows within one span and one row group. The
-    /// other arguments are the index of the span and the number of rows; `take` must read these
-    /// rows.
+    /// other arguments of `take` are the index of the span and the number of rows; `take` must read
+    /// these rows.
     pub fn visit(
         &self,
         groups: &Groups<'_>,
@@ -340,7 +340,7 @@ enum Kind {
     /// Unsigned integers.
     Unsigned,
     /// Instants in integer units, with the number of units per second. They are read as seconds
-    /// from the first instant on, because an f64 has too few digits for seconds since 1970 with the
+    /// after the first instant, because an f64 has too few digits for seconds since 1970 with the
     /// resolution of a sampling step.
     Instants(f64),
 }

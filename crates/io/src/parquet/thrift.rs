@@ -1,5 +1,5 @@
-//! Reader of the compact protocol of Thrift, with which a footer is checked before memory is
-//! allocated for what it states.
+//! Reader of the compact protocol of Thrift. It is used to check a footer before the memory that
+//! the footer states is allocated.
 //!
 //! # Source
 //! Apache Thrift, compact protocol.

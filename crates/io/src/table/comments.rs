@@ -54,8 +54,8 @@ struct CommentLine {
     fields: Vec<String>,
     /// `true` if the fields are units.
     are_units: bool,
-    /// `true` if no other comment is between it and the table, except units and lines without
-    /// words.
+    /// `true` if no other comment is between this line and the table, except units and lines
+    /// without words.
     is_adjacent: bool,
 }
 

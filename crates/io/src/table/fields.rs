@@ -24,7 +24,7 @@ pub(crate) struct Row<'a> {
     pub text: &'a [u8],
     /// Offset in the text.
     pub at: usize,
-    /// Number of line ends before it in the text.
+    /// Number of line ends before the row in the text.
     pub line: u64,
     /// `true` if it has a quote that may enclose a field.
     pub is_quoted: bool,

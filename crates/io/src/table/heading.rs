@@ -74,8 +74,8 @@ struct Filled {
 impl Filled {
     /// Counts the fields of a table below the rows `above`.
     ///
-    /// There may be one name more than fields: in all rows the last field is missing, or in all but
-    /// the first row, whose extra field is a comment.
+    /// There may be one more name than there are fields: in all rows the last field is missing, or
+    /// in all but the first row, whose extra field is a comment.
     fn new(above: &[Beginning<'_>], table: &[Beginning<'_>]) -> Self {
         let first = table[0].fields.filled();
         let usual = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(first);

@@ -15,7 +15,8 @@ pub struct Inventory {
     pub samples: usize,
     /// Contents of each requested column, or the reason why it cannot be used.
     pub columns: Vec<Result<Tally, IoError>>,
-    /// Time axis from the column of instants, if one is given, or the reason why it has none.
+    /// Time axis from the column of instants, if one is given, or the reason why this column gives
+    /// no time axis.
     pub sampling: Option<Result<Sampling, IoError>>,
     /// Last line of a text, counted from 1 in the file, if no line break ends it: the file may have
     /// been truncated within its last number.
@@ -85,7 +86,8 @@ impl RecordFile {
         instants: Option<usize>,
         take: &mut dyn FnMut(usize, usize, &[f64]),
     ) -> Result<Inventory, IoError> {
-        // The sum of no numbers is −0 in Rust, as for a column in memory.
+        // In Rust, the sum of no numbers is −0; these sums begin with −0, too, as those of a column
+        // in memory.
         let mut sums = vec![-0.0; columns.len()];
         let mut steps = Steps::default();
         let read: Vec<usize> = columns.iter().copied().chain(instants).collect();

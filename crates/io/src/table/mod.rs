@@ -188,8 +188,8 @@ impl Table {
         Ok(FirstRows { table, is_whole, decimal, stored })
     }
 
-    /// Creates a table from named columns in memory; `name` is that of the table in messages. The
-    /// name of a column may have a unit, as in a file; a column with infinite numbers or NaN is
+    /// Creates a table from named columns in memory; `name` is the name of the table in messages.
+    /// The name of a column may have a unit, as in a file; a column with infinite numbers or NaN is
     /// refused when it is used.
     pub fn from_columns(
         name: impl Into<String>,

@@ -18,7 +18,7 @@ const SLACK: f64 = 0.01;
 /// instants the number of corners grows only with the cube root of their number.
 const MOST_CORNERS: usize = 1 << 16;
 
-/// Number of digits of a double; a rounding beyond it is not visible.
+/// Number of digits of a double; rounding to more digits is not visible.
 const DOUBLE_DIGITS: i32 = 17;
 
 /// Number of first instants that are stored and checked once their digits are known.
@@ -277,10 +277,10 @@ mod tests {
                 uniform(read(rate, 300_000, |t| format!("{t:.decimals$}"))),
                 "{rate} {decimals}"
             );
-            // From another instant on.
+            // The same rate, with another first instant.
             assert!(uniform(read(rate, 9_000, |t| format!("{:.decimals$}", t + 7.123_456_7))));
         }
-        // Seven significant digits, of which fewer and fewer are decimal places.
+        // Seven significant digits; the number of decimal places decreases.
         assert!(uniform(read(25_600.0, 300_000, |t| format!("{t:.6e}"))));
         // Single precision.
         assert!(uniform((0..300_000).map(|k| f64::from((f64::from(k) / 25_600.0) as f32))));
@@ -296,8 +296,8 @@ mod tests {
         off.channel(0).iter().enumerate().map(time).map(print).collect()
     }
 
-    /// With 100 seeded records each, no rounded one is refused, and none with genuine jitter or a
-    /// missing sample is taken for rounding.
+    /// Of 100 seeded records of each kind, all with rounded instants are accepted, and all with
+    /// genuine jitter or a missing sample are refused.
     #[test]
     fn rounding_is_told_from_jitter_and_from_a_gap() {
         for (rate, decimals) in [(51_200.0, 5), (25_600.0, 6), (96_000.0, 5)] {
@@ -313,7 +313,8 @@ mod tests {
             for jitter in [0.02, 0.05, 0.2] {
                 assert_eq!(accepted(jitter, None), 0, "{rate} {decimals} jitter {jitter}");
             }
-            // Near the ends coarse rounding leaves room for one.
+            // Near the ends of a record, a missing sample can be within coarse rounding, so none is
+            // removed there.
             for lost in [64, 100, 2048, 4000] {
                 assert_eq!(accepted(0.0, Some(lost)), 0, "{rate} {decimals} without {lost}");
             }
@@ -337,7 +338,7 @@ mod tests {
         // A clock that runs a hundredth of a per cent faster in the second half.
         let drift = |k: usize| (k as f64 + 1e-4 * k.saturating_sub(50_000) as f64) / 25_600.0;
         assert!(!uniform((0..100_000).map(|k| format!("{:.6}", drift(k)).parse().unwrap())));
-        // Too coarse to tell.
+        // Instants that are too coarse to distinguish a missing sample from rounding.
         assert!(!uniform(read(25_600.0, 1000, |t| format!("{t:.4}"))));
         assert!(!uniform([0.0, 0.0, 0.0]));
         assert!(!uniform([2.0, 1.0, 0.0]));

@@ -19,8 +19,8 @@ pub enum TimeAxis<'a> {
     OfFile,
 }
 
-/// Maximum deviation of a step from the median step, as a fraction of it: a hundredth of a step is
-/// a phase error of 1.8° at the Nyquist frequency.
+/// Maximum deviation of a step from the median step, as a fraction of the median: a hundredth of a
+/// step is a phase error of 1.8° at the Nyquist frequency.
 const STEP_TOLERANCE: f64 = 0.01;
 
 /// Maximum relative difference between two steps or rates that count as equal: universal files

@@ -20,9 +20,9 @@ pub(crate) struct Header {
     pub title: String,
     /// Decay, in 1/s, that an exponential window adds to every mode, as the second line states it.
     pub added_decay: Option<f64>,
-    /// Segments over which it was averaged, as the third line states them.
+    /// Segments over which the function was averaged, as the third line states them.
     pub segments: Option<AveragedSegments>,
-    /// 1 is a response in time, 4 a frequency response function.
+    /// Type of the function: 1 is a response in time, 4 a frequency response function.
     pub function: u32,
     /// Node and direction of the measurement.
     pub response: String,
@@ -36,7 +36,7 @@ pub(crate) struct Header {
     /// First abscissa and increment, for even spacing.
     pub start: f64,
     pub step: f64,
-    /// 17 is time, 18 frequency.
+    /// Type of the abscissa: 17 is time, 18 frequency.
     pub abscissa: u32,
     /// Labels of the abscissa and of its unit; empty without one.
     pub abscissa_labels: [String; 2],
@@ -101,7 +101,8 @@ impl Header {
         })
     }
 
-    /// Returns how many numbers the file has: the values and, for uneven spacing, their instants.
+    /// Returns the number of numbers in the file: the values and, for uneven spacing, their
+    /// instants.
     pub fn numbers(&self) -> usize {
         let numbers_per_value = 1 + usize::from(self.is_complex) + usize::from(!self.is_even);
         self.count.saturating_mul(numbers_per_value)

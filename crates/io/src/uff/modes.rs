@@ -210,7 +210,7 @@ mod tests {
     fn a_file_that_is_cut_short_or_wrong_is_an_error_with_its_line() {
         let text = written();
         for end in 0..text.len() {
-            // Between datasets a shorter file is a file.
+            // A file that is cut between two datasets is still a valid file.
             if let Ok(read) = read_modes("a.unv", &text.as_bytes()[..end]) {
                 assert!((1..=2).contains(&read.modes.len()));
             }

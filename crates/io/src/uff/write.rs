@@ -92,7 +92,7 @@ struct Dataset<'a> {
     title: &'a str,
     /// Second and third line of the description.
     about: [&'a str; 2],
-    /// 4 is a frequency response function, 6 a coherence.
+    /// Type of the function: 4 is a frequency response function, 6 a coherence.
     function: u32,
     /// Node and direction.
     response: (u32, i32),

@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn other_text_is_no_unit() {
-        // `mn` and `NM` may be two units each.
+        // `mn` and `NM` may each mean two units.
         for text in [
             "",
             "left",

@@ -21,7 +21,7 @@ pub(super) fn notes_of(text: &str) -> impl Iterator<Item = &str> {
 pub(super) struct Bracket {
     /// Range with the brackets.
     pub span: Range<usize>,
-    /// Range between them.
+    /// Range between the brackets.
     pub inner: Range<usize>,
 }
 

@@ -109,7 +109,7 @@ fn unit_of_quantity(
 }
 
 /// Reads a unit before the name: `lbf: Hammer`, `mm displacement`. The unit is used if it has no
-/// other meaning and the name is that of the quantity of the unit.
+/// other meaning and the name states the quantity of the unit.
 fn leading_unit(name: &str, words: &[Range<usize>], wanted: Quantity) -> Option<UnitWords> {
     let text_of = |span: &Range<usize>| &name[span.clone()];
     (1..words.len().min(MAX_WORDS)).rev().find_map(|count| {

@@ -283,11 +283,11 @@ pub(super) fn is_ambiguous(unit: &str) -> bool {
     AMBIGUOUS.contains(&unit.to_lowercase().as_str())
 }
 
-/// Words that are units without a single size, or no size: tons of three kinds, decibels.
+/// Words for units with several sizes or none: tons of three kinds, decibels.
 const UNCLEAR: &[&str] =
     &["ton", "tons", "tn", "db", "dba", "dbv", "dbu", "dbm", "dbfs", "percent", "%", "%fs", "‰"];
 
-/// Returns whether a word is a unit whose size it does not determine.
+/// Returns whether a word is a unit with several sizes or none.
 pub(super) fn is_unclear(word: &str) -> bool {
     UNCLEAR.contains(&word.to_lowercase().as_str())
 }

@@ -270,7 +270,8 @@ fn the_system_may_be_that_of_another_file() {
     found["system"]["mass"] = serde_json::json!("m.mtx");
     let written = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     written("results/found.json", &found.to_string());
-    // The matrix is in the folder of the machine, the machine in one beside the description.
+    // The matrix is in the folder of the machine, and the machine is in a folder beside the
+    // description.
     let m = inline.system().unwrap().mass()[(0, 0)];
     written(
         "results/m.mtx",

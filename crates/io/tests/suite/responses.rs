@@ -233,7 +233,7 @@ fn broken_tables_are_refused() {
     }
 }
 
-/// Impossible segments are not used, and reported.
+/// Impossible segments are ignored and reported.
 #[test]
 fn impossible_segments_are_told() {
     let table = |segments: [&str; 5]| {

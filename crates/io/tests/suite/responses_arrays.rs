@@ -122,7 +122,7 @@ fn what_is_missing_or_does_not_go_together_is_said() {
     assert!(text.contains("entry 2 of H is not finite"), "{text}");
     let text = refused(&file(&[f, ("H", &[3, 1, 1, 1], three, three)]));
     assert!(text.contains("more than three dimensions"), "{text}");
-    // An array that is not a response is left out.
+    // An array that is not a response is omitted.
     let analytic: (&str, &[u32], &[f64], &[f64]) = ("z", &[4, 1], four, four);
     let responses = FrequencyResponses::parse("a.mat", &file(&[f, h, analytic])).unwrap();
     assert_eq!(responses.functions.len(), 1);

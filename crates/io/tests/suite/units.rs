@@ -508,7 +508,7 @@ fn units_that_contradict_each_other_are_reported() {
     }
 }
 
-/// Answer to a header outside brackets.
+/// Expected answer for a header whose unit is not in brackets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Answer {
     /// The numbers are multiplied by the factor, without a finding.
@@ -587,7 +587,7 @@ fn answer(name: &str, quantity: Quantity) -> Answer {
 }
 
 /// Judge: the definitions of the units, and what a person would read. A unit of the column after a
-/// mark is taken; one of another quantity is reported.
+/// mark is used; a unit of another quantity is reported.
 #[test]
 fn last_words_that_are_units_are_taken_or_reported() {
     const STYLES: [&str; 8] =
@@ -597,7 +597,7 @@ fn last_words_that_are_units_are_taken_or_reported() {
         for (unit, right) in units {
             for style in STYLES {
                 let name = header(style, word, unit);
-                // After a stroke the unit is that of the numbers, and a wrong one is refused.
+                // After a slash, the unit is that of the numbers, and a wrong one is refused.
                 let stated = stated_unit(&name, "", Some(quantity));
                 let refused = stated.as_ref().and_then(|stated| stated.used());
                 if style == "W / U" && refused.is_some_and(|unit| unit.quantity != quantity) {

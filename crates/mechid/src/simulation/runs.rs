@@ -23,7 +23,8 @@ pub struct RunsSummary {
     pub record_column: &'static str,
     /// Channels of each run.
     pub channels: Vec<String>,
-    /// Fields of the description that change; each is a column with its number for every run.
+    /// Fields of the description that change; each is a column with the value of the field in every
+    /// run.
     pub fields: Vec<String>,
 }
 

@@ -99,7 +99,7 @@ pub struct LargestMultiplier {
     pub value: [f64; 2],
     /// Modulus of the factor: below 1 disturbances decay (pure number).
     pub modulus: f64,
-    /// Error of the factor, with that by the time step if it is known (pure number).
+    /// Error of the factor, including the error due to the time step if it is known (pure number).
     pub error: f64,
     /// Error of the factor due to the time step of the scheme (pure number); `None` if it is not
     /// known.

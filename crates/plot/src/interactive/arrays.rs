@@ -108,7 +108,8 @@ mod tests {
         );
         assert_eq!(arrays.add(&[]), None);
         assert_eq!(arrays.into_texts().len(), 2);
-        // Phases have three bytes each, of which the last is cut off.
+        // Each phase has the three higher bytes of a number in single precision; the lowest byte is
+        // omitted.
         let phases = text(&[vec![-179.99], vec![0.5; 200]].concat(), 3);
         let bytes = STANDARD.decode(phases.split(' ').nth(2).unwrap()).unwrap();
         let first = f32::from_le_bytes([0, bytes[0], bytes[1], bytes[2]]);

@@ -36,7 +36,7 @@ pub fn of_decay(title: &str, row: &decay::BackboneRow, unit: &str) -> Figure {
         .share_x()
 }
 
-/// Returns values over amplitude with their intervals, if all of these are finite.
+/// Returns values over amplitude with their intervals, if all values and intervals are finite.
 fn panel((x, y): (Axis, Axis), name: &str, amplitude: &[f64], values: &[Uncertain]) -> Panel {
     let panel = Panel::new(x, y);
     let finite = |value: &Uncertain| {

@@ -97,8 +97,9 @@ fn modes_of_result(
     modes_page(&modes, figure, shapes.as_ref(), settings)
 }
 
-/// Returns measured and identified responses per unit force, a figure for each pair; `None` for
-/// another kind of figure, or if no line separates the forces.
+/// Returns measured and identified responses per unit force, a figure for each pair of response and
+/// force; `None` for another kind of figure, or if the responses to the forces cannot be separated
+/// at any line.
 fn pairs(
     identified: &Identified,
     style: FigureStyle,
@@ -151,7 +152,7 @@ fn motion_letter(quantity: ResponseQuantity) -> &'static str {
 }
 
 /// Returns the name of a response in the figure: the name of its channel if the measured quantity
-/// is drawn, otherwise of its point.
+/// is drawn, otherwise the name of its point.
 pub(crate) fn motion_name(
     channels: &Channels,
     measured: ResponseQuantity,
@@ -168,11 +169,11 @@ pub(crate) fn motion_name(
 }
 
 impl ToFigure for Identified {
-    /// Draws the measured and the identified receptance. If no line separates the forces, draws the
-    /// measured and the predicted amplitudes of the responses. For random and hammer tests, also
-    /// draws the coherence. For a fit in the time domain, draws the measured and the predicted
-    /// response of the first record. With nonlinear terms and whole periods, draws only the
-    /// restoring force.
+    /// Draws the measured and the identified receptance. If the responses to the forces cannot be
+    /// separated at any line, draws the measured and the predicted amplitudes of the responses. For
+    /// random and hammer tests, also draws the coherence. For a fit in the time domain, draws the
+    /// measured and the predicted response of the first record. With nonlinear terms and whole
+    /// periods, draws only the restoring force.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().title();
         if let Some((fitted, points)) = restoring::whole_periods(self) {

@@ -18,7 +18,8 @@ const PAIRS: usize = 2;
 /// Maximum number of driving points that are drawn: the number of colours of curves.
 const DRIVING_POINTS: usize = 6;
 
-/// Ratio of the ends of the frequency range to the lowest and the highest natural frequency.
+/// Ratio of the lowest natural frequency to the lower end of the frequency range, and of the upper
+/// end of the range to the highest natural frequency.
 const BEYOND: f64 = 5.0;
 
 /// Number of points on the whole axis.
@@ -35,7 +36,7 @@ const BESIDE_WIDTHS: (f64, f64) = (0.05, 20.0);
 /// response without resonance.
 const SHARPEST: f64 = 1e-4;
 
-/// Maximum ratio, to the highest natural frequency, of a natural frequency that counts as zero.
+/// Maximum ratio of a natural frequency that counts as zero to the highest natural frequency.
 const ROUNDING: f64 = 1e-7;
 
 /// Maximum number of natural frequencies whose values are listed in the legend.

@@ -6,8 +6,8 @@ use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 /// Maximum number of samples that are drawn; a panel cannot show more.
 const SHOWN: usize = 4000;
 
-/// Returns the responses of the first kind, measured and computed, above the residual, for every
-/// degree of freedom; `computed` is a word for the computed response, such as predicted.
+/// Returns the responses of the first measured quantity, measured and computed, above the residual,
+/// for every degree of freedom; `computed` is a word for the computed response, such as predicted.
 pub fn motion(title: &str, compared: &Compared, computed: &str) -> Figure {
     let (measured, predicted) = (&compared.measured, &compared.predicted);
     let shown = measured.len().min(SHOWN);

@@ -34,8 +34,8 @@ impl Names<'_> {
 /// Number of points of a fitted curve.
 const FINE: usize = 800;
 
-/// Maximum condition number of the forces of several experiments at which their responses are
-/// separated.
+/// Maximum condition number of the matrix of forces of several experiments; above it, the responses
+/// to the forces are not separated.
 const SEPARABLE: f64 = 100.0;
 
 /// Maximum relative difference between frequencies of several records that count as the same line.
@@ -48,8 +48,8 @@ const GRID: usize = 8;
 /// Returns magnitude and phase of the response per unit force x_i / F_j, measured and fitted, in
 /// the quantity of the style or, if the style has none, in the measured quantity. The pairs are
 /// those of the degrees of freedom that the records determine: on lines where F_j acts alone, and
-/// on lines where as many records as degrees of freedom have independent forces. `None` if no line
-/// separates the forces.
+/// on lines where as many records as degrees of freedom have independent forces. `None` if the
+/// responses to the forces cannot be separated at any line.
 ///
 /// The panels form a matrix, with a row for each response and a column for each force; with more
 /// than eight degrees of freedom all pairs are drawn together.
@@ -98,8 +98,8 @@ pub fn receptance(
 pub const DRAWN_PAIRS: usize = 128;
 
 /// Returns a separate figure for each pair with a response, at most [`DRAWN_PAIRS`] of them, with
-/// the coherence of its response below the curves, if it is known. `None` if no line separates the
-/// forces.
+/// the coherence of its response below the curves, if it is known. `None` if the responses to the
+/// forces cannot be separated at any line.
 ///
 /// # Errors
 /// As [`receptance`].

@@ -176,8 +176,8 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
     ])
 }
 
-/// Draws measured and identified receptance; if no line separates the forces, measured and
-/// predicted response.
+/// Draws measured and identified receptance; if the responses to the forces cannot be separated at
+/// any line, draws measured and predicted response.
 ///
 /// # Errors
 /// [`ReportError::Analysis`] if the system has no receptance at a line, [`ReportError::Plot`] if
@@ -354,7 +354,7 @@ fn correlation_panel(
         .legend(Legend::Above)
 }
 
-/// Returns the panel of the correlation of a residual with itself.
+/// Returns the panel of the autocorrelation of a residual.
 fn own_panel(residual: &str, own: &OwnCorrelation) -> Panel {
     match own {
         OwnCorrelation::Samples { correlation, .. } => {
@@ -374,7 +374,7 @@ fn own_panel(residual: &str, own: &OwnCorrelation) -> Panel {
     }
 }
 
-/// Draws the correlation of the residual with itself and with the forces.
+/// Draws the autocorrelation of the residual, and its correlation with the forces.
 pub fn correlations(
     part: &RecordReview<'_>,
     correlations: &[Correlations],

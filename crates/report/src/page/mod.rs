@@ -385,7 +385,7 @@ mod tests {
         let files = ["a/x & y.csv", "a/1.csv", "b/1.csv"].map(String::from);
         let short = without_folders(&part, &files).into_string();
         assert_eq!(short, "<p>x &amp; y.csv: late; a/1.csv, b/1.csv: clipped</p>");
-        // The same file in two records is no other file.
+        // The same file in two records counts as one file.
         let twice = ["a/1.csv", "a/1.csv"].map(String::from);
         assert!(!without_folders(&part, &twice).into_string().contains("a/1.csv"));
     }

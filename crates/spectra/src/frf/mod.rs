@@ -236,8 +236,8 @@ impl Frf {
             }
             FrfEstimator::Hv => spectra.hv()?,
         };
-        // The variance of H1 is known; that of another estimate is taken in proportion to its
-        // square.
+        // The variance of H1 is known; the variance of another estimate is that of H1 times the
+        // squared ratio of the two estimates.
         for (v, (h, h1)) in variance.iter_mut().zip(response.iter().zip(h1.iter())) {
             if h1.norm_sqr() > 0.0 {
                 *v *= h.norm_sqr() / h1.norm_sqr();

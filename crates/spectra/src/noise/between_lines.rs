@@ -123,7 +123,7 @@ mod tests {
             }
             assert_eq!(parts, expected, "{periods}");
         }
-        // As many samples as may be held, half and a third as many.
+        // A period has as many samples as the buffer, half as many, or a third as many.
         assert_eq!([1, 2, 3].map(|parts| periods_as_one(6, MAX_HELD / parts, 1)), [1, 1, 3]);
     }
 }

@@ -147,8 +147,9 @@ mod tests {
         assert!((level - mean.sqrt()).abs() < 1e-6 * level, "{level}");
     }
 
-    /// A resonance a hundred times as high as the noise does not hide its level, because some 350
-    /// lines beside it give the root to 2.7 %, and the mean of 40 experiments to a sixth of that.
+    /// A resonance in the known noise, a hundred times as high as the white noise, does not hide
+    /// the level of the white noise: about 350 lines beside the resonance determine the level to
+    /// 2.7 %, and the mean of 40 experiments to a sixth of this error.
     #[test]
     fn the_level_is_found_beside_a_resonance() {
         let known: Vec<f64> =
@@ -167,8 +168,8 @@ mod tests {
         assert!((0.0..1e-4).contains(&level), "{level}");
     }
 
-    /// Of 200 sets of 300 lines near a resonance the right form is chosen in nearly all, with the
-    /// right levels.
+    /// In nearly all of 200 sets of 300 lines near a resonance, the right form is chosen, and the
+    /// mean levels are right.
     #[test]
     fn noise_in_proportion_to_a_response_is_recognised() {
         let response: Vec<f64> =
@@ -188,7 +189,7 @@ mod tests {
                     (got.white > 0.0, got.relative > 0.0) == (white > 0.0, relative > 0.0),
                 );
             }
-            // Schwarz's criterion adds a part that is not there in 1.7 % of large sets.
+            // In 1.7 % of large sets, Schwarz's criterion adds a part that does not exist.
             assert!(right >= 188, "{white} {relative}: {right}");
             assert!((sums[0] - white).abs() < 0.05 * white + 0.02, "{sums:?}");
             assert!((sums[1] - relative).abs() < 0.05 * relative + 1e-5, "{sums:?}");

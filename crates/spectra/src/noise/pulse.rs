@@ -142,7 +142,8 @@ mod tests {
     use super::*;
 
     /// On lines up to half the sampling rate the patterns have the whole covariance of the samples;
-    /// on the lowest quarter of them few patterns have all of it but a ten-thousandth.
+    /// on the lowest quarter of these lines, a few patterns have the covariance except for a
+    /// ten-thousandth.
     #[test]
     fn patterns_have_the_covariance_of_the_noise() {
         let sampling = Sampling::new(0.01, 400).unwrap();

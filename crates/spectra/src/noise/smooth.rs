@@ -385,7 +385,8 @@ fn deviance(log_power: &DVector<f64>, variances: &DVector<f64>, ratio: &mut DVec
 mod tests {
     use super::*;
 
-    /// A band of noise a hundred times as high is found in many lines as well as in few.
+    /// A band whose noise power is a hundred times that of the other lines is found among many
+    /// lines as well as among few.
     #[test]
     fn many_lines_show_the_band_that_few_do() {
         let deviation = |line: usize| -(1.0 - (0.618_033_988_75 * line as f64).fract()).ln();
@@ -409,8 +410,8 @@ mod tests {
     #[test]
     fn a_line_at_the_end_that_is_quiet_by_chance_has_not_all_the_weight() {
         let omega: Vec<f64> = (1..=100).map(f64::from).collect();
-        // Deviations of a fixed sequence, exponentially distributed as squares of complex numbers
-        // are.
+        // The deviations are a fixed sequence with an exponential distribution, which is that of
+        // the squares of complex normal numbers.
         let deviation = |line: usize| -(1.0 - (0.618_033_988_75 * line as f64).fract()).ln();
         let mut variances = DMatrix::from_fn(100, 1, |line, _| deviation(line + 1) / omega[line]);
         for quiet in [1e-2, 1e-4, 1e-6] {

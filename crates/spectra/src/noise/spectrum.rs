@@ -39,9 +39,9 @@ impl NoiseSpectrum {
     /// Creates a spectrum from a known covariance per row, at `omega` (rad/s).
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if there is not one matrix per frequency, [`NumericsError::Size`] if
-    /// they are not square and of one even size, [`SpectraError::NoiseVariance`] if a variance is
-    /// negative or not finite.
+    /// [`NumericsError::Size`] if there is not one matrix per frequency, or if the matrices are not
+    /// square and of the same even size, [`SpectraError::NoiseVariance`] if a variance is negative
+    /// or not finite.
     pub fn new(
         omega: Vec<f64>,
         covariance: Vec<DMatrix<Complex<f64>>>,

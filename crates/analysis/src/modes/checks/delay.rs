@@ -26,8 +26,8 @@ struct Phase {
 /// Returns, for each driving point with at least two modes, the test of a delay: phases of the
 /// residues in proportion to the frequency. Delays above half a period of a mode are not found.
 ///
-/// Modes can also be complex, each in its own way. The scatter about the proportional phases
-/// estimates the effects of the errors and of complex modes together.
+/// Modes can also be complex, with phases that differ from mode to mode. The scatter about the
+/// proportional phases estimates the effects of the errors and of complex modes together.
 pub(super) fn tests(
     modes: &[IdentifiedMode],
     inputs: &[String],
@@ -92,8 +92,8 @@ fn delay(phases: &[Phase]) -> Option<Delay> {
 /// Returns the delay for modes with an `expected` phase, in rad.
 ///
 /// The scatter between the modes is estimated by the method of moments and added to the variances
-/// of the phases. The variance of the delay follows from the residuals, but is at least the
-/// variance that follows from the weights.
+/// of the phases. The variance of the delay is computed from the residuals; if the variance that
+/// follows from the weights is larger, it is used instead.
 ///
 /// # Source
 /// Knapp & Hartung (2003), Statistics in Medicine 22, 2693–2710.
@@ -174,8 +174,8 @@ mod tests {
         MODES.map(&mut phase).into()
     }
 
-    /// Without a delay a p-value below 5 % comes in 5 % of the cases or fewer, for real and complex
-    /// modes, with viscous and structural damping and with half of each.
+    /// Without a delay, the p-value is below 5 % in at most 5 % of the cases: for real and complex
+    /// modes, with viscous damping, structural damping, and half of each.
     #[test]
     fn p_values_are_right_with_complex_modes() {
         let mut rng = ChaCha20Rng::seed_from_u64(1);

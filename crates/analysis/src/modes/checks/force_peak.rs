@@ -71,7 +71,7 @@ mod tests {
         assert!(suspected.text.contains("2.970, 2.990, 3.000 Hz"), "{}", suspected.text);
         assert!(check(&[]).is_none());
         assert!(check(&[(3.0, 0.01), (3.01, 0.01), (3.2, 0.01), (9.0, 0.2)]).is_none());
-        // Two sharp modes within a broad one.
+        // Two lightly damped modes are within the half-width of a heavily damped mode.
         assert!(check(&[(2.7, 0.01), (3.0, 0.2), (3.2, 0.01)]).is_none());
     }
 }

@@ -9,8 +9,8 @@ use super::super::summary::{ModalCheck, ModalModeRow};
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Returns, for each of several forces, the check that it excites some mode, by a test that its
-/// participations in all modes are zero.
+/// Returns, for each of several forces, the check that it excites at least one mode. The test is
+/// that its participations in all modes are zero.
 ///
 /// # Source
 /// Wald's test of the participations, with two degrees of freedom for each mode.
@@ -36,8 +36,8 @@ pub(super) fn force_checks(modes: &[IdentifiedMode], inputs: &[String]) -> Vec<M
     several(inputs).filter_map(check).collect()
 }
 
-/// Returns, for each of several responses, the check that it moves in some mode, by a test that its
-/// entries in the shapes are zero, in all modes that have standard errors.
+/// Returns, for each of several responses, the check that it moves in at least one mode. The test
+/// is that its entries in the shapes of all modes with standard errors are zero.
 ///
 /// # Source
 /// Wald's test of the shapes, with two degrees of freedom for each mode.

@@ -72,8 +72,8 @@ fn explained_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
     share_checks("explained", explained, names, words)
 }
 
-/// Returns the check of the share of the variance of each response that is predicted where it was
-/// not fitted.
+/// Returns, for each response, the check of the share of its variance that is predicted in data
+/// that were not fitted.
 pub(super) fn prediction_checks(predicted: &[f64], names: &[String]) -> Vec<ModalCheck> {
     let words = [
         "the modes predict",

@@ -92,7 +92,7 @@ impl<'a> Misfit<'a> {
         };
         let rows = vec![Line::new(data.dof()); data.len()];
         let layout = Layout::new(unknowns, data.transient().ncols());
-        // The transients of all other records are zero on a line.
+        // On a line, only the transient of its own record is not zero.
         let is_used = |line: usize, at: usize| match layout.columns()[at].1.checked_sub(data.dof())
         {
             None => true,
@@ -321,8 +321,8 @@ impl Restartable for Misfit<'_> {
             let rows = Sampling::new(1.0, self.shares.len()).ok()?;
             noise::white(rows, 2, 1.0, seed).ok()
         });
-        // With a complex normal number z, |z|²/2 has an exponential distribution; half the square
-        // of this has the mean 1.
+        // If z is complex normal, |z|²/2 has an exponential distribution, and half of its square
+        // has the mean 1.
         for (share, pair) in
             self.shares.iter_mut().zip(drawn.iter().flat_map(|d| d.data().row_iter()))
         {
@@ -331,7 +331,7 @@ impl Restartable for Misfit<'_> {
     }
 }
 
-/// Returns the factor L of the displacement part of every covariance.
+/// Returns the factor L of the displacement block of every covariance.
 fn output_weights(noise: &NoiseSpectrum) -> Result<Vec<ComplexMatrix>, EstimateError> {
     let n = noise.dof();
     noise

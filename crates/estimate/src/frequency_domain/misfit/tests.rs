@@ -96,7 +96,8 @@ fn the_gradient_is_that_of_the_sum_of_squares() {
                     cost(&mut misfit, &theta)
                 };
                 let difference = (near(1e-5) - near(-1e-5)) / 2e-5;
-                // Central differences: rounding 1e-16/1e-5 and curvature 1e-10, both relative.
+                // Relative errors of central differences: 1e-16/1e-5 due to rounding, 1e-10 due to
+                // curvature.
                 let error = (gradient[at] - difference).abs();
                 assert!(error < 1e-8 * gradient.norm(), "{at}: {error:e}");
             }
@@ -129,7 +130,8 @@ fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
         assert!(equations.gram.diagonal().iter().all(|v| (v - 1.0).abs() < 1e-12));
 
         let (covariance, condition) = equations.covariance().unwrap();
-        // In units of the lengths of the columns: powers of s differ by orders of magnitude.
+        // The unit is the length of each column, because the powers of s differ by orders of
+        // magnitude.
         let lengths = gram.diagonal().map(f64::sqrt);
         let (to, back) = (DMatrix::from_diagonal(&lengths), lengths.map(f64::recip));
         let back = DMatrix::from_diagonal(&back);
@@ -141,7 +143,7 @@ fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
         let expected = singular.max() / singular.min();
         assert!((condition / expected - 1.0).abs() < 1e-6, "{condition} {expected}");
 
-        // There and back.
+        // The inverse transformation returns the same unknowns.
         let back = equations.coordinates.unknowns(&equations.coordinates.transform(&theta));
         assert!((back - &theta).norm() < 1e-12 * theta.norm());
     }
@@ -169,7 +171,7 @@ fn the_curvature_is_the_second_derivative_along_a_step() {
         let curvature = misfit.curvature(&equations, &step).unwrap();
         let to = transformation(&equations.coordinates, theta.len());
         let error = (to.tr_mul(&curvature) - &expected).norm() / expected.norm();
-        // Second differences: rounding 1e-16/1e-8.
+        // Rounding error of second differences: 1e-16/1e-8.
         assert!(error < 1e-6, "{error:e}");
     }
 }

@@ -14,8 +14,8 @@ use crate::limits::PART_INFORMS;
 pub struct PartsComparison {
     /// Number of parts.
     pub parts: usize,
-    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by
-    /// noise alone.
+    /// Mean square of the differences between the parts, in units of their noise; 1 if the parts
+    /// differ by noise alone.
     pub ratio: f64,
     /// Number of independent differences.
     pub degrees_of_freedom: usize,
@@ -71,8 +71,9 @@ pub(crate) enum Level {
 }
 
 impl Level {
-    /// Returns the variance and its degrees of freedom without the `squares` of the residual that a
-    /// statistic of this rank explains; `None` if no residual remains.
+    /// Returns the variance and its degrees of freedom. If the variance comes from the residual,
+    /// the sum `squares` that a statistic of this `rank` explains is subtracted first. `None` if no
+    /// residual remains.
     fn without(&self, squares: f64, rank: usize) -> Option<(f64, f64)> {
         let (level, of_level) = match *self {
             Self::Known { inflation, degrees_of_freedom } => (inflation, degrees_of_freedom),
@@ -107,8 +108,8 @@ impl Scores<'_> {
         self.covariance.view((part * count, part * count), (count, count)).into_owned()
     }
 
-    /// Compares the scores of some `parts` with their covariance; `parameters` are the names.
-    /// `None` with too few residuals for an estimate of the noise.
+    /// Compares the scores of some `parts` with their covariance; `parameters` are the names of the
+    /// parameters. `None` if there are too few residuals for an estimate of the noise.
     pub(crate) fn compare(
         &self,
         level: &Level,
@@ -191,8 +192,8 @@ impl PartDifference {
 }
 
 impl PartsOfFit<'_> {
-    /// Compares the parameters that the parts of a split determine; `None` with fewer than two
-    /// parts or too few residuals for an estimate of the noise.
+    /// Compares the parameters that the parts of a split determine; `None` if there are fewer than
+    /// two parts, or too few residuals for an estimate of the noise.
     ///
     /// For scores s with a covariance V of rank d, sᵀV⁺s/d divided by the noise level follows
     /// Fisher's distribution. Its degrees of freedom are d and those of the noise level.

@@ -1,4 +1,5 @@
-//! Weighted residual of a fit and its sensitivities, without the part that transients explain.
+//! Weighted residual of a fit and its sensitivities, without the components that the transients
+//! explain.
 
 use mechid_numerics::products::transposed_product;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
@@ -13,9 +14,9 @@ use crate::pulse_covariance::PulseCovariance;
 
 /// Weighted residual and sensitivities at some values of the parameters.
 pub(super) struct Linearised {
-    /// Residual e without the part that the transients explain.
+    /// Residual e without the component that the transients explain.
     pub(super) residual: DVector<f64>,
-    /// Orthonormal basis Q of the sensitivities without the part that the transients explain.
+    /// Orthonormal basis Q of the sensitivities without the components that the transients explain.
     pub(super) basis: DMatrix<f64>,
     /// Change of every parameter per unit of each basis column, parameters × columns.
     pub(super) root: DMatrix<f64>,
@@ -87,13 +88,14 @@ impl Linearised {
         &self.root * &self.coefficients
     }
 
-    /// Removes the part of the residual that the parameters still explain.
+    /// Removes the component of the residual that the parameters still explain.
     pub(super) fn finish_step(&mut self) {
         self.residual -= &self.basis * &self.coefficients;
         self.coefficients.fill(0.0);
     }
 
-    /// Changes from independent unknowns to the entries, whose derivative is `tangent`.
+    /// Replaces the independent unknowns by the entries; `tangent` is the derivative of the entries
+    /// with respect to the independent unknowns.
     pub(super) fn relate(&mut self, tangent: &DMatrix<f64>) {
         self.root = tangent * &self.root;
     }

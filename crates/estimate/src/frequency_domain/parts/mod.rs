@@ -127,8 +127,8 @@ impl<'a> PartsOfFit<'a> {
     }
 
     /// Linearises a fit of averaged responses, each with the degrees of freedom of its forces,
-    /// counted from 0; `data` has all of them. `None` as for [`PartsOfFit::new`], and if the error
-    /// covariance of a response is unknown.
+    /// counted from 0; `data` has the lines of all these responses. `None` as for
+    /// [`PartsOfFit::new`], and if the error covariance of a response is unknown.
     pub fn from_responses(
         data: &'a FrequencyData,
         records: &'a [(Frf, Vec<usize>)],

@@ -51,9 +51,9 @@ impl PartsOfFit<'_> {
     /// each parameter to first order. `records` has the samples of the rows; without them
     /// nonlinear terms are not tested. `None` if no term can be tested.
     ///
-    /// C has the weighted changes of the response by a term as columns, and Z is C without the part
-    /// that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and the
-    /// parameters change by −(QR)⁺C a, where QR are their sensitivities and e is the residual.
+    /// C has the weighted changes of the response by a term as columns, and Z is C without the
+    /// component that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and
+    /// the parameters change by −(QR)⁺C a, where QR are their sensitivities and e is the residual.
     /// Around the estimate of the model without the term, the mean square error of the model with
     /// the term is the covariance of these changes plus their square. The terms are weighted by
     /// their likelihoods, as in an average of models.
@@ -91,7 +91,8 @@ impl PartsOfFit<'_> {
         })
     }
 
-    /// Returns the explained part of the residual for a term with these columns.
+    /// Returns the test of a term with these columns, with the fraction of the residual power that
+    /// the term explains.
     fn explained(&self, term: OmittedTerm, mut columns: DMatrix<f64>) -> Option<Explained> {
         remove(&self.linear.transients, &mut columns);
         let by_parameters = self.linear.effect_of(&columns);

@@ -109,8 +109,8 @@ impl Cuts {
     }
 }
 
-/// Returns bands of lines with equal information, which is the sum of the leverages of their
-/// residuals.
+/// Returns bands of lines with equal information. The information of a band is the sum of the
+/// leverages of its residuals.
 fn bands(fit: &PartsOfFit<'_>) -> Vec<(Part, Cut)> {
     let n = fit.data.dof();
     let leverage = |row: usize| fit.linear.basis.rows(2 * n * row, 2 * n).norm_squared();
@@ -132,7 +132,7 @@ pub(crate) fn equal_bands(
     let mut bands: Vec<Vec<usize>> = vec![Vec::new()];
     let (mut sum, mut last) = (0.0, f64::NAN);
     for row in rows {
-        // Rows of one frequency stay together.
+        // Rows of the same frequency are in the same band.
         let is_next = sum >= total * bands.len() as f64 / PARTS as f64 && bands.len() < PARTS;
         if is_next && omega[row] > last {
             bands.push(Vec::new());

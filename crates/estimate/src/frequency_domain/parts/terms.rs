@@ -209,8 +209,8 @@ impl<'a> LikelyMotion<'a> {
         })
     }
 
-    /// Returns the force due to a unit of an entry and, in a symmetric matrix, also of the mirrored
-    /// entry.
+    /// Returns the force that a unit of an entry and, in a symmetric matrix, of the mirrored entry
+    /// causes.
     fn by_entry(&self, entry: Parameter) -> Change {
         let (n, omega) = (self.fit.data.dof(), self.fit.data.omega());
         let (row, column) = (entry.row(), entry.column());

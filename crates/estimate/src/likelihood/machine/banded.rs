@@ -157,7 +157,7 @@ mod tests {
             let n = 10;
             let entry = |i: usize, j: usize| {
                 let x = (1.7 * i as f64 + 2.9 * j as f64 + 0.3).sin();
-                // A small diagonal makes rows change places.
+                // A small diagonal causes row exchanges.
                 let size = if i == j { 0.01 } else { 1.0 };
                 Complex::new(x * size, (3.1 * x).cos() * size)
             };

@@ -48,7 +48,7 @@ pub struct MachineEstimate {
     pub parts: Vec<PartsComparison>,
     /// Delay that explains most of the residual; `None` if the data do not determine a delay.
     pub delay: Option<DelayScore>,
-    /// Part with a measured receptance.
+    /// Part of the machine with a measured receptance, if there is one.
     pub(super) part: Option<MeasuredPart>,
 }
 

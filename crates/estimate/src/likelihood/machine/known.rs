@@ -43,9 +43,9 @@ pub struct FreedCoefficient {
 
 impl MachineEstimate {
     /// Returns the known coefficient of the machine that raises the likelihood most if it becomes
-    /// an unknown. It is chosen to first order; the returned numbers come from a fit with this
-    /// unknown. The arguments are the same as for the estimate. `None` if there are no known
-    /// coefficients or very many, or the fit fails.
+    /// an unknown. The choice uses first-order changes of the likelihood; the returned numbers come
+    /// from a fit with this unknown. The arguments are the same as for the estimate. `None` if
+    /// there are no known coefficients or very many, or the fit fails.
     ///
     /// # Source
     /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57 (score

@@ -108,7 +108,7 @@ pub(super) struct Nominal<'a> {
     assembly: &'a Assembly,
     measured: Option<&'a MeasuredPart>,
     places: &'a Places,
-    /// Row of each degree of freedom in the band.
+    /// Row of each degree of freedom in the band matrix.
     row: Vec<usize>,
     half: usize,
     coefficients: Vec<Complex<f64>>,

@@ -21,7 +21,7 @@ struct Linearised<'a> {
     pulses: &'a DMatrix<f64>,
     /// Orthonormal basis Q of the sensitivities to the parameters that are not at a bound.
     basis: DMatrix<f64>,
-    /// Change of each of these parameters per unit of each basis column.
+    /// Change of each parameter that is not at a bound, per unit of each basis column.
     root: DMatrix<f64>,
     values: DVector<f64>,
     names: Vec<String>,

@@ -280,7 +280,7 @@ fn the_gradient_includes_the_errors_of_pulses() {
 fn first_steps_have_lines_of_every_force_and_record() {
     let assembly = assembly(false);
     for thinning in 2..=6 {
-        // Six numbers a line.
+        // A line has six real numbers.
         let lines = (thinning * SEARCH_NUMBERS * assembly.parameters().len()).div_ceil(6);
         let omega: Vec<f64> = (1..=lines).map(|line| line as f64).collect();
         let model = MachineModel::new(&assembly, &omega, None, false).unwrap();

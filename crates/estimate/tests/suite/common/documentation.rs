@@ -1,9 +1,10 @@
 //! Tables of the documentation that a study computes.
 
-/// Fails unless the rows between two marks of the page on estimators, below their two header lines,
-/// equal the computed ones; a row of `None` is not compared.
+/// Fails unless the rows of the table between two marks of the page on estimators equal the
+/// computed rows. The first two lines of the table are its header; a row of `None` is not compared.
 ///
-/// With the variable `MECHID_BLESS` set, the rows are rewritten instead, from all computed ones.
+/// If the environment variable `MECHID_BLESS` is set, the computed rows replace the rows of the
+/// page instead.
 pub fn documented(start: &str, end: &str, computed: &[Option<String>]) {
     let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/book/src/studies/estimators.md");
     let text = std::fs::read_to_string(place).expect("studies/estimators.md");

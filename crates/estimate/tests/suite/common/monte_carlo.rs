@@ -57,7 +57,7 @@ impl Experiment {
         Self { system, unknowns, periods, noise, lines, force, motion }
     }
 
-    /// The noisy experiment number `seed`.
+    /// Returns the noisy periods of the experiment with this seed.
     pub fn measure(&self, seed: u64) -> RepeatedPeriods {
         let level = NoiseLevel::FractionOfRms(self.noise);
         let motion = noise::add_white(&self.motion, level, seed).unwrap();
@@ -120,8 +120,9 @@ impl Experiment {
 
     /// Smallest standard deviations of unbiased estimators, by the Cramér–Rao inequality.
     ///
-    /// Independent of the estimators: sensitivities of the closed-form displacement by central
-    /// differences, with white noise of 4 s²/N per line of one of the periods.
+    /// The bound does not depend on the estimators. It follows from the sensitivities of the
+    /// closed-form displacement, by central differences, and from white noise of 4 s²/N on each
+    /// line of one period.
     pub fn bound(&self) -> DVector<f64> {
         let (truth, omega) = (self.truth(), self.lines.omega());
         let force = forces(self.lines.as_slice(), self.system.dof(), 50.0);

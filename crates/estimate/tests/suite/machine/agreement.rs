@@ -19,7 +19,7 @@ use nalgebra::{Complex, DMatrix, dmatrix};
 
 use super::generator::{complex_noise, random_phases};
 
-/// Two degrees of freedom, nothing symmetric.
+/// Two degrees of freedom, no symmetric matrix.
 fn truth() -> [DMatrix<f64>; 3] {
     [
         dmatrix![10.0, 0.5; 0.2, 8.0],
@@ -65,8 +65,8 @@ fn identified(data: &LineData, quantity: ResponseQuantity) -> LikelihoodEstimate
 /// 10⁻⁶·√(residuals) standard errors for about 400 residuals.
 const SEARCH_END: f64 = 2e-5;
 
-/// Checks that values agree to `tolerance` of the largest entry of the matrix, in addition to the
-/// end of a search, and standard errors to 10⁻⁶.
+/// Checks that the values agree to `tolerance` times the largest entry of the matrix plus
+/// [`SEARCH_END`] standard errors, and that the standard errors agree to 10⁻⁶.
 fn check(data: &FrequencyData, likelihood: &LikelihoodEstimate, tolerance: f64) {
     let before = output_error(data, &Unknowns::unknown_mass(2).unwrap()).unwrap();
     let places = [("xx", 0, 0), ("xy", 0, 1), ("yx", 1, 0), ("yy", 1, 1)];

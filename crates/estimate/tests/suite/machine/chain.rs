@@ -91,8 +91,8 @@ pub fn truth_with_bound() -> Vec<(String, f64)> {
     [truth(), vec![("absent".into(), 0.0)]].concat()
 }
 
-/// The chain with a prior of 1 % on the first spring, `away` of its standard deviations from the
-/// truth.
+/// The chain with a prior of 1 % on the first spring. The mean of the prior is `away` standard
+/// deviations above the truth.
 pub fn fit_with_prior(seed: u64, away: f64) -> Option<LikelihoodEstimate> {
     let data = data(&STIFFNESSES, seed);
     let settings = Settings::default();
@@ -146,8 +146,8 @@ fn intervals_of_springs_and_dampers_hold() {
     assert!((0.85..1.15).contains(&judged.scatter), "{judged:?}");
 }
 
-/// Of 80 intervals of 95 %, fewer than 87 % contain the truth with a probability of 0.002, of 80
-/// intervals of 80 % with one of 0.94.
+/// Fewer than 87 % of 80 intervals contain the truth with a probability of 0.002 if their coverage
+/// is 95 %, and with a probability of 0.94 if it is 80 %.
 #[test]
 fn unknown_noise_is_found_from_the_residual() {
     for noise in [NoiseSource::WhiteResidual, NoiseSource::SmoothResidual] {
@@ -232,8 +232,8 @@ pub fn three_masses_truth() -> Vec<(String, f64)> {
     (0..3).flat_map(of).collect()
 }
 
-/// Of 108 intervals of 95 %, fewer than 89 % contain the truth with a probability of 0.008, of 108
-/// intervals of 80 % with one of 0.99.
+/// Fewer than 89 % of 108 intervals contain the truth with a probability of 0.008 if their coverage
+/// is 95 %, and with a probability of 0.99 if it is 80 %.
 #[test]
 fn masses_springs_and_dampers_of_a_chain_with_an_unmeasured_mass() {
     let judged = judge(&three_masses_truth(), 12, three_masses);

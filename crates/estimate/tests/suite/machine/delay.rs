@@ -1,4 +1,4 @@
-//! Score test of a delay, on right data and on late outputs; the reference is the phase e^(−iωτ).
+//! Score test of a delay, on correct data and on late outputs; the reference is the phase e^(−iωτ).
 
 use mechid_estimate::likelihood::machine::{MachineEstimate, identify_machine};
 use mechid_estimate::likelihood::{DelayScore, Settings};
@@ -52,8 +52,8 @@ fn no_delay_is_found_in_right_data() {
     }
 }
 
-/// With the changes of the score the parameters are the true ones, which intervals that include
-/// these changes contain.
+/// If the changes that the score test predicts are added, the parameters agree with the true ones.
+/// Intervals that include these changes contain the truth.
 #[test]
 fn a_delay_of_all_sensors_or_of_one_is_found() {
     const DELAY: f64 = 1e-4;

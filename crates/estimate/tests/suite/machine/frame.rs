@@ -39,7 +39,7 @@ fn data(is_relative: [bool; 2], delay: f64, seed: u64) -> LineData {
     measured(&omega, ground, outputs, 0.01, seed)
 }
 
-/// The frame with its first mass known: forces are not measured, so one of them sets the scale.
+/// The frame with a known first mass: no force is measured, so a known mass must set the scale.
 pub fn fit(is_relative: [bool; 2], seed: u64) -> Option<LikelihoodEstimate> {
     fit_of_clocks(is_relative, None, seed)
 }
@@ -95,7 +95,7 @@ fn absolute_and_relative_accelerations_give_the_frame() {
     }
 }
 
-/// Judge: the delay that the generator gave the roof.
+/// The reference is the delay that the generator gave to the roof.
 #[test]
 fn the_delay_of_a_logger_with_a_clock_of_its_own_is_found() {
     let delay = || FreeCoefficient::from_start(0.0).at_least(-0.05).at_most(0.05);

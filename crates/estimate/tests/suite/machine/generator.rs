@@ -18,7 +18,8 @@ pub fn random_phases(lines: usize, inputs: usize, seed: u64) -> DMatrix<Complex<
     complex_noise(lines, inputs, seed).map(|z| z / z.norm())
 }
 
-/// Outputs with noise of a share of their root mean square, and data that state its covariance.
+/// Returns data of the outputs with noise, and with the stated covariance of the noise. Its RMS on
+/// each output is a fraction `share` of the RMS of this output.
 pub fn measured(
     omega: &[f64],
     inputs: DMatrix<Complex<f64>>,

@@ -119,8 +119,9 @@ pub fn experiment(
     Some((estimate.likelihood, warnings))
 }
 
-/// Noise of 0.1 % of the peak force is more than that of the response near the resonances. If it is
-/// known, intervals hold, no test warns, and the errors are smaller than without.
+/// Near the resonances, noise of 0.1 % of the peak force has more effect than the noise of the
+/// response. If the fit knows the noise of the force, the intervals contain the truth, no test
+/// warns, and the errors are smaller.
 #[test]
 fn noise_of_a_hammer_is_common_to_all_lines() {
     let run = |is_known: bool| -> Vec<_> {
@@ -130,15 +131,15 @@ fn noise_of_a_hammer_is_common_to_all_lines() {
     let judged = |estimates: &[(LikelihoodEstimate, usize)]| {
         judge(&truth(), 10, |seed| Some(estimates[seed as usize].0.clone()))
     };
-    // Of 40 intervals of 95 %, fewer than 33 hold with a probability of 0.001; of the intervals
-    // without the noise of the force some 55 % hold.
+    // Of 40 intervals of 95 %, fewer than 33 hold with a probability of 0.001; if the fit ignores
+    // the noise of the force, about 55 % of the intervals hold.
     let [of_known, of_ignored] = [judged(&known), judged(&ignored)];
     assert!(of_known.held >= 0.825 && of_known.failed == 0, "{of_known:?}");
     assert!((0.75..1.3).contains(&of_known.scatter), "{of_known:?}");
     assert!(of_ignored.held < 0.8 && of_ignored.scatter > 1.6, "{of_ignored:?}");
     let warned = |of: &[(LikelihoodEstimate, usize)]| of.iter().filter(|(_, n)| *n > 0).count();
-    // Some four p-values below 1 % in an experiment: three experiments of ten have a probability
-    // of 0.007.
+    // An experiment has about four p-values, each with a limit of 1 %: at least three of ten
+    // experiments warn with a probability of 0.007.
     assert!(warned(&known) <= 2, "{}", warned(&known));
     assert!(warned(&ignored) >= 5, "{}", warned(&ignored));
     let square_error = |estimates: &[(LikelihoodEstimate, usize)]| -> f64 {

@@ -149,7 +149,7 @@ impl Rotor {
 pub fn shaken(rotor: &Rotor, lines: usize, seed: u64) -> LineData {
     let omega: Vec<f64> =
         (0..lines).map(|line| TAU * (10.0 + 240.0 * line as f64 / lines as f64)).collect();
-    // Another seed than that of the noise, which must not be coherent with the force.
+    // The seed differs from that of the noise, which must not be coherent with the force.
     let force = random_phases(lines, 1, 5000 + seed) * Complex::from(10.0);
     let outputs = response_rows(rotor, &omega, |row| {
         let mut load = DVector::zeros(4 * rotor.nodes);
@@ -212,7 +212,8 @@ fn a_rotor_that_is_too_soft_by_a_percent_shows_in_the_misfit() {
     assert_eq!(estimate.error_scale, ratio.sqrt());
 }
 
-/// The data tell which part of the model is wrong, and intervals that allow for it hold.
+/// The data show which coefficient of the model is wrong, and intervals that include the effect of
+/// this error contain the truth.
 #[test]
 fn a_wrong_modulus_is_found_and_allowed_for() {
     let soft = Rotor::new(13, 0.99);

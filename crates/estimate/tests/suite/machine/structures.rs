@@ -89,7 +89,7 @@ fn a_frame_on_a_shake_table() {
 /// One mass on two springs; the true machine has no damper.
 fn oscillator(damping: f64, seed: u64) -> LineData {
     let omega = omega(10..=110, 0.25);
-    // Another seed than that of the noise, which must not be coherent with the force.
+    // The seed differs from that of the noise, which must not be coherent with the force.
     let force = random_phases(omega.len(), 1, 6000 + seed);
     let [m, c, k] = [dmatrix![2.0], dmatrix![damping], dmatrix![2e4]];
     let all = eliminated([&m, &c, &k], &omega, &force);

@@ -43,7 +43,8 @@ fn data_sets_are_columns_with_the_units_and_rates_of_their_attributes() {
     assert_eq!(si("run 1/motion[1]", Quantity::DISPLACEMENT), 1e-3);
     assert_eq!(si("run 1/motion[2]", Quantity::DISPLACEMENT), 1e-6);
     assert!((si("run 2/acc", Quantity::ACCELERATION) - 9.80665).abs() < 1e-12);
-    // A rate in the group of the data sets, a time column of their own, and a step of their own.
+    // The instants follow from a rate in the group of the data sets, from their own time column, or
+    // from their own step.
     for names in [&["run 1/force", "run 1/motion[2]"][..], &["run 2/acc"], &["counts"]] {
         let record = table.record(&TimeAxis::OfFile, names).unwrap();
         assert_eq!((record.len(), record.sampling().dt()), (8, 0.25), "{names:?}");

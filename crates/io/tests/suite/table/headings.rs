@@ -115,11 +115,12 @@ fn definitions_of_columns_in_lines_of_their_own_are_read() {
         let si = table.to_si(acc, Quantity::ACCELERATION).unwrap();
         assert!((si - 9.80665).abs() < 1e-12, "{text}");
     }
-    // A list that leaves out a column gives no names: its words are not those of all columns.
+    // A list of definitions that omits a column gives no names, because some columns would have
+    // none.
     let table = three(&format!("# 2: force [kN]\n# 3: acc [g]\n{ROWS}"));
     assert!((0..3).all(|column| table.unit(column).is_none()), "{}", table.available());
     assert!(table.find("acc").is_err(), "{}", table.available());
-    // Numbers that are not those of the columns, and ranges.
+    // Definitions whose numbers do not begin with 0 or 1, and ranges.
     for above in [
         "# 2 force [kN]\n# 3 acc [g]\n",
         "# force: range 5 kN\n# acc: 50 g\n",

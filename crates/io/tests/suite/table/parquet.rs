@@ -210,7 +210,8 @@ fn with_footer(footer: &[u8]) -> Vec<u8> {
     [b"PAR1\x15\x00", footer, &len, b"PAR1"].concat()
 }
 
-/// The decoder allocates the memory that the schema claims, and recurses as deep as it is nested.
+/// The decoder allocates the memory that the schema claims, and recurses as deep as the schema is
+/// nested.
 #[test]
 fn a_schema_that_claims_more_than_it_has_is_refused() {
     let element = |children: &[u8]| [&[0x48, 0x01, b'r', 0x15], children, &[0x00]].concat();

@@ -146,7 +146,7 @@ fn a_block_begins_where_it_is_told_to() {
         assert_eq!(at(0..20, 8, 8), [(1.0, 8), (9.0, 8), (17.0, 4)]);
         assert_eq!(at(4..12, 4, 4), [(5.0, 4), (9.0, 4)]);
         assert_eq!(at(0..20, 50, 50), [(1.0, 20)]);
-        // The last block has only rows that were passed before, or a new one.
+        // A further block is passed only if it has a row that was not passed before.
         assert_eq!(at(0..9, 5, 4), [(1.0, 5), (5.0, 5)]);
         assert_eq!(at(0..10, 5, 4), [(1.0, 5), (5.0, 5), (9.0, 2)]);
     }

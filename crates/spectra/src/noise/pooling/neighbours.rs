@@ -105,7 +105,8 @@ mod tests {
     use super::super::mean;
     use super::*;
 
-    /// Judge: sums by definition, line by line, over powers that differ by twelve decades.
+    /// The reference is the definition of the sums, line by line, with powers that differ by twelve
+    /// decades.
     #[test]
     fn neighbours_are_added_as_by_definition() {
         let vary = |k: usize| (0.618_033_988_75 * k as f64).fract();

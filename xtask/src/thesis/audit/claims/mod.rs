@@ -113,7 +113,7 @@ pub enum Support {
 pub struct Claim {
     /// Running number.
     pub number: u8,
-    /// Section in which it is made.
+    /// Section that makes the claim.
     pub section: &'static str,
     /// Statement of the claim.
     pub statement: &'static str,
