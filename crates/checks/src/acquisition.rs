@@ -329,7 +329,8 @@ pub fn fault_of_hits(
         let mut likelihood = unchanged.clone();
         let cost = |corner: f64| likelihood.cost(&fault.removed(&joint, &system, dt, corner)?);
         let widths = CORNER_WIDTHS.map(|width| width * score.amount);
-        let (corner, least) = minimum_near(score.amount, widths, cost, |cost| cost < undisturbed)?;
+        let (corner, least) =
+            minimum_near(score.amount, widths, cost, |cost, _| cost < undisturbed)?;
         fault.is_plausible(corner).then_some(())?;
         let without: Option<Vec<FrequencyData>> =
             records.iter().map(|data| fault.removed(data, &system, dt, corner)).collect();

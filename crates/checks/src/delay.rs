@@ -1,5 +1,6 @@
 //! Delay between force and response.
 
+use std::cell::Cell;
 use std::f64::consts::PI;
 use std::fmt::{self, Formatter};
 
@@ -108,15 +109,27 @@ pub fn delay_of_open_records(
     let near = delay_of_either_window(&corrected, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     let late_lines = |data: &FrequencyData, samples: f64| data.with_later_force(samples * dt);
     let late = |samples: f64| late_lines(&with_pulses, samples);
-    // With many lines, the search begins on a part of them.
+    // With many lines, the search begins on a part of them. It ends there if the smallest residual
+    // power on this part is significantly above the limit.
+    let is_excluded = Cell::new(false);
     let on_fewer = likelihood.on_fewer_lines(&with_pulses).and_then(|(lines, mut fewer)| {
+        let equal_powers = FisherSnedecor::new(fewer.spare() as f64, fewer.spare() as f64).ok()?;
+        let undelayed = fewer.cost(&lines)?;
         if near.abs() > DELAY_NEAR {
             fewer.search(&late_lines(&lines, near))?;
         }
         let cost = |samples: f64| fewer.cost(&late_lines(&lines, samples));
-        let (near, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_| true)?;
+        let promises = |delayed: f64, is_minimum: bool| {
+            let p_value = equal_powers.sf(delayed / (below * undelayed));
+            is_excluded.set(is_minimum && p_value <= SIGNIFICANCE);
+            !is_excluded.get()
+        };
+        let (near, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, promises)?;
         Some((near, fewer))
     });
+    if is_excluded.get() {
+        return None;
+    }
     let (near, reach) = match on_fewer {
         Some((near, fewer)) => {
             likelihood.start_at(fewer);
@@ -130,7 +143,7 @@ pub fn delay_of_open_records(
         }
     };
     let cost = |samples: f64| likelihood.cost(&late(samples));
-    let promises = |delayed: f64| follows_force || is_significant(delayed);
+    let promises = |delayed: f64, _| follows_force || is_significant(delayed);
     let (samples, delayed) = minimum_near(near, [reach, DELAY_RESOLVED], cost, promises)?;
     let remaining = delayed / undelayed;
     if !is_significant(delayed) || remaining >= below {

@@ -167,6 +167,9 @@ pub(crate) const DELAY_REFINED: f64 = 0.02;
 /// Maximum number of parabolic steps in the search for a delay or a corner frequency.
 pub(crate) const PARABOLAS: usize = 8;
 
+/// Maximum step of the search for a delay or a corner frequency, in half widths of the parabola.
+pub(crate) const LONGEST_STEP: f64 = 2.0;
+
 /// Minimum ratio of successive parabola widths in the search for a delay or a corner frequency.
 pub(crate) const LEAST_PART: f64 = 0.1;
 

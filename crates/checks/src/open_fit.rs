@@ -4,7 +4,7 @@ use mechid_estimate::frequency_domain::ChangedRecords;
 use mechid_signal::Extent;
 use mechid_spectra::FrequencyData;
 
-use super::limits::{LEAST_PART, PARABOLAS};
+use super::limits::{LEAST_PART, LONGEST_STEP, PARABOLAS};
 use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::after_spectral_fit;
 
@@ -29,12 +29,13 @@ pub(super) fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
 
 /// Returns the position of the minimum of a `cost` near `start`, and the cost there. The search
 /// uses parabolas with a half width that decreases from the first of `widths` to the last. `None`
-/// if a cost does not exist or if `promises` rejects a cost.
+/// if a cost does not exist or if `promises` rejects the cost after a step; its second argument is
+/// `true` if the parabola has its minimum there, so that the step was not limited.
 pub(super) fn minimum_near(
     start: f64,
     widths: [f64; 2],
     mut cost: impl FnMut(f64) -> Option<f64>,
-    promises: impl Fn(f64) -> bool,
+    promises: impl Fn(f64, bool) -> bool,
 ) -> Option<(f64, f64)> {
     let ([mut width, resolved], mut place) = (widths, start);
     let mut least = cost(place)?;
@@ -43,13 +44,13 @@ pub(super) fn minimum_near(
         let (slope, curvature) = (after - before, after - 2.0 * least + before);
         // The step is limited if the three points do not enclose a minimum.
         let step = if curvature > 0.0 {
-            (-0.5 * slope / curvature).clamp(-2.0, 2.0)
+            (-0.5 * slope / curvature).clamp(-LONGEST_STEP, LONGEST_STEP)
         } else {
-            -2.0 * slope.signum()
+            -LONGEST_STEP * slope.signum()
         };
         place += step * width;
         least = cost(place)?;
-        if !promises(least) {
+        if !promises(least, step.abs() < LONGEST_STEP) {
             return None;
         }
         width *= f64::clamp(step.abs(), LEAST_PART, 1.0);

@@ -418,8 +418,27 @@ fn scaled(
 /// Returns log det S + tr(S⁻¹Ŝ): minus the log-likelihood of the covariance S, per complex
 /// deviation, for a sample covariance Ŝ. `None` for a singular S.
 fn sample_cost(s: &DMatrix<Complex<f64>>, sample: &DMatrix<Complex<f64>>) -> Option<f64> {
+    if is_diagonal(s) {
+        let variances = (0..s.nrows()).map(|at| (s[(at, at)].re, sample[(at, at)].re));
+        return independent_cost(variances);
+    }
     let factor = s.clone().cholesky()?;
     Some(log_determinant(factor.l_dirty())? + factor.solve(sample).trace().re)
+}
+
+/// Returns the [`sample_cost`] of independent channels, from pairs of a variance and its sample.
+fn independent_cost(variances: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let cost = |(variance, sample): (f64, f64)| {
+        (variance > 0.0).then(|| variance.ln() + sample / variance)
+    };
+    variances.map(cost).sum()
+}
+
+fn is_diagonal(c: &DMatrix<Complex<f64>>) -> bool {
+    let off_diagonal = |column: usize| (0..c.nrows()).filter(move |row| *row != column);
+    let is_zero =
+        |column: usize| off_diagonal(column).all(|row| c[(row, column)].norm_sqr() == 0.0);
+    (0..c.ncols()).all(is_zero)
 }
 
 /// Returns twice the sum of the logarithms of the diagonal of a triangular matrix; `None` unless

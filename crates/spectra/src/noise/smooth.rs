@@ -280,16 +280,17 @@ impl Trial {
 /// Returns the spectrum of a given form.
 pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let basis = form.basis(omega);
-    let mut log_power = variances.clone();
     let initial = initial_log_powers(&basis, variances);
-    for (mut column, initial) in log_power.column_iter_mut().zip(initial) {
-        let channel = column.clone_owned();
-        let (mut log_power, _) = most_likely(&basis, &channel, initial, SMOOTH_TOLERANCE);
+    let of_channel = |(channel, initial): (usize, DVector<f64>)| {
+        let variances = variances.column(channel).into_owned();
+        let (mut log_power, _) = most_likely(&basis, &variances, initial, SMOOTH_TOLERANCE);
         if !form.bumps.is_empty() {
             fill_notches(&mut log_power, (QUIET_DEVIATIONS / nu) as usize);
         }
-        column.copy_from(&log_power);
-    }
+        log_power
+    };
+    let of_channels: Vec<_> = initial.into_par_iter().enumerate().map(of_channel).collect();
+    let mut log_power = DMatrix::from_columns(&of_channels);
     let mut leverage: Vec<f64> = basis.row_iter().map(|row| row.norm_squared()).collect();
     for bump in &form.bumps {
         let band = bump.band(omega.len());

@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::{Covariances, sample_cost, window};
+use super::{Covariances, independent_cost, is_diagonal, sample_cost, window};
 
 /// Covariances of lines in rising order of frequency, prepared for sums over neighbours.
 pub(super) struct Neighbours {
-    /// Entries of each covariance, entries × lines.
+    /// Entries of each covariance, entries × lines: all entries, or only those of the diagonals if
+    /// no channels are correlated.
     samples: DMatrix<Complex<f64>>,
     channels: usize,
 }
@@ -16,11 +17,29 @@ pub(super) struct Neighbours {
 impl Neighbours {
     pub(super) fn new(covariance: &[DMatrix<Complex<f64>>]) -> Self {
         let channels = covariance.first().map_or(0, DMatrix::nrows);
-        let mut samples = DMatrix::zeros(channels * channels, covariance.len());
+        let is_diagonal = covariance.iter().all(is_diagonal);
+        let entries = if is_diagonal { channels } else { channels * channels };
+        let mut samples = DMatrix::zeros(entries, covariance.len());
         for (mut column, one) in samples.column_iter_mut().zip(covariance) {
-            column.copy_from_slice(one.as_slice());
+            if is_diagonal {
+                column.copy_from(&one.diagonal());
+            } else {
+                column.copy_from_slice(one.as_slice());
+            }
         }
         Self { samples, channels }
+    }
+
+    /// Returns minus the log-likelihood, per complex deviation, that the covariance with the
+    /// entries `model` gives to the covariance of a line; `None` if the model is singular.
+    fn cost_of(&self, model: DVector<Complex<f64>>, line: usize) -> Option<f64> {
+        let sample = self.samples.column(line);
+        if self.samples.nrows() == self.channels {
+            let pairs =
+                model.iter().zip(sample.iter()).map(|(model, sample)| (model.re, sample.re));
+            return independent_cost(pairs);
+        }
+        sample_cost(&self.matrix(model), &self.matrix(sample.into_owned()))
     }
 
     /// Returns, for each line, the sum of `count` consecutive covariances, beginning with that of
@@ -74,8 +93,7 @@ impl Neighbours {
                 0 => first[0].column(line) + first[1].column(line + 1),
                 start => last[0].column(line - start) + last[1].column(line + 1 - start),
             };
-            let mean = self.matrix(other_lines.unscale((window.len() - 1) as f64));
-            cost += sample_cost(&mean, &self.matrix(self.samples.column(line).into_owned()))?;
+            cost += self.cost_of(other_lines.unscale((window.len() - 1) as f64), line)?;
         }
         Some(cost)
     }
@@ -96,6 +114,9 @@ impl Neighbours {
     }
 
     fn matrix(&self, entries: DVector<Complex<f64>>) -> DMatrix<Complex<f64>> {
+        if entries.len() == self.channels {
+            return DMatrix::from_diagonal(&entries);
+        }
         DMatrix::from_column_slice(self.channels, self.channels, entries.as_slice())
     }
 }
