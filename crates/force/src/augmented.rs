@@ -220,7 +220,7 @@ impl Augmented {
     }
 
     /// Returns the innovations divided by their standard deviations, channels of a sample side by
-    /// side; `None` if one is not finite.
+    /// side; `None` if an innovation is not finite.
     pub fn innovations(&self, tuned: &Tuned) -> Option<Vec<f64>> {
         let process = LowPass::new(tuned.model.order).ok()?;
         let space = self.space(&tuned.model, &process, tuned.noise, 10.0).ok()?;
@@ -291,7 +291,7 @@ impl Augmented {
         best.ok_or(ForceError::NoLikelihood)
     }
 
-    /// Returns posterior models with their weights; if the model was given, only this one.
+    /// Returns posterior models with their weights; if the model was given, only this model.
     pub fn posterior_points(
         &self,
         best: &Tuned,

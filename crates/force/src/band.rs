@@ -16,7 +16,7 @@ use crate::limits;
 /// their result with this part of the reference force.
 ///
 /// # Errors
-/// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
+/// [`ForceError::NoBand`] if the lower end is not below the upper end, or an end is not finite.
 ///
 /// [`Measurement::in_band`]: crate::Measurement::in_band
 ///

@@ -8,7 +8,7 @@ use crate::error::ForceError;
 /// noise.
 ///
 /// A component of a complex line represents two real unknowns and has the weight 2; white noise of
-/// variance σ² then has the mean energy weight·σ² in it.
+/// variance σ² then has the mean energy weight·σ² in this component.
 pub(crate) struct Components {
     /// Singular values s_i, in descending order; the last ones may be zero.
     pub singular: Vec<f64>,

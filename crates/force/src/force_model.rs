@@ -145,7 +145,7 @@ pub(crate) fn step_noise(
 mod tests {
     use super::*;
 
-    /// Judge: the closed form of ∫ dω / (1 + ω^2p) and the covariance equation itself.
+    /// Reference: the closed form of ∫ dω / (1 + ω^2p), and the covariance equation.
     #[test]
     fn low_passes_have_unit_variance_and_their_spectrum() {
         for order in 1..=ForceModel::MOST {

@@ -90,11 +90,11 @@ pub fn frequency_domain(
     })
 }
 
-/// Mean squares over a period due to errors.
+/// Mean squares, over a period, of the errors of the forces and of the residual.
 struct Variance {
-    /// Part in each force from noise of the channels with standard deviation `scale`.
+    /// Contribution of the channel noise, whose standard deviation is `scale`, to each force.
     noise: Vec<f64>,
-    /// Part in each force from the uncertainty of the system.
+    /// Contribution of the uncertainty of the system to each force.
     system: Vec<f64>,
     /// Contribution of the uncertainty of the system to the residual of each channel,
     /// `1 × channels`.

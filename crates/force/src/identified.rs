@@ -15,7 +15,8 @@ use crate::unexplained::{Residual, Unexplained};
 #[derive(Debug, Clone)]
 pub struct IdentifiedForce {
     record: Record,
-    /// Computed on demand: a search over many forces does not need it.
+    /// Spectrum of the force. It is computed on demand, because a search over many forces does not
+    /// need it.
     spectrum: OnceLock<Spectrum>,
     standard_error: Option<Record>,
     /// Residual of the measured channels; `None` if there are not more channels than forces.
@@ -68,7 +69,7 @@ impl IdentifiedForce {
     /// ([`Measurement::in_band`](crate::Measurement::in_band)).
     ///
     /// # Errors
-    /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
+    /// [`ForceError::NoBand`] if the lower end is not below the upper end, or an end is not finite.
     ///
     /// # Source
     /// Brillinger, *Time Series: Data Analysis and Theory* (1981), chapter 4 (white noise on

@@ -58,9 +58,9 @@ pub struct KalmanForce {
     pub seen_from_hz: Option<f64>,
     /// Log-likelihood of the measurement, dimensionless, without constants.
     pub log_likelihood: f64,
-    /// Probability that the prediction errors of a right model are at least as correlated from
-    /// sample to sample; `None` for a short record and for a force that acts only during a part of
-    /// the record.
+    /// Probability that the prediction errors of a correct model are at least as correlated from
+    /// sample to sample as those of this result; `None` for a short record and for a force that
+    /// acts only during a part of the record.
     pub whiteness_p_value: Option<f64>,
 }
 
@@ -80,7 +80,7 @@ pub struct KalmanForce {
 /// addition to a strong sinusoid, has correlated prediction errors
 /// ([`KalmanForce::whiteness_p_value`]); the standard error is then too small. The standard error
 /// in a band is its value far from the ends of the record, plus the excess of the error of the
-/// whole force at the instant over its median over the record.
+/// whole force: its value at the instant minus its median over the record.
 ///
 /// Cost: linear in the record. With c channels and m = 2n + (order × forces) states, a pass takes
 /// about 2m³ + 2cm² operations per sample until the variances converge, then m² + 2cm; tuning takes
@@ -162,8 +162,8 @@ pub fn kalman(
 }
 
 /// Returns the probability that white innovations have at least the correlations of the innovations
-/// under a tuning: the smallest one of all channels, times their number. `None` for a record that
-/// is too short.
+/// under a tuning: the smallest probability of all channels, times the number of channels. `None`
+/// for a record that is too short.
 ///
 /// # Source
 /// Durbin & Koopman (2012), *Time Series Analysis by State Space Methods*, section 2.12 (diagnostic
@@ -194,8 +194,8 @@ fn quiet_part_noise(
 }
 
 /// Returns the part of the force in a band. Its variance has three parts: the variance far from the
-/// ends of the record, the excess of the variance of the whole force at each instant over its
-/// median, and the slower errors that leak into the band at the ends of the record.
+/// ends of the record, the excess of the variance of the whole force (its value at each instant
+/// minus its median), and the slower errors that leak into the band at the ends of the record.
 fn in_band(
     force: IdentifiedForce,
     forced: &[usize],

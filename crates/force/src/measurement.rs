@@ -93,7 +93,7 @@ impl Measurement {
     /// force, but is not returned.
     ///
     /// # Errors
-    /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
+    /// [`ForceError::NoBand`] if the lower end is not below the upper end, or an end is not finite.
     pub fn in_band(self, band_hz: [f64; 2]) -> Result<Self, ForceError> {
         check_band(band_hz)?;
         Ok(Self { band_hz: Some(band_hz), ..self })
@@ -124,7 +124,7 @@ impl Measurement {
         self.record.sampling()
     }
 
-    /// Returns whether there are more channels than forces, so that they have a residual.
+    /// Returns whether there are more channels than forces, so that the channels have a residual.
     pub(crate) fn exceeds(&self, forced: &[usize]) -> bool {
         self.channels.len() > forced.len()
     }

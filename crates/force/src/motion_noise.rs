@@ -135,7 +135,7 @@ pub fn discretised_with_noise(
     Ok(force.with_standard_error(Some(error)))
 }
 
-/// Estimate of the force in a step, from the motion at its ends.
+/// Estimate of the force in a step, from the motion at the two ends of the step.
 struct Side {
     /// Index of the step, relative to the step that begins with the sample: 0, or −1 for the
     /// previous step.
@@ -170,8 +170,8 @@ fn error(
         extent == Extent::WholePeriod || (0..len - 1).contains(&step)
     };
     let sides: Vec<&Side> = sides.iter().filter(within).collect();
-    // In a short period, one sample may be both before and after another sample: the two
-    // contributions of the first one are added before they are squared.
+    // In a short period, the same sample may be both before and after another sample: its two
+    // contributions are added before they are squared.
     let mut parts: BTreeMap<isize, DMatrix<f64>> = BTreeMap::new();
     for side in &sides {
         for (sample, part) in (k as isize + side.step..).zip(&side.of_ends) {

@@ -273,7 +273,8 @@ mod tests {
 
     #[test]
     fn intervals_about_another_place_than_the_mean_hold_as_much() {
-        // No offset: 1.96; a large one: one tail, 1.645; between them a table of the normal law.
+        // Without an offset, the half width is 1.96 (two tails); with a large offset it is 1.645
+        // (one tail). The values between them are from a table of the normal distribution.
         assert!((half_width(0.0, 2.0) / 2.0 - 1.959964).abs() < 1e-6);
         assert!((half_width(-30.0, 2.0) - 30.0 - 2.0 * 1.644854).abs() < 1e-5);
         // P(|N(1, 1)| < 2.7) = Φ(1.7) − Φ(−3.7) = 0.955435 − 0.000108.

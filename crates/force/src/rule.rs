@@ -16,16 +16,16 @@ use crate::limits;
 pub enum Rule {
     /// The λ whose force is nearest to the posterior mean of the force.
     ///
-    /// This mean needs the variances of force and noise, the colour of the force, the share of
-    /// driven components among the strongest ones, and the number of these strongest ones; all are
-    /// those of maximum likelihood. It is the recommended rule, and the only one here that
-    /// minimises the error of the force, not of the response. The book (`studies/force.md`)
-    /// compares the others.
+    /// This mean needs the variances of force and noise, the colour of the force, the number of the
+    /// strongest components, and the share of them that the force drives; all these values are
+    /// those of maximum likelihood. This is the recommended rule, and the only rule here that
+    /// minimises the error of the force instead of the error of the response. The book
+    /// (`studies/force.md`) compares it with the other rules.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
     ///
-    /// It minimises the error of the response, not of the force: with few driven lines it damps too
-    /// little.
+    /// This rule minimises the error of the response, not of the force: with few driven lines it
+    /// damps too little.
     ///
     /// # Source
     /// Golub, Heath & Wahba (1979).

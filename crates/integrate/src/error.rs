@@ -60,18 +60,18 @@ pub enum IntegrateError {
         /// The degree of freedom, counted from 0.
         index: usize,
     },
-    /// The forces within the steps differ from the force in number of samples or time step.
+    /// The mid-step forces have another number of samples, or another time step, than the force.
     #[error(
         "the mid-step forces have {} with steps of {got_dt} s, but the force has {expected} with steps of {dt} s: \
          they need the same sampling", message::count(*got, "sample"),
         got_dt = message::number(*got_dt), dt = message::number(*dt)
     )]
     MidStepSampling {
-        /// Samples of the forces within the steps.
+        /// Number of samples of the mid-step forces.
         got: usize,
-        /// Time step of the forces within the steps, in seconds.
+        /// Time step of the mid-step forces, in seconds.
         got_dt: f64,
-        /// Samples of the force.
+        /// Number of samples of the force.
         expected: usize,
         /// Step of the force, in seconds.
         dt: f64,

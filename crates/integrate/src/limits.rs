@@ -3,11 +3,12 @@
 
 // Matrices.
 
-/// Maximum number of degrees of freedom for which dense matrices are never converted to sparse
-/// ones.
+/// Maximum number of degrees of freedom of a system whose dense matrices are always used as they
+/// are.
 pub(crate) const DENSE_DOF: usize = 64;
 
-/// Fraction of non-zero entries below which larger dense matrices are converted to sparse.
+/// Fraction of non-zero entries below which the dense matrices of a larger system are converted to
+/// sparse matrices.
 pub(crate) const SPARSE_FRACTION: f64 = 0.1;
 
 /// Maximum number of diagonals of a matrix that is factored by band. At this width, solutions for a
@@ -70,7 +71,7 @@ pub(crate) const STEP_NEWTON_STEPS: usize = 50;
 /// Smallest fraction of a Newton step that is tried before the search ends.
 pub(crate) const STEP_NEWTON_FRACTION: f64 = 1e-4;
 
-/// Relative change of a displacement or velocity for a tangent by forward differences, about √ε.
+/// Relative change of a displacement or velocity in the forward differences of a tangent, about √ε.
 pub(crate) const TANGENT_DIFFERENCE: f64 = 1e-7;
 
 // Periodic responses.
@@ -79,8 +80,8 @@ pub(crate) const TANGENT_DIFFERENCE: f64 = 1e-7;
 /// above it the response is found in a Krylov space.
 pub(crate) const PERIOD_MAP_DOF: usize = 300;
 
-/// Change of the state over a period, relative to its size, at which a linear periodic response is
-/// accepted: a tenth of the accuracy promised.
+/// Correction of the periodic state, relative to the state, at which a linear periodic response is
+/// accepted: a tenth of the documented accuracy.
 pub(crate) const PERIODIC_GAP: f64 = 1e-13;
 
 /// Relative residual of the equations of a linear periodic state in a Krylov space.
@@ -152,9 +153,9 @@ pub(crate) const AMPLIFICATION_DOF: usize = 20;
 /// above it only the largest eigenvalues are computed, in Krylov spaces.
 pub(crate) const DENSE_EIGENVALUE_DOF: usize = 200;
 
-/// Largest growth per step that is accepted. Rounding turns the double eigenvalue 1 of a free body
-/// into 1 ± √ε, times a condition number, which is no instability; at this rate a motion needs a
-/// million steps to grow by a factor e.
+/// Largest growth per step that is accepted. Rounding moves the double eigenvalue 1 of a free body
+/// by √ε times a condition number, which is not an instability. At the accepted rate a motion needs
+/// a million steps to grow by a factor e.
 pub(crate) const TOLERATED_GROWTH: f64 = 1e-6;
 
 /// Growth per step above which a step is larger than the critical step, unless the system has a
@@ -233,8 +234,8 @@ pub(crate) const LOWEST_FREQUENCY_STEPS: usize = 3;
 /// Largest ratio of the imaginary part of a shift to its modulus for which real factors are used.
 pub(crate) const REAL_SHIFT: f64 = 1e-6;
 
-/// Distance between a shift and the eigenvalue near it, relative to the eigenvalue; without it the
-/// matrix would be singular.
+/// Distance between a shift and the eigenvalue near it, relative to the eigenvalue; at a distance
+/// of zero the matrix would be singular.
 pub(crate) const SHIFT_OFFSET: f64 = 1e-6;
 
 /// Largest relative difference of converged eigenvalues from two shifts that count as the same

@@ -1,4 +1,5 @@
-//! Cost of identifying modes over outputs, lines and modes; the last lines are the goals.
+//! Computing time of the modal identification as a function of the numbers of outputs, lines and
+//! modes. The last printed lines compare two large cases with their goals.
 //!
 //! The identification chooses the order. Every case prints how many of its modes were found, so
 //! that a shorter time due to missing modes is visible.
@@ -13,7 +14,8 @@ use std::time::Instant;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mechid_modal::{ModalSettings, identify_modes};
 
-/// Returns the shortest of a few times of an identification, in seconds, and its number of modes.
+/// Returns the shortest time of `repeats` identifications, in seconds, and the number of modes that
+/// were found.
 fn seconds(case: &generator::Case, repeats: usize) -> (f64, usize) {
     let data = case.lines(1);
     let mut modes = 0;
@@ -26,7 +28,7 @@ fn seconds(case: &generator::Case, repeats: usize) -> (f64, usize) {
     (times.fold(f64::INFINITY, f64::min), modes)
 }
 
-/// Prints the time of each size, and the slope from one to the next.
+/// Prints the time for each size, and the exponent of its growth from one size to the next.
 fn slopes(what: &str, sizes: &[usize], case: impl Fn(usize) -> generator::Case) {
     let mut before: Option<(usize, f64)> = None;
     for &size in sizes {

@@ -1,12 +1,12 @@
-//! Free decays known exactly, under white and coloured noise: right numbers of modes, coverage of the 95 %
-//! intervals, scatter over the Cramér–Rao bound.
+//! Free decays known exactly, under white and coloured noise: percentage of records with the right
+//! number of modes, coverage of the 95 % intervals, ratio of the scatter to the Cramér–Rao bound.
 //!
 //! ```sh
 //! cargo run --release -p mechid-modal --example decay_study -- 1000
 //! ```
 //!
-//! The arguments are the number of experiments of each case and, if not all are wanted, the first letters of
-//! a case.
+//! The arguments are the number of experiments per case and, optionally, the first letters of the
+//! names of the cases to run.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]
 

@@ -1,8 +1,8 @@
 //! Modes of a measured record: a text file with a header and columns separated by commas.
 //!
 //! `cargo run --release -p mechid-modal --example modal_record -- FILE RATE_HZ INPUTS LOW_HZ
-//! HIGH_HZ [SHARE]` takes the first INPUTS columns as forces; with SHARE, the modes of this part of
-//! the record predict the rest.
+//! HIGH_HZ [SHARE]` takes the first INPUTS columns as forces; with SHARE, the modes are identified
+//! from this fraction of the record and predict the rest.
 #![allow(clippy::print_stdout, reason = "an example prints its table")]
 
 use std::error::Error;

@@ -7,11 +7,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::indicators::{Indicator, IndicatorError, ShapeWithCovariance, mac, mac_with_error};
 
-/// Largest ratio of the frequencies of two modes that can be one mode. Before an update, the
-/// frequencies of a finite-element model may differ from the measured ones by up to a fifth.
+/// Largest ratio of the frequencies of two modes that may represent the same mode. Before an
+/// update, the frequencies of a finite-element model may differ from the measured ones by up to a
+/// fifth.
 const MAX_FREQUENCY_RATIO: f64 = 1.25;
 
-/// Smallest MAC of two modes that can be one mode; below it the shapes have little in common.
+/// Smallest MAC of two modes that may represent the same mode; below it the shapes have little in
+/// common.
 const MIN_MAC: f64 = 0.3;
 
 /// Ratio of an eigenvalue of the covariance of a shape difference to the largest one, at or below
@@ -71,8 +73,8 @@ pub struct Difference {
     pub value: f64,
     /// Standard error of the difference, in the unit of the values.
     pub standard_error: f64,
-    /// Probability that the errors alone cause a difference at least as large; `None` without
-    /// errors.
+    /// Probability that the errors alone cause a difference at least as large; `None` if both
+    /// values are exact.
     pub p_value: Option<f64>,
     /// P-value after Holm's adjustment for the number of tests of the comparison.
     pub adjusted_p_value: Option<f64>,
@@ -104,7 +106,7 @@ pub struct ModePair {
     pub natural_frequency_hz: Difference,
     /// Difference of the damping ratios; `None` if one of the modes has no damping ratio.
     pub damping_ratio: Option<Difference>,
-    /// Test of the shapes; `None` without errors, or with a single output.
+    /// Test of the shapes; `None` if both shapes are exact, or with a single output.
     pub shape: Option<ShapeTest>,
 }
 
@@ -301,7 +303,7 @@ mod tests {
             comparison.pairs.iter().map(|outputs| (outputs.first, outputs.second)).collect();
         assert_eq!(indices, [(0, 1), (1, 0)]);
         assert_eq!((comparison.only_first, comparison.only_second), (vec![2], vec![2]));
-        // 0.6 Hz over √(0.01² + 0.0106²): beyond doubt.
+        // The difference of 0.6 Hz is many times its standard error √(0.01² + 0.0106²) Hz.
         let difference = comparison.pairs[0].natural_frequency_hz;
         assert!((difference.value - 0.6).abs() < 1e-12);
         assert!(difference.adjusted_p_value.unwrap() < 1e-10);
@@ -309,8 +311,8 @@ mod tests {
         assert_eq!((equal.value, equal.adjusted_p_value), (0.0, Some(1.0)));
     }
 
-    /// Judge: two tests of one structure; the least adjusted p-value is below 5 % in 5 % of the
-    /// comparisons.
+    /// Reference: for two tests of the same structure, the smallest adjusted p-value is below 5 %
+    /// in 5 % of the comparisons.
     #[test]
     fn equal_structures_are_called_different_at_the_stated_rate() {
         let mut random = ChaCha8Rng::seed_from_u64(2);
@@ -348,7 +350,7 @@ mod tests {
             alarms += usize::from(least < 0.05);
         }
         let share = alarms as f64 / runs as f64;
-        // 5 % ± 4 standard deviations of 2,000 runs.
+        // The limits are 5 % ± 4 standard deviations for 2,000 runs.
         assert!((0.03..0.07).contains(&share), "{share}");
     }
 

@@ -18,14 +18,14 @@ use crate::ModalError;
 use crate::limits::{CONSTRAINT_STEPS, DEPENDENT_EQUATION};
 use crate::mode_parameters::ModeParameters;
 
-/// Sensor at the point of a force, in its direction or against it.
+/// Sensor at the point of a force, with the direction of the force or the opposite direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DrivingPoint {
     /// Index of the output.
     pub output: usize,
     /// Index of the input.
     pub input: usize,
-    /// `true` if the sensor is positive against the direction of the force.
+    /// `true` if the positive direction of the sensor is opposite to that of the force.
     pub is_opposite: bool,
 }
 
@@ -36,7 +36,8 @@ impl DrivingPoint {
         Self { output, input, is_opposite: false }
     }
 
-    /// Returns the response in the direction of the force per output: 1 or −1.
+    /// Returns the factor (1 or −1) between the output and the response in the direction of the
+    /// force.
     pub fn sign(&self) -> f64 {
         if self.is_opposite { -1.0 } else { 1.0 }
     }
@@ -46,9 +47,9 @@ impl DrivingPoint {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ModalConstraint {
-    /// Proportional damping: if the inputs are forces and the outputs are the n-th time derivatives
-    /// of displacements, the residues of a mode are real multiples of λⁿ/(2jω_d), with its pole λ
-    /// and its damped natural frequency ω_d.
+    /// Proportional damping: the residues of a mode are real multiples of λⁿ/(2jω_d), where λ is
+    /// the pole and ω_d the damped natural frequency of the mode. The inputs must be forces, and
+    /// the outputs must be the n-th time derivatives of displacements.
     RealShapes {
         /// The order n: 0 for displacements, 1 for velocities, 2 for accelerations.
         derivative: i32,
@@ -121,7 +122,8 @@ impl ModalConstraint {
                 let pole = mode.pole();
                 let phase = pole.powi(*derivative) / Complex::i();
                 let phase = phase / phase.norm();
-                // If the gauge is the load of a transient, it does not fix the phase of the forces.
+                // If the gauge is a transient, it does not fix the phase of the forces;
+                // `phase_input` does.
                 let reference = mode.phase_input();
                 let phase_factor = mode.participation(reference);
                 let phase_factor = phase_factor / phase_factor.norm();
@@ -177,7 +179,8 @@ pub(crate) fn impose(
             return None;
         }
         let scaled = DMatrix::from_diagonal(&scale) * inner * DMatrix::from_diagonal(&scale);
-        // Dependent equations add no direction; only independent ones count as degrees of freedom.
+        // Dependent equations add no direction; only independent equations count as degrees of
+        // freedom.
         let eigen = crate::decomposition::hermitian_eigen(scaled)?;
         let floor = DEPENDENT_EQUATION * eigen.eigenvalues.max();
         let independent = eigen.eigenvalues.iter().enumerate().filter(|(_, value)| **value > floor);
@@ -240,8 +243,8 @@ mod tests {
 
     type C = Complex<f64>;
 
-    /// A mode of two outputs and two inputs; variances of real and imaginary part of each shape
-    /// entry, nothing else is uncertain.
+    /// A mode with two outputs and two inputs. Only the shape entries are uncertain: `variance` is
+    /// the variance of the real and of the imaginary part of each entry.
     fn mode(shape: [C; 2], variance: [f64; 2]) -> ModeParameters {
         let pole = C::new(-2.0, 300.0);
         let mut values = vec![-pole.re, pole.im].into_iter().map(f64::ln).collect::<Vec<_>>();
@@ -257,7 +260,8 @@ mod tests {
         ModeParameters { outputs, inputs, gauge, values, covariance, degrees_of_freedom }
     }
 
-    /// With both participations 1, reciprocity makes the two entries equal: their weighted mean.
+    /// If both participations are 1, reciprocity makes the two shape entries equal: the result is
+    /// their weighted mean.
     #[test]
     fn reciprocity_of_known_participations_is_a_weighted_mean() {
         let (a, b) = (C::new(1.0, 0.2), C::new(1.3, -0.1));
@@ -273,7 +277,7 @@ mod tests {
         assert!((result.covariance[(2, 2)] - variance).abs() < 1e-9);
     }
 
-    /// A sensor against the direction of its force measures the negative entry.
+    /// A sensor whose direction is opposite to that of the force measures the negative shape entry.
     #[test]
     fn reciprocity_counts_the_direction_of_a_sensor() {
         let (a, b) = (C::new(1.0, 0.2), C::new(1.3, -0.1));
@@ -289,8 +293,8 @@ mod tests {
         assert!((plain.shape(0) - result.shape(0)).norm() < 1e-12);
     }
 
-    /// With a known pole the entries lose what is across the phase of a real residue: accelerations
-    /// per force have λ²/j.
+    /// If the pole is known, each shape entry loses its component perpendicular to the phase of a
+    /// real residue, which is λ²/j for accelerations per force.
     #[test]
     fn real_shapes_lose_their_part_across_the_phase() {
         let pole = C::new(-2.0, 300.0);
@@ -299,20 +303,21 @@ mod tests {
         let real = ModalConstraint::RealShapes { derivative: 2 };
         let both = [
             real.clone(),
-            // The participations are real already; these equations follow from nothing else.
+            // The estimated participations are 1, so that reciprocity requires equal shape entries.
             ModalConstraint::Reciprocity {
                 points: vec![DrivingPoint::new(0, 0), DrivingPoint::new(1, 1)],
             },
         ];
         let estimate = mode(entries, [0.01, 0.01]);
-        // The participation of input 1 is known and real: its equation has no error.
+        // The estimated participation of input 1 is real, and its imaginary part is uncertain: its
+        // equation is satisfied, but counts as a degree of freedom.
         let one = ModeParameters { covariance: with_variance(&estimate, 9, 0.01), ..estimate };
         let (statistic, freedom, result) = impose(&[real], &one).unwrap();
         assert_eq!(freedom, 3);
         assert!((statistic - (0.09 + 0.01) / 0.01).abs() < 1e-6, "{statistic}");
         assert!((result.shape(0) - 2.0 * phase).norm() < 1e-9);
         assert!((result.shape(1) + phase).norm() < 1e-9);
-        // Real shapes make half of reciprocity hold by itself.
+        // For real shapes, half of the reciprocity equations are already satisfied.
         let (_, freedom, result) = impose(&both, &one).unwrap();
         assert_eq!(freedom, 4);
         assert!((result.shape(0) - result.shape(1)).norm() < 1e-9);

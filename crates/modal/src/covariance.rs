@@ -1,9 +1,9 @@
-//! Covariance of poles, participations and shapes due to the whole noise: noise of the sensors, and
+//! Covariance of poles, participations and shapes due to all noise: noise of the sensors, and
 //! unmeasured forces.
 //!
-//! In the fit, the weights of all outputs depend on frequency in the same way. Its parameters have
-//! the covariance G⁻¹ M G⁻¹, where G is the curvature and M is the variance of the score under the
-//! estimated noise.
+//! In the fit, the weights of all outputs depend on frequency in the same way. The parameters of
+//! the fit have the covariance G⁻¹ M G⁻¹, where G is the curvature and M is the variance of the
+//! score under the estimated noise.
 //!
 //! # Source
 //! White, Econometrica 50 (1982) 1, with the variance of the score from the noise model.
@@ -32,8 +32,9 @@ type C = Complex<f64>;
 pub(crate) struct Covariance {
     /// Covariance of the parameters of the search.
     pub(crate) parameters: DMatrix<f64>,
-    /// Degrees of freedom of the noise estimate at each mode: real and imaginary parts in the
-    /// window of a line, or fewer with an unmeasured force.
+    /// Degrees of freedom of the noise estimate at each mode: the number of real and imaginary
+    /// parts in the averaging window of a line, over all outputs, or fewer if an unmeasured force
+    /// drives the mode.
     pub(crate) degrees_of_freedom: Vec<usize>,
     /// A⁺ C, the derivatives of the linear unknowns of the modes with respect to the parameters,
     /// `2m × parameters`.
@@ -379,15 +380,16 @@ fn noise_ratios(fit: &Fit<'_>, noise: &Noise, mean: &[f64], block: &Block) -> Ve
     noise.sensor.iter().zip(&fit.weights.level).map(ratio).collect()
 }
 
-/// Returns the factors that scale a symmetric matrix to a unit diagonal, and the scaled matrix.
-/// Factors of entries that are not positive are not finite.
+/// Returns the factors that scale a symmetric matrix to a unit diagonal, and the scaled matrix. A
+/// factor is not finite if the entry on the diagonal is zero or negative.
 fn with_unit_diagonal(matrix: &[f64], size: usize) -> (Vec<f64>, DMatrix<f64>) {
     let scale: Vec<f64> = (0..size).map(|k| 1.0 / matrix[k * size + k].sqrt()).collect();
     let scaled = DMatrix::from_fn(size, size, |a, b| matrix[b * size + a] * scale[a] * scale[b]);
     (scale, scaled)
 }
 
-/// Returns the inverse of a symmetric positive definite matrix, scaled to a unit diagonal.
+/// Returns the inverse of a symmetric positive definite matrix. The matrix is scaled to a unit
+/// diagonal before it is inverted.
 fn symmetric_inverse(matrix: &[f64], size: usize) -> Option<DMatrix<f64>> {
     let (scale, scaled) = with_unit_diagonal(matrix, size);
     if scale.iter().any(|value| !value.is_finite()) {
@@ -398,8 +400,8 @@ fn symmetric_inverse(matrix: &[f64], size: usize) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(size, size, |a, b| inverse[(a, b)] * scale[a] * scale[b]))
 }
 
-/// Returns the mode that the data determine least: the one with the largest part in the direction
-/// of the scaled parameters along which the likelihood changes least.
+/// Returns the mode that the data determine least: in scaled parameters, the likelihood changes
+/// least along one direction, and this mode has the largest component in that direction.
 ///
 /// # Source
 /// Belsley, Kuh & Welsch, *Regression Diagnostics* (1980), section 3.2 (decomposition of the
@@ -437,7 +439,8 @@ mod tests {
         let pairs = [(0, None), (1, None), (2, None), (0, Some(1)), (1, Some(1)), (2, Some(1))];
         let size = 2 * pairs.len();
         let mut curvature = DMatrix::<f64>::identity(size, size);
-        // Parameters of different sizes, of which two of the second mode act alike.
+        // The parameters have different sizes, and two parameters of the second mode have the same
+        // effect.
         curvature[(2, 8)] = 1.0 - 1e-15;
         curvature[(8, 2)] = 1.0 - 1e-15;
         let sizes = DVector::from_fn(size, |k, _| 10f64.powi(k as i32 % 5 - 2));

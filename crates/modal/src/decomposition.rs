@@ -1,5 +1,5 @@
-//! Decompositions of small matrices, with `None` where one does not converge or an entry is not
-//! finite.
+//! Decompositions of small matrices, which return `None` if the decomposition does not converge or
+//! an entry is not finite.
 
 use mechid_model::{RealSchur, linear_algebra};
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};

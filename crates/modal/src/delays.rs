@@ -104,7 +104,7 @@ pub(crate) fn determined_delays(
     (count > 0 && gain > count as f64 * lines.schwarz()).then_some(delays)
 }
 
-/// Linear fit of the outputs, each without a trial delay.
+/// Linear fit of the outputs after removal of a trial delay from each output.
 struct Trial<'a, D> {
     lines: &'a Lines,
     design: D,

@@ -57,7 +57,7 @@ pub enum ModalError {
         from_hz: f64,
         /// Highest frequency, in Hz.
         to_hz: f64,
-        /// Candidates that were tried, with the reasons of their rejection.
+        /// Candidates that were tried, with the reasons for their rejection.
         dropped: Vec<DroppedCandidate>,
     },
     /// A stated frequency is not in the band.
@@ -85,7 +85,7 @@ pub enum ModalError {
     Decomposition {
         /// Matrix that was decomposed.
         what: &'static str,
-        /// Number of its rows.
+        /// Number of rows of the matrix.
         size: usize,
     },
     /// The numbers of channels of line data and estimate differ.

@@ -35,7 +35,7 @@ pub struct ModalEstimate {
     /// Parameters of `modes` with their joint covariances.
     parameters: Vec<ModeParameters>,
     constraint_tests: Vec<ConstraintTest>,
-    /// Modes of the model that were not requested by frequency.
+    /// Modes of the model that were not requested.
     others: Vec<IdentifiedMode>,
     dropped: Vec<DroppedCandidate>,
     powers: ResidualPowers,
@@ -248,7 +248,7 @@ impl ModalEstimate {
         &self.constraint_tests
     }
 
-    /// Returns the rejected candidates, each with the reason of its rejection.
+    /// Returns the rejected candidates, each with the reason for its rejection.
     pub fn dropped(&self) -> &[DroppedCandidate] {
         &self.dropped
     }

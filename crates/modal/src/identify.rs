@@ -62,9 +62,10 @@ impl Default for ModalSettings {
 /// Identifies the modes in the band of the data by maximum likelihood, without a window.
 ///
 /// The search varies the poles and participation factors; the shapes and residual terms follow from
-/// linear least squares at each step. The transient of each open record (one that is not whole
-/// periods) is estimated as one more force, common to all outputs. Delays of the outputs relative
-/// to the forces are part of the model if the data determine them ([`ModalEstimate::delays`]).
+/// linear least squares at each step. The transient of each open record (a record that does not
+/// consist of whole periods) is estimated as one more force, common to all outputs. Delays of the
+/// outputs relative to the forces are part of the model if the data determine them
+/// ([`ModalEstimate::delays`]).
 ///
 /// # Errors
 /// [`ModalError`] if the data do not suffice for a mode, or if no mode is significant.
@@ -89,7 +90,7 @@ pub fn identify_modes(
     let advanced = lines.advanced(delays.iter().copied().map(OutputDelay::exact).collect());
     let Ok(poles) = initial_poles(&advanced) else { return plain.finish() };
     let search = Identification::selected(&advanced, settings, poles);
-    // Many residual terms can take the place of the delays.
+    // The data may leave the delays undetermined, because many residual terms can represent them.
     let determined = determined_delays(&lines, &search.fit, delays).unwrap_or_default();
     let lines = lines.advanced(determined);
     let search = search.on(&lines);
@@ -185,7 +186,8 @@ impl<'a> Identification<'a> {
         search.choose_modes();
         search.choose_powers(AKAIKE);
         search.apply_rules();
-        // A removed mode may have been the only reason for the residual terms.
+        // The chosen residual terms may only have been needed because of a mode that is now
+        // removed.
         while search.remove_replaceable() {
             search.choose_powers(lines.schwarz());
             search.apply_rules();
@@ -270,7 +272,8 @@ impl<'a> Identification<'a> {
                 Ok(()) => {
                     self.update_noise();
                     self.remove_impossible();
-                    // A candidate that only replaces another mode would be added again and again.
+                    // If the number of modes did not rise, the candidate only replaced another
+                    // mode, and the loop would never end.
                     if self.fit.model.modes() <= before {
                         break;
                     }
@@ -623,9 +626,9 @@ fn is_sinusoid(reason: &DropReason) -> bool {
     matches!(reason, DropReason::UndeterminedDamping { .. })
 }
 
-/// Returns the reasons, without those of modes near a weaker mode that is removed, too.
-/// Neighbouring modes may explain the same response, so that the reason against the stronger mode
-/// may disappear when the weaker one is removed.
+/// Returns the reasons for the removal of modes, except of modes near a weaker mode that is
+/// removed. Neighbouring modes may explain the same response, so that the reason against the
+/// stronger mode may disappear when the weaker mode is removed.
 fn weakest_of_neighbours(
     poles: &[Complex<f64>],
     losses: &[f64],

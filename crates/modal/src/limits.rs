@@ -3,19 +3,18 @@
 /// Number of lines in a block of the parallel sums. Blocks limit the memory of a sum and fix the
 /// order of its terms, so that the result does not depend on the number of processors.
 pub const BLOCK_LINES: usize = 256;
-/// Maximum length of the part of a column that the preceding columns do not explain, relative to
-/// the length of the column, at which the column counts as linearly dependent; such a column has no
+/// Part of a column that the preceding columns do not explain, as a fraction of the column (in
+/// norms), at or below which the column counts as linearly dependent; such a column has no
 /// coefficient.
 pub const DEPENDENT_COLUMN: f64 = 1e-11;
 /// Largest number of damped steps of one search.
 pub const MAX_STEPS: usize = 40;
 /// Largest number of damping increases within a step before the search ends.
 pub const MAX_DAMPING_INCREASES: usize = 14;
-/// Decrease of −2 log L in one step. At a smaller decrease the last search has converged: its
-/// estimates then differ from the optimum by a few hundredths of their standard errors.
+/// Decrease of −2 log L in one step, below which the last search has converged; the estimates then
+/// differ from the optimum by a few hundredths of their standard errors.
 pub const COST_TOLERANCE: f64 = 1e-3;
-/// Decrease of −2 log L in one step. At a smaller decrease, a search between two changes of the
-/// model ends.
+/// Decrease of −2 log L in one step, below which a search between two changes of the model ends.
 pub const ROUGH_COST_TOLERANCE: f64 = 0.5;
 /// Maximum number of steps of a search while noise and number of modes are still unknown.
 pub const ROUGH_STEPS: usize = 10;
@@ -66,7 +65,7 @@ pub const CLUSTER_DAMPING: f64 = 0.3;
 pub const MAX_TRIES: usize = 3;
 /// Distance from a candidate, in half-widths, within which the lines are used for its gain.
 pub const SCAN_HALF_WIDTHS: f64 = 12.0;
-/// Minimum number of lines on either side of a candidate.
+/// Minimum number of lines on either side of a candidate that are used for its gain.
 pub const MIN_SCAN_LINES: usize = 12;
 /// Minimum ratio of the damping of a mode to its standard error; below it the damping is
 /// undetermined.

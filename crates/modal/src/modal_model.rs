@@ -19,7 +19,7 @@ type C = Complex<f64>;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ModalModel {
-    /// Modes in the band, then the modes outside it that belong to the model.
+    /// Modes in the band, then the modes outside the band that belong to the model.
     pub terms: Vec<ModalTerm>,
     /// Angular frequency ω₀ that scales the residual terms, in rad/s.
     pub reference: f64,

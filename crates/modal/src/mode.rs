@@ -90,8 +90,8 @@ pub enum DropReason {
     },
     /// The damping is too large for a resonance: the root represents modes outside the band.
     TooDamped,
-    /// The data do not determine it beside the other modes: the likelihood does not change in a
-    /// direction of its parameters.
+    /// The data do not determine this mode in addition to the other modes: the likelihood does not
+    /// change along one direction of its parameters.
     Undetermined,
     /// The root is outside the band: too far from it, insignificant, or not determined.
     OutsideBand,
@@ -133,7 +133,7 @@ pub struct DroppedCandidate {
     pub frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Reason of the rejection.
+    /// Reason for the rejection.
     pub reason: DropReason,
 }
 

@@ -18,8 +18,8 @@ type C = Complex<f64>;
 pub(crate) struct ModeParameters {
     pub(crate) outputs: usize,
     pub(crate) inputs: usize,
-    /// Index of the load whose participation is 1; an index above those of the inputs is that of a
-    /// transient.
+    /// Index of the load whose participation is 1; an index that is not the index of an input
+    /// belongs to a transient.
     pub(crate) gauge: usize,
     pub(crate) values: DVector<f64>,
     pub(crate) covariance: DMatrix<f64>,
@@ -155,9 +155,9 @@ impl ModeParameters {
         (mass, gradient)
     }
 
-    /// Returns the shape with a largest entry of 1, divided by the root of the modal mass, and the
-    /// standard errors of the real and imaginary parts of its entries; `None` if the mass is not
-    /// positive or not determined.
+    /// Returns the shape with a largest entry of 1, divided by the root of the modal mass. Each
+    /// entry has the standard errors of its real and imaginary parts. `None` unless the mass is
+    /// determined and positive.
     pub(crate) fn mass_normalised_shape(
         &self,
         point: DrivingPoint,

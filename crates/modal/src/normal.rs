@@ -307,7 +307,7 @@ mod tests {
         Fit::new(lines, model, Weights { shape, level: vec![1.0, 0.7, 1.3] })
     }
 
-    /// The projected cost is differentiated by central differences: independent of every formula
+    /// Reference: central differences of the projected cost, which do not use any of the formulas
     /// above.
     #[test]
     fn descent_is_the_derivative_of_half_the_cost() {
@@ -335,7 +335,7 @@ mod tests {
         }
     }
 
-    /// The cost of the projection is that of a direct least-squares solution of the whole matrix.
+    /// Reference: the cost of a direct least-squares solution with the whole matrix.
     #[test]
     fn projection_is_the_least_squares_solution() {
         let lines = lines();

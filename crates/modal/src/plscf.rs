@@ -263,7 +263,8 @@ impl NormalEquations {
         let normal = &self.reduced[order];
         let corner = normal.view((0, 0), (size, size)).into_owned();
         let right = normal.view((0, size), (size, q)).into_owned();
-        // The highest coefficient is the identity: poles of noise then tend to be unstable.
+        // The highest coefficient is the identity, because the poles that represent noise then tend
+        // to be unstable.
         let coefficients = -scaled_solve(corner, right)?;
         let block = |power: usize| coefficients.rows(power * q, q).transpose();
         let mut companion = DMatrix::zeros(size, size);
@@ -442,7 +443,8 @@ mod tests {
         assert_eq!(clusters.len(), 4);
         for (r, cluster) in clusters.iter().enumerate() {
             let gap = (cluster.pole.pole - truth.poles[r]).norm() / truth.poles[r].re.abs();
-            // Not exact: a fraction in z has no modes at negative frequencies.
+            // The poles are not exact, because a fraction in z has no modes at negative
+            // frequencies.
             assert!(gap < 0.01, "{r}: {gap}");
             assert!(mac(&cluster.pole.vector, &truth.participations[r]) > 0.9999);
         }
@@ -460,7 +462,7 @@ mod tests {
             let gap = near.fold(f64::INFINITY, f64::min) / pole.re.abs();
             assert!(gap < 0.1, "{pole}: {gap}");
         }
-        // A common weight changes nothing.
+        // A weight that is equal on all lines does not change the poles.
         let again = initial_poles(&weighted, &orders()).unwrap();
         assert_eq!(again.len(), clusters.len());
         for (one, two) in clusters.iter().zip(&again) {
@@ -468,7 +470,7 @@ mod tests {
         }
     }
 
-    /// Judge: the sums over the lines of one order, written out.
+    /// Reference: the sums over the lines for one order, computed directly.
     #[test]
     fn the_equations_of_every_order_are_those_of_direct_sums() {
         let table = table(&truth(3, 2), 1e-3);

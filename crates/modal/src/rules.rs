@@ -60,7 +60,7 @@ pub(crate) fn drop_reasons(
     reasons
 }
 
-/// Returns whether shapes or participations of two modes differ beyond their errors.
+/// Returns whether the shapes or participations of two modes differ significantly.
 fn differ(
     fit: &Fit<'_>,
     covariance: &Covariance,

@@ -61,8 +61,8 @@ impl<'a> Fit<'a> {
     }
 
     /// Takes at most `limit` steps, until a step lowers the cost by less than `tolerance` or the
-    /// time limit is over. It also ends if the cost would remain above `goal` with all further
-    /// steps as effective as the last one.
+    /// time limit is over. It also ends if the cost would remain above `goal` even if all further
+    /// steps were as effective as the last one.
     fn search_until(&mut self, limit: usize, tolerance: f64, goal: f64) {
         if self.model.modes() == 0 {
             return;

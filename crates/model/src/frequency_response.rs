@@ -40,8 +40,9 @@ impl SecondOrderSystem {
             .solve(&DMatrix::identity(self.dof(), self.dof()))
             .ok_or(ModelError::SingularDynamicStiffness { omega, reciprocal_condition: 0.0 })?;
         let reciprocal_condition = 1.0 / (terms * one_norm(&receptance));
-        // The terms of D cancel at a resonance, with a rounding error of about 2ε of their size:
-        // below that, no digit of the inverse is right. The comparison also rejects NaN.
+        // At a resonance the terms of D cancel, with a rounding error of about 2ε of their size. If
+        // the reciprocal condition is below this limit, no digit of the inverse is right. The
+        // comparison also rejects NaN.
         if reciprocal_condition > 2.0 * f64::EPSILON {
             Ok(receptance)
         } else {

@@ -8,8 +8,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::limits;
 use crate::{ModelError, SecondOrderSystem};
 
-/// Largest modulus of an eigenvalue, relative to the largest eigenvalue, that may be the rounding
-/// of a double zero (rigid-body modes): about √ε (pure number).
+/// Largest modulus of an eigenvalue, relative to the largest eigenvalue, at which the eigenvalue
+/// may be a double zero (rigid-body mode) with rounding errors: about √ε (pure number).
 pub const EIGENVALUE_ROUNDING: f64 = 1e-7;
 
 /// Mode x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
@@ -66,7 +66,8 @@ impl Mode {
         self.eigenvalue.im / std::f64::consts::TAU
     }
 
-    /// Damping ratio −Re λ / |λ|: negative if unstable, ±1 for a real eigenvalue, 0 for a zero one.
+    /// Damping ratio −Re λ / |λ|: negative if unstable, ±1 for a real eigenvalue, 0 for a zero
+    /// eigenvalue.
     pub fn damping_ratio(&self) -> f64 {
         match self.natural_frequency() {
             0.0 => 0.0,
@@ -174,7 +175,7 @@ impl SecondOrderSystem {
 
     fn decomposition(&self) -> Result<Decomposition, ModelError> {
         let mut a = self.state_matrix();
-        // Balancing squares the entries, and it does not terminate for infinite ones.
+        // Balancing squares the entries, and does not terminate if an entry is infinite.
         let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
         if largest > 1e150 || a.iter().any(|v| v.is_nan()) {
             return Err(ModelError::StateMatrixOverflow { largest });
@@ -186,8 +187,8 @@ impl SecondOrderSystem {
         Ok(Decomposition { size: schur.t.norm(), balance, schur })
     }
 
-    /// Returns the fastest growing free response; `None` for a system whose free responses all
-    /// decay or persist.
+    /// Returns the fastest growing free response; `None` if all free responses decay or keep their
+    /// amplitude.
     ///
     /// Growth within [`EIGENVALUE_ROUNDING`] of zero counts as rounding.
     ///
@@ -429,7 +430,7 @@ mod tests {
         assert!(system(dmatrix![1e-10], dmatrix![0.0], dmatrix![1e100]).modes().is_ok());
     }
 
-    /// Judge: λ = −c/2m ± i√(k/m − c²/4m²) of one degree of freedom.
+    /// Reference: λ = −c/2m ± i√(k/m − c²/4m²) of one degree of freedom.
     #[test]
     fn the_growing_response_is_that_of_the_closed_form() {
         let found = system(dmatrix![2.0], dmatrix![-0.4], dmatrix![800.0]).instability().unwrap();
@@ -468,7 +469,7 @@ mod tests {
 
     #[test]
     fn many_equal_and_critically_damped_oscillators_have_their_eigenvalue() {
-        // Coordinates that mix them: a product of mirrors.
+        // A product of reflections mixes the coordinates of the oscillators.
         for size in 10..=24 {
             let mut turn = DMatrix::identity(size, size);
             for m in 0..size {
@@ -483,12 +484,12 @@ mod tests {
                 .eigenvalues()
                 .unwrap_or_else(|e| panic!("{size}: {e}"));
             assert_eq!(eigenvalues.len(), 2 * size);
-            // Defective pairs: rounding of ε splits them by about √ε.
+            // The eigenvalues are defective pairs, which rounding of ε splits by about √ε.
             assert!(eigenvalues.iter().all(|l| (l + 10.0).norm() < 1e-5), "{eigenvalues:?}");
         }
     }
 
-    /// Judge: a chain between walls has the shapes sin(r π i / (n + 1)); in two planes without
+    /// Reference: a chain between walls has the shapes sin(r π i / (n + 1)); in two planes without
     /// coupling, each shape belongs to two modes.
     #[test]
     fn two_equal_chains_have_the_shapes_of_the_closed_form() {

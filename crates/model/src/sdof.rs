@@ -7,8 +7,8 @@ use crate::{ModelError, SecondOrderSystem};
 
 /// Mass on a spring and a viscous damper: m ẍ + c ẋ + k x = F.
 ///
-/// Mass and stiffness are positive. The damping may have any sign: a negative one belongs to an
-/// unstable system or an inaccurate estimate, for which responses are needed, too.
+/// Mass and stiffness are positive. The damping may have any sign: negative damping belongs to an
+/// unstable system or an inaccurate estimate, and their responses are needed, too.
 ///
 /// ```
 /// use mechid_model::Sdof;

@@ -29,7 +29,7 @@ pub struct SparseSystem {
 }
 
 impl SparseSystem {
-    /// Default limit of the memory of the factors of its matrices, in bytes.
+    /// Default memory limit for the factors of the matrices, in bytes.
     pub const FACTOR_LIMIT: u64 = 4_000_000_000;
 
     /// Creates a system from the n×n matrices M (kg), C (N·s/m) and K (N/m).
@@ -70,7 +70,7 @@ impl SparseSystem {
         Self { factor_limit: bytes, ..self }
     }
 
-    /// Returns the memory that factors of its matrices may use, in bytes.
+    /// Returns the memory limit for the factors of the matrices, in bytes.
     pub fn factor_limit(&self) -> u64 {
         self.factor_limit
     }

@@ -135,7 +135,7 @@ mod tests {
     use super::*;
     use crate::Sdof;
 
-    /// Judge: the closed form of one degree of freedom.
+    /// Reference: the closed form of one degree of freedom.
     #[test]
     fn a_step_is_the_closed_form() {
         let (sdof, dt, force) = (Sdof::new(3.0, 0.8, 50.0).unwrap(), 0.13, [4.0, -7.0]);

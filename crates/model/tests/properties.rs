@@ -1,4 +1,4 @@
-//! What must hold for every system: sums and products of eigenvalues, invariances, inverses.
+//! Properties of every system: sums and products of eigenvalues, invariances, inverses.
 
 use mechid_model::{Mode, SecondOrderSystem};
 use mechid_numerics::linear_algebra::singular_values;
@@ -46,7 +46,8 @@ fn spectrum_gap(p: &[Complex<f64>], q: &[Complex<f64>]) -> f64 {
     p.iter().map(nearest).fold(0.0, f64::max) / largest
 }
 
-/// Rounding moves a nearly defective pair among random systems by √ε, hardly ever by more.
+/// Tolerance of an eigenvalue: in random systems, rounding moves a nearly defective pair by √ε, and
+/// hardly ever by more.
 const EIGENVALUE: f64 = 1e-6;
 
 proptest! {
@@ -136,7 +137,7 @@ proptest! {
         let tolerance = 1e-14 * d.norm() * h.norm();
         prop_assert!((&d * &h - &one).norm() < tolerance);
         prop_assert!((&h * &d - &one).norm() < tolerance);
-        // A real system: the receptance at −ω is the conjugate one.
+        // For a real system, the receptance at −ω is the conjugate of the receptance at ω.
         let mirrored = s.receptance(-omega).unwrap().map(|z| z.conj());
         prop_assert!((h - mirrored).norm() == 0.0);
     }
@@ -164,7 +165,8 @@ fn a_long_chain_has_its_known_frequencies() {
         for (j, mode) in modes.iter().enumerate() {
             let angle = (j + 1) as f64 * std::f64::consts::PI / (2 * (n + 1)) as f64;
             let omega = 2.0 * (k / m).sqrt() * angle.sin();
-            // Errors are absolute in the largest frequency, up to 30 times the smallest.
+            // The errors are in proportion to the largest frequency, which is up to 30 times the
+            // smallest.
             assert!((mode.natural_frequency() / omega - 1.0).abs() < 1e-11, "n {n}, j {j}");
             assert!((mode.damping_ratio() - beta * omega / 2.0).abs() < 1e-11, "n {n}, j {j}");
             assert!(residual(&s, mode) < 1e-13);

@@ -36,7 +36,7 @@ fn free_motion_by_hand() {
         (8.0, [-0.016_734_762_011_132_237, -0.078_095_556_051_950_44, 0.379_321_272_252_330_7]),
         (10.0, [0.029_022_103_322_797_543, -0.068_851_758_017_088_7, 0.228_170_376_794_251_3]),
     ];
-    // ẍ is a difference of terms some times its size, hence 10 ε.
+    // ẍ is a difference of terms that are several times as large as ẍ, hence 10 ε.
     let sampling = Sampling::new(0.75, 2).unwrap();
     for (c, expected) in cases {
         let free = sdof(c).free_response(sampling, 0.3, -1.1).unwrap();
@@ -134,7 +134,8 @@ fn the_harmonic_transient_dies_into_the_steady_state() {
     }
 }
 
-/// Steps of the size of each jump of the force, each begun at its sample: O(N²), no recurrence.
+/// Returns the sum of step responses, one for each jump of the force, from the sample of the jump
+/// on: O(N²), without a recurrence.
 fn sum_of_steps(s: &Sdof, force: &[f64], dt: f64) -> Vec<f64> {
     let unit = s.step_response(Sampling::new(dt, force.len()).unwrap(), 1.0, 0.0, 0.0).unwrap();
     let unit = unit.displacement().channel(0).to_vec();
@@ -156,7 +157,7 @@ fn a_held_force_is_a_sum_of_steps() {
         let sum = sum_of_steps(&sdof(c), &force, dt);
         let largest = sum.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         for (k, expected) in sum.iter().enumerate() {
-            // 120 terms of rounding.
+            // The tolerance allows for the rounding of 120 terms.
             assert!((sample(&held, k)[0] - expected).abs() < 1e-13 * largest, "c {c}, k {k}");
         }
     }
@@ -164,8 +165,9 @@ fn a_held_force_is_a_sum_of_steps() {
 
 #[test]
 fn a_linear_force_is_the_limit_of_finer_and_finer_held_ones() {
-    // The held force at midpoints of r parts misses a straight line by O(1/r²): Richardson's
-    // combination of r and 2r leaves O(1/r⁴).
+    // A force that is held at the midpoint value of each of r parts gives a response with an error
+    // of O(1/r²) for a straight line; in Richardson's combination of r and 2r, the error is
+    // O(1/r⁴).
     let dt = 0.2;
     let force = forces(60);
     let refined = |c: f64, r: usize| -> Vec<f64> {
@@ -221,8 +223,8 @@ fn bad_input_is_named() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Judge: ẋ and ẍ are the derivatives of x, for any damping and any frequency. Since ẍ follows
-    /// from the equation of motion, the equation then holds.
+    /// Reference: ẋ and ẍ are the derivatives of x, for any damping and any frequency. Since ẍ
+    /// follows from the equation of motion, the equation then holds.
     #[test]
     fn harmonic_motion_satisfies_the_equation_of_motion(
         zeta in 0.0..3.0f64, omega_n in 0.5..5.0f64, omega in 0.0..6.0f64, phase in 0.0..6.3f64,

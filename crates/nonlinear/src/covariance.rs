@@ -148,9 +148,9 @@ impl BlockScores {
     }
 
     /// Returns the smallest number of Satterthwaite's degrees of freedom of the first `wanted`
-    /// parameters. Parameter k has (Σ w)²/Σ w² − 1, where w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk is the
-    /// information of each block. Initial states, which follow these parameters, depend on the
-    /// first block only and are ignored.
+    /// parameters. Parameter k has (Σ w)²/Σ w² − 1 degrees of freedom, where w = \[(AᵀA)⁻¹ A_bᵀA_b
+    /// (AᵀA)⁻¹\]_kk is the information of each block. Initial states, which follow these
+    /// parameters, depend on the first block only and are ignored.
     fn degrees_of_freedom(&self, inverse: &DMatrix<f64>, wanted: usize) -> usize {
         let mut sums = DVector::<f64>::zeros(self.parameters);
         let mut squares = DVector::<f64>::zeros(self.parameters);

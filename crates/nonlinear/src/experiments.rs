@@ -30,7 +30,7 @@ pub struct SteadyExperiments {
 
 /// One experiment: its periods and their mean.
 struct Experiment {
-    /// Mean of its periods.
+    /// Mean of the periods.
     mean: Steady,
     /// Single periods; empty if there is only one period.
     periods: Vec<Steady>,

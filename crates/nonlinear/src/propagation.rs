@@ -125,7 +125,8 @@ impl<'a> Propagation<'a> {
 mod tests {
     use super::*;
 
-    /// ⟨g, L e⟩ = ⟨Lᵀ g, e⟩ for every quantity, with transitions that change.
+    /// The test is ⟨g, L e⟩ = ⟨Lᵀ g, e⟩ for every quantity, with transitions that change from
+    /// sample to sample.
     #[test]
     fn the_adjoint_is_one() {
         let (n, samples) = (2, 12);

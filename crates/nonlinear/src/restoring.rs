@@ -31,7 +31,7 @@ pub struct RestoringForce {
 pub struct Extrapolation {
     /// Name of the term.
     pub term: String,
-    /// Exponent of the growth of the force of the term from the edge of the data to [`REACH`] times
+    /// Exponent with which the force of the term grows from the edge of the data to [`REACH`] times
     /// the range of the data; 3 for a cubic spring.
     pub order: f64,
     /// Ratio of the standard error of the restoring force to the restoring force, at the edge of

@@ -153,8 +153,8 @@ impl Powers {
 mod tests {
     use super::*;
 
-    /// Judge: a mean of P values on L lines has the variance of the values divided by P, with 2 L
-    /// (P − 1) degrees of freedom, or fewer if the variances of the lines differ.
+    /// Reference: a mean of P values on L lines has the variance of the values divided by P, with 2
+    /// L (P − 1) degrees of freedom, or fewer if the variances of the lines differ.
     #[test]
     fn a_mean_has_the_variance_of_its_values() {
         let (lines, periods) = (50, 4);

@@ -65,9 +65,9 @@ pub struct SelectionStep {
     pub unexplained: f64,
 }
 
-/// Adds candidates to the given terms, one after the other: each time the candidate that lowers the
-/// equation error most, as long as the criterion accepts it. At the end it removes uncertain terms
-/// ([`Criterion::Information`]).
+/// Adds candidates to the given terms, one after the other. Each step adds the candidate that
+/// lowers the equation error most, if the criterion accepts this candidate. At the end, uncertain
+/// terms are removed ([`Criterion::Information`]).
 ///
 /// Rows are weighted by the residual of a fit with all candidates, so that a missing term does not
 /// affect the weights. Constants inside the laws do not change.

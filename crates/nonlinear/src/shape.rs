@@ -120,8 +120,8 @@ impl Shape {
     }
 
     /// Returns the derivatives of the force of the model with respect to each free constant: for
-    /// each experiment and constant one matrix of rows × degrees of freedom. They are the
-    /// derivatives of the residual with opposite sign.
+    /// each experiment and constant one matrix of rows × degrees of freedom. The derivatives of the
+    /// residual have the opposite sign.
     pub(super) fn slopes(
         &self,
         equations: &Equations<'_>,

@@ -13,7 +13,7 @@ use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
     serde(rename_all = "kebab-case")
 )]
 pub enum Weighting {
-    /// The choice among the others that gives the residual the highest likelihood, by Akaike's
+    /// Weighting with the highest likelihood of the residual, chosen from the others by Akaike's
     /// criterion.
     #[default]
     Automatic,

@@ -234,8 +234,8 @@ pub(super) fn most_likely(
 mod tests {
     use super::*;
 
-    /// Judge: the covariance of the residual, computed sample by sample, becomes the unit matrix,
-    /// and its determinant is that of the filter.
+    /// Reference: the covariance of the residual, computed sample by sample. The filter makes it
+    /// the unit matrix, and states its determinant.
     #[test]
     fn the_filter_makes_the_covariance_one() {
         let (n, samples) = (2, 9);

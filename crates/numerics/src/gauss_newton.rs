@@ -191,7 +191,7 @@ pub fn minimise<P: SumOfSquares>(
             damping = f64::max(growth * damping, FIRST_DAMPING);
             growth *= 2.0;
             if damping > LARGEST_DAMPING {
-                // The cost decreases in no direction: this is a minimum up to rounding, or the data
+                // No direction reduces the cost: this is a minimum up to rounding, or the data
                 // determine no minimum.
                 return Some(Minimum { parameters, cost, steps, converged: undamped.is_some() });
             }
@@ -278,7 +278,7 @@ mod tests {
             let second = -20.0 * change[0] * change[0];
             let in_parameters = dvector![-20.0 * self.at[0] * second, 10.0 * second];
             // Coordinates are multiples of the parameters, so Jᵀ in coordinates is Jᵀ divided by
-            // them.
+            // the same factors.
             let scale = linearisation.coordinates(&dvector![1.0, 1.0]);
             self.is_curved.then(|| in_parameters.component_div(&scale))
         }
@@ -336,7 +336,7 @@ mod tests {
         });
     }
 
-    /// exp(−θ t) through exact data: the end is the truth whatever the start.
+    /// A fit of exp(−θ t) to exact data: the search ends at the true θ from any start.
     #[test]
     fn steps_that_are_too_long_are_damped() {
         struct Decay(f64, f64);

@@ -89,7 +89,8 @@ enum Part {
 }
 
 impl Part {
-    /// Returns where the weights have this part of H: the first column and the number of columns.
+    /// Returns the columns of the weights that have this part of H: the first column and the number
+    /// of columns.
     fn columns(self, dof: usize) -> (usize, usize) {
         let real = real_part(0, dof);
         match self {
@@ -211,7 +212,7 @@ mod tests {
         Complex::new(number(at), number(at + 57))
     }
 
-    /// The rows, written out, judge the products: 45 lines of 5 regressors, with few and many
+    /// Judge: sums over the explicit rows of 45 lines and 5 regressors, with few and with many
     /// degrees of freedom.
     #[test]
     fn products_are_those_of_the_rows() {
@@ -241,7 +242,7 @@ mod tests {
                 for (row, (a, b)) in pairs.enumerate() {
                     let term = |line: usize| phi(line, a).conj() * phi(line, b) * h(line, i, j);
                     let expected: f64 = (0..lines).map(|line| 2.0 * term(line).re).sum();
-                    // Rounding of a sum of 45 terms below 100.
+                    // The tolerance is the rounding error of a sum of 45 terms below 100.
                     assert!((products[(row, column)] - expected).abs() < 1e-11, "{i} {j} {a} {b}");
                 }
             }

@@ -157,8 +157,8 @@ impl LeastSquares {
     }
 }
 
-/// Solves least squares on compressed rows. They have the same Gram matrices as the `rows` original
-/// rows. Units are as in [`Solution`].
+/// Solves least squares on compressed rows, which have the same Gram matrices as the `rows`
+/// original rows. Units are as in [`Solution`].
 ///
 /// # Errors
 /// [`NumericsError::NothingUnknown`], [`NumericsError::TooFewRows`], and errors of a decomposition.

@@ -30,8 +30,8 @@ pub(crate) const RANK_TOLERANCE: f64 = 100.0 * f64::EPSILON;
 /// undetermined.
 pub(crate) const SHARE_TOLERANCE: f64 = 1e-6;
 
-/// Minimum norm of a column whose squares are all normal numbers; the squares of a smaller one lose
-/// digits.
+/// Minimum norm of a column whose squares are all normal numbers; the squares of a smaller column
+/// lose digits.
 pub(crate) const SMALLEST_NORM: f64 = 1e-140;
 
 /// Largest magnitude of an entry that counts as 0 in a decomposition, relative to the largest

@@ -162,7 +162,7 @@ mod tests {
 
     use super::*;
 
-    /// Numbers of every size, and those that are none.
+    /// Numbers of every size, NaN and infinity.
     fn entry() -> impl Strategy<Value = f64> {
         prop_oneof![
             4 => -1.0..1.0f64,
@@ -186,7 +186,8 @@ mod tests {
                 let s = &found.singular_values;
                 prop_assert!(s.as_slice().is_sorted_by(|a, b| a >= b));
                 let (u, v_t) = (found.u.unwrap(), found.v_t.unwrap());
-                // Ratios of entries cost digits in the last step of nalgebra, a 2 × 2 matrix.
+                // Large ratios of entries lose digits in the last step of nalgebra, the
+                // decomposition of a 2 × 2 matrix.
                 if matrix.iter().all(|v| *v == 0.0 || (1e-3..1.0).contains(&v.abs())) {
                     let gap = u * DMatrix::from_diagonal(s) * v_t - &matrix;
                     prop_assert!(gap.norm() < 1e-12, "{}", gap);
@@ -213,7 +214,8 @@ mod tests {
         let expected = NumericsError::EntryNotFinite { row: 1, column: 1 };
         assert_eq!(svd(infinite.clone()).unwrap_err(), expected);
         assert_eq!(exponential(&infinite).unwrap_err(), expected);
-        // Nilpotent, but its modulus is not: the bound on the truncation error overflows.
+        // The matrix is nilpotent, but the matrix of its moduli is not, so that the bound on the
+        // truncation error overflows.
         for large in [1e12, 1e40, 1e300] {
             let refused = exponential(&(dmatrix![1.0, 1.0; -1.0, -1.0] * large));
             assert_eq!(refused, Err(NumericsError::ExponentialOverflow { norm: 2.0 * large }));

@@ -241,14 +241,15 @@ mod tests {
                     };
                     let quotient = (moved(1.0) - moved(-1.0)) / (2.0 * step);
                     let derivative = generator.derivative(&change).unwrap();
-                    // Rounding over the step, 1e-10, times the conditioning of the eigenvalues.
+                    // The rounding error divided by the step is 1e-10; the conditioning of the
+                    // eigenvalues multiplies this error.
                     assert!((derivative - quotient).abs().max() < tolerance, "{row} {column}");
                 }
             }
         }
     }
 
-    /// Held force: the integral of the exponential is known for one state.
+    /// For a held force and one state, the integral of the exponential is known.
     #[test]
     fn the_inputs_are_integrated() {
         let (a, b) = (-0.8f64, 3.0);

@@ -85,7 +85,8 @@ impl WithSimd for BlockedGram<'_> {
                 for ((to, a), weight) in weighted.iter_mut().zip(part(column)).zip(weights) {
                     *to = a * weight;
                 }
-                // Four products at a time, because each weighted entry is then read once for four.
+                // Four products are computed at a time, so that each weighted entry is read only
+                // once for four products.
                 let mut row = column;
                 while row + 4 <= columns {
                     let others = [part(row), part(row + 1), part(row + 2), part(row + 3)];

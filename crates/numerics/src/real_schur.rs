@@ -227,7 +227,7 @@ mod tests {
             let v: DMatrix<f64> =
                 DMatrix::from_fn(size, size, |_, _| source.random_range(-1.0..1.0));
             check(&v);
-            // Eigenvalues that differ by rounding only, in scrambled coordinates.
+            // The eigenvalues of this matrix differ only by rounding, and the matrix is full.
             let equal = DMatrix::from_diagonal_element(size, size, 0.7);
             let noise = v.map(|x| 1e-15 * x);
             check(&(equal + noise));
@@ -238,7 +238,7 @@ mod tests {
         }
         for size in 1..5 {
             check(&DMatrix::zeros(size, size));
-            // A cyclic permutation: ordinary shifts leave it as it is.
+            // Ordinary shifts do not change a cyclic permutation.
             check(&DMatrix::from_fn(size, size, |i, j| f64::from((j + 1) % size == i)));
         }
     }

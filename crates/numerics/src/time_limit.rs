@@ -83,7 +83,7 @@ thread_local! {
     static ACTIVE: RefCell<Option<Rc<Active>>> = const { RefCell::new(None) };
 }
 
-/// Puts an earlier limit back when the work under a later one ends, also by a panic.
+/// Restores the earlier limit when the work under a later limit ends, also if the work panics.
 struct Restored(Option<Rc<Active>>);
 
 impl Drop for Restored {
@@ -95,16 +95,16 @@ impl Drop for Restored {
 /// Runs some work on this thread with a limit, which replaces any other limit of this thread until
 /// the work ends.
 ///
-/// `None` means no limit, also if the calling code has a limit: a thread that waits for a part
-/// of its work may take on other work meanwhile, and the limit does not apply to that.
+/// `None` means no limit, also if the calling code has a limit: a thread that waits for a part of
+/// its work may run other work meanwhile, and the limit does not apply to this other work.
 pub fn within<T>(limit: Option<TimeLimit>, work: impl FnOnce() -> T) -> T {
     let active = limit.map(|limit| Rc::new(Active::new(limit)));
     let _restored = Restored(ACTIVE.replace(active));
     work()
 }
 
-/// Runs two parts of some work, at the same time unless they have a limit: a limit applies to one
-/// thread.
+/// Runs two parts of some work: at the same time if there is no limit, otherwise one after the
+/// other, because a limit applies to one thread.
 pub fn join<A: Send, B: Send>(
     one: impl FnOnce() -> A + Send,
     other: impl FnOnce() -> B + Send,
@@ -142,7 +142,7 @@ mod tests {
         let limit = TimeLimit::from_seconds(0.0);
         within(limit, || {
             assert_eq!(ended(), None);
-            // Other work has no limit, and does not end this one.
+            // Other work has no limit, and does not use up the limit of this work.
             within(None, || assert!(!is_over() && ended().is_none()));
             assert_eq!(ended(), None);
             assert!(is_over());

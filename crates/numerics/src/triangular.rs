@@ -279,7 +279,8 @@ mod tests {
     }
 
     proptest! {
-        /// The Gram matrix, formed explicitly, judges the factor; signs of rows are free.
+        /// Judge: the Gram matrix, formed explicitly. The factor is unique except for the signs of
+        /// its rows.
         #[test]
         fn the_factor_has_the_gram_matrix_of_the_rows(
             (cut, a) in (1usize..700).prop_flat_map(|rows| (0..rows, matrix(rows, 5)))
@@ -294,7 +295,8 @@ mod tests {
             prop_assert_eq!(parts.rows(), a.nrows());
             for factor in [whole, parts] {
                 let gram = factor.r().tr_mul(factor.r());
-                // 1e-13: rounding of a sum of 700 products of numbers below one.
+                // The tolerance of 1e-13 is the rounding error of a sum of 700 products of numbers
+                // below 1.
                 prop_assert!((gram - a.tr_mul(&a)).abs().max() < 1e-13 * a.nrows() as f64);
                 prop_assert_eq!(factor.r().lower_triangle() , DMatrix::from_diagonal(&factor.r().diagonal()));
             }

@@ -12,7 +12,8 @@ fn random(size: usize, seed: u64) -> DMatrix<f64> {
     DMatrix::from_fn(size, size, |_, _| source.random_range(-1.0..1.0))
 }
 
-/// exp by its series after many halvings: slow and plain, the judge.
+/// Returns the exponential by the series of the matrix after many halvings: a slow but simple
+/// reference.
 fn exponential(a: &DMatrix<f64>) -> DMatrix<f64> {
     let halvings = (a.norm().log2().ceil().max(0.0) as i32) + 4;
     let small = a / 2f64.powi(halvings);
@@ -33,7 +34,8 @@ fn error(got: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     (got - expected).norm() / expected.norm()
 }
 
-/// V diag-blocks V⁻¹ with the eigenvalues given as (real, imaginary) pairs or single reals.
+/// Returns a full matrix with these eigenvalues: real ones, and complex pairs as (real part,
+/// imaginary part).
 fn with_eigenvalues(reals: &[f64], pairs: &[(f64, f64)], seed: u64) -> DMatrix<f64> {
     let size = reals.len() + 2 * pairs.len();
     let mut blocks = DMatrix::zeros(size, size);
@@ -51,11 +53,11 @@ fn with_eigenvalues(reals: &[f64], pairs: &[(f64, f64)], seed: u64) -> DMatrix<f
 
 #[test]
 fn closed_forms() {
-    // A Jordan block: log(1 + N) = N − N²/2, defective as can be.
+    // A Jordan block I + N has only one eigenvector; its logarithm is N − N²/2.
     let jordan = dmatrix![1.0, 1.0, 0.0; 0.0, 1.0, 1.0; 0.0, 0.0, 1.0];
     let expected = dmatrix![0.0, 1.0, -0.5; 0.0, 0.0, 1.0; 0.0, 0.0, 0.0];
     assert!((logarithm(&jordan).unwrap() - expected).norm() < 1e-14);
-    // A damped turn by 3 rad, nearly half a turn.
+    // A rotation by 3 rad, nearly half a turn, with decay.
     let (s, c) = 3f64.sin_cos();
     let turn = dmatrix![c, -s; s, c] * (-0.2f64).exp();
     let expected = dmatrix![-0.2, -3.0; 3.0, -0.2];
@@ -75,8 +77,8 @@ fn clustered_eigenvalues_cost_no_accuracy() {
 
 #[test]
 fn nearly_defective_matrices_are_as_accurate_as_their_conditioning_allows() {
-    // Eigenvalues 0.9 and 0.9 + gap joined by a coupling of 1: the logarithm is known exactly
-    // through the divided difference of ln, stable as ln1p(gap/0.9)/gap.
+    // The eigenvalues 0.9 and 0.9 + gap are coupled by an entry of 1. The exact logarithm has the
+    // divided difference of ln, which ln1p(gap/0.9)/gap gives without cancellation.
     for gap in [1e-1, 1e-4, 1e-8, 1e-13] {
         let a = dmatrix![0.9, 1.0; 0.0, 0.9 + gap];
         let actual_gap = a[(1, 1)] - 0.9;
@@ -85,8 +87,9 @@ fn nearly_defective_matrices_are_as_accurate_as_their_conditioning_allows() {
             0.9f64.ln(), (actual_gap / 0.9).ln_1p() / actual_gap; 0.0, (0.9 + gap).ln()
         ];
         assert!(error(&log, &expected) < 1e-14, "gap {gap}: {log} {expected}");
-        // The same turned out of its triangular shape: Schur sees the gap only to √ε, but
-        // the logarithm is not sensitive to it (its condition number here is below 10).
+        // In rotated coordinates the same matrix is not triangular. The Schur form has the gap only
+        // to √ε, but the logarithm is not sensitive to the gap (its condition number here is below
+        // 10).
         let q = random(2, 3).qr().q();
         let turned = &q * &a * q.transpose();
         let expected = &q * expected * q.transpose();
@@ -102,7 +105,7 @@ fn matrices_close_to_the_identity_keep_their_relative_accuracy() {
         // This is the step after `a` was rounded to doubles.
         let x = &a - DMatrix::identity(4, 4);
         let series = &x - &x * &x / 2.0 + &x * &x * &x / 3.0 - &x * &x * &x * &x / 4.0;
-        // The series stops at x⁵/5, a share of size⁴ of the first term.
+        // The first omitted term of the series is x⁵/5, about size⁴ times the first term.
         let bound = 1e-14 + 10.0 * size.powi(4);
         assert!(error(&logarithm(&a).unwrap(), &series) < bound, "size {size}");
     }
@@ -128,7 +131,8 @@ proptest! {
 
     #[test]
     fn the_exponential_undoes_the_logarithm(size in 1usize..12, seed in 0u64..10_000) {
-        // Eigenvalues of the exponent within the unit disc times √size: inside ±iπ.
+        // The imaginary parts of the eigenvalues of the exponent are within ±π, so that the
+        // exponent is the principal logarithm.
         let exponent = random(size, seed);
         let a = exponential(&exponent);
         let log = logarithm(&a).unwrap();

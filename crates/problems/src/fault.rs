@@ -174,7 +174,7 @@ fn delayed(record: &Record, samples: f64) -> Result<Record, ProblemError> {
     Ok(Spectrum::from_lines(record.sampling(), lines)?.to_record()?)
 }
 
-/// Repeats the row before `first` for a number of samples.
+/// Overwrites `samples` rows from `first` on with the row before `first`.
 fn hold(data: &mut DMatrix<f64>, first: usize, samples: usize) {
     for k in first..(first + samples).min(data.nrows()) {
         let last = data.row(first - 1).into_owned();
@@ -197,7 +197,7 @@ mod tests {
         Record::from_channels(sampling, &[a.channel(0), b.channel(0)]).unwrap()
     }
 
-    /// Judge: what each fault is, line by line of the spectrum or sample by sample.
+    /// Judge: the definition of each fault, for each line of the spectrum or for each sample.
     #[test]
     fn faults_are_what_they_say() {
         let clean = two_sines();

@@ -1,4 +1,5 @@
-//! An oscillator with a nonlinear, changing or hidden part, integrated by a separate rule.
+//! An oscillator with a nonlinear spring, friction, a changing stiffness or a hidden mass,
+//! integrated by its own Runge–Kutta rule.
 
 use std::f64::consts::TAU;
 
@@ -7,8 +8,9 @@ use nalgebra::Complex;
 
 use crate::error::ProblemError;
 
-/// An oscillator under a force of many lines. The classical Runge–Kutta rule integrates the motion
-/// at eight times the sampling rate. With all faults zero the oscillator is linear.
+/// An oscillator under a force of many lines. The force is computed at eight times the sampling
+/// rate, and the classical Runge–Kutta rule integrates the motion in four steps per sample of the
+/// record. With all faults zero the oscillator is linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaultyOscillator {
     /// Mass, in kg.
@@ -17,7 +19,8 @@ pub struct FaultyOscillator {
     pub damping: f64,
     /// Stiffness, in N/m.
     pub stiffness: f64,
-    /// Relative change of the stiffness from the first sample to the last (pure number).
+    /// Relative change of the stiffness from the start of the motion to the last sample (pure
+    /// number).
     pub drift: f64,
     /// Cubic stiffness of the spring, in N per cubed displacement in m.
     pub cubic: f64,
@@ -25,12 +28,12 @@ pub struct FaultyOscillator {
     pub friction: f64,
     /// Unmeasured mass, in kg, on a separate spring.
     pub hidden_mass: f64,
-    /// Natural frequency of that mass on its spring, in Hz.
+    /// Natural frequency of the unmeasured mass on its spring, in Hz.
     pub hidden_hz: f64,
 }
 
 impl FaultyOscillator {
-    /// Number of computed samples per sample of the record.
+    /// Number of computed samples of the force per sample of the record.
     const FINER: usize = 8;
     /// Damping ratio of the hidden mass.
     const HIDDEN_DAMPING: f64 = 0.01;
@@ -112,7 +115,7 @@ impl FaultyOscillator {
     }
 
     /// Returns the time derivatives of displacement and velocity, then those of the hidden mass;
-    /// `elapsed` rises from −½ to ½ over the record.
+    /// `elapsed` rises from −½ at the start of the motion to ½ at its end.
     fn rate(&self, force: f64, elapsed: f64, [x, v, y, w]: [f64; 4]) -> [f64; 4] {
         let omega = TAU * self.hidden_hz;
         let (spring, damper) = (omega * omega, 2.0 * Self::HIDDEN_DAMPING * omega);

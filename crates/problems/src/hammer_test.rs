@@ -26,7 +26,7 @@ pub struct HammerTest {
     pub sampling: Sampling,
     /// Quantity of the response.
     pub quantity: ResponseQuantity,
-    /// Number of hits, at equal distances with a random part.
+    /// Number of hits, at equal time intervals plus a random part.
     pub hits: usize,
     /// Mean peak of the hits, in N.
     pub peak: f64,
@@ -234,7 +234,8 @@ impl Oscillator {
         }
     }
 
-    /// Returns displacement and velocity `t` seconds after a sine of force began at rest.
+    /// Returns displacement and velocity `t` seconds after the beginning of a sine of force; before
+    /// it the oscillator is at rest.
     fn to_sine(&self, pulse: &Pulse, t: f64) -> [f64; 2] {
         if t <= 0.0 {
             return [0.0; 2];

@@ -71,7 +71,8 @@ pub struct Test {
     pub system: SecondOrderSystem,
     /// True if M is known in the identification.
     pub mass_known: bool,
-    /// Numbers of the driven lines and, above them, of an equal number of lines without force.
+    /// Numbers of the driven lines; above them, the period has about the same number of lines
+    /// without force.
     pub lines: Vec<usize>,
     /// Force (N), samples × dof, one period.
     pub force: Record,

@@ -1,8 +1,8 @@
 //! Records of the Silverbox, a public benchmark that is not part of the project.
 //!
 //! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear system
-//! identification", ECC 2013. An electronic circuit with the equation of a mass on a hardening
-//! spring; force and displacement in volts.
+//! identification", ECC 2013. The Silverbox is an electronic circuit with the equation of a mass on
+//! a hardening spring; force and displacement are in volts.
 
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub fn start_of(realisation: usize) -> usize {
     8692 * realisation + 337
 }
 
-/// Returns one channel of some samples.
+/// Returns one channel of the samples `start .. start + len`.
 pub fn part(record: &Record, channel: usize, start: usize, len: usize) -> Record {
     let window = record.window(start, len).unwrap();
     Record::from_channel(window.sampling(), window.channel(channel).to_vec()).unwrap()

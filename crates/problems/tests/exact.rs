@@ -11,7 +11,8 @@ use nalgebra::{Complex, DMatrix, DVector, dmatrix, dvector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Conditioning of the modal matrices of these small systems is below about 10⁴, times ε.
+/// Tolerance of a modal superposition: the condition number of the modal matrices, below about 10⁴
+/// for these small systems, times ε.
 const MODAL: f64 = 1e-11;
 
 fn random_force(dof: usize, len: usize, dt: f64) -> Record {
@@ -34,15 +35,15 @@ fn gap(p: &Response, q: &Response) -> f64 {
         .max(relative(p.acceleration(), q.acceleration()))
 }
 
-/// The same force repeated `times` times.
+/// Returns the force repeated `times` times.
 fn repeated(force: &Record, times: usize) -> Record {
     let (len, dof) = (force.len(), force.channels());
     let data = DMatrix::from_fn(len * times, dof, |k, j| force.data()[(k % len, j)]);
     Record::new(force.sampling().with_len(len * times).unwrap(), data).unwrap()
 }
 
-/// Superposition of the 2n complex modes: q̇ = λ q + b F, each integrated by hand for a force
-/// that runs from its left to its right value.
+/// Returns the superposition of the 2n complex modes q̇ = λ q + b F, each integrated in closed form
+/// for a force that changes linearly from its left to its right value.
 fn by_modes(
     system: &SecondOrderSystem,
     force: &Record,
@@ -138,7 +139,8 @@ fn periodic_motions_repeat_and_attract() {
     ];
     for (periodic, started) in pairs {
         let steady = periodic(&system, &force).unwrap();
-        // The slowest mode decays by exp(−0.1869·2π·3.17·1.28) < 0.01 per period: 12 periods.
+        // The slowest mode decays by exp(−0.1869·2π·3.17·1.28) < 0.01 per period, so that 12
+        // periods are enough.
         let long = started(&system, &repeated(&force, 12), &some_state(2)).unwrap();
         let last = |r: &Record| r.window(11 * 128, 128).unwrap();
         let last = Response::new(
@@ -153,7 +155,7 @@ fn periodic_motions_repeat_and_attract() {
 
 #[test]
 fn very_light_damping_still_closes() {
-    // ζ = 1e-6: waiting would take a hundred thousand periods.
+    // With ζ = 1e-6, the transient would last a hundred thousand periods.
     let system = SecondOrderSystem::new(dmatrix![1.0], dmatrix![2e-5], dmatrix![100.0]).unwrap();
     let force = random_force(1, 64, 0.013);
     let steady = exact_zoh_periodic(&system, &force).unwrap();
@@ -193,8 +195,8 @@ fn a_prescribed_motion_is_found_from_its_force() {
         let expected = Response::new(record(0), record(1), record(2)).unwrap();
         let found = exact_harmonic_periodic(&system, &record(3)).unwrap();
         assert!(gap(&found, &expected) < 1e-12, "len {len}");
-        // A motion that starts on the periodic one stays there; any other starts at its given
-        // state.
+        // A motion that starts in the periodic state is periodic; any other motion starts in its
+        // given state.
         let on = InitialState::new(rows[0][0].clone(), rows[0][1].clone()).unwrap();
         assert!(gap(&exact_harmonic(&system, &record(3), &on).unwrap(), &expected) < 1e-12);
         let off = exact_harmonic(&system, &record(3), &some_state(3)).unwrap();
@@ -205,8 +207,9 @@ fn a_prescribed_motion_is_found_from_its_force() {
 
 #[test]
 fn the_three_conventions_meet_on_a_fine_grid() {
-    // One cosine, 2,000 samples a period: the linear force is wrong by (ωΔt)²/12 of the amplitude,
-    // the held force by ωΔt/2; the next terms are smaller by a factor (ωΔt)² ≈ 1e-5.
+    // The force is a cosine with 2,000 samples per period. The error of the linear force is
+    // (ωΔt)²/12 of the amplitude, that of the held force ωΔt/2; the next terms are smaller by a
+    // factor of (ωΔt)² ≈ 1e-5.
     let system = steffen_rade();
     let sampling = Sampling::new(5e-4, 2000).unwrap();
     let data = DMatrix::from_fn(2000, 2, |k, j| {
@@ -229,7 +232,7 @@ fn gap_of_displacement(p: &Response, q: &Response) -> f64 {
 
 #[test]
 fn an_undamped_line_has_no_periodic_motion() {
-    // ω = 3 exactly on line 3 of a period of 2π.
+    // The natural frequency of 3 rad/s is exactly on line 3 of a period of 2π s.
     let system = SecondOrderSystem::new(dmatrix![1.0], dmatrix![0.0], dmatrix![9.0]).unwrap();
     let force = random_force(1, 100, std::f64::consts::TAU / 100.0);
     for periodic in [exact_zoh_periodic, exact_foh_periodic] {

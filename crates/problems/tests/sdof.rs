@@ -1,5 +1,5 @@
-//! Two independent exact answers for one degree of freedom: the matrix exponential here, the
-//! divided differences of the closed forms in `mechid-model`.
+//! Two independent exact answers for one degree of freedom: the matrix exponential of this crate,
+//! and the divided differences of the closed forms in `mechid-model`.
 
 use mechid_model::{InitialState, Response, Sdof};
 use mechid_problems::{
@@ -22,7 +22,8 @@ proptest! {
 
     #[test]
     fn sampled_forces_have_one_answer(
-        // Undamped to heavily overdamped, 1,000 to 1 samples per natural period.
+        // The systems are undamped to heavily overdamped, with 1 to 1,000 samples per natural
+        // period.
         log_zeta in -4.0..2.0f64, log_period in 0.0..3.0f64,
         force in prop::collection::vec(-10.0..10.0f64, 2..80),
         x0 in -0.1..0.1f64, v0 in -1.0..1.0f64,
@@ -32,7 +33,8 @@ proptest! {
         let dt = std::f64::consts::TAU / 20.0 / 10f64.powf(log_period);
         let force = Record::from_channel(Sampling::new(dt, force.len()).unwrap(), force).unwrap();
         let start = InitialState::new(dvector![x0], dvector![v0]).unwrap();
-        // ẍ = (F − c ẋ − k x)/m cancels; with ζ = 100 it loses two or three digits more.
+        // ẍ = (F − c ẋ − k x)/m suffers from cancellation; with ζ = 100 it loses two or three more
+        // digits.
         let tolerance = 1e-12 * (1.0 + 10.0 * zeta);
         let held = sdof.held_force_response(&force, x0, v0).unwrap();
         prop_assert!(gap(&held, &exact_zoh(&sdof.system(), &force, &start).unwrap()) < tolerance);

@@ -125,7 +125,7 @@ mod tests {
                 }
             }
         }
-        // One overload of a hammer.
+        // One clipped hit of a hammer.
         let blow = |k: usize| if k < 20 { (TAU * k as f64 / 40.0).sin().min(0.7) } else { 0.0 };
         let hammer: Vec<f64> = (0..500).map(blow).collect();
         assert_eq!(clipping(&hammer).unwrap().level, 0.7);
@@ -142,7 +142,7 @@ mod tests {
             let held: Vec<f64> = x.iter().flat_map(|x| [*x; 8]).collect();
             assert_eq!(clipping(&held), None, "seed {seed}");
         }
-        // A slow sine through a coarse converter rests on its greatest value.
+        // A slow sine behind a coarse converter has many equal samples at its largest value.
         let slow: Vec<f64> = (0..5000).map(|k| (TAU * k as f64 / 1000.0).sin()).collect();
         for step in [0.2, 0.01, 0.001, 0.0001] {
             assert_eq!(clipping(&converted(&slow, step)), None, "step {step}");
@@ -150,7 +150,7 @@ mod tests {
         let binary = Prbs::new(7, 2.0, 5).unwrap();
         let binary = binary.sample(Sampling::new(0.01, 127 * 5).unwrap()).unwrap();
         assert_eq!(clipping(binary.channel(0)), None);
-        // One blow, then rest.
+        // One hit without clipping, and then zero force.
         let blow = |k: usize| if k < 20 { (TAU * k as f64 / 40.0).sin() } else { 0.0 };
         assert_eq!(clipping(&(0..500).map(blow).collect::<Vec<_>>()), None);
         for few in [&[][..], &[1.0], &[2.0; 50]] {

@@ -14,11 +14,11 @@ use crate::spectrum::Spectrum;
 /// A driven line has at least a thousandth of the amplitude of the strongest one, and exceeds the
 /// noise:
 ///
-/// - In several periods the noise is the part that changes from one to the next. The periodic part
+/// - In several periods the noise is the part that changes from period to period. The periodic part
 ///   is compared with the median scatter of the 33 lines around it by Fisher's test, at a level of
 ///   0.1 % for all lines of the record together.
-/// - In a single period the noise is the weakest lines (at least 16) if there is a gap above them:
-///   no line within a factor of 3 in amplitude.
+/// - In a single period the weakest lines (at least 16) are the noise if a gap is above them: a
+///   factor of 3 in amplitude without a line.
 ///
 /// If the driven lines have less than half of the power of each channel, because the excitation is
 /// random or the period is wrong, all lines above a thousandth of the strongest amplitude count.
@@ -151,8 +151,8 @@ mod tests {
         }
     }
 
-    /// Line 40 has a hundredth of the others: in noise of 1 % only its mean over many periods is
-    /// significant.
+    /// The amplitude of line 40 is a hundredth of the amplitude of the other lines. With noise of 2
+    /// %, line 40 is significant only in the mean over many periods.
     #[test]
     fn many_periods_bring_a_weak_line_out() {
         let sampling = Sampling::new(1.0 / 128.0, PERIOD).unwrap();
@@ -180,7 +180,7 @@ mod tests {
         let random = add_white(&zero, NoiseLevel::StandardDeviation(1.0), 3).unwrap();
         assert!(driven_lines(&random, PERIOD).unwrap().len() > 120);
         assert!(driven_lines(&random, 4 * PERIOD).unwrap().len() > 500);
-        // The power of a multisine spreads over other lines in windows of another length.
+        // If the window is not a period, the power of a multisine spreads over other lines.
         let record = noisy(&[4, 9, 16, 25, 36, 49, 64], 4, 0.01, 1);
         assert!(driven_lines(&record, 190).unwrap().len() > 80);
     }

@@ -79,8 +79,8 @@ fn levels(powers: &[f64]) -> Vec<f64> {
     powers.rchunks_exact(limits::FLOOR_LINES).map(mean).collect()
 }
 
-/// Returns the mean level of the highest lines, as far as their level is flat; `None` if there are
-/// too few such lines or if the signal drives them.
+/// Returns the mean level of the highest lines, down to the line at which the level is no longer
+/// flat; `None` if these lines are too few or if the signal drives them.
 fn even_level(levels: &[f64]) -> Option<f64> {
     let strongest = levels.iter().copied().fold(0.0, f64::max);
     let mut equal = 0;
@@ -109,8 +109,7 @@ mod tests {
     use crate::noise;
     use crate::noise::NoiseLevel;
 
-    /// A force up to 0.35 of the sampling rate, from a random one whose higher lines are cut off,
-    /// with noise.
+    /// Returns a random force without lines above 0.35 of the sampling rate, with added noise.
     fn force(samples: usize, level: f64, seed: u64) -> Record {
         let period = Sampling::new(0.002, 4 * samples).unwrap();
         let mut lines =
@@ -144,7 +143,7 @@ mod tests {
         let sampling = Sampling::new(0.002, 4096).unwrap();
         let white = noise::white(sampling, 1, 1.0, 1).unwrap();
         assert_eq!(noise_above_band(&white).unwrap(), [None]);
-        // Few samples, or a spectrum that falls over the whole band, give no level.
+        // A short record, or a spectrum that decreases over the whole band, gives no level.
         let short = noise::white(Sampling::new(0.002, 128).unwrap(), 1, 1.0, 1).unwrap();
         assert_eq!(noise_above_band(&short).unwrap(), [None]);
         let falling =

@@ -12,7 +12,7 @@ use crate::spectrum::Spectrum;
 
 /// A periodic signal F(t) = Σ A_n cos(n ω0 t + φ_n), known exactly at any t.
 ///
-/// The fundamental ω0 is not part of it: the same multisine serves any period.
+/// The multisine does not contain the fundamental ω0, so that it can be used with any period.
 ///
 /// ```
 /// use mechid_signal::{Multisine, Phases, Sampling, lines};
@@ -193,7 +193,8 @@ impl Multisine {
 
     /// Root mean square over a period, √(Σ A_n² / 2).
     pub fn rms(&self) -> f64 {
-        // Amplitudes relative to the largest: squares of very large or small ones overflow.
+        // The amplitudes are divided by the largest one, because squares of very large or very
+        // small amplitudes overflow or underflow.
         let largest = self.amplitudes.iter().fold(0.0_f64, |m, a| m.max(*a));
         if largest == 0.0 {
             return 0.0;
@@ -224,7 +225,8 @@ impl Multisine {
 
     /// Samples one period on a fine grid.
     fn fine_period(&self) -> Vec<f64> {
-        // Lines 10, 20, 30 have the waveform of lines 1, 2, 3: the shortest period is enough.
+        // Lines 10, 20, 30 have the waveform of lines 1, 2, 3, so that the shortest period is
+        // enough.
         let common = self.lines.iter().fold(0, |d, n| gcd(d, *n));
         let lines: Vec<usize> = self.lines.iter().map(|n| n / common).collect();
         let last = lines[lines.len() - 1];

@@ -142,8 +142,7 @@ pub fn add(
 }
 
 /// Returns white noise shaped in frequency. The samples are the first half of a period of twice the
-/// length, because the two ends of a whole period match, but the two ends of a record of noise do
-/// not.
+/// length: the end of a whole period continues at its beginning, which a record of noise does not.
 fn power_law(
     sampling: Sampling,
     exponent: f64,
@@ -247,7 +246,7 @@ mod tests {
         assert!(add_white(&r, NoiseLevel::SnrDb(f64::NAN), 0).is_err());
     }
 
-    /// Mean over many records of E(x_k x_{k+lag}), in units of the variance asked for.
+    /// Mean of x_k x_{k+lag} over many records, relative to the requested variance.
     fn correlation(colour: Colour, lag: usize) -> f64 {
         let r = coloured(axis(64), 4000, 3.0, colour, 8).unwrap();
         let product = |c: usize| r.channel(c)[20] * r.channel(c)[20 + lag];
@@ -284,15 +283,16 @@ mod tests {
         for exponent in [0.0, 1.0, 2.0] {
             let r = coloured(axis(4096), 40, 1.0, Colour::PowerLaw { exponent }, 2).unwrap();
             let spectrum = Spectrum::from_record(&r.without_mean());
-            // Power of two octave bands three octaves apart, far from both ends.
+            // Power of two octave bands, three octaves apart and far from both ends of the
+            // spectrum.
             let power = |from: usize| {
                 let lines = spectrum.lines().rows(from, from);
                 lines.iter().map(|z| z.norm_sqr()).sum::<f64>()
             };
             let fall = (power(64) / power(512)).log2() / 3.0;
-            // An octave band of density 1/f^a carries 2^(1 − a) times the power of the next
-            // lower one. 40 · 64 lines: each band scatters by 2 %; a slope of 2 leaks a little
-            // because the record is not a period.
+            // With a density of 1/f^a, an octave band has 2^(1 − a) times the power of the next
+            // lower band. Over 40 · 64 lines the power of each band scatters by 2 %. With an
+            // exponent of 2 there is some leakage, because the record is not a period.
             assert!((fall - (exponent - 1.0)).abs() < 0.06, "{exponent}: {fall}");
         }
     }

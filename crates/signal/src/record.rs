@@ -209,7 +209,7 @@ impl Record {
 
 /// Position of the first NaN or infinity.
 ///
-/// Works block by block without a branch inside, so that the check of a finite record runs at
+/// The search has no branch within a block of values, so that the check of a finite record runs at
 /// memory speed.
 fn first_unusable(values: &[f64]) -> Option<usize> {
     const BLOCK: usize = 1024;
@@ -264,7 +264,7 @@ mod tests {
         assert_eq!(e, SignalError::Length { channel: 1, got: 1, expected: 2 });
         let e = Record::from_channels(s, &[[1.0, 2.0], [0.0, f64::INFINITY]]).unwrap_err();
         assert_eq!(e, SignalError::NotFinite { sample: 1, channel: 1, value: f64::INFINITY });
-        // The first of two, far from the beginning.
+        // The record has two such values far from its beginning; the error names the first.
         let mut long = DMatrix::zeros(3000, 2);
         (long[(2500, 1)], long[(2999, 1)]) = (f64::NEG_INFINITY, f64::NAN);
         let e = Record::new(Sampling::new(0.1, 3000).unwrap(), long).unwrap_err();

@@ -76,8 +76,9 @@ pub fn repetition(samples: &[f64]) -> Option<Repetition> {
     (!grows_or_decays(&centred, period)).then_some(repetition)
 }
 
-/// Returns the lags of the minima of the difference, one for each run of lags that are `alike`,
-/// from `first` on: a slow signal also resembles itself at the lags around its period.
+/// Returns the lags of the minima of the difference, from `first` on, one for each run of lags that
+/// are `alike`. A slow signal also resembles itself at the lags around its period, so that a run
+/// has several lags.
 fn valleys(
     differences: &[f64],
     first: usize,
@@ -176,7 +177,7 @@ mod tests {
             assert_eq!(found.period, period);
             assert!(found.mismatch < 1e-14, "{}", found.mismatch);
         }
-        // A record that ends within its third period.
+        // The record ends within its third period.
         let whole = multisine(100, 3);
         assert_eq!(repetition(&whole.channel(0)[..253]).unwrap().period, 100);
         // Alternating signs repeat after two samples.
@@ -190,8 +191,8 @@ mod tests {
             let noisy = add_white(&clean, NoiseLevel::FractionOfRms(part), 7).unwrap();
             let found = repetition(noisy.channel(0)).unwrap();
             assert_eq!(found.period, 200, "noise of {part}");
-            // Noise adds to both: part/√(1 + part²). The standard error of 1800 pairs is 1/√3600 of
-            // it.
+            // Noise increases both the difference and the RMS, so that the mismatch is part/√(1 +
+            // part²). With 1800 pairs its relative standard error is 1/√3600.
             let expected = part / (1.0 + part * part).sqrt();
             assert!((found.mismatch / expected - 1.0).abs() < 0.07, "{}", found.mismatch);
         }
@@ -238,8 +239,8 @@ mod tests {
         }
     }
 
-    /// A modulation with three eighths and with one and a half of a period: each cycle has another
-    /// amplitude.
+    /// The record has three eighths, or one and a half, of a period of the modulation, so that each
+    /// cycle has another amplitude.
     #[test]
     fn a_modulated_vibration_does_not_repeat_within_its_modulation() {
         for depth in [0.1, 0.3, 0.9] {
@@ -250,7 +251,7 @@ mod tests {
                 };
                 let record: Vec<f64> = (0..1000).map(wave).collect();
                 assert_eq!(repetition(&record), None, "{depth}, {hz} Hz, {modulation_hz} Hz");
-                // Whole modulations repeat, after each of them.
+                // A long record repeats after a whole number of periods of the modulation.
                 let long: Vec<f64> = (0..16_000).map(wave).collect();
                 let found = repetition(&long).unwrap();
                 let cycles = found.period as f64 * modulation_hz / 1000.0;
@@ -259,8 +260,8 @@ mod tests {
         }
     }
 
-    /// A period of 76.1 samples: after 76 samples the next period agrees, the fortieth does not;
-    /// after ten times 76.1 all agree.
+    /// A period of 76.1 samples: at multiples of 76 samples the first periods agree, but the
+    /// fortieth does not; at multiples of 761 samples all periods agree.
     #[test]
     fn a_period_that_only_neighbours_share_is_none() {
         let turn = |k: usize| std::f64::consts::TAU * k as f64 / 76.1;
@@ -279,7 +280,7 @@ mod tests {
         assert_eq!(repetition(noise.channel(0)), None);
         let ramp: Vec<f64> = (0..1000).map(f64::from).collect();
         assert_eq!(repetition(&ramp), None);
-        // One period and a half does not repeat once in full.
+        // One and a half periods are less than the two periods that are necessary.
         assert_eq!(repetition(&multisine(100, 2).channel(0)[..150]), None);
         for few in [&[][..], &[1.0], &[2.0; 50]] {
             assert_eq!(repetition(few), None);

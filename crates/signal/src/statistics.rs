@@ -30,7 +30,7 @@ pub struct RunningStatistics {
     count: usize,
     sum: f64,
     /// Σ x² divided by the square of [`power_of_two`] of the peak. The division prevents overflow
-    /// and underflow; a change to the scale of another peak is exact.
+    /// and underflow. If the peak changes, the conversion to the new scale is exact.
     squares: f64,
     /// Σ (x − mean)², scaled as `squares`.
     centred_squares: f64,
@@ -241,7 +241,7 @@ mod tests {
             merged.merge(&RunningStatistics::from_samples(part).unwrap()).unwrap();
         }
         let (_, deviation) = two_pass(&all);
-        // Samples of this size are themselves rounded to 1e-7 of the deviation.
+        // The rounding of samples of this size is 1e-7 of the standard deviation.
         assert!((merged.standard_deviation() / deviation - 1.0).abs() < 1e-7);
         assert!((merged.standard_deviation() - 0.5_f64.sqrt()).abs() < 1e-3);
     }

@@ -1,7 +1,7 @@
 //! Fast Fourier transforms of real samples, planned once for each length.
 //!
-//! Every crate that names a planner compiles all of its algorithms again; these functions compile
-//! them only in this crate.
+//! Every crate that uses a planner compiles all algorithms of the planner again; with these
+//! functions they are compiled only in this crate.
 
 use std::sync::Arc;
 
@@ -17,8 +17,8 @@ pub fn forward(len: usize) -> Arc<dyn RealToComplex<f64>> {
     RealFftPlanner::new().plan_fft_forward(len)
 }
 
-/// Plans the transform of `len / 2 + 1` lines to `len` samples, without scaling: [`forward`] and
-/// back multiplies by `len`.
+/// Plans the transform of `len / 2 + 1` lines to `len` samples, without scaling: [`forward`]
+/// followed by this transform multiplies the samples by `len`.
 ///
 /// # Source
 /// The crates `realfft` and `rustfft`.

@@ -12,8 +12,9 @@ use crate::study::accelerations::{found, row};
 
 #[test]
 fn the_force_is_found_in_the_band_that_they_show() {
-    // At the lower end of the band, noise is as large as the force, by the choice of this end. Some
-    // of the 307 lines make 10 %, and more if stiff springs or far masses let the noise through.
+    // The band begins where the noise is as large as the force. Some of the 307 lines, near this
+    // end, cause an error of 10 %, and a larger error if stiff springs or distant masses amplify
+    // the noise.
     for (dof, hz, level, most) in
         [(1, 1.0, 0.01, 0.1), (1, 40.0, 0.01, 0.35), (2, 40.0, 0.001, 0.2), (3, 1.0, 0.05, 0.5)]
     {
@@ -24,7 +25,7 @@ fn the_force_is_found_in_the_band_that_they_show() {
             assert!((100.0..400.0).contains(&one.size), "{what}: {:.0} N", one.size);
             assert!(one.band_hz[0] > 0.0 && one.band_hz[0] < 30.0, "{what}: {:?}", one.band_hz);
         }
-        // Four records of some hundred independent errors each.
+        // The four records have some hundred independent errors each.
         let held = all.iter().map(|one| one.held).sum::<f64>() / 4.0;
         assert!((0.88..0.995).contains(&held), "{dof} masses, {hz} Hz, {level}: {held:.3}");
     }
@@ -94,7 +95,7 @@ fn a_band_that_is_asked_for_is_the_one_returned() {
     let (truth, [_, displacements]) = period(&system);
     let band_hz = [5.0, 12.0];
     let banded = displacements.in_band(band_hz).unwrap();
-    // Of lines 1.5, 10 and 15.5 Hz the middle one.
+    // Only the line at 10 Hz is in the band; the lines at 1.5 and 15.5 Hz are not.
     let expected = within_band(&truth, band_hz, Extent::WholePeriod).unwrap();
     let filter = Filter::Shrinkage;
     let found =

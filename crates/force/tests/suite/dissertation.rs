@@ -65,7 +65,7 @@ fn schemes() -> [(&'static str, Box<dyn Scheme>); 4] {
     ]
 }
 
-/// The same record with sample k + `lead` in the place of sample k, round the period.
+/// Returns the record with sample k + `lead` at index k, with wrap-around at the end of the period.
 fn advanced(record: &Record, lead: usize) -> Record {
     let len = record.len();
     let data =
@@ -73,8 +73,9 @@ fn advanced(record: &Record, lead: usize) -> Record {
     Record::new(record.sampling(), data).unwrap()
 }
 
-/// The sequences that the printed parameters came from: in its central-difference runs the
-/// displacement is one sample ahead of velocity and force, in its Wilson runs the whole response.
+/// Returns the sequences that the printed parameters came from. In the central-difference runs of
+/// the dissertation, the displacement is one sample ahead of velocity and force; in its Wilson
+/// runs, the whole response is one sample ahead of the force.
 fn as_stored(name: &str, response: &Response) -> Response {
     let (x, motion) = match name {
         "central difference" => (1, 0),
@@ -93,7 +94,8 @@ fn range(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, 0.0], |[low, high], v| [low.min(*v), high.max(*v)])
 }
 
-/// Three decimals were kept of the ranges below, some after an earlier rounding.
+/// Tolerance of the ranges below: they were printed with three decimals, some after an earlier
+/// rounding.
 const PRINTED: f64 = 6e-4;
 
 fn assert_range(what: &str, found: [f64; 2], expected: [f64; 2]) {
@@ -172,7 +174,7 @@ fn check_bearing(len: usize, npi: f64, expected: [([f64; 2], f64); 4]) {
         let what = format!("{name}, Nt {len}, NPI {npi}");
         assert_range(&what, range(&ratios), expected);
         let spurious = spurious_ratio(found.spectrum(), &truth, 0, 1, &all).unwrap();
-        // Two decimals were kept.
+        // The values were printed with two decimals.
         assert!((range(&spurious)[1] - largest).abs() < 6e-3, "{what}: {:?}", range(&spurious));
     }
 }
@@ -225,9 +227,9 @@ fn the_force_of_the_bearing_from_512_samples() {
     );
 }
 
-/// With identified parameters the discretised equation is the least-squares row itself without
-/// its force term: F̂ = ρ F + residual, ρ = φ̂_F M/Δt. The estimator leaves φ_F free and Euler's
-/// rule explains the force by the state instead, so ρ is far from 1, and with it F̂.
+/// With identified parameters the discretised equation is the least-squares row itself without its
+/// force term: F̂ = ρ F + residual, ρ = φ̂_F M/Δt. The estimator leaves φ_F free and Euler's rule
+/// explains the force by the state instead, so that ρ is far from 1, and F̂ is far from F.
 #[test]
 fn the_discretised_force_is_a_fraction_of_the_force_and_a_residual() {
     let machine = dissertation_sdof();

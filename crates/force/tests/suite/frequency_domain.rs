@@ -109,7 +109,7 @@ fn a_force_sought_where_none_acts_is_seen_as_spurious() {
         spurious_ratio(found.spectrum(), &Spectrum::from_record(&force), 0, 1, &LINES).unwrap();
     let motion = Spectrum::from_record(&x);
     for (n, ratio) in LINES.into_iter().zip(spurious) {
-        // F̂x − Fx = ΔKxy·Y, of a force of 100 N.
+        // F̂x − Fx = ΔKxy·Y, relative to a force of 100 N.
         let expected = 5.0 * motion.line(n, 1).norm() / 100.0;
         assert!((ratio - expected).abs() < 1e-12, "line {n}");
     }
@@ -219,9 +219,10 @@ fn the_standard_error_is_the_scatter_over_noise() {
         let outside = find(&Noise::OutsideLines);
         measured_level += outside.standard_error().unwrap().data().norm_squared();
     }
-    // 200 draws of 8 real amplitudes know a standard deviation to 1.8 %.
+    // 200 draws of 8 real amplitudes determine a standard deviation to 1.8 %.
     assert!(((seen / stated).sqrt() - 1.0).abs() < 0.06, "{:.3}", (seen / stated).sqrt());
-    // 59 silent lines know the level of one draw to 6 %, the mean of 200 far better.
+    // 59 lines without force determine the noise level of one draw to 6 %, and the mean over 200
+    // draws far better.
     let ratio = (measured_level / stated).sqrt();
     assert!((ratio - 1.0).abs() < 0.02, "{ratio:.3}");
 }

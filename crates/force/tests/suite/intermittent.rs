@@ -44,8 +44,8 @@ fn measured(
     (every(&exact), Measurement::from_record(ResponseQuantity::Acceleration, noisy))
 }
 
-/// The spectrum of a pulse falls like that of a force of low order, which takes all noise as force:
-/// then only 51 % of the intervals contained the force.
+/// The spectrum of a pulse falls like that of a force model of low order, and this model mistakes
+/// all noise for force: with it, only 51 % of the intervals contained the force.
 #[test]
 fn the_error_of_an_impact_is_that_of_its_noise() {
     let runs = 4;

@@ -39,7 +39,7 @@ fn walk(found: &KalmanForce, force: usize) -> f64 {
     found.model.rms[force] * (2.0 * std::f64::consts::TAU * found.model.corner_hz).sqrt()
 }
 
-/// Mean square of the error over the stated standard error, for one degree of freedom.
+/// Mean square of the ratio of the error to the stated standard error, for one degree of freedom.
 fn surprise(found: &KalmanForce, truth: &Record, dof: usize) -> f64 {
     let (record, error) = (found.force.record(), found.force.standard_error().unwrap());
     let parts = (0..truth.len()).map(|k| {

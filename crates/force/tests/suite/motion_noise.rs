@@ -33,7 +33,7 @@ fn response(data: &DMatrix<f64>) -> Response {
     Response::new(part(0), part(2), part(4)).unwrap()
 }
 
-/// Noise of the levels on every channel.
+/// Returns a response that consists of noise only, with the level of each channel.
 fn noisy(samples: usize, seed: u64) -> Response {
     let white = noise::white(Sampling::new(DT, samples).unwrap(), 6, 1.0, seed).unwrap();
     let data = DMatrix::from_fn(samples, 6, |k, c| LEVELS[c / 2][c % 2] * white.channel(c)[k]);

@@ -12,7 +12,8 @@ fn the_excited_lines_stay_near_the_noise_floor() {
     for case in cases() {
         let (found, floor) = (rms_error(&case, frequency_domain), case.floor());
         assert!(found < 1.2 * floor, "{}: {found:.4}, floor {floor:.4}", case.name);
-        // The floor is one: ten realisations of 80 real amplitudes know it to 4 %.
+        // The floor is a lower bound, which ten realisations of 80 real amplitudes determine to 4
+        // %.
         assert!(found > 0.85 * floor, "{}: {found:.4}, floor {floor:.4}", case.name);
     }
 }
@@ -42,7 +43,8 @@ fn assert_printed(header: &str, found: &str) {
     assert!(printed.len() >= found.len(), "run the example noise_study and paste its tables");
     for (old, new) in printed.iter().zip(&found) {
         let same = match (old, new) {
-            // Another libm may move the last digit, and a choice of parameter by one step.
+            // Another mathematical library (libm) may change the last digit, and may move the
+            // chosen parameter by one step.
             (Ok(old), Ok(new)) => (old - new).abs() <= 0.03 * new.abs() + 0.002,
             (old, new) => old == new,
         };
@@ -65,7 +67,7 @@ fn the_likelihood_rule_stays_near_the_best_parameter_as_the_book_prints() {
     for (case, filter, [likelihood, ..]) in &rows {
         let what = format!("{}, {}, {filter}", case.name, case.level);
         assert!(likelihood.mean < 1.3, "{what}: {:.2}", likelihood.mean);
-        // Truncation has no value between one line more and one line less.
+        // Truncation keeps or removes whole lines, so that its best parameter is less well defined.
         let worst = if *filter == "Tikhonov" { 1.3 } else { 1.5 };
         assert!(likelihood.worst < worst, "{what}: {:.2}", likelihood.worst);
     }

@@ -65,7 +65,7 @@ fn stacked(measured: &Measurement, scale: &[f64]) -> DVector<f64> {
     })
 }
 
-/// (GᵀG + λ²D) u = Gᵀy, D without the unknowns of the start.
+/// Solves (GᵀG + λ²D) u = Gᵀy, where D is zero for the unknowns of the initial state.
 fn normal_equations(
     g: &DMatrix<f64>,
     y: &DVector<f64>,
@@ -81,7 +81,8 @@ fn wobble(k: usize, i: usize) -> f64 {
     (0.21 * k as f64 + i as f64).sin() + 0.4 * (0.9 * k as f64).cos()
 }
 
-/// Rounding of the normal equations: condition about 1e6 at the λ used, times 1e-16, and room.
+/// Rounding of the normal equations: a condition number of about 1e6 at the λ used, times 1e-16,
+/// with a margin.
 const ROUNDING: f64 = 1e-8;
 
 fn assert_same(found: &Record, forced: &[usize], expected: &DVector<f64>) {
@@ -139,7 +140,7 @@ fn with_starts(system: &SecondOrderSystem, g: DMatrix<f64>, scale: &[f64]) -> DM
 fn whole_periods_solve_their_normal_equations() {
     for (dof, forced) in [(1, vec![0]), (3, vec![2]), (3, vec![2, 0])] {
         let system = random_stable(dof, 11);
-        // An odd length has no Nyquist line: its lines are all there is.
+        // An odd length has no Nyquist line, so that the lines contain the whole force.
         let (len, scale) = (31, [1e-4, 2e-1]);
         let truth = force(len, dof, &forced, wobble);
         let answer = |f: &Record| exact_harmonic_periodic(&system, f).unwrap();
@@ -177,7 +178,7 @@ fn truncation_that_drops_nothing_is_least_squares() {
 
 #[test]
 fn the_standard_error_is_what_is_seen() {
-    // A white force on every line is what the Bayesian reading of Tikhonov's λ assumes.
+    // Tikhonov's λ, as a Bayesian prior, assumes a white force on every line.
     let system = random_stable(2, 5);
     let len = 255;
     for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::Shrinkage] {
@@ -200,7 +201,8 @@ fn the_standard_error_is_what_is_seen() {
             seen += (found.force.record().data() - truth.data()).norm_squared();
             stated += found.force.standard_error().unwrap().data().norm_squared();
         }
-        // 12 × 255 samples know a variance to 3 %; the plug-in values of σ and τ add about 10 %.
+        // 12 × 255 samples determine a variance to 3 %; the plug-in values of σ and τ add about 10
+        // %.
         let ratio = (seen / stated).sqrt();
         assert!((0.85..1.15).contains(&ratio), "{filter:?}: {ratio:.3}");
     }
@@ -293,7 +295,7 @@ fn bad_requests_are_refused_with_their_numbers() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Twice the measurement is twice the force, whichever rule chose the parameter.
+    /// Twice the measurement gives twice the force, for every rule for the parameter.
     #[test]
     fn every_rule_follows_the_scale(
         values in prop::collection::vec(-1.0..1.0f64, 30),

@@ -30,7 +30,7 @@ fn uncertain(names: &[&str], root: &DMatrix<f64>) -> UncertainSystem {
     UncertainSystem::new(bearing(), parameters, root * root.transpose()).unwrap()
 }
 
-/// Correlated, a few per cent each.
+/// Machine whose uncertain entries have correlated errors of a few per cent each.
 fn machine() -> UncertainSystem {
     let root = dmatrix![
         0.3, 0.0, 0.0, 0.0;
@@ -79,8 +79,8 @@ fn the_stated_error_is_the_scatter_over_machines() {
     let response = response();
     let measured =
         Measurement::from_record(ResponseQuantity::Displacement, response.displacement().clone());
-    // 2,000 draws know a standard deviation to 1.6 %; the second order of the regularised
-    // method adds about as much.
+    // 2,000 draws determine a standard deviation to 1.6 %; second-order effects of the regularised
+    // method add about as much.
     let draws = 2000;
     let found = with_uncertain_system(&machine(), |s| continuous(s, &response)).unwrap();
     let seen = scatter(|s| continuous(s, &response).unwrap().record().clone(), draws);
@@ -133,7 +133,8 @@ fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
     let measured =
         Measurement::from_record(ResponseQuantity::Displacement, response().displacement().clone());
     let noise = Noise::PerChannel(vec![1e-3, 2e-3]);
-    // The motions that a force on the second direction makes are in proportion by the first row.
+    // Under a force on the second direction, the first row of the equations gives the ratio of the
+    // two motions.
     let uncertain = uncertain(&["c11", "k12"], &dmatrix![0.2, 0.0; 0.3, 0.4]);
     let rests = |s: &SecondOrderSystem| -> Vec<f64> {
         let found = frequency_domain(s, &measured, &[1], &LINES, &noise).unwrap();
@@ -154,7 +155,7 @@ fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
 
         assert!(channel.rest < 1e-9 * seen);
         let ratio = channel.machine.unwrap() / seen;
-        // The limits are the accuracy of 2,000 draws, and the second order.
+        // The limits allow for the accuracy of 2,000 draws and for second-order effects.
         assert!((ratio - 1.0).abs() < 0.04, "{ratio:.3}");
     }
 }

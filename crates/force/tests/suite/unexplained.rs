@@ -134,8 +134,9 @@ fn noise_leaves_what_its_level_says() {
         let channels = found.unexplained().unwrap();
         sum += channels.iter().map(|c| (c.rest / c.noise.unwrap()).powi(2)).sum::<f64>();
     }
-    // Two channels and one force leave one of two complex numbers per line. χ² of eight degrees of
-    // freedom over eight has a standard deviation of 1/2, its mean over 400 runs one of 0.025.
+    // Two channels and one force leave one of two complex numbers per line. χ² with eight degrees
+    // of freedom, divided by eight, has a standard deviation of 1/2; its mean over 400 runs has a
+    // standard deviation of 0.025.
     let mean = sum / runs as f64;
     assert!((mean - 1.0).abs() < 0.1, "{mean}");
 }
@@ -190,7 +191,7 @@ fn on_open_records_the_rest_is_that_of_the_motion_which_the_force_makes() {
     is_rest_of(&system, found.record(), &measured, found.unexplained().unwrap());
     let found = kalman(&system, &measured, &[0], Start::FromRest, &Tuning::Likelihood).unwrap();
     let channels = found.force.unexplained().unwrap();
-    // The smoother has the motion itself.
+    // The smoother also returns the motion.
     for (c, (channel, described)) in channels.iter().zip(measured.channels()).enumerate() {
         let found = match described.quantity {
             ResponseQuantity::Displacement => &found.displacement,
@@ -203,7 +204,7 @@ fn on_open_records_the_rest_is_that_of_the_motion_which_the_force_makes() {
     assert!(channels.iter().all(|c| c.noise.is_none()));
 }
 
-/// A machine is already in motion without a force: the initial state explains all of it.
+/// A machine is already in motion without a force: the initial state explains the whole motion.
 #[test]
 fn a_motion_at_the_start_is_no_rest() {
     let system = random_stable(3, 4);

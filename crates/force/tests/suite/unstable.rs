@@ -16,7 +16,8 @@ fn falling(rate: f64) -> SecondOrderSystem {
     SecondOrderSystem::new(m, dmatrix![0.0], k).unwrap()
 }
 
-/// A displacement of 25 and 60 rad/s that starts from rest, and its force in closed form.
+/// A displacement with the frequencies 25 and 60 rad/s that starts from rest, and its force in
+/// closed form.
 fn held_up(rate: f64, sampling: Sampling) -> (Measurement, Record) {
     let (w, u) = (25.0, 60.0);
     let x = |t: f64| (w * t).cos() - (u * t).cos() + (w * t).sin() - w / u * (u * t).sin();
@@ -68,7 +69,7 @@ fn the_kalman_smoother_needs_no_more_than_a_step_that_does_not_grow_too_much() {
         let error = relative_error(found.unwrap().force.record(), &force).unwrap();
         assert!(error < 0.01, "{growth}: {error}");
     }
-    // e¹⁵⁰ and e¹⁵⁰⁰ in one step.
+    // The free response grows by e¹⁵⁰ or e¹⁵⁰⁰ in one step.
     for rate in [75_000.0, 750_000.0] {
         let (seen, _) = held_up(rate, sampling);
         let refused = kalman(&falling(rate), &seen, &[0], Start::InMotion, &Tuning::Likelihood);

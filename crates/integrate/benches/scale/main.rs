@@ -1,8 +1,8 @@
 //! Cost of a step and of its preparation for many degrees of freedom and for nonlinear forces.
 //!
-//! Prints times. The last lines are ratios: to a loop written by hand for a chain, of nonlinear
-//! steps to linear ones, and to SciPy if `MECHID_BENCH_PYTHON` names a Python interpreter that has
-//! it.
+//! Prints times. The last lines are ratios of times: a chain against a loop written by hand,
+//! nonlinear steps against linear steps, and SciPy against this crate if `MECHID_BENCH_PYTHON`
+//! names a Python interpreter with SciPy.
 
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
@@ -24,7 +24,7 @@ fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }
 
-/// Something to be timed.
+/// Work that is timed.
 type Job<'a> = Box<dyn FnMut() + 'a>;
 
 fn job<'a, T>(mut run: impl FnMut() -> T + 'a) -> Job<'a> {
@@ -49,7 +49,7 @@ fn seconds<const N: usize>(mut jobs: [Job<'_>; N]) -> [f64; N] {
     fastest
 }
 
-/// Ratio that is shown at the end, and its goal.
+/// Ratio that is printed at the end, and its required value.
 struct Ratio {
     what: String,
     ratio: f64,
@@ -65,7 +65,8 @@ fn chain(n: usize) -> SparseSystem {
     damped(band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]))
 }
 
-/// Returns a grid; if `skew`, it has unsymmetric cross-coupled stiffness like that of seals.
+/// Returns a grid of masses; if `skew`, its stiffness matrix has unsymmetric cross-coupling, like
+/// that of seals.
 fn grid(side: usize, skew: bool) -> SparseSystem {
     let across = if skew { 90.0 } else { 0.0 };
     let at = |i: usize, j: usize| i * side + j;
@@ -192,7 +193,7 @@ fn sparse(ratios: &mut Vec<Ratio>) {
             job(|| ours(&system, &short, dofs)),
             job(|| ours(&system, &long, dofs)),
             job(|| scheme.prepare(&system, DT).expect("stable")),
-            // There is no such loop for a grid; the time measured instead is not shown.
+            // The loop by hand is for chains only; for a grid its time is not printed.
             job(|| by_hand(n, if kind == "chain" { steps } else { 1 })),
         ]);
         let (step, hand) = ((end - begin) / steps as f64, hand / steps as f64);
@@ -221,7 +222,8 @@ fn sparse(ratios: &mut Vec<Ratio>) {
     }
 }
 
-/// Euler–Bernoulli beams in two planes, coupled by spinning: `n` degrees of freedom, 4 a node.
+/// Euler–Bernoulli beams in two planes, coupled by gyroscopic terms: `n` degrees of freedom, 4 for
+/// each node.
 fn rotor(n: usize) -> SparseSystem {
     let nodes = n / 4;
     let (length, stiff, heavy) = (0.1, 2e3, 0.5);
@@ -255,7 +257,7 @@ fn rotor(n: usize) -> SparseSystem {
     SparseSystem::new(m, c, k).expect("regular")
 }
 
-/// Runs Newmark's method on Duffing's oscillator, written by hand: Newton's method on the
+/// Runs Newmark's method on Duffing's oscillator, written by hand: Newton's method solves for the
 /// acceleration, with the tangent, until the equation holds to twelve digits.
 fn duffing_by_hand([m, c, k, cubic]: [f64; 4], force: &[f64]) -> [Vec<f64>; 3] {
     let (h, q) = (0.5 * DT, 0.25 * DT * DT);

@@ -35,7 +35,7 @@ fn empty<const ALL: bool>(len: usize) -> [Vec<f64>; 3] {
     [len, kept, kept].map(|len| vec![0.0; len])
 }
 
-/// The recurrence of the textbooks, average acceleration.
+/// Runs the recurrence of the textbooks with average acceleration.
 fn textbook<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let (m, c, k) = (system.mass()[0], system.damping()[0], system.stiffness()[0]);
     let (dt, f) = (force.sampling().dt(), force.channel(0));
@@ -171,7 +171,8 @@ fn transition_2<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> 
     [xs, vs, accs]
 }
 
-/// Newmark with the dense kernels it needs: two products and one factorised solve per step.
+/// Runs Newmark's method with dense kernels: two products and one solve with existing factors per
+/// step.
 fn dense_newmark<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let (n, len, dt) = (system.dof(), force.len(), force.sampling().dt());
     let (c, k) = (system.damping(), system.stiffness());
@@ -205,7 +206,8 @@ fn dense_newmark<const ALL: bool>(system: &SecondOrderSystem, force: &Record) ->
     [xs, vs, accs]
 }
 
-/// Runge–Kutta with the dense kernels it needs: two products and one factorised solve per stage.
+/// Runs the Runge–Kutta method with dense kernels: two products and one solve with existing factors
+/// per stage.
 fn dense_runge_kutta<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let (n, len, dt) = (system.dof(), force.len(), force.sampling().dt());
     let mass = system.mass().clone().lu();

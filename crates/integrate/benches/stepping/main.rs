@@ -1,4 +1,5 @@
-//! Cost of a step: every scheme against hand-written loops, and how it grows with n.
+//! Cost of a step of every scheme, against hand-written loops, for several numbers of degrees of
+//! freedom n.
 //!
 //! Prints ns per step; the last lines are the ratios to the fastest loop written by hand. All
 //! compared loops run in turn within one run of the program.
@@ -39,7 +40,8 @@ fn schemes() -> Vec<(&'static str, Box<dyn Scheme>)> {
     ]
 }
 
-/// A lightly damped chain of `dof` masses, coupled throughout, |λ| up to about 60 rad/s.
+/// A lightly damped chain of `dof` masses; every mass is coupled to all others, and |λ| is at most
+/// about 60 rad/s.
 fn chain(dof: usize) -> SecondOrderSystem {
     let stiffness = DMatrix::from_fn(dof, dof, |i, j| match i.abs_diff(j) {
         0 => 2000.0,
@@ -65,7 +67,7 @@ fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }
 
-/// Something to be timed, under its name.
+/// Work that is timed, with its name.
 type Timed<'a> = (String, Box<dyn FnMut() + 'a>);
 
 fn timed<'a, T>(name: impl Into<String>, mut run: impl FnMut() -> T + 'a) -> Timed<'a> {
@@ -140,8 +142,8 @@ fn steps<const ALL: bool>(dof: usize, ratios: &mut Vec<Ratio>) {
         "\nn = {dof}, {kept}: ns per step, memory allocated within; ratio to the loop by hand"
     );
     for ((name, _), time) in jobs.iter().zip(&times) {
-        // For more than two degrees of freedom, a scheme is compared with its own sequence of
-        // kernels.
+        // For more than two degrees of freedom, Runge–Kutta schemes are compared with the
+        // Runge–Kutta loop, and all other schemes with the Newmark loop.
         let own = times[usize::from(name.contains("Runge"))];
         let ratio = time / if dof <= 2 { fastest } else { own };
         println!("{name:<42} {time:9.2}   {ratio:5.2}");

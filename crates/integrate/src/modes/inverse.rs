@@ -92,8 +92,9 @@ impl<'a> Inverse<'a> {
     /// Sets the unit of velocities to `omega` (rad/s), if the shift of the operator is zero and the
     /// present unit is far smaller; returns whether the unit was changed.
     ///
-    /// Modes far above the unit have a numerical range of size 1/unit about zero. Until they
-    /// converge, the estimates of their eigenvalues lie anywhere in this range.
+    /// For modes far above the unit, the numerical range of the operator has a size of 1/unit
+    /// around zero. Until these modes converge, the estimates of their eigenvalues lie anywhere in
+    /// this range.
     pub(super) fn suits(&mut self, omega: f64) -> bool {
         let is_far = self.shift == Complex::ZERO
             && omega > limits::VELOCITY_SCALE_RATIO * self.scale

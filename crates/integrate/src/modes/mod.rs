@@ -98,7 +98,8 @@ pub fn sparse_modes(
     let reaches_zero =
         modes.len() < count || modes.last().is_some_and(|last| distance(last) > omega);
     if reaches_zero && Inverse::is_free(system) {
-        // The real part of the inverted operator vanishes at λ = 0.
+        // The real part of the inverted operator vanishes at λ = 0, so that another search must
+        // find the rigid-body modes.
         modes.retain(|mode| !mode.is_rigid_body);
         let lowest = search_modes(system, ModeSearch::Lowest, count.min(limits::RIGID_BODY_MODES))?;
         modes.extend(lowest.into_iter().filter(|mode| mode.is_rigid_body));
@@ -153,7 +154,7 @@ fn search_modes(
             let reach = Reach::new(&candidates, inverse.shift);
             let exhausted = shift > 0 && candidates.iter().all(|mode| mode.converged);
             let modes = merge(candidates, &known, search);
-            // The space is complete: these are all modes of the system.
+            // A complete space contains all modes of the system.
             let complete = space.products == len;
             let usable = modes.iter().take(count).filter(|mode| mode.converged).count();
             let enough = usable == count

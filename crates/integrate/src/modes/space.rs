@@ -16,7 +16,7 @@ pub(super) struct Space {
     basis: Vec<DVector<f64>>,
     /// Column j: products of the basis vectors with the image of basis vector j under the operator.
     columns: Vec<Vec<f64>>,
-    /// Number of images.
+    /// Number of basis vectors to which the operator was applied.
     pub(super) products: usize,
     /// Number of pseudo-random vectors that were added.
     added: usize,
@@ -44,7 +44,8 @@ impl Space {
         }
     }
 
-    /// Subtracts the parts along the basis from `vector`, and returns these parts.
+    /// Subtracts the projections of `vector` on the basis vectors from `vector`, and returns their
+    /// coefficients.
     fn orthogonalise(&self, vector: &mut DVector<f64>) -> Vec<f64> {
         let mut parts = vec![0.0; self.basis.len()];
         for _ in 0..2 {

@@ -108,7 +108,7 @@ impl Member {
                 let largest = values.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
                 let step = limits::TANGENT_DIFFERENCE * if largest > 0.0 { largest } else { 1.0 };
                 values[j] = original + step;
-                // Rounding changes the step, and the difference quotient needs the rounded step.
+                // The difference quotient needs the step after rounding.
                 let step = values[j] - original;
                 self.force.force(time, &self.x, &self.v, &mut self.moved);
                 let values = if of_velocity { &mut self.v } else { &mut self.x };
@@ -277,7 +277,8 @@ impl LocalNewton {
         self.jacobian.fill_with_identity();
         for (mut column, tangent) in self.jacobian.column_iter_mut().zip(self.tangent.column_iter())
         {
-            // Most slopes are zero, because most forces act between few degrees of freedom.
+            // Most entries of the tangent are zero, because each force acts between few degrees of
+            // freedom.
             for (of_one, slope) in self.local.column_iter().zip(tangent.iter()) {
                 if *slope != 0.0 {
                     column.axpy(*slope, &of_one, 1.0);

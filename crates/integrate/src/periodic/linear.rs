@@ -177,7 +177,7 @@ fn by_products(
         start += solution.vector.component_mul(&shooting.scales);
         let size = Shooting::missed(&start.component_div(&shooting.scales));
         let missed = Shooting::missed(&solution.vector) / size;
-        // A correction that is as large as the previous one is only rounding.
+        // A correction of more than a tenth of the previous correction is only rounding.
         let solved = solution.residual <= limits::PERIODIC_GMRES_RESIDUAL;
         if solved
             && (missed <= limits::PERIODIC_GAP
@@ -242,9 +242,9 @@ mod tests {
         Multisine::flat(1..=9, 1.0, Phases::SchroederBinary).unwrap().sample(sampling).unwrap()
     }
 
-    /// Judge: the map of every scheme, formed as a matrix. With the weaker damping nearly half of
-    /// the 140 modes keep a tenth of their motion for a period, so that (I − Φ)⁻¹ multiplies
-    /// rounding.
+    /// Judge: the map of every scheme, formed as a matrix. With the weaker damping, nearly half of
+    /// the 140 modes still have a tenth of their motion after a period, so that (I − Φ)⁻¹ amplifies
+    /// rounding errors.
     #[test]
     fn a_search_finds_what_the_whole_map_gives() {
         let force = record(160);
@@ -276,7 +276,8 @@ mod tests {
         }
     }
 
-    /// A chain that no wall holds: its free motion repeats.
+    /// A free chain: a constant displacement repeats in every period, so that the periodic response
+    /// is not unique.
     #[test]
     fn what_does_not_repeat_is_refused_at_any_size() {
         let mut stiffness = band(400, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);

@@ -76,8 +76,8 @@ impl PeriodicOrbit {
 /// force; to find them, give as many periods of the force. Nonlinear forces that depend on time
 /// must repeat with the force.
 ///
-/// If the number of samples is even, the orbit is found again with twice the step, which shows the
-/// error of its multipliers by the step and takes half as long again.
+/// If the number of samples is even, the orbit is found again with twice the step. The difference
+/// shows the error of the multipliers due to the time step; this takes half as long again.
 ///
 /// Up to 64 degrees of freedom a Newton step costs two passes over the period for each number of
 /// the state. For more degrees of freedom, the derivative of the state over a period is not formed.
@@ -283,7 +283,7 @@ fn nearer(
         let next = state + step.component_mul(&shooting.scales) * part;
         match shooting.gap(&next) {
             Ok(gap) if Shooting::missed(&gap) < missed => return Ok(Some([next, gap])),
-            // The new state is too far away: the equation of a step has no solution there.
+            // The new state is too far away if the equation of a step has no solution.
             Ok(_) | Err(IntegrateError::NotSolved { .. }) => part *= 0.5,
             Err(other) => return Err(other),
         }

@@ -46,8 +46,8 @@ impl<'a> Shooting<'a> {
         (limits::SEARCH_BYTES / bytes).clamp(2, limits::SEARCH_VECTORS)
     }
 
-    /// Returns the state after the start from `guess` and `settling` periods; the last of them
-    /// gives the scales.
+    /// Returns the state after the start from `guess` and `settling` periods; one more pass sets
+    /// the scales.
     pub(crate) fn settle(
         &mut self,
         guess: &InitialState,
@@ -116,8 +116,8 @@ impl<'a> Shooting<'a> {
         gap.iter().fold(0.0, |most, r| if r.abs() <= most { most } else { r.abs() })
     }
 
-    /// Returns the derivative of the state at the end of the period in a direction at its
-    /// beginning, both relative to the scales.
+    /// Returns the derivative of the state at the end of the period in a direction of the state at
+    /// the beginning, both relative to the scales.
     pub(crate) fn derivative(
         &mut self,
         state: &DVector<f64>,

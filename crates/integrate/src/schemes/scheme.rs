@@ -28,7 +28,7 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     fn conventions(&self) -> Vec<Convention>;
 
     /// Returns the instant within each step at which the force must be supplied, as a fraction of
-    /// the step (a pure number); none if its values at the samples are enough.
+    /// the step (a pure number); `None` if the force at the samples is enough.
     fn inner_instant(&self) -> Option<f64> {
         None
     }

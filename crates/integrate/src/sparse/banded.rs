@@ -12,12 +12,14 @@ use crate::sparse::tridiagonal::Tridiagonal;
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.
 #[derive(Debug)]
 pub(crate) struct BandedLu {
-    /// Diagonals below and above the main one in L and U.
+    /// Number of diagonals of L below the main diagonal; `upper` counts those of U above the main
+    /// diagonal.
     lower: usize,
     upper: usize,
     /// The columns of L below the diagonal, `lower` entries each.
     multipliers: Vec<f64>,
-    /// The row that each row was exchanged with when its column was eliminated; empty if none was.
+    /// For each column, the row that was exchanged with the row of the diagonal entry; empty if no
+    /// rows were exchanged.
     exchanges: Vec<u32>,
     /// The columns of U above the diagonal, `upper` entries each, top row first.
     above: Vec<f64>,
@@ -202,8 +204,8 @@ mod tests {
 
     use super::*;
 
-    /// Entries without a pattern in a band of `lower` and `upper` diagonals; small diagonal entries
-    /// where `weak`.
+    /// Returns a matrix of pseudo-random entries in a band of `lower` and `upper` diagonals; its
+    /// diagonal entries are small if `weak`.
     fn random(n: usize, lower: usize, upper: usize, weak: bool) -> CsrMatrix<f64> {
         let mut seed = 7_u64;
         let mut next = || {
@@ -239,7 +241,7 @@ mod tests {
                     ordering.gather(b.as_slice(), there.as_mut_slice());
                     factors.solve(there.as_mut_slice());
                     ordering.scatter(there.as_slice(), b.as_mut_slice());
-                    // Backward stable: small residuals, whatever the condition.
+                    // A backward stable solution has a small residual at any condition number.
                     let residual = (&dense * &b - &dense * &x).amax();
                     let size = dense.amax() * b.amax() * n as f64;
                     assert!(residual <= 1e-14 * size, "n {n}, band {lower} {upper}: {residual:e}");
@@ -250,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_pivot_of_rounding_is_refused() {
-        // The two rows are equal except for the rounding of their terms.
+        // The two rows are equal, so that the second pivot vanishes.
         let matrix = triplets(2, [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 1.0), (1, 1, 2.0)]).unwrap();
         let ordering = Ordering::narrowing(matrix.pattern());
         assert!(BandedLu::new(&matrix, &ordering, &[3.0, 3.0]).is_err_and(|p| p < 1e-15));

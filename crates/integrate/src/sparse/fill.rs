@@ -54,9 +54,10 @@ mod tests {
         let banded = band(50, &[(-4, 1.0), (0, 4.0), (4, 1.0)]);
         assert_eq!(entries(banded.pattern(), &natural), 50 + 2 * 46);
         let banded = band(50, &[(-3, 1.0), (-1, 1.0), (0, 4.0), (1, 1.0), (3, 1.0)]);
-        // All entries of the band except one: no entry above (2, 0) fills it.
+        // All entries of the band become non-zero except (2, 0).
         assert_eq!(entries(banded.pattern(), &natural), 50 + 2 * (49 + 48 + 47 - 1));
-        // A star: eliminated first, its centre binds all others to one another; last, it does not.
+        // A star: if its centre is eliminated first, all other nodes become coupled to one another;
+        // if it is eliminated last, no entry is added.
         let star = (1..50).flat_map(|i| [(0, i, 1.0), (i, 0, 1.0), (i, i, 2.0)]);
         let star = triplets(50, star.chain([(0, 0, 60.0)])).unwrap();
         assert_eq!(entries(star.pattern(), &natural), 50 * 50);

@@ -25,8 +25,8 @@ impl<T> GeneralLu<T>
 where
     T: ComplexField<RealField = f64> + faer::traits::ComplexField,
 {
-    /// Factors `matrix`, whose rows are sums of terms of the given `sizes`, unless the factors need
-    /// more than `limit` bytes.
+    /// Factors `matrix`, unless the factors need more than `limit` bytes. `sizes` has, for each
+    /// row, the sum of the moduli of the terms of its entries.
     pub(crate) fn new(
         mut matrix: CscMatrix<T>,
         sizes: &[f64],
@@ -118,7 +118,7 @@ pub(super) fn pattern<T>(matrix: &CscMatrix<T>) -> SymbolicSparseColMatRef<'_, u
     SymbolicSparseColMatRef::new_checked(matrix.nrows(), matrix.ncols(), offsets, None, rows)
 }
 
-/// Returns the largest modulus; NaN if the vector has one.
+/// Returns the largest modulus; NaN if an entry is NaN.
 fn largest<T: ComplexField<RealField = f64>>(vector: &[T]) -> f64 {
     vector
         .iter()
@@ -136,8 +136,8 @@ mod tests {
     use super::*;
     use crate::sparse::{Ordering, SparseLu, is_positive_definite};
 
-    /// Every degree of freedom bound to a few others far away, so that no order makes a narrow
-    /// band; weak diagonal entries ask for exchanges of rows.
+    /// A matrix that couples every degree of freedom to a few distant ones, so that no order gives
+    /// a narrow band; small diagonal entries make exchanges of rows necessary.
     fn wide(n: usize, diagonal: f64, skew: f64) -> CsrMatrix<f64> {
         let links = (0..n).flat_map(|i| [(i, (i * i + 1) % n), (i, (7 * i + 3) % n)]);
         let entries = links.flat_map(|(i, j)| [(i, j, -1.0 - skew), (j, i, -1.0 + skew)]);

@@ -65,15 +65,15 @@ pub(crate) enum SparseLu {
     },
     /// Factors of a matrix that is symmetric and positive definite.
     Symmetric(Box<CholeskyFactors>),
-    /// Factors of a matrix with a nearly symmetric pattern, and pivots without exchanges.
+    /// Factors without exchanges of rows of a matrix with a nearly symmetric pattern.
     Unsymmetric(Box<UnsymmetricFactors>),
     /// Factors of a matrix of any pattern.
     General(Box<GeneralLu<f64>>),
 }
 
 impl SparseLu {
-    /// Factors `matrix`, whose rows are sums of terms of the given `sizes`, unless the factors need
-    /// more than `limit` bytes.
+    /// Factors `matrix`, unless the factors need more than `limit` bytes. `sizes` has, for each
+    /// row, the sum of the moduli of the terms of its entries.
     pub(crate) fn new(
         matrix: &CsrMatrix<f64>,
         sizes: &[f64],
@@ -134,7 +134,8 @@ impl std::fmt::Debug for SparseLu {
     }
 }
 
-/// Returns Σ scaleᵢ Aᵢ of square matrices of one size, and the size of the terms of each row.
+/// Returns Σ scaleᵢ Aᵢ of square matrices of one size, and for each row the sum of the moduli of
+/// all terms.
 pub(crate) fn combination(terms: &[(f64, &CsrMatrix<f64>)]) -> (CsrMatrix<f64>, Vec<f64>) {
     let n = terms[0].1.nrows();
     let (mut offsets, mut columns, mut values) = (Vec::with_capacity(n + 1), vec![], vec![]);
@@ -166,8 +167,8 @@ pub(crate) fn combination(terms: &[(f64, &CsrMatrix<f64>)]) -> (CsrMatrix<f64>, 
     (matrix, sizes)
 }
 
-/// Returns whether the symmetric `matrix` is positive definite: whether elimination without
-/// exchanges meets positive pivots only.
+/// Returns whether the symmetric `matrix` is positive definite: elimination without exchanges then
+/// has only positive pivots.
 pub(crate) fn is_positive_definite(matrix: &CsrMatrix<f64>) -> bool {
     let ordering = Ordering::narrowing(matrix.pattern());
     if ordering.diagonals(matrix.pattern()) > limits::BAND_DIAGONALS {

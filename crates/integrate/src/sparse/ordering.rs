@@ -123,8 +123,8 @@ impl Graph {
         order
     }
 
-    /// Returns a node at the edge of its component: hardly any node is farther from the other nodes
-    /// of the component.
+    /// Returns a node at the edge of its component: its distance to the farthest node of the
+    /// component is nearly the largest possible one.
     fn peripheral(&self, mut node: u32) -> u32 {
         let mut depth = 0;
         // Each round but the last increases the depth; a few rounds are enough.
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_shuffled_chain_becomes_tridiagonal_again() {
-        // Two chains of 40 with shuffled numbers: 37 is prime to 80.
+        // Two chains of 40 nodes with shuffled numbers: 37 and 80 have no common factor.
         let name = |k: usize| k * 37 % 80;
         let links = (0..79).filter(|k| *k != 39).map(|k| (name(k), name(k + 1), 1.0));
         let pattern = triplets(80, links).unwrap().pattern().clone();

@@ -84,7 +84,7 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// Indices of rows, in rising order.
+/// Indices of rows, in ascending order.
 #[derive(Debug, Clone)]
 struct Rows<'a> {
     joint: std::ops::Range<usize>,
@@ -180,7 +180,8 @@ impl Panels {
 }
 
 impl Panel {
-    /// Returns the number of stored entries: the triangle as a full square, and the rows below it.
+    /// Returns the number of stored entries: a full square that contains the triangle, and the rows
+    /// below it.
     fn entries(self) -> usize {
         self.width as usize * (self.width + self.below) as usize
     }

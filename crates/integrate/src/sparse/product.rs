@@ -7,8 +7,7 @@ use nalgebra_sparse::csr::CsrMatrix;
 /// A matrix in the form with the fastest product: by diagonals, or by rows.
 #[derive(Debug)]
 pub(crate) enum Product {
-    /// Values along diagonals: for each one the column minus the row, the first row, and the
-    /// values.
+    /// Values along diagonals; each diagonal has its first row, its first column and its values.
     Diagonals(Vec<Diagonal>),
     /// Values row by row.
     Rows { starts: Vec<u32>, columns: Vec<u32>, values: Vec<f64> },
@@ -21,19 +20,20 @@ pub(crate) struct Diagonal {
     values: Vec<f64>,
 }
 
-/// Number of rows in one block, so that they stay in the cache.
+/// Number of rows of a block that stays in the cache.
 const BLOCK: usize = 1024;
 
 impl Product {
     pub(crate) fn from_matrix(matrix: &CsrMatrix<f64>) -> Self {
         let n = matrix.nrows();
-        // Index: n − 1 + column − row.
+        // The index of a diagonal is n − 1 + column − row.
         let mut counts = vec![0_usize; 2 * n - 1];
         for (i, j, value) in matrix.triplet_iter() {
             counts[n - 1 + j - i] += usize::from(*value != 0.0);
         }
         let used: Vec<usize> = (0..2 * n - 1).filter(|at| counts[*at] > 0).collect();
-        // Diagonals use vector instructions and need no column indices.
+        // Products along diagonals use vector instructions and no column indices; they are faster
+        // if at most about half of the stored entries are zero.
         if used.len() * n > 2 * matrix.nnz() + n {
             return Self::by_rows(matrix);
         }

@@ -34,8 +34,8 @@ pub(crate) struct CholeskyPlan {
 }
 
 impl CholeskyPlan {
-    /// Returns the order of `matrix` if it is symmetric; its rows are sums of terms of the given
-    /// `sizes`.
+    /// Returns the order of `matrix` if it is symmetric. `sizes` has, for each row, the sum of the
+    /// moduli of the terms of its entries.
     pub(crate) fn new(matrix: &CsrMatrix<f64>, sizes: &[f64]) -> Option<Self> {
         let columns = CscMatrix::from(matrix);
         // The columns of a symmetric matrix are its rows.
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use crate::sparse::SparseLu;
 
-    /// A grid of `side` × `side` × `layers`, each node bound to its neighbours.
+    /// A grid of `side` × `side` × `layers` nodes, each coupled to its neighbours.
     fn grid(side: usize, layers: usize, diagonal: f64) -> CsrMatrix<f64> {
         let at = |i: usize, j: usize, k: usize| (k * side + i) * side + j;
         let mut entries = vec![];

@@ -5,18 +5,19 @@ use nalgebra_sparse::csr::CsrMatrix;
 use crate::limits;
 use crate::sparse::ordering::Ordering;
 
-/// Elimination from both ends to the middle: each row depends on the one before it, so that two
-/// independent chains take half the time.
+/// Elimination from both ends to the middle. Each row depends on the row before it, so that two
+/// independent chains of rows take half the time of one chain.
 ///
 /// # Source
 /// Babuška (1972), SIAM Journal on Numerical Analysis 9, 53–77; van der Vorst (1987), Parallel
 /// Computing 5, 45–54.
 #[derive(Debug)]
 pub(super) struct Tridiagonal {
-    /// Multiple of the previous row, on the side of the nearer end, that is subtracted from each
-    /// row.
+    /// For each row, the multiple of its neighbouring row towards the nearer end that is
+    /// subtracted.
     multipliers: Vec<f64>,
-    /// Entry towards the middle, divided by the pivot, row by row.
+    /// For each row, the entry towards the middle divided by the pivot; for the first row of the
+    /// lower half, the multiplier of the last step.
     inward: Vec<f64>,
     /// Reciprocals of the pivots.
     reciprocals: Vec<f64>,
@@ -62,7 +63,8 @@ impl Tridiagonal {
         is_pivot(pivots[half], last).then_some(())?;
         let inward: Vec<f64> = (0..n)
             .map(|i| match i {
-                // The last row of the elimination has only its pivot.
+                // The last row of the elimination has only its pivot; this index stores the
+                // multiplier of the last step.
                 i if i == half => below[half] / pivots[half - 1],
                 i if i < half => above[i] / pivots[i],
                 i => below[i] / pivots[i],

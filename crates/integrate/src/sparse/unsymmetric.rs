@@ -26,7 +26,7 @@ use crate::sparse::{NotFactored, combination};
 /// ed. (2013), section 4.3.4, on LU without exchanges where the symmetric part is definite.
 #[derive(Debug)]
 pub(crate) struct UnsymmetricFactors {
-    /// L with the pivots, and Uᵀ of diagonal 1.
+    /// L, with the pivots on its diagonal; `upper` is Uᵀ, with a diagonal of 1.
     lower: Panels,
     upper: Panels,
     /// Row of the matrix for each row of the factors, and 1 / √(size of its terms).
@@ -79,8 +79,9 @@ impl UnsymmetricPlan {
         }
     }
 
-    /// Factors `matrix`, whose rows are sums of terms of the given `sizes`, unless the factors need
-    /// more than `limit` bytes; none if it needs exchanges of rows.
+    /// Factors `matrix`, unless the factors need more than `limit` bytes; `None` if exchanges of
+    /// rows are necessary. `sizes` has, for each row, the sum of the moduli of the terms of its
+    /// entries.
     pub(crate) fn factor(
         self,
         matrix: &CsrMatrix<f64>,
@@ -248,8 +249,8 @@ mod tests {
     use super::*;
     use crate::sparse::SparseLu;
 
-    /// A grid of `side` × `side` with forces that are not symmetric, and with weak `diagonal`
-    /// entries if it says so.
+    /// A grid of `side` × `side` nodes with unsymmetric coupling; `diagonal` is the size of the
+    /// diagonal entries.
     fn grid(side: usize, diagonal: f64) -> CsrMatrix<f64> {
         let at = |i: usize, j: usize| i * side + j;
         let mut entries = vec![];
@@ -262,7 +263,7 @@ mod tests {
                 }
             }
         }
-        // One way only.
+        // This entry has no mirrored entry.
         entries.push((0, side * side - 1, 0.3));
         triplets(side * side, entries).unwrap()
     }

@@ -35,8 +35,8 @@ impl<'a> Fastest<'a> {
         Ok(*self.rate.get_or_init(|| rate))
     }
 
-    /// Returns two systems of a single degree of freedom, at least as fast as the stiffest and the
-    /// most damped motion.
+    /// Returns two systems that move only along the stiffest and only along the most damped motion;
+    /// each is at least as fast as this motion. `None` if the system is not passive.
     pub(super) fn motions(&self) -> Result<Option<&[SecondOrderSystem; 2]>, IntegrateError> {
         if let Some(motions) = self.passive.get() {
             return Ok(motions.as_ref());
@@ -56,7 +56,8 @@ impl<'a> Fastest<'a> {
 }
 
 /// Returns the system that moves only along the vector x = `shape`, with mass x*Mx, damping x*Cx
-/// and stiffness x*Kx; its two degrees of freedom are the real and imaginary parts.
+/// and stiffness x*Kx; its two degrees of freedom are the real and imaginary parts of the complex
+/// amplitude.
 ///
 /// If `shape` belongs to an eigenvector of the amplification matrix, the eigenvalue of this
 /// eigenvector is also an eigenvalue of the returned system.

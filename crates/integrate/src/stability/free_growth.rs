@@ -87,8 +87,8 @@ pub fn growth_per_period(
     }
 }
 
-/// Returns the growth of a motion per period, if its energy grows between the two halves of the
-/// periods followed.
+/// Returns the growth factor of a motion per period, if its energy is larger in the second half of
+/// the followed periods than in the first half.
 fn followed(
     shooting: &mut Shooting<'_>,
     mut motion: DVector<f64>,
@@ -142,7 +142,8 @@ mod tests {
     #[test]
     fn what_grows_by_itself_is_found_and_nothing_else() {
         let sampling = Sampling::new(0.01, 200).unwrap();
-        // Damping of all masses, of one of them, and forces across two of them.
+        // Damping of all masses, additional damping of one mass, cross-coupled stiffness between
+        // two masses, and whether a motion grows.
         let machines = [
             (1.0, -60.0, 0.0, true),
             (1.0, -3.0, 0.0, false),
@@ -156,8 +157,8 @@ mod tests {
             let logarithm = rightmost(&system) * sampling.duration();
             assert_eq!(logarithm > 0.0, grows, "{damping} {at_one} {follower}");
             match growth_per_period(&system, sampling).unwrap() {
-                // Fast growth by the steps themselves, whose frequency is a little low; where all
-                // masses grow alike by a motion that decays in part.
+                // The growth found is not exact: the frequency of the steps is a little low, and if
+                // many motions grow alike, the followed motion also has parts that decay.
                 Some(found) => {
                     assert!(grows && (found.ln() - logarithm).abs() < 0.1 * logarithm, "{found}");
                 }
@@ -166,7 +167,8 @@ mod tests {
         }
     }
 
-    /// A motion decreases to a fifteenth in a step, and in a period below the smallest number.
+    /// A motion decreases to a fifteenth in a step, and below the smallest positive number in a
+    /// period.
     #[test]
     fn a_motion_of_which_nothing_is_left_does_not_grow() {
         let n = 100;

@@ -51,7 +51,7 @@ impl<'a> Amplification<'a> {
         Self { stepper, time, still, state }
     }
 
-    /// Returns a start with pseudo-random displacements only.
+    /// Returns a state with pseudo-random displacements, and zeros elsewhere.
     pub(super) fn start(&self) -> DVector<f64> {
         let (n, len) = (self.still.len(), self.state.len());
         let mut start = start_vector(len);
@@ -73,8 +73,8 @@ impl<'a> Amplification<'a> {
     }
 }
 
-/// Returns the spectral radius of the whole amplification matrix, if a motion grows that does not
-/// grow in the system itself.
+/// Returns the spectral radius of the whole amplification matrix, if a motion grows by more than
+/// `tolerated` plus twice the growth of the system itself.
 pub(super) fn small_growth(
     stepper: &mut dyn Stepper,
     system: &SecondOrderSystem,

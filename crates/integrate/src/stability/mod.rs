@@ -67,10 +67,11 @@ pub fn spectral_radius(
 /// then refined to rounding by bisection. For an unstable system, twice the growth of the system
 /// itself is allowed.
 ///
-/// For more than 20 degrees of freedom, the limit is the limit of a single degree of freedom that
-/// moves along the fastest mode. Finding this mode takes a hundred products with the matrices. If
-/// the system can only lose energy, factorisations then enclose its highest frequency to one part
-/// in 10⁴. For other systems the highest frequency is known to about one part in a thousand.
+/// For sparse matrices, and for more than 20 degrees of freedom, the limit is that of a single
+/// degree of freedom that moves along the fastest mode. Finding this mode takes a hundred products
+/// with the matrices. If the system can only lose energy, factorisations then enclose its highest
+/// frequency to one part in 10⁴. For other systems the highest frequency is known to about one part
+/// in a thousand.
 ///
 /// # Errors
 /// The errors of [`Scheme::prepare_unchecked`], and [`IntegrateError::Unstable`] if not even the

@@ -97,7 +97,8 @@ impl Symmetric {
     }
 
     /// Returns whether the diagonal entries are positive (or zero) and larger than (or equal to)
-    /// the sum of the rest of their rows. The matrix is then positive definite (or semidefinite).
+    /// the sum of the moduli of the other entries of their rows. The matrix is then positive
+    /// definite (or semidefinite).
     fn is_dominant(&self, strictly: bool) -> bool {
         let sums = self.row_sums();
         let diagonal = |i: usize| match self {
@@ -144,7 +145,7 @@ pub(super) struct Top {
 
 impl Top {
     /// Returns an upper bound of the largest eigenvalue, to a part in 10⁴, by bisection: M σ − A is
-    /// definite above it.
+    /// positive definite for all σ above the largest eigenvalue.
     pub(super) fn above(&self, system: &dyn System, which: Matrix) -> f64 {
         let (mut low, mut high) = (self.value, self.value + self.residual);
         if high <= 0.0 {

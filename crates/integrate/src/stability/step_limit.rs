@@ -33,8 +33,7 @@ fn whole(system: &dyn System) -> Option<&SecondOrderSystem> {
 }
 
 impl Examined<'_> {
-    /// Returns an error if the prepared `stepper` makes a motion grow that does not grow in the
-    /// system.
+    /// Returns an error if the prepared `stepper` makes a motion grow faster than in the system.
     pub(crate) fn refuse_unstable(
         &self,
         system: &dyn System,
@@ -171,8 +170,8 @@ impl Examined<'_> {
     fn small_limit(&self, system: &SecondOrderSystem) -> Result<Option<f64>, IntegrateError> {
         let eigenvalues = system.eigenvalues()?;
         let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
-        // A free body has a double eigenvalue 0, which rounding changes to about √ε times the
-        // others.
+        // A free body has a double eigenvalue 0; rounding moves it to about √ε times the other
+        // eigenvalues.
         let free = eigenvalues.iter().any(|l| l.norm() < 1e-6 * fastest);
         let tolerated = if free { limits::TOLERATED_GROWTH } else { limits::CRITICAL_GROWTH };
         let own_growth = own_growth(&eigenvalues);

@@ -6,9 +6,9 @@
 //! [x_s ẋ_s] = X_s [z F] + Σ P_sr g_r,    r ≤ s
 //! ```
 //!
-//! at the collocations s of a step. Unit states, loads and forces give these maps from the stepping
-//! code, so that each collocation has one equation in one unknown, or none if the scheme is
-//! explicit.
+//! at the collocations s of a step. These maps are read from the stepping code with unit states,
+//! unit loads and unit forces. Each collocation has one equation in one unknown; an explicit scheme
+//! has no equation.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -284,7 +284,7 @@ impl<const S: usize, const W: usize, const R: usize> Rows<S, W, R> {
         }
     }
 
-    /// Computes two independent sums at a time, in half the time of one after the other.
+    /// Computes two independent sums at the same time, which takes half the time of a single sum.
     fn times(&self, z: &[f64; S], w: &[f64; W]) -> [f64; R] {
         let [mut even, mut odd] = [[0.0; R]; 2];
         for j in (0..S).step_by(2) {
@@ -309,14 +309,14 @@ struct Probe {
 
 #[derive(Debug, Default)]
 struct ProbeState {
-    /// The collocation at which the force is 1 N; 0 at all others.
+    /// Collocation at which the force is 1 N; at all others the force is 0.
     unit: Option<usize>,
     asked: Vec<Asked>,
     /// True while Newton's method continues at the last collocation.
     goes_on: bool,
 }
 
-/// Instant in s, displacement and velocity of the last evaluation at a collocation.
+/// Instant (s), displacement and velocity of the last evaluation at a collocation.
 #[derive(Debug, Clone, Copy)]
 struct Asked {
     time: f64,
@@ -347,8 +347,8 @@ impl NonlinearForce for Probe {
 
     fn force(&self, time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
         let mut state = self.state();
-        // After it has asked for the tangent, Newton's method evaluates a constant force exactly
-        // once more.
+        // After Newton's method has read the tangent of a constant force, it evaluates the force
+        // exactly once more.
         if std::mem::take(&mut state.goes_on) {
             state.asked.pop();
         }

@@ -10,8 +10,8 @@ use crate::stepping::transition::Transition;
 #[derive(Debug)]
 pub(crate) struct FixedSize {
     one: Transition,
-    /// Two steps at once, if both together are short compared with every period. This halves the
-    /// waiting time, because each step depends on the one before.
+    /// Two steps at once, if both together are short compared with every period. Each step has to
+    /// wait for the result of the step before; two steps at once halve this waiting time.
     two: Option<Transition>,
 }
 
@@ -103,16 +103,17 @@ impl FixedSize {
 /// Returns whether `factor` steps of `dt` are short compared with every period: (ωΔt)² is below
 /// about 1.
 ///
-/// The entries of D are rounded once and are of the order of (ωΔt)². Beyond that limit an undamped
-/// motion would grow or decay by up to ε in every step; the stepper rounds anew in each step and
-/// preserves the energy.
+/// The entries of D are rounded once and are of the order of (ωΔt)². Above this limit their
+/// rounding would make an undamped motion grow or decay by up to ε in every step. The stepper
+/// itself has a different rounding error in each step, and preserves the energy.
 pub(crate) fn resolves(transition: &Transition, dt: f64, n: usize, factor: f64) -> bool {
     let change = |i: usize| (factor * factor * dt * transition.change[(n + i, i)]).abs();
     (0..n).all(|i| change(i) <= 1.0)
 }
 
-/// Returns z(t+2Δt) = z + (2D + D²) z + (B + DB) F(t) + B F(t+Δt); the loads of this transition are
-/// the loads of both steps.
+/// Returns the transition z(t+2Δt) = z + (2D + D²) z + (B + DB) F(t) + B F(t+Δt) of two steps. It
+/// stores 2D + D² and B + DB, the matrix of the loads of the first step; the loads of the second
+/// step have the matrix B of one step.
 fn doubled(one: &Transition) -> Transition {
     let d = &one.change;
     let later = |b: &DMatrix<f64>| b + d * b;

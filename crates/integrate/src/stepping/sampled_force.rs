@@ -107,7 +107,7 @@ impl<'a> ForceTable<'a> {
         self.dof
     }
 
-    /// Returns whether every degree of freedom has its channel.
+    /// Returns whether every degree of freedom has a channel of the force.
     pub(crate) fn is_complete(&self) -> bool {
         self.forced.is_none()
     }

@@ -203,7 +203,7 @@ impl Simulation {
                 done = ahead;
             }
         }
-        // A sum is not finite if one of its terms is not, so that the last state shows any
+        // A value that is not finite stays so in all later steps, so that the last state shows any
         // overflow.
         let ends = self.state.iter().all(|z| z.is_finite());
         motion.finite = finite && ends && motion.begins_finite(from);

@@ -1,4 +1,5 @@
-//! Impossible computations are refused with the wrong numbers named; nothing panics.
+//! Impossible computations are refused with an error that contains the offending numbers; no
+//! function panics.
 
 use mechid_integrate::*;
 use mechid_model::{InitialState, ModelError, Sdof, SecondOrderSystem};
@@ -116,7 +117,7 @@ fn functions_that_yield_no_number() {
 
 #[test]
 fn effective_masses_that_are_singular() {
-    // K = −4/Δt²·M: the average acceleration has M + ¼Δt²K = 0.
+    // With K = −4/Δt²·M, the effective mass of average acceleration is M + ¼Δt²K = 0.
     let one = |v: f64| DMatrix::from_element(1, 1, v);
     let system = SecondOrderSystem::new(one(1.0), one(0.0), one(-400.0)).unwrap();
     let refused = Newmark::AVERAGE_ACCELERATION.prepare(&system, 0.1).err().unwrap();
@@ -168,7 +169,7 @@ fn records_of_one_or_two_samples_are_integrated() {
                 let rest = InitialState::rest(dof);
                 let response = integrate(scheme.as_ref(), &system, &force, &rest).unwrap();
                 assert_eq!((response.displacement().len(), response.dof()), (len, dof));
-                // A constant force has a constant steady state: K x = F.
+                // A constant force has a constant steady state with K x = F.
                 let steady = integrate_periodic(scheme.as_ref(), &system, &force).unwrap();
                 let x = steady.displacement().data().row(0).transpose();
                 let held = system.stiffness() * &x;

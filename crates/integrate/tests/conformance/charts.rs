@@ -6,7 +6,7 @@ use mechid_integrate::*;
 use mechid_model::Sdof;
 use nalgebra::{Complex, Matrix3, Schur};
 
-/// The amplification matrix on (x, Δt ẋ, Δt² ẍ), free of units.
+/// Returns the amplification matrix for (x, Δt ẋ, Δt² ẍ), which does not depend on units.
 fn amplification(scheme: &dyn Scheme, zeta: f64, angle: f64) -> Matrix3<f64> {
     let dt = 0.01;
     let system = Sdof::from_modal(1.0, zeta, angle / dt).unwrap().system();
@@ -15,12 +15,13 @@ fn amplification(scheme: &dyn Scheme, zeta: f64, angle: f64) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| a[(i, j)] * f64::powi(dt, i as i32 - j as i32))
 }
 
-/// Bathe (1982), section 9.4, prints the matrices for (ẍ, ẋ, x): to (x, Δt ẋ, Δt² ẍ).
+/// Converts a matrix that Bathe (1982), section 9.4, prints for (ẍ, ẋ, x) to the order (x, Δt ẋ,
+/// Δt² ẍ).
 fn turned(printed: [[f64; 3]; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| printed[2 - i][2 - j])
 }
 
-/// Newmark's matrix as printed, α and δ being Bathe's names for β and γ.
+/// Returns Newmark's matrix as printed; α and δ are Bathe's names for β and γ.
 fn printed_newmark(alpha: f64, delta: f64, zeta: f64, w: f64) -> Matrix3<f64> {
     let b = 1.0 / (1.0 / (w * w) + 2.0 * zeta * delta / w + alpha);
     let k = zeta * b / w;
@@ -84,7 +85,8 @@ fn wilson_is_the_printed_matrix() {
 
 #[test]
 fn houbolt_steps_like_the_printed_row() {
-    // x(t+Δt) from x(t), x(t−Δt), x(t−2Δt); the state is built from four displacements.
+    // The printed row gives x(t+Δt) from x(t), x(t−Δt) and x(t−2Δt). The state follows from four
+    // displacements.
     let (xs, dt) = ([0.7, -0.4, 0.2, 0.9], 0.01);
     for (zeta, w) in ANGLES.iter().flat_map(|w| [(0.0, *w), (0.05, *w), (0.7, *w)]) {
         let b = 1.0 / (2.0 / (w * w) + 11.0 * zeta / (3.0 * w) + 1.0);
@@ -130,11 +132,13 @@ fn charts_follow_the_closed_forms() {
     ];
     for ratio in [0.003, 0.01, 0.05, 0.1, 0.2, 0.3] {
         let w = TAU * ratio;
-        // γ = ½, undamped: tan or cos of the angle in closed form, no decay at all.
+        // With γ = ½ and without damping, the angle per step has a closed form, and there is no
+        // decay.
         let mut cases: Vec<(Box<dyn Scheme>, f64)> =
             vec![(Box::new(CentralDifference::default()), 2.0 * (w / 2.0).asin())];
         for (scheme, beta) in newmarks {
-            // cos Ω̄ = 1 − ½Ω²/(1 + βΩ²), as sin² (Ω̄/2) to keep the digits at small steps.
+            // The closed form cos Ω̄ = 1 − ½Ω²/(1 + βΩ²) is written with sin² (Ω̄/2), which keeps
+            // the digits at small steps.
             let half = (0.25 * w * w / (1.0 + beta * w * w)).sqrt().asin();
             cases.push((Box::new(scheme), 2.0 * half));
         }
@@ -171,7 +175,7 @@ fn anchors_at_ten_steps_per_period() {
     let houbolt = Houbolt::default();
     let wilson = WilsonTheta::new(1.4).unwrap();
     let central = CentralDifference::default();
-    // To the four decimals given.
+    // The elongations in per cent are known to four decimals.
     for (scheme, elongation) in [
         (&Newmark::AVERAGE_ACCELERATION as &dyn Scheme, 3.2075),
         (&Newmark::LINEAR_ACCELERATION, 1.6002),
@@ -183,17 +187,18 @@ fn anchors_at_ten_steps_per_period() {
         let found = percent(scheme).0;
         assert!((found - elongation).abs() < 0.5e-4 + 1e-9, "{}: {found}", scheme.name());
     }
-    // The order of the decays is that of the curves of Bathe & Wilson (1973), from memory of them:
-    // Houbolt by far the most, Wilson (θ = 1.4) some, Newmark none.
+    // The decays have the order of the curves of Bathe & Wilson (1973), which are cited from
+    // memory: Houbolt by far the most, Wilson (θ = 1.4) some, Newmark none.
     let decay =
         [&houbolt as &dyn Scheme, &wilson, &Newmark::AVERAGE_ACCELERATION].map(|s| percent(s).1);
     assert!(decay[0] > 2.0 * decay[1] && decay[1] > 1.0 && decay[2].abs() < 1e-9, "{decay:?}");
 }
 
-/// Returns period elongation and amplitude decay of the root with the smallest angle.
+/// Returns period elongation and amplitude decay of the principal root, the complex root of largest
+/// modulus.
 fn principal_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
     let roots = Schur::new(matrix).complex_eigenvalues();
-    // Of a spurious pair, were there one, the principal root is the larger.
+    // The modulus of a spurious pair is smaller than that of the principal root.
     let root = roots.iter().filter(|l| l.im > 1e-9).max_by(|a, b| a.norm().total_cmp(&b.norm()));
     let root = root.expect("it oscillates");
     [w / root.arg() - 1.0, 1.0 - (TAU * root.norm().ln() / root.arg()).exp()]
@@ -202,7 +207,7 @@ fn principal_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
 /// Curves of period elongation and amplitude decay over Δt/T, such as those of Bathe & Wilson
 /// (1973), Earthquake Eng. Struct. Dyn. 1, 283–291, show the eigenvalues of the amplification
 /// matrices. A curve cannot be read precisely, so the points are computed from the matrices;
-/// Houbolt's is the companion matrix of (2 + Ω²) λ³ − 5 λ² + 4 λ − 1.
+/// Houbolt's matrix is the companion matrix of (2 + Ω²) λ³ − 5 λ² + 4 λ − 1.
 #[test]
 fn charts_follow_the_printed_matrices() {
     for ratio in (1..=20).map(|k| 0.01 * f64::from(k)) {
@@ -242,7 +247,7 @@ fn stability_limits_in_steps_per_period() {
         (&RungeKutta4::LINEAR, SQRT_2 / PI),
     ] {
         let found = limit(scheme).unwrap();
-        // The growth of 1e-9 per step that counts as none moves a limit by less than that.
+        // A growth of 1e-9 per step is tolerated; this moves a limit by less than 1e-9.
         assert!((found / expected - 1.0).abs() < 1e-9, "{}: {found}", scheme.name());
     }
     for scheme in [&Newmark::AVERAGE_ACCELERATION as &dyn Scheme, &Houbolt::default()] {
@@ -265,15 +270,15 @@ fn the_spectral_radius_at_large_steps_is_the_parameter() {
         }
         for scheme in schemes {
             let found = far(scheme.as_ref());
-            // A triple root moves by the third root of rounding, and of 1/Ω².
+            // A triple root has an error of the size of the cube root of ε, and of 1/Ω².
             assert!((found - rho).abs() < 1e-4, "{}: {found}", scheme.name());
         }
     }
     assert!(far(&Bathe::HALVES) < 1e-5);
 }
 
-/// Undamped, at Δt/T = 0.1: amplitude decay and period elongation from the characteristic
-/// polynomials, computed apart.
+/// Without damping, at Δt/T = 0.1: amplitude decay and period elongation from the characteristic
+/// polynomials, computed independently of this crate.
 #[test]
 fn anchors_of_the_schemes_with_numerical_damping() {
     for (scheme, elongation, decay) in anchors() {
@@ -291,7 +296,7 @@ fn anchors_of_the_schemes_with_numerical_damping() {
 fn anchors() -> Vec<(Box<dyn Scheme>, f64, f64)> {
     vec![
         (Box::new(GeneralisedAlpha::new(0.8).unwrap()), 0.033828405968, 0.000987678193),
-        // As Houbolt's scheme.
+        // For ρ∞ = 0 the values are those of Houbolt's scheme.
         (Box::new(GeneralisedAlpha::new(0.0).unwrap()), 0.123205719568, 0.292133199285),
         (
             Box::new(GeneralisedAlpha::hilber_hughes_taylor(0.7).unwrap()),

@@ -34,12 +34,13 @@ pub fn schemes() -> Vec<Box<dyn Scheme>> {
     ]
 }
 
-/// Nonlinear terms as a force, degrees of freedom counted from 1: `terms("k3: x1^3", &[3.0])`.
+/// Nonlinear terms as a force, with degrees of freedom counted from 1: `terms("k3: x1^3", &[3.0])`.
 pub fn terms(text: &str, coefficients: &[f64]) -> TermForces {
     TermForces::new(&text.parse().unwrap(), coefficients).unwrap()
 }
 
-/// A force without a sample at zero, with content on every channel: Σ of three sines, shifted.
+/// A force that is not zero at t = 0, on every channel: two harmonics and a constant, with other
+/// phases on each channel.
 pub fn force_at(t: f64, f: &mut [f64]) {
     for (c, f) in f.iter_mut().enumerate() {
         let c = c as f64;
@@ -47,7 +48,7 @@ pub fn force_at(t: f64, f: &mut [f64]) {
     }
 }
 
-/// [`force_at`] sampled.
+/// Samples of [`force_at`].
 pub fn force(sampling: Sampling, dof: usize) -> Record {
     let mut data = DMatrix::zeros(sampling.len(), dof);
     let mut row = vec![0.0; dof];
@@ -58,7 +59,7 @@ pub fn force(sampling: Sampling, dof: usize) -> Record {
     Record::new(sampling, data).unwrap()
 }
 
-/// Non-zero x(0) and ẋ(0).
+/// Initial state with non-zero x(0) and ẋ(0).
 pub fn moving(dof: usize) -> InitialState {
     InitialState::new(
         nalgebra::DVector::from_fn(dof, |i, _| 0.2 - 0.1 * i as f64),

@@ -11,7 +11,8 @@ const SIZES: [usize; 7] = [1, 2, 3, 5, 10, 20, 50];
 const DT: f64 = 0.004;
 const LEN: usize = 24;
 
-/// A stable system, without symmetry, its force and the response from a moving start.
+/// Returns a stable system without symmetry, its force and its response; if `start`, from a moving
+/// initial state, otherwise from rest.
 fn run(scheme: &dyn Scheme, dof: usize, start: bool) -> (SecondOrderSystem, Record, Response) {
     let system = mechid_problems::random_stable(dof, 11);
     let force = force(Sampling::new(DT, LEN).unwrap(), dof);
@@ -20,7 +21,7 @@ fn run(scheme: &dyn Scheme, dof: usize, start: bool) -> (SecondOrderSystem, Reco
     (system, force, response)
 }
 
-/// Sample k of x, ẋ, ẍ.
+/// Returns sample k of x, ẋ and ẍ.
 fn at(response: &Response, k: usize) -> [DVector<f64>; 3] {
     parts(response).map(|p| p.row(k).transpose())
 }
@@ -29,14 +30,15 @@ fn load(force: &Record, k: usize) -> DVector<f64> {
     force.data().row(k).transpose()
 }
 
-/// M ẍ + C ẋ + K x − F, relative to the terms.
+/// Returns the norm of M ẍ + C ẋ + K x − F, relative to the sum of the norms of its terms.
 fn imbalance(s: &SecondOrderSystem, [x, v, a]: [DVector<f64>; 3], f: DVector<f64>) -> f64 {
     let terms = [s.mass() * a, s.damping() * v, s.stiffness() * x, -f];
     let size: f64 = terms.iter().map(|t| t.norm()).sum();
     terms.iter().sum::<DVector<f64>>().norm() / size
 }
 
-/// Differences of displacements carry rounding of x divided by Δt or Δt².
+/// Returns whether two vectors agree to rounding. Difference quotients have the rounding error of x
+/// divided by Δt or Δt², which `scale` must include.
 fn close(left: &DVector<f64>, right: &DVector<f64>, scale: f64) -> bool {
     (left - right).norm() <= 1e-12 * scale
 }
@@ -90,7 +92,7 @@ fn central_differences_are_central() {
             assert!(close(&v, &vs, x.norm() / DT + v.norm()), "n {dof} sample {k}");
             assert!(close(&a, &accs, x.norm() / (DT * DT) + a.norm()), "n {dof} sample {k}");
         }
-        // From rest: as if x(−Δt) = x(0) = 0.
+        // The start from rest assumes x(−Δt) = x(0) = 0.
         let rest = CentralDifference { start: CentralDifferenceStart::Rest };
         let (_, _, response) = run(&rest, dof, false);
         let ([_, v, a], [x1, ..]) = (at(&response, 0), at(&response, 1));
@@ -151,12 +153,12 @@ fn wilson_is_in_equilibrium_at_theta() {
             let (system, force, response) = run(&scheme, dof, true);
             for k in 0..LEN - 1 {
                 let ([x, v, a], [xn, vn, an]) = (at(&response, k), at(&response, k + 1));
-                // Acceleration linear over the step …
+                // The acceleration is linear over the step.
                 let vs = &v + 0.5 * DT * (&a + &an);
                 let xs = &x + DT * &v + DT * DT / 6.0 * (2.0 * &a + &an);
                 assert!(close(&xn, &xs, x.norm() + DT * v.norm()), "n {dof} sample {k}");
                 assert!(close(&vn, &vs, v.norm() + DT * a.norm()), "n {dof} sample {k}");
-                // … and on to t + θΔt, where it balances the load.
+                // The acceleration is linear up to t + θΔt, where equilibrium with the load holds.
                 let a_theta = &a + theta * (&an - &a);
                 let v_theta = &v + 0.5 * long * (&a + &a_theta);
                 let x_theta = &x + long * &v + long * long / 6.0 * (2.0 * &a + &a_theta);
@@ -208,7 +210,8 @@ fn generalised_alpha_is_in_equilibrium_between_the_samples() {
     }
 }
 
-/// The parameters as Chung & Hulbert (1993) print them for their two limits, and HHT's α = −0.1.
+/// Parameters that Chung & Hulbert (1993) print for ρ∞ = 0 and ρ∞ = 1, and those of HHT with α =
+/// −0.1.
 #[test]
 fn generalised_alpha_has_the_printed_parameters() {
     let of = |s: GeneralisedAlpha| [s.alpha_m(), s.alpha_f(), s.beta(), s.gamma()];
@@ -240,7 +243,7 @@ fn bathe_is_the_printed_composite() {
             let am =
                 half.solve(&(middle - system.damping() * &vh - system.stiffness() * &xh)).unwrap();
             let (xm, vm) = (xh + q * q * &am, vh + q * &am);
-            // The two differences solved for x' and ẋ' with ẍ' unknown.
+            // The two differences give x' and ẋ' as functions of the unknown ẍ'.
             let q = DT / 3.0;
             let vh = (4.0 * &vm - &v) / 3.0;
             let xh = (4.0 * &xm - &x) / 3.0 + q * &vh;
@@ -322,8 +325,8 @@ fn every_size_from_1_to_50_follows_its_transition() {
             let transition = Transition::from_stepper(stepper.as_mut());
             let start = moving(dof);
             let response = integrate(scheme.as_ref(), &system, &force, &start).unwrap();
-            // The last step once more, from the stored motion, by the explicit matrices. Houbolt
-            // remembers more than the motion.
+            // The explicit matrices repeat the last step from the stored motion. Schemes whose
+            // state has more than the motion, such as Houbolt's, are skipped.
             if transition.change.nrows() > 3 * dof {
                 continue;
             }
@@ -345,7 +348,8 @@ fn every_size_from_1_to_50_follows_its_transition() {
     }
 }
 
-/// The fixed-size loop for few degrees of freedom and the stepper itself are the same scheme.
+/// Two degrees of freedom use the loop of fixed size, and four use the stepper itself; both give
+/// the same response.
 #[test]
 fn two_uncoupled_halves_take_both_loops() {
     let one = mechid_problems::random_stable(2, 3);
@@ -367,7 +371,7 @@ fn two_uncoupled_halves_take_both_loops() {
             integrate(scheme.as_ref(), &both, &wide, &mechid_model::InitialState::rest(4)).unwrap();
         for (s, l) in parts(&small).iter().zip(parts(&large)) {
             let gap = (*s - l.columns(0, 2)).amax() / s.amax();
-            // 500 steps of rounding at ε each, in a stable scheme.
+            // Each of the 500 steps of a stable scheme has a rounding error of ε.
             assert!(gap < 1e-12, "{}: {gap:e}", scheme.name());
         }
     }

@@ -43,7 +43,7 @@ fn responses_superpose() {
             let both = integrate(scheme, &system, &sum, &doubled).unwrap();
             let (a, b) = (owned(&a), owned(&b));
             let added = std::array::from_fn(|i| 2.0 * &a[i] - 0.5 * &b[i]);
-            // 150 steps of rounding.
+            // The responses differ by the rounding of 150 steps.
             assert!(distance(added, &both) < 1e-12, "{} n {dof}", scheme.name());
         }
     }
@@ -53,7 +53,7 @@ fn responses_superpose() {
 fn the_displacement_alone_is_that_of_the_whole_response() {
     for dof in [1, 2, 5] {
         let system = mechid_problems::random_stable(dof, 2);
-        // Odd and even numbers of steps, from none on.
+        // Odd and even numbers of steps, also a record without a step.
         for len in [1, 2, 3, 64, 65] {
             let force = force(Sampling::new(1e-3, len).unwrap(), dof);
             for scheme in schemes() {
@@ -84,7 +84,8 @@ fn a_late_force_moves_the_machine_late() {
             let a = integrate(scheme.as_ref(), &system, &soon, &rest).unwrap();
             let b = integrate(scheme.as_ref(), &system, &delayed, &rest).unwrap();
             for (a, b) in parts(&a).iter().zip(parts(&b)) {
-                // Only the last step of a record may depend on the force beyond it.
+                // Only the last step of a record may depend on the force after the end of the
+                // record.
                 let (a, b) = (a.rows(0, len - late - 1), b.rows(late, len - late - 1));
                 assert!((a - b).amax() < 1e-13 * a.amax(), "{} n {dof}", scheme.name());
             }
@@ -111,7 +112,7 @@ fn a_rotated_period_gives_the_rotated_response() {
 
 #[test]
 fn units_do_not_matter() {
-    // Factors that are powers of two: every digit must stay.
+    // With factors that are powers of two, all digits must stay the same.
     let (mass, length, time) = (2f64.powi(-7), 2f64.powi(10), 2f64.powi(-9));
     for dof in [1, 2, 3, 6] {
         let s = mechid_problems::random_stable(dof, 4);
@@ -179,7 +180,7 @@ fn a_diagonal_system_is_its_single_degrees_of_freedom() {
             .unwrap();
             let alone = integrate(scheme, &single.system(), &one, &start).unwrap();
             let column = owned(&all).map(|p| p.columns(c, 1).into_owned());
-            // 400 steps of rounding, undamped in the second.
+            // The responses differ by the rounding of 400 steps; the second oscillator is undamped.
             assert!(distance(column, &alone) < 1e-11, "{} channel {c}", scheme.name());
         }
     }
@@ -225,8 +226,8 @@ fn modes_may_be_integrated_one_by_one() {
     }
 }
 
-/// The signals set in at t = 0 or later: the flat Schroeder multisine from each of a few samples
-/// on, linear between samples, is compared with its exact response.
+/// The force is a flat Schroeder multisine that begins at different samples of its period and is
+/// linear between samples. The response is compared with the exact response to this force.
 #[test]
 fn small_steps_approach_the_exact_discretisation() {
     let len = 64;
@@ -251,7 +252,8 @@ fn small_steps_approach_the_exact_discretisation() {
                     distance(every, &exact)
                 };
                 let (coarse, fine) = (error(40), error(160));
-                // Factor 4 in the step: 4 for the schemes of first order, 16 for the others.
+                // A step of a quarter of the size reduces the error by a factor of 4 for schemes of
+                // first order, and of 16 for the others.
                 let ratio = coarse / fine;
                 let name = scheme.name();
                 // The matrix exponential of a linear force is the exact discretisation.
@@ -265,7 +267,7 @@ fn small_steps_approach_the_exact_discretisation() {
     }
 }
 
-/// `force` with `times` steps for one, linear between its samples.
+/// Returns `force` with each step divided into `times` steps, linear between its samples.
 fn refined(force: &Record, times: usize) -> Record {
     let len = (force.len() - 1) * times + 1;
     let data = DMatrix::from_fn(len, force.channels(), |k, c| {
@@ -279,7 +281,8 @@ fn refined(force: &Record, times: usize) -> Record {
 
 #[test]
 fn average_acceleration_keeps_the_energy() {
-    // ωΔt small, middling and large; loops of fixed size (n = 1, 2) and the stepper (n = 3).
+    // ωΔt is small, medium or large; n = 1 and n = 2 use loops of fixed size, n = 3 uses the
+    // stepper.
     for (dof, angle) in [(1, 0.05), (1, 0.7), (1, 5.0), (2, 0.3), (3, 0.3)] {
         let stiffness = DMatrix::from_fn(dof, dof, |i, j| if i == j { 3.0 } else { -1.0 });
         let mass = DMatrix::from_diagonal(&DVector::from_fn(dof, |i, _| 1.0 + 0.5 * i as f64));

@@ -1,4 +1,4 @@
-//! Some modes of sparse systems, against closed forms and all modes of dense ones.
+//! Some modes of sparse systems, against closed forms and against all modes of dense systems.
 
 use std::f64::consts::PI;
 
@@ -33,12 +33,13 @@ fn a_chain_has_the_frequencies_of_its_closed_form() {
             (0..n).map(angle).fold(0.0, |most: f64, v| if v.abs() > most.abs() { v } else { most });
         for i in (0..n).step_by(37) {
             let entry = found.mode.shape()[i];
-            // The largest entry of a symmetric shape may be either of two.
+            // A symmetric shape has two entries of largest modulus; its sign depends on which of
+            // them is scaled to 1.
             let gap = (entry.re.abs() - (angle(i) / largest).abs()).abs() + entry.im.abs();
             assert!(gap < 1e-6, "mode {k}, entry {i}: {entry} {}", angle(i) / largest);
         }
     }
-    // In the middle of the band, between modes 1000 and 1001.
+    // The frequency is in the middle of the band, between modes 1000 and 1001.
     let about = 0.5 * (exact(1000) + exact(1001)) + 0.1 * (exact(1001) - exact(1000));
     let found = sparse_modes(&system, ModeSearch::NearOmega(about), 3).unwrap();
     for (found, r) in found.iter().zip([1001, 1000, 1002]) {
@@ -97,7 +98,7 @@ fn a_gyroscopic_system_has_the_modes_of_its_dense_form() {
     near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     near.truncate(5);
     assert_same(&sparse_modes(&sparse, ModeSearch::NearOmega(omega), 5).unwrap(), &near);
-    // All of a small system.
+    // All modes of a small system.
     let dense = rotor(3);
     let all = dense.modes().unwrap();
     let found = sparse_modes(&SparseSystem::from(&dense), ModeSearch::Lowest, 20).unwrap();
@@ -123,7 +124,7 @@ fn repeated_frequencies_have_independent_shapes() {
     }
 }
 
-/// Judge: ω = 2 √(k/m) sin(r π / 2n), from r = 0, the drift.
+/// Judge: ω = 2 √(k/m) sin(r π / 2n), where r = 0 is the rigid-body motion.
 #[test]
 fn a_free_chain_drifts_and_oscillates() {
     let n = 300;
@@ -139,7 +140,7 @@ fn a_free_chain_drifts_and_oscillates() {
     }
 }
 
-/// Judge: the closed form; the highest of them is sixty times the lowest.
+/// Judge: the closed form. The highest of the frequencies is about sixty times the lowest.
 #[test]
 fn many_modes_of_a_chain_are_found_from_one_shift() {
     let n = 150;
@@ -152,7 +153,8 @@ fn many_modes_of_a_chain_are_found_from_one_shift() {
     }
 }
 
-/// The drift is the mode nearest to a low frequency, and one of those about a higher one.
+/// The rigid-body motion is the mode nearest to a low frequency; it is also among the four modes
+/// nearest to a higher frequency.
 #[test]
 fn a_free_chain_has_modes_near_low_frequencies() {
     let n = 100;
@@ -198,7 +200,7 @@ fn what_cannot_be_searched_is_refused() {
     assert!(matches!(refused, IntegrateError::SingularShift { .. }), "{refused}");
 }
 
-/// A cube of masses: by symmetry its frequencies come in threes and sixes.
+/// A cube of masses: because of its symmetry, many frequencies occur three or six times.
 #[test]
 fn a_cube_has_the_frequencies_of_its_closed_form() {
     let w = 8;
@@ -227,8 +229,9 @@ fn a_cube_has_the_frequencies_of_its_closed_form() {
     }
 }
 
-/// Masses of 1 kg with springs of 900 N/m between them and to the walls about, `ground` N/m to ground each,
-/// and damping in proportion to stiffness: width × height of them.
+/// Grid of width × height masses of 1 kg. Springs of 900 N/m connect neighbours, and the outer
+/// masses to the surrounding walls; each mass has a spring of `ground` N/m to ground. The damping
+/// is `proportion` times the stiffness.
 fn grounded_grid(width: usize, height: usize, ground: f64, proportion: f64) -> SparseSystem {
     let at = |x: usize, y: usize| y * width + x;
     let walls = if height > 1 { 4.0 } else { 2.0 };
@@ -247,7 +250,8 @@ fn grounded_grid(width: usize, height: usize, ground: f64, proportion: f64) -> S
     SparseSystem::new(band(n, &[(0, 1.0)]), damping, stiffness).unwrap()
 }
 
-/// ω² of such a grid, rising: k_g + 4 k sin²(r π / 2(w + 1)) + 4 k sin²(s π / 2(h + 1)).
+/// Returns ω² of such a grid, in ascending order: k_g + 4 k sin²(r π / 2(w + 1)) + 4 k sin²(s π /
+/// 2(h + 1)).
 fn grounded_squares(width: usize, height: usize, ground: f64) -> Vec<f64> {
     let part = |r: usize, n: usize| {
         if n == 1 { 0.0 } else { 3600.0 * (r as f64 * PI / (2 * (n + 1)) as f64).sin().powi(2) }
@@ -262,7 +266,8 @@ fn grounded_squares(width: usize, height: usize, ground: f64) -> Vec<f64> {
 /// Springs to ground give the spectrum a floor, above which the modes lie close together.
 #[test]
 fn grounded_machines_have_the_lowest_modes_of_their_closed_form() {
-    // Of the chain, and of the grid with a floor near its top, no mode is near the first shift.
+    // The chain, and the grid with the stiffest springs to ground, have no mode near the first
+    // shift.
     let cases = [(60, 60, 200.0, 8, 1e-4), (10_000, 1, 200.0, 2, 1e-4), (40, 40, 1e5, 2, 0.0)];
     for (width, height, ground, count, proportion) in cases {
         let system = grounded_grid(width, height, ground, proportion);
@@ -303,8 +308,8 @@ fn modes_near_a_frequency_are_found_beside_the_floor() {
     }
 }
 
-/// A grounded chain beside a mass that is free to drift and one with little stiffness and much damping: their
-/// modes are found from one shift, those of the chain from another.
+/// A grounded chain, a mass that is free to drift, and an overdamped mass of little stiffness. The
+/// modes of the two single masses are found from one shift, the modes of the chain from another.
 #[test]
 fn modes_far_below_the_floor_come_first() {
     let n = 4000;

@@ -48,7 +48,7 @@ fn jacobi(u: f64, m: f64) -> [f64; 3] {
     [sn, cn, (1.0 - m * sn * sn).sqrt()]
 }
 
-/// x, ẋ, ẍ of ẍ + k x + κ x³ = 0 released at x = `amplitude`: amplitude · cn(Ωt).
+/// Returns x, ẋ and ẍ of ẍ + k x + κ x³ = 0, released at x = `amplitude`: x = amplitude · cn(Ωt).
 fn duffing(k: f64, cubic: f64, amplitude: f64, t: f64) -> [f64; 3] {
     let omega = (k + cubic * amplitude * amplitude).sqrt();
     let m = 0.5 * cubic * amplitude * amplitude / (omega * omega);
@@ -57,7 +57,8 @@ fn duffing(k: f64, cubic: f64, amplitude: f64, t: f64) -> [f64; 3] {
     [x, -amplitude * omega * sn * dn, -(k * x + cubic * x.powi(3))]
 }
 
-/// The judge judged: Jacobi's functions against the series of sn, and the differential equation.
+/// Checks the closed form itself: Jacobi's functions against the series of sn, and the motion
+/// against the differential equation.
 ///
 /// # Source
 /// Abramowitz & Stegun, *Handbook of Mathematical Functions* (1964), 16.22.1.
@@ -102,7 +103,8 @@ fn duffings_oscillator_converges_with_the_order_of_each_scheme() {
             let expected = match () {
                 () if name.starts_with("Newmark (β = 0.3025") || is_at_rest(scheme) => 1.0,
                 () if name.starts_with("Runge") => 4.0,
-                // Numerov's method without damping, but for the velocity.
+                // Without damping this is Numerov's method, of fourth order except for the
+                // velocity.
                 () if name.contains("Fox") && i != 1 => 4.0,
                 () if i == 2 && has("carried") => 1.0,
                 () => 2.0,
@@ -112,7 +114,8 @@ fn duffings_oscillator_converges_with_the_order_of_each_scheme() {
     }
 }
 
-/// 2π over the period of that motion, in rad/s: the backbone, by the arithmetic-geometric mean.
+/// Returns the frequency of Duffing's free motion (the backbone curve), 2π over its period, in
+/// rad/s, by the arithmetic-geometric mean.
 ///
 /// # Source
 /// Abramowitz & Stegun, *Handbook of Mathematical Functions* (1964), section 17.6.
@@ -126,8 +129,9 @@ fn backbone(k: f64, cubic: f64, amplitude: f64) -> f64 {
     square.sqrt() * a
 }
 
-/// Judge: a force that makes up for the damping of a free motion keeps it going, on the backbone; harmonic
-/// balance of the first harmonic gives that within 2.2 % at any amplitude.
+/// Judge: a force equal to the damping force sustains the undamped free motion, at the frequency of
+/// the backbone. Harmonic balance with one harmonic gives this frequency within 2.2 % at any
+/// amplitude.
 ///
 /// # Source
 /// Nayfeh & Mook, *Nonlinear Oscillations* (1979), section 4.1.
@@ -158,8 +162,8 @@ fn an_orbit_whose_losses_are_made_up_for_lies_on_the_backbone() {
     }
 }
 
-/// Springs and dampers between the second and the fourth of five masses and a force that depends
-/// on time, for a response that was chosen beforehand: x = a sin(ωt + φ) in each.
+/// Springs and dampers between the second and the fourth of five masses, and a force that depends
+/// on time. The external force is such that each mass has the chosen response x = a sin(ωt + φ).
 #[test]
 fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
     let n = 5;
@@ -216,8 +220,8 @@ fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
     }
 }
 
-/// The same force as terms with their tangents, as a function without, and over more degrees of
-/// freedom than it needs; on dense and on sparse matrices.
+/// The same force is given as terms with tangents, as a function without tangents, and as a
+/// function of more degrees of freedom than necessary, with dense and with sparse matrices.
 #[test]
 fn reduction_and_tangents_do_not_change_the_response() {
     let n = 30;
@@ -268,7 +272,8 @@ fn reduction_and_tangents_do_not_change_the_response() {
     }
 }
 
-/// One or two degrees of freedom have steps of fixed size; a choice of responses goes through the scheme itself.
+/// One or two degrees of freedom have steps of fixed size; a simulation of selected degrees of
+/// freedom uses the steps of the scheme itself.
 #[test]
 fn steps_of_fixed_size_are_those_of_the_scheme() {
     let one = oscillator(1.0, 0.4, 400.0);
@@ -322,7 +327,7 @@ fn steps_of_fixed_size_are_those_of_the_scheme() {
     }
 }
 
-/// A linear spring as a nonlinear force is part of K.
+/// A linear spring and damper, given as a nonlinear force, have the effect of terms in K and C.
 #[test]
 fn a_linear_spring_is_a_part_of_the_stiffness() {
     let soft = Sdof::new(2.0, 0.3, 50.0).unwrap().system();
@@ -343,7 +348,8 @@ fn a_linear_spring_is_a_part_of_the_stiffness() {
     }
 }
 
-/// Between two stops: straight lines, and half a sine at each of them.
+/// Between the two stops the displacement is linear in time; in contact with a stop it is half a
+/// sine.
 #[test]
 fn a_mass_between_stops_comes_back_in_time() {
     let (clearance, stiffness, speed) = (0.1, 400.0, 2.0);
@@ -358,7 +364,7 @@ fn a_mass_between_stops_comes_back_in_time() {
         let x = response.displacement().channel(0);
         let (end, most) = (x[steps as usize], response.displacement().column(0).amax());
         let name = scheme.name();
-        // 1e-3 of the travel in a period is what first order leaves.
+        // A scheme of first order has an error of about 1e-3 of the travel in a period.
         let first_order = name.starts_with("Newmark (β = 0.3025");
         let near = if first_order { 5e-3 } else { 1e-4 };
         assert!(end.abs() < near, "{name}: {end}");
@@ -367,7 +373,8 @@ fn a_mass_between_stops_comes_back_in_time() {
     }
 }
 
-/// ẍ = −(μ/m) tanh(ẋ/w): sinh(ẋ/w) falls as e^{−μt/mw}. ẍ = −(c/m) ẋ² (forwards): 1/ẋ grows as ct/m.
+/// With friction, ẍ = −(μ/m) tanh(ẋ/w), sinh(ẋ/w) decreases as e^{−μt/mw}. With drag, ẍ = −(c/m) ẋ²
+/// for ẋ > 0, 1/ẋ increases as ct/m.
 #[test]
 fn friction_and_drag_slow_a_mass_as_they_should() {
     let free = oscillator(2.0, 0.0, 0.0);
@@ -394,7 +401,7 @@ fn the_energy_of_duffings_oscillator_does_not_drift() {
     let linear = oscillator(1.0, 0.0, 1.0);
     let cubic = terms("k3: x1^3", &[3.0]);
     let system = SystemWithForces::new(&linear).with(cubic).unwrap();
-    // The period of amplitude 1.2 is about 2.9 s; 500 of them.
+    // The motion has an amplitude of 1.2 and a period of about 2.9 s; the record has 500 periods.
     let worst = |scheme: &dyn Scheme, dt: f64| {
         let steps = (1450.0 / dt) as usize;
         let none = still(dt, steps + 1, 1);
@@ -413,7 +420,7 @@ fn the_energy_of_duffings_oscillator_does_not_drift() {
         assert!(all < 1.05 * early && all < 2e-3, "{name}: {early:e} {all:e}");
         assert!((all / fine - 4.0).abs() < 0.2, "{name}: {all:e} {fine:e}");
     }
-    // Schemes with numerical damping reduce the energy; all others must not add any.
+    // A scheme with numerical damping changes the energy, here by less than 5 %.
     let (_, lost) = worst(&GeneralisedAlpha::new(0.8).unwrap(), 0.02);
     assert!(lost < 0.05, "{lost}");
 }
@@ -421,7 +428,7 @@ fn the_energy_of_duffings_oscillator_does_not_drift() {
 #[test]
 fn what_newtons_method_cannot_solve_is_an_error() {
     let free = oscillator(1.0, 0.0, 100.0);
-    // Dry friction with a jump: while it sticks no velocity balances the forces.
+    // Dry friction with a jump: while the mass sticks, no velocity gives equilibrium.
     let sticking = ForceFunction::new(vec![0], |_, _, v, g| g[0] = 50.0 * v[0].signum());
     let not_a_number = ForceFunction::new(vec![0], |t, _, _, g| g[0] = (0.25 - t).sqrt());
     let force = force(Sampling::new(0.01, 100).unwrap(), 1);
@@ -433,7 +440,7 @@ fn what_newtons_method_cannot_solve_is_an_error() {
     for scheme in nonlinear_schemes() {
         let (scheme, name) = (scheme.as_ref(), scheme.name());
         let refused = of(scheme, &not_a_number).err();
-        // Explicit schemes hand the NaN on to the record, implicit ones find no solution.
+        // Explicit schemes write the NaN into the response; implicit schemes find no solution.
         match refused {
             Some(IntegrateError::NotSolved { time, .. }) => {
                 assert!((0.24..0.29).contains(&time), "{name}: {time}");

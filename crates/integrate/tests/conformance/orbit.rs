@@ -24,8 +24,8 @@ fn one_period(omega: f64, len: usize, force: impl Fn(f64) -> f64) -> Record {
     Record::from_channel(sampling, (0..len).map(|k| force(sampling.time(k))).collect()).unwrap()
 }
 
-/// ẍ + c ẋ + x + x³ = F with F such that x = cos 2t: found with the order of each scheme, and the
-/// product of the multipliers is e^(−cT), by Liouville's formula.
+/// In ẍ + c ẋ + x + x³ = F, the force is such that x = cos 2t. The orbit converges with the order
+/// of each scheme, and the product of the multipliers is e^(−cT), by Liouville's formula.
 #[test]
 fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
     let (c, omega) = (0.4, 2.0);
@@ -53,7 +53,8 @@ fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
             };
             let found: f64 = orbit.multipliers().iter().map(|m| m.norm()).product();
             assert_eq!((orbit.multipliers().len(), orbit.is_stable()), (2, true), "{name}");
-            // The two are conjugate, so that the modulus of each is the root of their product.
+            // The two multipliers are complex conjugates, so that the modulus of each is the square
+            // root of their product.
             let multiplier = orbit.multipliers()[0];
             let missed = (multiplier.norm() - product.sqrt()).abs();
             let stated = orbit.scheme_error().unwrap();
@@ -71,13 +72,14 @@ fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
             let found = (coarse / fine).log2();
             assert!((found - order).abs() < 0.3, "{name}: {found} {coarse:e} {fine:e}");
         }
-        // The damping of a scheme itself is part of the product: of third order, or of first.
+        // The numerical damping of a scheme changes the product; the change is of third order, or
+        // of first order.
         assert!(fine[2] < if order == 1.0 { 0.2 } else { 0.01 }, "{name}: {:e}", fine[2]);
     }
 }
 
-/// Where the resonance curve folds over there are three orbits, the middle one unstable; amplitudes
-/// from one-term harmonic balance, [(k − ω²)A + ¾k₃A³]² + (cωA)² = F².
+/// Three orbits exist where the resonance curve folds over, and the middle one is unstable. The
+/// amplitudes follow from one-term harmonic balance, [(k − ω²)A + ¾k₃A³]² + (cωA)² = F².
 ///
 /// # Source
 /// Nayfeh & Mook, *Nonlinear Oscillations* (1979), section 4.1.
@@ -99,7 +101,7 @@ fn the_three_orbits_of_a_folded_resonance_are_found() {
     let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     let force = one_period(omega, 200, |t| f * (omega * t).cos());
     for (k, a) in amplitudes.into_iter().enumerate() {
-        // x = A cos(ωt − φ) with the phase that the balance leaves.
+        // x = A cos(ωt − φ), with the phase φ from the harmonic balance.
         let elastic = (1.0 - omega * omega) * a + 0.75 * k3 * a.powi(3);
         let phase = (c * omega * a).atan2(elastic);
         let near = released(a * phase.cos(), a * omega * phase.sin());
@@ -144,7 +146,7 @@ fn orbits_that_are_not_isolated_or_not_there_are_refused() {
     };
     let refused = of(&free);
     assert!(matches!(refused, Err(IntegrateError::NoPeriodicState { .. })), "{refused:?}");
-    // A constant force that nothing balances.
+    // The mean force is larger than the resistance, so that no periodic response exists.
     let pushed = ForceFunction::new(vec![0], |_, _, v, g| g[0] = -1.0 + 0.1 * v[0].tanh());
     let pushed = SystemWithForces::new(&free).with(pushed).unwrap();
     let refused = of(&pushed);
@@ -155,8 +157,8 @@ fn orbits_that_are_not_isolated_or_not_there_are_refused() {
     assert!(none, "{refused:?}");
 }
 
-/// Coupled masses between walls, one with a cubic spring, that move as chosen: found with second order, whatever
-/// the number of masses.
+/// Coupled masses between walls, one with a cubic spring; the force is such that they have a chosen
+/// motion. The orbit converges with second order for many masses, too.
 #[test]
 fn a_chosen_response_of_many_masses_is_an_orbit() {
     let (dof, omega) = (150, 6.0);
@@ -165,7 +167,8 @@ fn a_chosen_response_of_many_masses_is_an_orbit() {
     let chain = SparseSystem::new(mass, damping, stiffness).unwrap();
     let cubic = terms("k3: x41^3", &[4e3]);
     let system = SystemWithForces::new(&chain).with(cubic).unwrap();
-    // x_i = a_i cos ωt with the shape of the string, so that its neighbours pull it back by its curvature.
+    // The motion is x_i = a_i cos ωt with the shape a_i of a string. The force of the springs
+    // between neighbours is then proportional to x_i.
     let shape = |i: usize| (std::f64::consts::PI * (i as f64 + 1.0) / (dof as f64 + 1.0)).sin();
     let curved = 2.0 - 2.0 * (std::f64::consts::PI / (dof as f64 + 1.0)).cos();
     let (k, c) = (100.0 + 900.0 * curved, 3.0 + curved);
@@ -189,8 +192,8 @@ fn a_chosen_response_of_many_masses_is_an_orbit() {
     assert!(((coarse / fine).log2() - 2.0).abs() < 0.2, "{coarse:e} {fine:e}");
 }
 
-/// At rest at the top of its hill the first of many masses, ẍ + 1.5 ẋ − x + x³ = 0, leaves by e^(λT),
-/// λ² + 1.5 λ − 1 = 0.
+/// The first of many masses, ẍ + 1.5 ẋ − x + x³ = 0, is at its unstable equilibrium x = 0. A
+/// disturbance grows by e^(λT) in a period, with λ² + 1.5 λ − 1 = 0.
 #[test]
 fn the_instability_of_one_mass_among_many_shows_in_the_largest_multiplier() {
     let dof = 100;

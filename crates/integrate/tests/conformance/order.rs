@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::common::*;
 
-/// The exact motion under [`force_at`] at t = 2 s by the matrix exponential of a larger,
-/// autonomous system whose extra states are the sines of the force.
+/// Returns the exact motion under [`force_at`] at time `t`, by the matrix exponential of a larger,
+/// autonomous system whose extra states are the harmonics and the constant of the force.
 fn exact(system: &SecondOrderSystem, initial: &InitialState, t: f64) -> [DVector<f64>; 3] {
     let n = system.dof();
     let a = system.state_matrix();
@@ -37,7 +37,7 @@ fn exact(system: &SecondOrderSystem, initial: &InitialState, t: f64) -> [DVector
     [end.rows(0, n).into(), end.rows(n, n).into(), slope.rows(n, n).into()]
 }
 
-/// Relative errors of x, ẋ, ẍ at t = 2 s in `steps` steps.
+/// Relative errors of x, ẋ and ẍ at t = 2 s after `steps` steps.
 fn errors(scheme: &dyn Scheme, initial: &InitialState, steps: usize) -> [f64; 3] {
     let system = coupled();
     let sampling = Sampling::new(2.0 / steps as f64, steps + 1).unwrap();
@@ -59,8 +59,9 @@ fn every_scheme_converges_with_its_order() {
     let expected = |scheme: &dyn Scheme| {
         let name = scheme.name();
         let has = |choice: &str| scheme.conventions().iter().any(|c| c.choice.contains(choice));
-        // γ = 0.6 is first order; so are a force held over half a step or all of it and a start
-        // from rest under F(0) ≠ 0, which misplaces the impulse ½ Δt F(0).
+        // Three conventions are of first order: γ = 0.6, a force that is held over half a step or a
+        // whole step, and a start from rest with F(0) ≠ 0, which neglects or shifts the impulse ½
+        // Δt F(0).
         let first = name.contains("Newmark (β = 0.3025") || has("held") || has("at rest");
         let order = match () {
             () if first => 1.0,
@@ -79,7 +80,8 @@ fn every_scheme_converges_with_its_order() {
         let initial = if rest_only { InitialState::rest(2) } else { moving.clone() };
         let measured = orders(scheme, &initial, 400);
         for (order, expected) in measured.into_iter().zip(expected(scheme)) {
-            // Between Δt/T of about 1/200 and 1/800 the next term is some per cent.
+            // Between Δt/T of about 1/200 and 1/800, the next term of the error is a few per cent
+            // of the first.
             assert!((order - expected).abs() < 0.12, "{}: {measured:?}", scheme.name());
         }
     }

@@ -18,7 +18,7 @@ fn by_lines(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> 
     let mut stepper = scheme.prepare_unchecked(system, dt).unwrap();
     let transition = Transition::from_stepper(stepper.as_mut());
     let states = transition.change.nrows();
-    // Δt² of a displacement, Δt of a velocity: numbers of one size.
+    // In units of Δt² for displacements and of Δt for velocities, all entries have similar sizes.
     let units = DVector::from_fn(states, |i, _| dt.powi(2 - (i / n).min(2) as i32));
     let mut parts = [(); 3].map(|()| DMatrix::zeros(len, n));
     for line in 0..len {
@@ -72,7 +72,8 @@ fn schroeder(dt: f64, len: usize, dof: usize) -> Record {
         .unwrap()
         .sample(Sampling::new(dt, len).unwrap())
         .unwrap();
-    // Every channel the same signal, 5 samples apart, so that F(0) differs from channel to channel.
+    // Each channel has the signal of the previous channel shifted by 5 samples, so that F(0)
+    // differs between channels.
     let data = DMatrix::from_fn(len, dof, |k, c| one.channel(0)[(k + 5 * c) % len]);
     Record::new(one.sampling(), data).unwrap()
 }
@@ -86,7 +87,8 @@ fn the_repeating_response_is_exact_at_any_damping() {
             for scheme in schemes() {
                 let response = integrate_periodic(scheme.as_ref(), &system, &force).unwrap();
                 let error = error(&response, &by_lines(scheme.as_ref(), &system, &force));
-                // The natural frequency lies between lines: no resonance multiplies rounding.
+                // The natural frequency is between lines, so that no resonance amplifies rounding
+                // errors.
                 assert!(error < 1e-12, "{} ζ {zeta} N {len}: {error:e}", scheme.name());
             }
         }
@@ -108,7 +110,7 @@ fn coupled_systems_of_any_size_repeat() {
     }
 }
 
-/// Coupled neighbours, 14 … 62 rad/s, the damping ratio `zeta` at 45 rad/s.
+/// A chain with natural frequencies of 14 to 62 rad/s, and the damping ratio `zeta` at 45 rad/s.
 fn chain(dof: usize, zeta: f64) -> SecondOrderSystem {
     let stiffness = DMatrix::from_fn(dof, dof, |i, j| match i.abs_diff(j) {
         0 => 2000.0,
@@ -121,7 +123,8 @@ fn chain(dof: usize, zeta: f64) -> SecondOrderSystem {
 
 #[test]
 fn waiting_gives_the_same() {
-    // ζ = 0.4: after 60 periods of about 3.6 natural ones the transient is far below rounding.
+    // A period of the force is about 3.6 natural periods. With ζ = 0.4 the transient is far below
+    // rounding after 58 periods of the force.
     let system = Sdof::from_modal(10.0, 0.4, 22.36).unwrap().system();
     let (len, periods) = (128, 60);
     let one = schroeder(8e-3, len, 1);
@@ -159,8 +162,9 @@ fn a_response_at_resonance_still_closes() {
     let half_step = v.channel(0)[end] + 0.5 * dt * a.channel(0)[end];
     let closed = x.channel(0)[end] + dt * half_step;
     assert!((closed - x.channel(0)[0]).abs() < 1e-12 * x.column(0).amax());
-    // And the line at resonance is F/(c ω'), ω' = sin θ/Δt being the factor from x to v. In the
-    // damping of 1e-9 rounding of K leaves about seven digits; the other lines add 1e-8.
+    // The line at resonance has the amplitude F/(c ω'), where ω' = sin θ/Δt is the ratio of v to x.
+    // Because of the rounding of K, only about seven digits of the damping ratio of 1e-9 are known;
+    // the other lines add 1e-8.
     let seen = (std::f64::consts::TAU * 3.0 / 64.0).sin() / dt;
     let expected = 1.0 / (2e-9 * omega * seen);
     assert!((x.column(0).amax() / expected - 1.0).abs() < 1e-5);
@@ -256,7 +260,7 @@ fn two_passes_do() {
             let steps = Arc::new(AtomicUsize::new(0));
             let counted = Counted(scheme.as_ref(), Arc::clone(&steps));
             integrate_periodic(&AllowUnstable(&counted), &system, &force).unwrap();
-            // The few beyond two passes read the scheme's matrices, unit state by unit state.
+            // A few more steps than two passes read the matrices of the scheme from unit states.
             let passes = steps.load(Ordering::Relaxed) as f64 / len as f64;
             assert!(passes < 2.1, "{} ζ {zeta}: {passes} passes", scheme.name());
         }

@@ -12,7 +12,8 @@ fn definite(dof: usize, entries: &[f64], floor: f64) -> DMatrix<f64> {
 }
 
 prop_compose! {
-    /// M and K symmetric and positive, C symmetric and not negative, of any relation to them.
+    /// Systems with M and K symmetric positive definite, and C symmetric positive semidefinite and
+    /// independent of M and K.
     fn passive()(
         dof in 1usize..=4,
         m in prop::collection::vec(-1.0..1.0f64, 16),
@@ -68,7 +69,8 @@ proptest! {
         let expected = 2.0 / fastest(&system);
         for scheme in [&CentralDifference::default() as &dyn Scheme, &Newmark::CENTRAL_DIFFERENCE] {
             let limit = critical_step(scheme, &system).unwrap().unwrap();
-            // Damping makes the eigenvalue −1 move off slowly; it is missed by 1e-9 of growth.
+            // With damping, the eigenvalue passes −1 slowly, so that the tolerated growth of 1e-9
+            // moves the limit.
             prop_assert!((limit / expected - 1.0).abs() < 1e-6, "{limit} {expected}");
             prop_assert!(scheme.prepare(&system, 0.999 * expected).is_ok());
             let refused = scheme.prepare(&system, 1.01 * expected);
@@ -83,7 +85,8 @@ proptest! {
 
     #[test]
     fn runge_kutta_is_limited_by_its_polynomial(system in passive()) {
-        // Every eigenvalue λ of the system is multiplied by R(λΔt) on its own.
+        // In each step, the motion of every eigenvalue λ of the system is multiplied by its own
+        // factor R(λΔt).
         let limit = critical_step(&RungeKutta4::LINEAR, &system).unwrap().unwrap();
         let eigenvalues = system.eigenvalues().unwrap();
         let growth = |dt: f64| {
@@ -101,8 +104,8 @@ proptest! {
 
     #[test]
     fn stable_oil_films_are_no_obstacle(dof in 1usize..=4, seed in 0u64..1000, exponent in -3.0..3.0f64) {
-        // C and K without symmetry: average acceleration is the trapezoidal rule, stable whatever
-        // the coupling, as long as the system is.
+        // C and K are not symmetric. Average acceleration is the trapezoidal rule, which is stable
+        // for every stable system.
         let system = mechid_problems::random_stable(dof, seed);
         let dt = 10f64.powf(exponent) / 60.0;
         let radius = spectral_radius(&Newmark::AVERAGE_ACCELERATION, &system, dt).unwrap();
@@ -112,7 +115,8 @@ proptest! {
 
 #[test]
 fn a_system_unstable_by_itself_may_grow() {
-    // An oil film that whirls: negative damping in effect, growth of its own.
+    // An oil film that whirls: its cross-coupled stiffness acts as negative damping, so that the
+    // motion of the system itself grows.
     let system = SecondOrderSystem::new(
         DMatrix::identity(2, 2),
         DMatrix::identity(2, 2) * 0.1,
@@ -130,7 +134,7 @@ fn a_system_unstable_by_itself_may_grow() {
 
 #[test]
 fn a_free_body_is_no_instability() {
-    // Rigid-body motion: the double eigenvalue 1 that rounding splits.
+    // Rigid-body motion has the double eigenvalue 1, which rounding splits.
     let chain = DMatrix::from_fn(6, 6, |i, j| match i.abs_diff(j) {
         0 if i == 0 || i == 5 => 100.0,
         0 => 200.0,

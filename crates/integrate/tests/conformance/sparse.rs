@@ -28,7 +28,7 @@ fn systems() -> Vec<(&'static str, SparseSystem)> {
     let n = 40;
     let chain = band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]);
     let weights: Vec<f64> = (0..n).map(|i| 1.0 + 0.02 * i as f64).collect();
-    // Neighbours that are no neighbours in number: 7 is prime to 40.
+    // Neighbouring masses do not have neighbouring numbers: 7 and 40 have no common factor.
     let name = |i: usize| i * 7 % n;
     let links = |off: f64, skew: f64| {
         (0..n).flat_map(move |i| {
@@ -74,7 +74,7 @@ fn sparse_and_dense_agree() {
     }
 }
 
-/// Non-zero x(0) and ẋ(0) of a size with the response.
+/// Non-zero x(0) and ẋ(0) of about the size of the response.
 fn small(n: usize) -> InitialState {
     let wave =
         |phase: f64| nalgebra::DVector::from_fn(n, |i, _| 1e-2 * (phase + 0.3 * i as f64).sin());
@@ -104,7 +104,8 @@ fn selected_degrees_of_freedom_are_those_of_the_whole() {
             }
         }
     }
-    // One degree of freedom, too, where a whole response is computed at fixed size.
+    // The same holds for one degree of freedom, where the whole response is computed with steps of
+    // fixed size.
     let one = mechid_model::Sdof::new(1.0, 0.1, 40.0).unwrap().system();
     let alone = force(sampling, 1);
     let selected = SelectedDofs { forced: &[0], observed: &[0] };
@@ -182,7 +183,7 @@ fn the_steady_state_of_a_sparse_system_is_that_of_its_receptance() {
             let exact: Complex<f64> =
                 (0..2).map(|c| receptance[(*at, dofs.forced[c])] * lines.line(line, c)).sum();
             let gap = found.line(line, channel) - exact;
-            // A record shows the real part of the line at half the rate of its samples.
+            // At half the sampling rate, a record contains only the real part of the line.
             let gap = if line == lines.len() - 1 { Complex::from(gap.re) } else { gap };
             assert!(gap.norm() < 1e-14, "{line}: {gap}");
         }
@@ -206,7 +207,7 @@ fn a_singular_mass_matrix_is_refused() {
 
 #[test]
 fn large_dense_systems_of_few_entries_are_stepped_as_sparse() {
-    // 200 masses: the dense system has 1.5 % of entries that are not zero.
+    // In the dense system of 200 masses, 1.5 % of the entries are not zero.
     let n = 200;
     let chain = band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]);
     let sparse = SparseSystem::new(band(n, &[(0, 1.0)]), &chain * 1e-3, chain).unwrap();

@@ -27,7 +27,7 @@ fn known_limits_are_those_of_one_degree_of_freedom() {
                 system.eigenvalues().unwrap().iter().map(|l| l.norm()).fold(0.0, f64::max);
             match scheme.stable_steps() {
                 StableSteps::All => assert_eq!(limit, None, "{name} ζ {ratio}"),
-                // Damping can only help.
+                // Damping can only increase the limit.
                 StableSteps::Frequencies(known) => {
                     let gap = limit.map(|limit| limit / known - 1.0);
                     assert!(gap.is_none_or(|gap| gap > -1e-9), "{name} ζ {ratio}: {gap:?}");
@@ -72,11 +72,12 @@ fn a_long_chain_is_refused_just_beyond_the_limit() {
                     }
                     StableSteps::Frequencies(limit) => limit / highest(n),
                     _ if damping > 0.0 => continue,
-                    // Undamped.
+                    // This is the limit of the Runge–Kutta scheme without damping.
                     _ => 8_f64.sqrt() / highest(n),
                 };
                 assert!(scheme.prepare(&chain, 0.999 * limit).is_ok(), "{name} n {n}");
-                // Damping in proportion to K moves the limit of γ > ½ up by some per cent.
+                // Damping proportional to K increases the limit of schemes with γ > ½ by some per
+                // cent.
                 match scheme.prepare(&chain, 1.05 * limit).err() {
                     Some(IntegrateError::Unstable { critical_step: Some(said), .. }) => {
                         let gap = said / limit - 1.0;
@@ -88,7 +89,8 @@ fn a_long_chain_is_refused_just_beyond_the_limit() {
             if n > 300 {
                 continue;
             }
-            // For this scheme no limit is known: the amplification itself gives it.
+            // No limit in closed form is known for this scheme; its amplification matrix gives the
+            // limit.
             let limit = critical_step(&wilson, &Sdof::new(1.0, 0.0, 1.0).unwrap().system());
             let limit = limit.unwrap().unwrap() / highest(n);
             assert!(wilson.prepare(&chain, 0.99 * limit).is_ok());
@@ -124,7 +126,7 @@ fn full_systems_without_symmetry_are_judged_by_their_eigenvalues() {
     }
 }
 
-/// The growth of a shaft that whirls by itself is no fault of the scheme.
+/// A shaft that whirls has a growing motion; this growth is not an instability of the scheme.
 #[test]
 fn growth_of_its_own_is_no_instability_of_the_scheme() {
     let n = 60;
@@ -163,8 +165,9 @@ fn the_spectral_radius_of_a_long_chain_is_that_of_its_fastest_mode() {
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
 }
 
-/// Judge: the number of eigenvalues of a tridiagonal pencil above a value, by the signs of its pivots (Sturm's
-/// sequence). The fastest motion of unequal masses is that of a few of them, which no iteration finds soon.
+/// Judge: the number of eigenvalues of a tridiagonal pencil above a value, by the signs of its
+/// pivots (Sturm's sequence). With unequal masses only a few masses take part in the fastest
+/// motion, and iterations converge to this motion slowly.
 #[test]
 fn a_chain_of_unequal_masses_is_refused_just_beyond_the_limit() {
     let n = 4000;

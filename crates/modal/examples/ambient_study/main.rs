@@ -1,9 +1,9 @@
 //! Coverage and errors of modes from responses alone, compared with covariance-driven subspace
 //! models (SSI-cov) of the order that is best when the true modes are known.
 //!
-//! `cargo run --release -p mechid-modal --example ambient_study -- SEEDS [CASE [FOLDER]]`; with a
-//! FOLDER the records, the true modes and the estimated modes are written there instead, for
-//! `pyoma2_ssi.py`.
+//! `cargo run --release -p mechid-modal --example ambient_study -- SEEDS [CASE [FOLDER]]`; with
+//! FOLDER, the example writes the records, the true modes and the estimated modes to this folder
+//! instead, for `pyoma2_ssi.py`.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a study prints its table")]
 
@@ -36,8 +36,8 @@ struct Case {
     rate_hz: f64,
     len: usize,
     noise: Noise,
-    /// Number of samples of a moving mean of the record: forces whose spectrum has zeros; 1 for
-    /// white forces.
+    /// Number of samples of the moving mean that is applied to the record. It has the effect of
+    /// forces whose spectrum has zeros; 1 for white forces.
     mean: usize,
 }
 
@@ -77,7 +77,7 @@ fn cases() -> Vec<Case> {
         forces: dmatrix![1.0, 0.3; 2.0, -2.0; -3.0, 6.0],
     };
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    // Each force drives all modes, so that far modes have correlated forces, too.
+    // Each force drives all modes, so that the modal forces of distant modes are correlated, too.
     let bridge = Structure {
         frequencies_hz: vec![1.1, 1.7, 2.6, 3.2, 3.3, 4.8, 6.0, 7.1],
         dampings: vec![0.01; 8],
@@ -184,7 +184,7 @@ fn main() {
     }
 }
 
-/// Writes the records of a case, and its modes: true ones and estimates.
+/// Writes the records, the true modes and the estimated modes of a case to files.
 fn write(case: &Case, seeds: u64, folder: &Path) -> std::io::Result<()> {
     let name = case.name.replace(',', "").replace(' ', "-");
     let mut modes = format!("seed,frequency_hz,damping_ratio\nrate,{},\n", case.rate_hz);
@@ -214,9 +214,10 @@ struct Study<'a> {
     seeds: u64,
     modes: Vec<ModeResult>,
     false_modes: usize,
-    /// Number of records whose halves differ, by the test that the program makes.
+    /// Number of records whose halves differ according to the test of [`PartsComparison`].
     changed: usize,
-    /// Number of records that the fitted spectrum does not describe, at 1 %.
+    /// Number of records for which the test of the fitted spectrum rejects the fit at the 1 %
+    /// level.
     unfit: usize,
 }
 
@@ -224,11 +225,11 @@ struct Study<'a> {
 struct ModeResult {
     decay_times: f64,
     found: usize,
-    /// Percentages of intervals that hold: f, ζ and shape.
+    /// Percentages of intervals that contain the true value: f, ζ and shape.
     held: [f64; 3],
-    /// Scatter over standard error of f and ζ.
+    /// Ratio of scatter to standard error, for f and ζ.
     scatter: [f64; 2],
-    /// Bias over scatter of f and ζ.
+    /// Ratio of bias to scatter, for f and ζ.
     bias: [f64; 2],
     /// Relative root-mean-square errors of f and ζ.
     rms: [f64; 2],
@@ -327,7 +328,8 @@ fn halves_differ(record: &Record, estimate: &AmbientEstimate) -> bool {
     PartsComparison::of_ambient(estimate, [&first, &second]).is_ok_and(|halves| halves.differ())
 }
 
-/// Adds to each true mode the nearest estimate that no other has; returns how many have one.
+/// Assigns to each true mode the nearest estimate that is not assigned to another mode; returns the
+/// number of assigned modes.
 fn tally_modes(tallies: &mut [Tally], modes: &[AmbientMode], truth: &Structure) -> usize {
     let mut taken = vec![false; modes.len()];
     for (r, tally) in tallies.iter_mut().enumerate() {
@@ -401,10 +403,11 @@ impl Tally {
     }
 }
 
-/// Block rows of the subspace models beside those of the estimate.
+/// Numbers of block rows of the additional subspace models.
 const BLOCK_ROWS: [usize; 3] = [20, 40, 80];
 
-/// Settings of subspace models: those of the estimate first.
+/// Number of settings of the subspace models: the setting of the estimate, then one for each entry
+/// of `BLOCK_ROWS`.
 const ROWS: usize = 1 + BLOCK_ROWS.len();
 
 /// Largest half order of a subspace model.
@@ -421,7 +424,8 @@ impl SubspaceErrors {
         Self { sums: vec![[[[0.0; 3]; HALF_ORDERS]; ROWS]; modes], records: 0 }
     }
 
-    /// Adds the subspace models of a record: those of the estimate, and of other block rows.
+    /// Adds the subspace models of a record: the models of the estimate, and models with other
+    /// numbers of block rows.
     fn add_all(&mut self, record: &Record, of_estimate: &Stabilisation, truth: &Structure) {
         self.add(0, of_estimate, truth);
         let orders: Vec<usize> = (1..=20).map(|half| 2 * half).collect();
@@ -490,6 +494,6 @@ impl SubspaceErrors {
 struct BestSubspace {
     rms: f64,
     order: usize,
-    /// 0: those of the estimate.
+    /// Number of block rows; 0 for the models of the estimate.
     block_rows: usize,
 }

@@ -1,13 +1,13 @@
 //! Errors of common tools relative to those of maximum likelihood, on the same records.
 //!
 //! `cargo run --release -p mechid-modal --example modal_rivals -- SEEDS` compares root-mean-square
-//! errors of f and ζ, mode by mode; with a FOLDER after SEEDS the records, the true modes and the
-//! estimated modes are written there instead, for `sdypy_ema.py`. The common tools are:
+//! errors of f and ζ, mode by mode; with FOLDER after SEEDS, it writes the records, the true modes
+//! and the estimated modes to this folder instead, for `sdypy_ema.py`. The common tools are:
 //!
-//! - random forces: responses by H1 from Hann-windowed segments that overlap by half, then pLSCF,
-//!   at the best of three lengths of segments;
-//! - hits: blocks from every hit on, with an exponential window whose damping is subtracted again,
-//!   H1 over the hits, then pLSCF, at the best of four windows.
+//! - random forces: frequency responses by H1 from Hann-windowed segments that overlap by half,
+//!   then pLSCF, with the best of three segment lengths;
+//! - hits: one block from each hit, with an exponential window, H1 over the hits, then pLSCF, with
+//!   the best of four windows. The damping that the window adds is subtracted from the poles.
 //!
 //! The common tools have an advantage: their poles are chosen with the true modes known, as the
 //! cluster nearest to each true pole, and the best setting is chosen mode by mode by the errors
@@ -76,7 +76,7 @@ fn write(case: &Case, seeds: u64, folder: &Path) -> std::io::Result<()> {
     fs::write(folder.join(format!("{name}.modes.csv")), modes)
 }
 
-/// Prints one line for each mode of a case.
+/// Prints the ratios of the errors for all modes together, then one line for each mode of a case.
 fn compare(case: &Case, seeds: u64) {
     let settings = case.settings();
     let modes = case.in_band();
@@ -95,7 +95,8 @@ fn compare(case: &Case, seeds: u64) {
         "{}, {seeds} records: RMS errors of the usual tool over those of identify_modes",
         case.name
     );
-    // All modes together: each error over the half-width of its mode, at the best setting of all.
+    // Over all modes: errors of f relative to the half-width of the mode, errors of ζ relative to
+    // ζ, with the setting that is best for all modes together.
     let widths: Vec<f64> =
         modes.iter().map(|mode| case.damping[*mode] * case.frequency_hz[*mode]).collect();
     let pooled = |squares: &[Squares]| {
@@ -144,7 +145,8 @@ impl Squares {
     }
 }
 
-/// Adds the errors of the poles nearest to the true ones, each used once, within five half-widths.
+/// Adds, for each mode, the error of the nearest pole within five half-widths; each pole is used
+/// once.
 fn add(case: &Case, modes: &[usize], poles: &[C], squares: &mut [Squares]) {
     let mut rest = poles.to_vec();
     for (mode, square) in modes.iter().zip(squares) {
@@ -225,7 +227,7 @@ fn hits(forces: &Record, len: usize) -> Vec<usize> {
     starts
 }
 
-/// Returns the responses by H1 in the band.
+/// Returns the frequency responses by H1 in the band.
 fn responses(
     case: &Case,
     [forces, motion]: [&Record; 2],
@@ -259,7 +261,7 @@ fn responses(
     let responses = power.into_iter().zip(cross);
     let responses = responses
         .map(|(power, cross)| {
-            // Both are Hermitian products of the forces: H P = C is P Hᴴ = Cᴴ.
+            // The power matrix P is Hermitian, so that H P = C is equivalent to P Hᴴ = Cᴴ.
             power.lu().solve(&cross.adjoint()).expect("the forces are independent").adjoint()
         })
         .collect();

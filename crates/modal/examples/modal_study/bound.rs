@@ -1,10 +1,11 @@
 //! Cramér–Rao bound of natural frequencies and damping ratios, from the true structure alone.
 //!
-//! The bound is independent of the estimator. The derivatives are differences of records that the
-//! generator makes without noise: of f and ζ by central differences, of shapes, participations and
-//! initial states exactly, because the record is linear in them. All modes count, also those
-//! outside the band; the other unknowns are the complex shapes, the complex participations of all
-//! forces but one, and the complex state of every mode at the start of the record.
+//! The bound is independent of the estimator. The derivatives come from records that the generator
+//! makes without noise. The derivatives with respect to f and ζ are central differences; those with
+//! respect to shapes, participations and initial states are exact, because the record is linear in
+//! them. All modes count, also those outside the band; the other unknowns are the complex shapes,
+//! the complex participations of all forces but one, and the complex state of every mode at the
+//! start of the record.
 //!
 //! # Source
 //! Kay, *Fundamentals of Statistical Signal Processing: Estimation Theory* (1993), section 15.7
@@ -84,7 +85,7 @@ fn of_record(case: &Case, seed: u64) -> DMatrix<f64> {
     }
 }
 
-/// Returns the record of one mode alone for given shape and participation, in lines.
+/// Returns the spectral lines of the record of one mode alone, for a given shape and participation.
 fn of_mode(
     case: &Case,
     seed: u64,
@@ -102,8 +103,8 @@ fn of_mode(
     alone.lines(seed).outputs().clone()
 }
 
-/// Returns the derivatives with respect to the unknowns other than the poles that all outputs
-/// share: participations of all forces but the first, and initial states.
+/// Returns the derivatives with respect to the unknowns that all outputs share, except the poles:
+/// participations of all forces but the first, and initial states.
 fn shared_derivatives(case: &Case, seed: u64) -> Vec<DMatrix<C>> {
     let inputs = case.participation[0].len();
     let mut all = Vec::new();
@@ -120,8 +121,8 @@ fn shared_derivatives(case: &Case, seed: u64) -> Vec<DMatrix<C>> {
     all
 }
 
-/// Returns the derivatives with respect to the real and imaginary part of each mode's shape at an
-/// output, which is its column.
+/// Returns the derivatives with respect to the real and imaginary part of each mode's shape. The
+/// column of an output is the derivative of this output with respect to its own shape entry.
 fn own_derivatives(case: &Case, seed: u64) -> Vec<DMatrix<C>> {
     let outputs = case.shape[0].len();
     let turns = [C::new(1.0, 0.0), C::i()];
@@ -133,7 +134,7 @@ fn own_derivatives(case: &Case, seed: u64) -> Vec<DMatrix<C>> {
     .collect()
 }
 
-/// Returns the free decay of a mode from the start of the record, in lines.
+/// Returns the spectral lines of the free decay of a mode from the start of the record.
 fn decay(case: &Case, mode: usize, shape: &[C]) -> DMatrix<C> {
     let pole = case.poles()[mode];
     let (forces, _) = case.record(0);
@@ -144,8 +145,8 @@ fn decay(case: &Case, mode: usize, shape: &[C]) -> DMatrix<C> {
     LineData::from_open_record(None, &record, case.band_hz).unwrap().outputs().clone()
 }
 
-/// Power of a line of an unmeasured force in unitary lines: its amplitude S has E|S|² = 2, with
-/// half of the power on either side of zero.
+/// Power of a line of an unmeasured force in unitary lines: its amplitude S has E|S|² = 2, and half
+/// of the power is at the negative frequency.
 const LINE_POWER: f64 = 0.5;
 
 enum Covariance {
@@ -175,7 +176,8 @@ fn noise_covariance(case: &Case, seed: u64) -> Covariance {
     let period = (4 * case.samples) as f64;
     let step = TAU * case.rate_hz / period;
     // The record is a window of a process with independent lines on a grid four times as fine: the
-    // power of a line is the power of those lines, weighted by the transform of the window.
+    // power of a line of the record is the sum of the powers of the fine lines, weighted by the
+    // squared transform of the window.
     const REACH: i64 = 400;
     let responses: Vec<DMatrix<C>> = {
         let last = (data.omega()[data.len() - 1] / step) as i64 + REACH + 1;
@@ -204,8 +206,8 @@ fn window_power(shift: i64, samples: usize) -> f64 {
     if shift == 0 { n } else { (x.sin() / (x / n).sin()).powi(2) / n }
 }
 
-/// Projects the last unknowns out of the normal equations of all and returns what remains of the
-/// first `kept`.
+/// Eliminates the last unknowns from the normal equations, and returns the equations of the first
+/// `kept` unknowns (Schur complement).
 fn schur(all: &DMatrix<f64>, kept: usize) -> DMatrix<f64> {
     let size = all.nrows();
     let scale: Vec<f64> =

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p mechid-modal --example modal_study -- SEEDS [CASE] [FIRST]` prints one
 //! row per case. The scatter is divided by an independent Cramér–Rao bound (`bound.rs`), the bias
-//! by the scatter. The modal masses are those of the first response and the first force. The row "sensor noise only" leaves unmeasured forces out of the noise model; the
-//! number of modes is given there.
+//! by the scatter. The modal masses are those of the first response and the first force. In the row
+//! "sensor noise only", the noise model has no unmeasured forces, and the number of modes is given.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 mod bound;
@@ -44,8 +44,9 @@ fn main() {
             continue;
         }
         let seeds = first..first + seeds;
-        // Unmeasured forces act at other places in every record. Noise on the forces is part of the
-        // model's inputs: no such bound exists for it.
+        // Unmeasured forces act at different points in each record, so the bound is averaged over
+        // all records. There is no bound for noise on the forces, because this noise is part of the
+        // inputs of the model.
         let most = if case.unmeasured > 0.0 { u64::MAX } else { BOUND_SEEDS };
         let records: Vec<u64> = seeds.clone().take(most as usize).collect();
         let bound = (case.force_noise == 0.0).then(|| Bound::of(&case, &records));

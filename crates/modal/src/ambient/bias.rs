@@ -26,7 +26,7 @@ const ERROR_STEP: f64 = 0.05;
 pub(super) struct Excess {
     centre: Coefficients,
     /// Coefficients after a step to either side of the fit, along each column of F that changes
-    /// poles. Each has the factor of its spectrum in M.
+    /// poles, each with the weight of its spectrum in M.
     moved: Vec<(Coefficients, f64)>,
     /// Contribution of the columns of F that do not change poles: half the sum of the second
     /// derivatives of ψγᵀ of each mode, and of D Q Dᵀ.
@@ -110,8 +110,8 @@ impl Fit {
         let (scaled, scale) = scaled(&self.information, 0.0);
         let eigen = hermitian_eigen(scaled)?;
         let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
-        // The lines do not determine the phase of a mode far from all others; no result depends on
-        // it.
+        // The lines do not determine the phase of a mode that is far from all others; no result
+        // depends on this phase.
         let errors: Vec<DVector<f64>> = directions
             .filter(|(value, _)| **value > DETERMINED_SHARE)
             .map(|(value, direction)| direction.component_mul(&scale) / value.sqrt())
@@ -122,8 +122,8 @@ impl Fit {
 }
 
 impl Excess {
-    /// Adds, times `weight`, the differences of ψγᵀ and D Q Dᵀ between `moved` and the centre,
-    /// which have the same poles.
+    /// Adds `weight` times the differences of ψγᵀ and D Q Dᵀ between `moved` and the centre. Both
+    /// have the same poles.
     fn add_residues(&mut self, moved: &Coefficients, weight: f64) {
         for (r, sum) in self.residues.iter_mut().enumerate() {
             for (coefficients, sign) in [(moved, weight), (&self.centre, -weight)] {

@@ -22,7 +22,7 @@ const REFINEMENTS: usize = 12;
 pub struct Harmonic {
     /// Frequency, in Hz.
     pub frequency_hz: f64,
-    /// Channel that shows it most clearly, counted from 0.
+    /// Channel that shows the sinusoid most clearly, counted from 0.
     pub channel: usize,
     /// Amplitude in that channel, in its unit.
     pub amplitude: f64,
@@ -70,8 +70,9 @@ pub fn harmonics(record: &Record, band_hz: [f64; 2]) -> Result<Vec<Harmonic>, Am
         let lines = padded_lines(record.channel(channel), padded);
         for index in from..to {
             let statistic = f_statistic(&lines, index, &sums);
-            // The lines are a quarter of a line spacing apart. `tested` counts `PADDING`
-            // neighbouring lines as one test; the factor `PADDING` allows for the best of them.
+            // The lines of the padded record are a quarter of the line spacing of the record apart.
+            // `tested` counts `PADDING` neighbouring lines as one test; the factor `PADDING` allows
+            // for the best of them.
             let p_value = (PADDING as f64 * tested as f64 * distribution.sf(statistic)).min(1.0);
             if p_value < HARMONIC_LEVEL {
                 let frequency_hz = index as f64 * step_hz;
@@ -108,7 +109,7 @@ fn taper_sums(len: usize) -> Vec<f64> {
 fn padded_lines(samples: &[f64], padded: usize) -> Vec<Complex<f64>> {
     let plan = transform::forward(padded);
     let mut input = vec![0.0; padded];
-    // The tapers count the samples from 1: the input begins one sample later.
+    // The tapers count the samples from 1, so the record begins at index 1 of the input.
     input[1..=samples.len()].copy_from_slice(samples);
     let mut output = plan.make_output_vec();
     // The lengths match the plan, so that this cannot fail.

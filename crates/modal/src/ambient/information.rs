@@ -76,8 +76,8 @@ impl LineInformation<'_> {
         }
     }
 
-    /// Adds the information of the directions with each other, with the shapes (derivatives `x`)
-    /// and with the noise.
+    /// Adds the entries between two directions, between directions and shapes (derivatives `x`),
+    /// and between directions and noise.
     fn add_directions(
         &self,
         directions: &[Direction],

@@ -17,7 +17,7 @@ use crate::stabilisation::Pole;
 /// noise of the sensor.
 const NOISE_QUANTILE: f64 = 0.1;
 
-/// Number of corrections of the amplitudes: repeated, because modes overlap.
+/// Number of corrections of the amplitudes; one is not enough, because modes overlap.
 const AMPLITUDE_STEPS: usize = 3;
 
 /// Half width, in decay rates, of the lines that determine an amplitude.
@@ -36,9 +36,9 @@ const QUANTITIES: [(Kernel, f64); 5] = [
 /// acceleration, filtered or not) that explains the lines best; `None` if the likelihood does not
 /// exist for any quantity.
 ///
-/// The quantities are compared at the poles of the subspace models. They differ in the tails of the
-/// resonances. With free poles, a wrong quantity could have a larger maximum at other poles, with
-/// damping ratios near zero.
+/// The quantities are compared at the poles of the subspace models. Their spectra differ in the
+/// tails of the resonances. With free poles, a wrong quantity could have a larger maximum at other
+/// poles, with damping ratios near zero.
 pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
@@ -74,8 +74,8 @@ fn initial_parameters(
     for (r, mode) in modes.iter().enumerate() {
         let (frequency, damping) = (parameters.layout.frequency(r), parameters.layout.damping(r));
         parameters.values[frequency] = mode.pole.norm().ln();
-        // A search cannot leave a resonance that is as narrow as a line, such as that of a
-        // sinusoid, so it does not start at one.
+        // A search cannot leave a resonance that is as narrow as a line, such as the peak of a
+        // sinusoid. The initial damping is therefore not smaller than this limit.
         let narrowest = MIN_DECAY_TIMES / (mode.pole.norm() * band.span.duration);
         parameters.values[damping] = mode.damping_ratio().max(narrowest).ln();
         let turn = Complex::cis(phase - mean_phase(&mode.vector));

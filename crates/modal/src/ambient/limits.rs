@@ -15,7 +15,8 @@ pub(super) const DEFAULT_FIRST_LINE: f64 = 4.0;
 /// Default maximum number of modes.
 pub(super) const DEFAULT_MAX_MODES: usize = 12;
 
-/// Smallest number of lines in the band per unknown of one mode; fewer do not determine it.
+/// Smallest number of lines in the band per unknown of one mode; fewer lines do not determine the
+/// mode.
 pub(super) const MIN_LINES_PER_UNKNOWN: usize = 3;
 
 /// Minimum ratio of the RMS value of a channel to the RMS value of the strongest channel; a channel
@@ -35,7 +36,7 @@ pub(super) const RESAMPLING: f64 = 2.5;
 /// Largest damping ratio of a pole that may be a mode.
 pub(super) const MAX_DAMPING: f64 = 0.2;
 
-/// Minimum fraction of the model orders with a pole for an initial mode.
+/// Minimum fraction of the model orders in which a pole must appear to become an initial mode.
 pub(super) const MIN_SHARE: f64 = 0.3;
 
 /// Width of pooled lines, as a share of the distance to the nearest pole: with this width the mean
@@ -79,7 +80,8 @@ pub(super) const MAX_BIAS: f64 = 1.0;
 /// Maximum number of alternations between the parameters and the transient.
 pub(super) const TRANSIENT_ROUNDS: usize = 6;
 
-/// Number of refused candidates that ends the search for further modes.
+/// Number of candidates that are refused, or accepted without an additional mode, at which the
+/// search for further modes ends.
 pub(super) const REFUSALS: usize = 2;
 
 /// Minimum ratio of the damping of a mode to its standard error; below it the damping is
@@ -89,15 +91,16 @@ pub(super) const DAMPING_SIGNIFICANCE: f64 = 2.0;
 /// Probability of a false harmonic in a record.
 pub(super) const HARMONIC_LEVEL: f64 = 1e-3;
 
-/// Number of sine tapers in the test for harmonics; the resolution is this number of half lines.
+/// Number of sine tapers in the test for harmonics; the resolution, in lines, is half of this
+/// number.
 pub(super) const TAPERS: usize = 7;
 
 /// Number of lines excluded on either side of a harmonic: the subtraction of the sinusoid is not
 /// exact there.
 pub(super) const EXCLUDED_LINES: f64 = 2.0;
 
-/// Minimum share of a channel's power that another channel does not explain; below it the two are
-/// copies.
+/// Minimum share of a channel's power that another channel does not explain; below it the two
+/// channels count as copies.
 pub(super) const COPIED_CHANNEL: f64 = 1e-10;
 
 /// Minimum ratio of the Wald statistic of a shape to the penalty of a mode; with a larger ratio the

@@ -15,7 +15,7 @@ use super::transient::Transient;
 /// needed because the noise varies with frequency.
 const WIDEST: f64 = 0.02;
 
-/// Lines of one record in a band, without the excluded ones.
+/// Lines of one record in a band, without the excluded lines.
 #[derive(Debug, Clone)]
 pub(super) struct BandLines {
     /// Angular frequencies, in rad/s.
@@ -37,7 +37,7 @@ pub(super) struct PooledLines {
     pub omega: f64,
     /// Number of lines.
     pub count: f64,
-    /// Chebyshev polynomials of the noise at this frequency.
+    /// Values of the Chebyshev polynomials of the noise at this frequency.
     pub terms: Vec<f64>,
     /// Mean of Y Yᴴ.
     pub periodogram: DMatrix<Complex<f64>>,
@@ -53,7 +53,7 @@ impl BandLines {
         std::f64::consts::TAU / self.span.duration
     }
 
-    /// Returns Chebyshev polynomials over the band at `omega`.
+    /// Returns the values of the Chebyshev polynomials over the band at `omega`.
     pub fn noise_terms(&self, omega: f64, count: usize) -> Vec<f64> {
         let (first, last) = (self.omega[0], self.omega[self.omega.len() - 1]);
         let x = if last > first { 2.0 * (omega - first) / (last - first) - 1.0 } else { 0.0 };
@@ -66,8 +66,8 @@ impl BandLines {
     }
 
     /// Pools lines over the fraction `part` of their distance to the nearest of the `poles`, or to
-    /// zero frequency: there the spectrum of an acceleration has a zero, so that with little noise
-    /// it changes by orders of magnitude from line to line.
+    /// zero frequency. At zero frequency the spectrum of an acceleration has a zero: with little
+    /// noise, it changes there by orders of magnitude from line to line.
     pub fn pooled(
         &self,
         poles: &[Complex<f64>],
@@ -116,7 +116,8 @@ impl BandLines {
             let kernels = coefficients.kernels(omega, self.span);
             coefficients.spectrum(&kernels, &noise(parameters, &terms))
         });
-        // The mean of a parabola at n points, relative to its change from the centre to the ends.
+        // Mean of a parabola over n points, as a fraction of its change from the centre to the
+        // ends.
         let count = range.len() as f64;
         let share = (count + 1.0) / (3.0 * (count - 1.0));
         let change = ((first + last) * Complex::from(0.5) - &centre) * Complex::from(share);

@@ -1,9 +1,10 @@
 //! Modes from responses alone, for structures that are excited by wind, traffic or their machinery.
 //!
-//! A subspace method ([`ssi_cov`]) gives initial poles and shapes. Poles, shapes, correlated white
-//! forces on the modes and smooth sensor noise then maximise Whittle's likelihood with the expected
-//! periodogram, and at last a likelihood with the transient of the open record as a random effect;
-//! no window, no averaging and no choice of a model order are needed.
+//! A subspace method ([`ssi_cov`]) gives initial poles and shapes. The unknowns are the poles, the
+//! shapes, correlated white forces on the modes and smooth sensor noise. Their estimates first
+//! maximise Whittle's likelihood with the expected periodogram, then a likelihood in which the
+//! transient of the open record is a random effect. No window, no averaging and no choice of a
+//! model order are needed.
 
 mod bias;
 mod error;
@@ -119,7 +120,7 @@ pub fn identify_ambient(
         return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
     }
     let modes = fitted_modes(&fitted, &band, &accepted, &sinusoids)?;
-    // The leakage of a record without intervals is not known well enough.
+    // If the record is too short for intervals, its leakage is not known well enough for this test.
     let is_long = modes.iter().all(AmbientMode::has_interval);
     let misfit = if is_long { fitted.misfit() } else { None };
     let parameters = fitted.fit.parameters;
@@ -139,7 +140,8 @@ pub fn identify_ambient(
 }
 
 impl AmbientEstimate {
-    /// Fits the spectrum again to `record`, a part of the whole, and returns its modes.
+    /// Fits the spectrum again to `record`, a part of the original record, and returns the modes of
+    /// this part.
     pub(crate) fn refitted(&self, record: &Record) -> Result<Vec<AmbientMode>, AmbientError> {
         let FittedSpectrum { parameters, scale, sound, excluded_hz } = &self.spectrum;
         let record = harmonics::subtracted(record, excluded_hz)?;

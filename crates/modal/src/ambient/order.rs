@@ -259,8 +259,8 @@ impl Choice<'_> {
             }
             match self.with(&fit, &candidate.pole, is_stated) {
                 Ok(next) => {
-                    // A pole that is not a mode may explain a background; only few such poles are
-                    // useful.
+                    // A pole that is not a mode may explain a background, but only a few such poles
+                    // are useful.
                     let modes = self.sound_modes(&next);
                     refusals += usize::from(modes <= self.sound_modes(&fit));
                     fit = next;
@@ -275,8 +275,8 @@ impl Choice<'_> {
         if fit.parameters.layout.modes > before { self.pruned(fit) } else { fit }
     }
 
-    /// Returns the fit with one more mode, or the reason for which it was rejected. A mode that is
-    /// stated may be insignificant.
+    /// Returns the fit with one more mode, or the reason for which it was rejected. If `is_stated`
+    /// is true, the mode may be insignificant.
     fn with(&self, fit: &Fit, pole: &Pole, is_stated: bool) -> Result<Fit, DropReason> {
         let shape = &pole.vector * nalgebra::Complex::from(-pole.pole.re);
         let mut start = fit.parameters.with_mode(pole.pole, &shape);

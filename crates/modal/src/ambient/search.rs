@@ -60,7 +60,7 @@ impl Effort {
     /// the initial amplitudes. With wrong amplitudes, a search with free poles would move a damping
     /// ratio to nearly zero, the value for a sinusoid, and no later search would increase it again.
     pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true, even_pools: false };
-    /// Effort to approach the maximum with coarse lines.
+    /// Effort to approach the maximum with coarsely pooled lines.
     pub const SHORT: Self =
         Self { iterations: 6, slow: 0.5, holds_poles: false, even_pools: false };
     /// Effort to test a mode: steps with a gain below `slow` are not needed, because the gain of a
@@ -253,7 +253,8 @@ pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort)
     let [pooled, coarse] = around(&first.parameters);
     let lines = SearchLines { pooled: &pooled, coarse: &coarse, span };
     let Fit { parameters, information: nearby, .. } = first;
-    // This information belongs to nearby parameters: it is computed anew if a step is refused.
+    // This information was computed for nearby parameters, so it is computed again if a step is
+    // refused.
     let mut fit = search_with_information(parameters, nearby, TRUSTED_UPDATES, lines, effort)?;
     fit.information = information(&fit.parameters, &pooled, span)?;
     // The cost is computed on all lines, so that fits with different pooling can be compared.

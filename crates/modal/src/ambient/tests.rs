@@ -179,8 +179,8 @@ fn largest_excess(pooled: &[PooledLines], band: &BandLines, parameters: &Paramet
     largest
 }
 
-/// One force drives three modes: the outputs move along one direction, which turns from line to
-/// line, and all other directions have only noise.
+/// One force drives three modes: the outputs move along one direction, which changes from line to
+/// line, and all other directions contain only noise.
 #[test]
 fn pooled_lines_are_even_also_in_the_noise() {
     let mut parameters = parameters(Kernel::Static, 4);
@@ -236,8 +236,8 @@ fn reordered_modes_keep_the_correlation_of_their_forces() {
     assert!(gap.amax() < 1e-12, "{gap}");
 }
 
-/// The reference is the mean of the logarithm of the mean of n squared magnitudes of unit variance:
-/// −1/(2n) + O(1/n²).
+/// The reference is the logarithm of the average of n squared magnitudes of unit variance. Its
+/// expected value is −1/(2n) + O(1/n²).
 #[test]
 fn the_bias_of_a_noise_level_is_that_of_a_logarithm() {
     let layout = Layout::new(0, 1, 1);
@@ -359,8 +359,8 @@ fn the_transient_correlates_the_lines() {
             let exact = terms.sum::<Complex<f64>>() * (dt * dt / DURATION);
             let [one, other] = [lines[j], *second].map(|w| response.gains(w));
             let [[_, force], [_, other_force]] = [lines[j], *second].map(|w| response.parts(w));
-            // Forces at two lines are independent. For a given transient, which depends on both of
-            // them, they are correlated.
+            // Forces at two lines are independent. For a given transient, which depends on both
+            // forces, they are correlated.
             let remaining = force * &prior * other_force.adjoint();
             let modelled = (one * &prior * other.adjoint() - remaining)[(0, 0)];
             let gap = (exact - modelled).norm() / exact.norm();

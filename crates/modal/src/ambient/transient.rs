@@ -77,7 +77,7 @@ impl FitWithTransient {
 /// transient, until the likelihood no longer rises.
 ///
 /// The information about the poles that the transient itself contains is not used: it is only as
-/// much as that of one of the many lines of a resonance.
+/// much as the information of a single line, and a resonance has many lines.
 ///
 /// # Source
 /// After Dempster, Laird & Rubin (1977), Journal of the Royal Statistical Society B 39, 1–38.

@@ -128,7 +128,8 @@ mod tests {
         assert_eq!(Autoregression::from_noise(white.channel(0)).order(), 0);
     }
 
-    /// The errors of e^{λk} and k e^{λk} are those of the sequences, sample by sample.
+    /// Reference: the prediction errors of the sequences e^{λk} and k e^{λk}, computed sample by
+    /// sample.
     #[test]
     fn whitened_exponential_functions_are_exponential_functions() {
         let noise = Autoregression::from_noise(&first_order(4000, 5));
@@ -156,8 +157,8 @@ mod tests {
         let later = noise.whitened(&x[100 - noise.order()..], 100 - noise.order(), noise.order());
         assert_eq!(whole[100..], later);
         assert!(noise.order() > 0);
-        // The first sample has the variance of the noise, 1/(1 − 0.9²), the others that of the
-        // errors.
+        // The first sample has the variance of the noise, 1/(1 − 0.9²), the other samples have the
+        // variance of the prediction errors.
         assert!((whole[0] / x[0] - (1.0f64 - 0.81).sqrt()).abs() < 0.05);
     }
 }

@@ -205,8 +205,8 @@ impl<'a> Target<'a> {
         Some(best)
     }
 
-    /// Returns minus twice the log-likelihood, without a constant that is the same for the linear
-    /// modes.
+    /// Returns minus twice the log-likelihood, without an additive constant; the likelihood of the
+    /// linear modes omits the same constant.
     fn cost(&self, fitted: &Fitted) -> f64 {
         let len = self.data.len();
         let squares = fitted.residual.as_slice().chunks(len).zip(&self.deviations);

@@ -106,8 +106,8 @@ impl FreeDecayEstimate {
         self.restart
     }
 
-    /// Sets the sample of a second excitation. It is ignored if the strongest mode is nonlinear,
-    /// because the nonlinearity explains the same residual.
+    /// Sets the sample of a second excitation. The sample is ignored if the strongest mode is
+    /// nonlinear, because the nonlinearity explains the same residual.
     pub(super) fn with_restart(self, restart: Option<usize>) -> Self {
         Self { restart: restart.filter(|_| self.backbone.is_none()), ..self }
     }

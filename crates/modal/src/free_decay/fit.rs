@@ -241,9 +241,9 @@ impl Data {
         Some(Fit { poles: poles.to_vec(), noise: noise.to_vec(), channels })
     }
 
-    /// Searches for the maximum-likelihood poles for given noise, from initial poles. It ends when
-    /// a step decreases minus twice the log-likelihood by less than `tolerance`, or the time limit
-    /// is over.
+    /// Searches for the maximum-likelihood poles for given noise, from initial poles. The search
+    /// ends when a step decreases minus twice the log-likelihood by less than `tolerance`, or the
+    /// time limit is over.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, with the Jacobian of
@@ -409,8 +409,8 @@ mod tests {
         samples
     }
 
-    /// The linear unknowns and the residual of every channel are those of a QR decomposition of all
-    /// whitened columns; one of the poles has decayed long before the end.
+    /// Reference: the linear unknowns and the residual of every channel from a QR decomposition of
+    /// all whitened columns. One of the poles has decayed long before the end of the record.
     #[test]
     fn coloured_channels_are_fitted_as_by_all_whitened_columns() {
         let len = 2 * POLE_SEGMENT + 500;

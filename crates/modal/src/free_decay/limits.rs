@@ -34,8 +34,8 @@ pub(crate) const MAX_STEPS: usize = 50;
 /// Decrease of minus twice the log-likelihood in a step below which the last search ends.
 pub(crate) const FINE: f64 = 1e-7;
 
-/// Decrease of minus twice the log-likelihood in one step. While numbers of modes are compared, a
-/// search ends at a smaller decrease.
+/// Decrease of minus twice the log-likelihood in one step, below which a search ends while numbers
+/// of modes are compared.
 pub(crate) const COARSE: f64 = 1e-2;
 
 /// Damping of a step above which a search ends, because no step lowers the cost.
@@ -76,8 +76,8 @@ pub(crate) const MOST_DAMPING: f64 = 0.9;
 /// Highest frequency of a mode, relative to half the sampling rate.
 pub(crate) const POLE_HIGHEST: f64 = 0.98;
 
-/// Probability that noise alone has the gain that is required of a further decay, or the prediction
-/// error that is required of a second excitation.
+/// Probability that noise alone reaches the gain that is required for a further decay, or the
+/// prediction error that is required for a second excitation.
 pub(crate) const FALSE_DECAY: f64 = 1e-3;
 
 /// Number of successive decays without sufficient gain after which the search for further decays
@@ -90,8 +90,8 @@ pub(crate) const COLOUR_ROUNDS: usize = 3;
 /// Maximum number of rows of the Hankel matrix, for any number of samples.
 pub(crate) const HANKEL_ROWS: usize = 160;
 
-/// Maximum fraction of the power that is above half the decimated sampling rate of the Hankel
-/// matrix.
+/// Maximum fraction of the power of the record that is above half the sampling rate after the
+/// decimation for the Hankel matrix.
 pub(crate) const INITIAL_ALIASED: f64 = 0.01;
 
 /// Decay of the slowest matched filter over the record, in nepers.

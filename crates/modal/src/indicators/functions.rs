@@ -82,7 +82,7 @@ mod tests {
 
     use super::*;
 
-    /// Two orthogonal modes of equal size at one frequency, and one further up.
+    /// Two orthogonal modes of equal size at one frequency, and a third mode at a higher frequency.
     fn responses(omegas: &[f64]) -> Vec<DMatrix<Complex<f64>>> {
         let shapes = [dvector![1.0, 1.0, 0.5], dvector![1.0, -1.0, 0.0], dvector![0.5, 0.5, -2.0]];
         let at = |omega: f64| {

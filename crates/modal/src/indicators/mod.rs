@@ -42,7 +42,7 @@ pub enum IndicatorError {
     /// A shape has no entry other than zero.
     #[error("a mode shape of {entries} entries is zero: it has no direction to compare")]
     ZeroShape {
-        /// Number of its entries.
+        /// Number of entries of the shape.
         entries: usize,
     },
     /// A singular value iteration did not converge.
@@ -203,7 +203,7 @@ mod tests {
         assert!((matrix - nalgebra::dmatrix![1.0, 0.02; 0.02, 1.0]).norm() < 1e-15);
         // Perpendicular phases of equal size: φᵀφ = 1 − 1.
         assert_eq!(mpc(&shape(&[(1.0, 0.0), (0.0, 1.0)])), 0.0);
-        // A line at 30 degrees, its sign alternating.
+        // All entries are on a line at 30 degrees, with alternating signs.
         let line = Complex::cis(std::f64::consts::FRAC_PI_6);
         let line = DVector::from_vec(vec![line, -line * 2.0, line * 0.1]);
         assert!((mean_phase(&line) - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn shapes_are_normalised_to_the_entry_of_the_largest_modulus() {
-        // |Re| + |Im| of the second entry is larger, its modulus smaller.
+        // The second entry has a larger |Re| + |Im| than the first entry, but a smaller modulus.
         let entries = shape(&[(1.0, 0.0), (-0.7, 0.7)]);
         let uncertain = ShapeWithCovariance::from_standard_errors(entries, &[0.1; 2]).unwrap();
         let normalised = uncertain.normalised();
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(uncertain.normalised_to(2), None);
     }
 
-    /// Judge: the scatter of a MAC and an MPC over many draws of the shapes.
+    /// Reference: the scatter of a MAC and an MPC over many random draws of the shapes.
     #[test]
     fn standard_errors_are_the_scatter_of_draws() {
         let a = shape(&[(1.0, 0.0), (0.7, 0.1), (-0.4, 0.05)]);

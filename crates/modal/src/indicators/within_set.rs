@@ -5,12 +5,12 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::{Indicator, IndicatorError, ShapeWithCovariance, check_size};
 
 /// Returns the MAC of two modes of one result with its standard error. `cross` is the covariance of
-/// the parts of `a` with those of `b` (2p × 2p, the p real parts first), in the product of their
-/// units; `None` if their errors are independent.
+/// the real and imaginary parts of `a` with those of `b` (2p × 2p, the p real parts first), in the
+/// product of their units; `None` if their errors are independent.
 ///
 /// The MAC is |z|² with z = aᴴb/(|a||b|). The covariance of z is to first order. The variance of
 /// |z|² follows from it exactly, so that the result is also right for orthogonal shapes, where the
-/// gradient of the MAC is zero. It is too small for equal shapes: use
+/// gradient of the MAC is zero. For equal shapes the standard error is too small: use
 /// [`mac_with_error`](super::mac_with_error) for one mode in two results.
 ///
 /// # Errors
@@ -95,7 +95,8 @@ mod tests {
     use super::*;
     use crate::indicators::mac;
 
-    /// Judge: the scatter of draws of two dependent shapes, close and orthogonal ones.
+    /// Reference: the scatter of random draws of two shapes with dependent errors, for close shapes
+    /// and for orthogonal shapes.
     #[test]
     fn standard_errors_are_the_scatter_of_dependent_draws() {
         let shape = |parts: [f64; 4]| {
@@ -104,7 +105,8 @@ mod tests {
         let a = shape([1.0, 0.8, -0.4, 0.3]);
         for b in [shape([0.9, 0.9, -0.1, 0.2]), shape([0.8, -1.0, 0.3, 0.4])] {
             let mut random = ChaCha8Rng::seed_from_u64(3);
-            // Errors are mixtures of 6 common normal variables and of those of each entry.
+            // Each error is a mixture of 6 normal variables that all entries share and of a
+            // separate normal variable.
             let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
             let mixture = DMatrix::from_fn(16, 6, |_, _| 0.003 * normal());
             let whole = &mixture * mixture.transpose() + DMatrix::identity(16, 16) * 1e-5;

@@ -10,8 +10,8 @@ use crate::noisy::{Case, found_in_noise};
 
 const CASE: Case = Case { modes: 2, channels: 2, noise: 0.01, coloured: false, close: false };
 
-/// Number of modes, coverage of the intervals, and scatter in some experiments; the book
-/// (`studies/decays.md`) has the results of more.
+/// A few experiments check the number of modes, the coverage of the intervals, and the scatter; the
+/// book (`studies/decays.md`) has the results of more experiments.
 #[test]
 fn intervals_hold_and_the_scatter_is_that_of_the_bound() {
     for (case, runs) in [
@@ -23,7 +23,8 @@ fn intervals_hold_and_the_scatter_is_that_of_the_bound() {
         let outcome = case.run(runs);
         let name = case.name();
         assert!(outcome.right() >= 98.0, "{name}: {} %", outcome.right());
-        // Four standard deviations of a share of the runs and of their root mean square.
+        // Tolerances: four standard deviations of a share of the runs, and of a root mean square
+        // over the runs.
         let (share, rms) =
             (400.0 * (0.95f64 * 0.05 / runs as f64).sqrt(), 4.0 / (2.0 * runs as f64).sqrt());
         for coverage in outcome.coverage() {
@@ -45,7 +46,7 @@ fn noise_alone_has_no_modes() {
     }
 }
 
-/// e^{σt} cos(ωt + φ) of each (Hz, damping ratio, amplitude, phase), summed.
+/// Returns the sum of decaying cosines, one for each (Hz, damping ratio, amplitude, phase).
 fn decays(sampling: Sampling, modes: &[[f64; 4]]) -> Vec<f64> {
     let value = |t: f64| {
         let one = |[hz, zeta, size, phase]: &[f64; 4]| {
@@ -122,7 +123,8 @@ fn a_steady_hum_does_not_decay() {
     assert!((hum.mode.natural_frequency_hz.value - 50.0).abs() < 0.01);
 }
 
-/// The requested number of modes; a requested mode that does not exist has no effect on the others.
+/// The requested number of modes is reported; a third mode, which the record does not have, has
+/// little energy.
 #[test]
 fn the_number_of_modes_can_be_given() {
     let sampling = Sampling::new(1e-3, 800).unwrap();
@@ -164,7 +166,8 @@ fn what_is_no_free_decay_is_told() {
     }
 }
 
-/// A record too long for a square matrix in memory: low modes at a high sampling rate.
+/// Low modes at a high sampling rate need a long record, for which a square matrix would not fit
+/// into memory.
 #[test]
 fn low_modes_of_a_long_record_are_found() {
     let sampling = Sampling::new(1e-4, 30_000).unwrap();

@@ -70,8 +70,9 @@ fn all_modes_of_each_quantity_are_found_and_no_other() {
     }
 }
 
-/// With little noise the lines between the modes and zero frequency weigh as much as the resonances:
-/// the leakage there is larger than the noise, and the spectrum of an acceleration falls to zero.
+/// With little noise, the lines between zero frequency and the modes have as much weight as the
+/// resonances: the leakage at these lines is larger than the noise, and the spectrum of an
+/// acceleration falls to zero.
 #[test]
 fn good_accelerometers_lose_no_mode() {
     let frame = Structure {
@@ -107,8 +108,9 @@ fn mast() -> Structure {
     }
 }
 
-/// Judge: the true modes of twelve records; at least 61 of 72 intervals of 95 % contain them, four
-/// standard deviations below the expectation. The long study is `examples/ambient_study`.
+/// Reference: the true modes of twelve records. At least 61 of 72 intervals of 95 % contain them;
+/// 61 is four standard deviations below the expected number. The long study is
+/// `examples/ambient_study`.
 #[test]
 fn intervals_hold_the_truth() {
     let truth = mast();
@@ -177,8 +179,9 @@ fn noise_that_falls_steeply_is_no_mode() {
 }
 
 /// Two records for which a wrong quantity has the larger maximum of the likelihood, and two for
-/// which the likelihood of independent lines has a false one, because a mode changes much between
-/// the ends: at damping ratios a tenth of the true ones or less.
+/// which the likelihood of independent lines has a false maximum, because the state of a mode
+/// differs much between the two ends of the record. The wrong maxima are at damping ratios of at
+/// most a tenth of the true values.
 #[test]
 fn no_resonance_becomes_a_sinusoid() {
     let truth = tower();
@@ -297,8 +300,8 @@ fn a_harmonic_is_named_and_left_out_on_request() {
     }
 }
 
-/// Judge: resonances of 15 decay times are no harmonics; the level of the test allows one in a
-/// thousand records.
+/// Resonances are not harmonics if the record has at least 15 of their decay times; the level of
+/// the test allows one false harmonic in a thousand records.
 #[test]
 fn resonances_are_not_taken_for_harmonics() {
     let truth = mast();
@@ -374,7 +377,7 @@ fn unusable_records_are_refused_with_their_numbers() {
     assert_eq!(refused(&good, &none), AmbientError::NoModesAsked);
 }
 
-/// Judge: white noise has no mode.
+/// White noise has no mode.
 #[test]
 fn noise_alone_has_no_mode() {
     let sampling = Sampling::from_rate_hz(30.0, 3000).unwrap();

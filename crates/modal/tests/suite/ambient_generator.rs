@@ -16,7 +16,7 @@ pub struct Structure {
     pub dampings: Vec<f64>,
     /// Outputs × modes.
     pub shapes: DMatrix<Complex<f64>>,
-    /// Modal forces per white force, modes × forces.
+    /// Modal force per unit of each white force, modes × forces.
     pub forces: DMatrix<f64>,
 }
 
@@ -31,7 +31,7 @@ pub enum Quantity {
 /// Noise of the sensors: a first-order autoregression.
 #[derive(Clone, Copy)]
 pub struct Noise {
-    /// Root-mean-square over that of each channel.
+    /// Root-mean-square of the noise, relative to that of each channel.
     pub level: f64,
     /// Pole of the autoregression: 0 for white noise, negative for noise that rises with frequency.
     pub pole: f64,
@@ -185,7 +185,7 @@ fn complex(parts: &DVector<f64>) -> Vec<Complex<f64>> {
 }
 
 /// Returns the means over `count` successive samples of a record: its spectrum then has zeros, as
-/// under forces whose spectrum has them.
+/// under forces whose spectrum has zeros.
 pub fn moving_mean(record: &Record, count: usize) -> Record {
     let len = record.len() + 1 - count;
     let mean =

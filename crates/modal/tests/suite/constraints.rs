@@ -45,7 +45,7 @@ fn true_constraints_hold_and_narrow_the_intervals() {
 fn false_constraints_are_rejected() {
     let reciprocity = ModalConstraint::Reciprocity { points: points() };
     assert!(smallest_p_value(&pair(8), reciprocity) < 1e-6);
-    // Velocities stated as accelerations are wrong by a quarter of a turn.
+    // If accelerations are stated to be velocities, the phases are wrong by a quarter of a turn.
     assert!(smallest_p_value(&reciprocal(), ModalConstraint::RealShapes { derivative: 1 }) < 1e-6);
 }
 

@@ -3,14 +3,14 @@
 use crate::generator::{Case, beyond_the_edge, hammer, one_by_one, pair};
 use crate::score::Score;
 
-/// Identifies a few records of a case: every mode is found, no other mode, and the intervals
-/// contain the truth about as often as stated.
+/// Identifies a few records of a case, and checks that every mode and no false mode is found, and
+/// that the intervals contain the true value about as often as stated.
 fn check(case: &Case, seeds: u64) -> Score {
     let score = Score::of(case, 0..seeds);
     assert_eq!(score.found_share(), 100.0, "{}", case.name);
     assert_eq!(score.false_modes, 0, "{}", case.name);
-    // Of the intervals of 5 modes and 6 records, fewer than 85 % contain the truth with a
-    // probability of 0.02; of intervals of 80 % with one of 0.74.
+    // For 5 modes and 6 records, the probability that fewer than 85 % of the intervals contain the
+    // true value is 0.02. If the true coverage were only 80 %, this probability would be 0.74.
     for coverage in [score.frequency.coverage(), score.damping.coverage()] {
         assert!((85.0..=100.0).contains(&coverage), "{}: {coverage} %", case.name);
     }
@@ -28,7 +28,7 @@ fn two_forces_and_a_close_pair() {
 }
 
 /// In this record the first search finds one mode instead of two that are 0.3 % apart; an
-/// unmeasured force on it absorbs the response of the second one.
+/// unmeasured force on the found mode absorbs the response of the second mode.
 #[test]
 fn an_unmeasured_force_hides_no_mode() {
     let mut close = pair(8);

@@ -21,7 +21,7 @@ type C = Complex<f64>;
 pub enum Excitation {
     /// White forces up to 0.9 of half the sampling rate.
     Random,
-    /// Hits at irregular instants; the record starts in the decay of an earlier one.
+    /// Hits at irregular instants; the record starts during the decay after an earlier hit.
     Hammer { hits: usize },
 }
 
@@ -41,13 +41,14 @@ pub struct Case {
     pub excitation: Excitation,
     /// Sensor noise, relative to the root-mean-square of each output.
     pub noise: f64,
-    /// Pole of the sensor noise (first-order autoregression).
+    /// Pole of the noise of sensors and measured forces (first-order autoregression).
     pub colour: f64,
-    /// Two unmeasured white forces, relative to the measured ones.
+    /// Level of two unmeasured white forces, relative to the measured forces.
     pub unmeasured: f64,
     /// Noise of the measured forces, relative to their root-mean-square.
     pub force_noise: f64,
-    /// Delays of the outputs behind the forces, in samples; repeated if the outputs are more.
+    /// Delays of the outputs behind the forces, in samples; the list is repeated if there are more
+    /// outputs than delays.
     pub delays: Vec<f64>,
     /// One record for each struck point instead of one record of all forces.
     pub roving: bool,
@@ -349,7 +350,7 @@ pub fn large([outputs, inputs]: [usize; 2], samples: usize, modes: usize) -> Cas
     case("large", &frequency_hz, &damping, [outputs, inputs], samples)
 }
 
-/// Hits at one point, twelve accelerometers.
+/// Returns a test with hits at one point and twelve accelerometers.
 pub fn hammer() -> Case {
     let mut case = case(
         "12x1 hammer",
@@ -389,7 +390,8 @@ pub fn cases() -> Vec<Case> {
     ]
 }
 
-/// Structure of one accelerometer at point 0 and a hammer that goes from point to point.
+/// Returns a test with one accelerometer at point 0 and a hammer that strikes one point after
+/// another.
 pub fn roving(points: usize) -> Case {
     let mut case = hammer();
     let mut normal = Normal::new(7);
@@ -415,7 +417,8 @@ impl Case {
         100 * seed + point as u64
     }
 
-    /// Returns one record for each struck point, stacked; the other inputs are zero in it.
+    /// Returns one record for each struck point, one after another; in each record the inputs at
+    /// the other points are zero.
     fn roving_lines(&self, seed: u64) -> LineData {
         let points = self.participation[0].len();
         let of_point = |point: usize| {

@@ -21,7 +21,8 @@ fn rows(file: &str) -> Option<Vec<Vec<f64>>> {
     Some(text.lines().skip(1).map(numbers).collect())
 }
 
-/// Returns forces and responses, in this order of the columns, of a part of a record.
+/// Returns the lines of a part of a record, whose first columns are the forces and whose other
+/// columns are the responses.
 fn part(
     rows: &[Vec<f64>],
     [from, to]: [f64; 2],
@@ -91,8 +92,8 @@ fn a_cantilever_has_one_mode_near_its_printed_frequency() {
 }
 
 /// The arm is in a closed loop, which no sum of modes driven by its inputs describes: the fit
-/// explains nearly everything where it was made, and predicts little elsewhere. The modes of the
-/// whole record are not in its halves.
+/// explains nearly all of the part of the record that it was fitted to, and predicts little of the
+/// rest. The halves of the record do not have the modes of the whole record.
 #[test]
 fn modes_of_a_controlled_arm_do_not_predict_the_rest() {
     let Some(whole) = cd_arm([0.0, 1.0]) else { return };

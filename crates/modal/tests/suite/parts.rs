@@ -1,4 +1,5 @@
-//! Modes of two parts of a record: of a structure that stays as it is, and of one that changes.
+//! Modes of two parts of a record, for a structure that does not change and for a structure that
+//! changes.
 
 use mechid_modal::{ModalSettings, PartsComparison, identify_modes};
 use mechid_signal::Record;
@@ -71,7 +72,7 @@ fn a_mode_that_changes_has_wider_intervals() {
     let [error, scaled] =
         [&narrow, &wide.modes()[1]].map(|mode| mode.natural_frequency_hz.standard_error);
     assert!((scaled / error / scales[1] - 1.0).abs() < 1e-12, "{error} {scaled}");
-    // The frequency of the whole lies between those of the halves; only the wider interval
+    // The frequency from the whole record is between those of the halves; only the wider interval
     // contains the mean of both.
     let mean = 0.5 * (case.frequency_hz[1] + softer.frequency_hz[1]);
     let off = (narrow.natural_frequency_hz.value - mean).abs();

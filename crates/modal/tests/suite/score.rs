@@ -23,18 +23,18 @@ impl Errors {
         100.0 * holds as f64 / all.len().max(1) as f64
     }
 
-    /// Returns the mean of the squared errors over their squared standard errors.
+    /// Returns the mean of the ratio of squared error to squared standard error.
     pub fn mean_square(&self) -> f64 {
         let all = self.0.iter().flatten().map(|(error, spread)| (error / spread).powi(2));
         all.clone().sum::<f64>() / all.count().max(1) as f64
     }
 
-    /// Returns scatter over mean standard error of each mode.
+    /// Returns the ratio of scatter to mean standard error of each mode.
     pub fn scatter(&self) -> Vec<f64> {
         self.each(|_, scatter, spread| scatter / spread)
     }
 
-    /// Returns bias over scatter of each mode.
+    /// Returns the ratio of bias to scatter of each mode.
     pub fn bias(&self) -> Vec<f64> {
         self.each(|mean, scatter, _| mean / scatter)
     }
@@ -67,14 +67,14 @@ pub struct Score {
     pub records: usize,
     pub frequency: Errors,
     pub damping: Errors,
-    /// Relative errors of the modal masses by the first output and the first input.
+    /// Relative errors of the modal masses at the first output and the first input.
     pub mass: Errors,
     shape_holds: usize,
     shape_count: usize,
     found: usize,
     wanted: usize,
     pub false_modes: usize,
-    /// Number of tests of constraints, and of those that reject at 5 %.
+    /// Number of tests of constraints, and number of tests that reject at 5 %.
     pub tests: [usize; 2],
 }
 

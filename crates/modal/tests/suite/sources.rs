@@ -83,8 +83,8 @@ fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
     assert!(estimate.modal_mass(0, outside, 2).is_none());
 }
 
-/// Reference: the delays of the generator, which shapes and participations do not contain, and no
-/// delays where there are none.
+/// Reference: the delays of the generator. Shapes and participations do not contain the delays. If
+/// the records have no delays, no delay is found.
 #[test]
 fn delays_between_forces_and_responses_are_part_of_the_model() {
     for (seed, delays) in [(1, vec![-0.5]), (2, vec![0.0, 0.3, 0.7]), (3, Vec::new())] {
@@ -129,8 +129,8 @@ fn number_and_frequencies_can_be_stated() {
     assert!((hz[0] - 87.0).abs() < 0.01 && (hz[1] - 305.0).abs() < 0.02, "{hz:?}");
 }
 
-/// Mains hum that the forces do not cause. Without it in the model, the standard error of the mode
-/// next to it is fifty times as large.
+/// Mains hum that the forces do not cause. If the model did not contain the hum, the standard error
+/// of the mode next to it would be fifty times as large.
 #[test]
 fn hum_is_no_mode_and_does_not_widen_the_errors_of_modes() {
     let case = pair(8);
@@ -175,7 +175,8 @@ fn data_without_noise_gives_the_truth() {
     }
 }
 
-/// Exact responses of six modes do not determine more modes; the fit of more ends without them.
+/// Exact responses of six modes do not determine more modes; a fit of more modes removes the
+/// additional ones.
 #[test]
 fn modes_that_the_data_do_not_determine_are_removed() {
     for (noise, count) in [(0.0, 9), (1e-12, 12)] {

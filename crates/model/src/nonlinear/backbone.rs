@@ -278,8 +278,8 @@ mod tests {
         FRAC_PI_2 / a
     }
 
-    /// Frequency, and amplitude of the fundamental, of ẍ + k x + k₃ x³ = 0 let go at `peak`:
-    /// x = peak cn(Ωt), Ω² = k + k₃ peak².
+    /// Frequency, and amplitude of the fundamental, of ẍ + k x + k₃ x³ = 0 released at rest at
+    /// `peak`: x = peak cn(Ωt), Ω² = k + k₃ peak².
     fn duffing(k: f64, cubic: f64, peak: f64) -> (f64, f64) {
         let square = k + cubic * peak * peak;
         let parameter = cubic * peak * peak / (2.0 * square);
@@ -291,7 +291,7 @@ mod tests {
 
     fn hardening() -> NonlinearSystem {
         let linear = Sdof::new(1.0, 0.3, 4.0).unwrap().system();
-        // Dampers of any kind are left out.
+        // The dampers have no effect on the backbone.
         let terms = "k3: x^3, c2: |v| v, cx: x^2 v".parse().unwrap();
         NonlinearSystem::new(linear, terms, vec![0.8, 0.1, 0.1]).unwrap()
     }
@@ -307,7 +307,7 @@ mod tests {
             assert!((point.omega / omega - 1.0).abs() < 1e-8, "{point:?}, {omega}");
             assert_eq!(point.standard_error, 0.0);
         }
-        // Straight to the largest, without the others on the way.
+        // The largest amplitude alone gives the same point as after the smaller amplitudes.
         let alone = known.backbone(0, &amplitudes[3..]).unwrap();
         assert!((alone[0].omega / points[3].omega - 1.0).abs() < 1e-10);
     }
@@ -354,7 +354,7 @@ mod tests {
 
     #[test]
     fn a_spring_that_softens_ends_where_it_gives_way() {
-        // x − x³: no vibration beyond the hilltops at ±1.
+        // With the force x − x³, no vibration exceeds the unstable equilibria at ±1.
         let linear = Sdof::new(1.0, 0.0, 1.0).unwrap().system();
         let system = NonlinearSystem::new(linear, "k3: x^3".parse().unwrap(), vec![-1.0]).unwrap();
         let known = UncertainNonlinearSystem::exact(system);

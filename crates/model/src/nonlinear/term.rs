@@ -68,7 +68,7 @@ impl Coordinate {
 
 /// Term θ f(q, q̇): a named coefficient θ, a [`Law`] f, and the [`Coordinate`] q.
 ///
-/// Two terms are equal if their expressions are.
+/// Two terms are equal if their expressions are equal.
 #[derive(Debug, Clone)]
 pub struct Term {
     name: String,
@@ -279,7 +279,7 @@ impl<'a> IntoIterator for &'a Terms {
 }
 
 impl fmt::Display for Terms {
-    /// Writes the term in the form that is parsed.
+    /// Writes the terms in the syntax of the parser.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let terms: Vec<String> = self.0.iter().map(Term::to_string).collect();
         f.write_str(&terms.join(", "))

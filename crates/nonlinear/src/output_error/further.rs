@@ -28,9 +28,9 @@ pub struct FurtherFit {
 /// Adds terms of the usual kinds to an output-error fit, as long as the information criterion
 /// falls; `None` if no term is added.
 ///
-/// The candidates are selected in the fit that is linearised at its parameters: here the change of
-/// the simulated response due to a small force of a candidate is known. Afterwards the selected
-/// terms are fitted together with all parameters.
+/// The candidates are selected in a linearised fit, in which the change of the simulated response
+/// due to a small force of a candidate is known. Afterwards the selected terms are fitted together
+/// with all parameters.
 ///
 /// # Errors
 /// As [`output_error`].
@@ -44,7 +44,8 @@ pub fn further_output_error(
     measured: ResponseQuantity,
     fit: &NonlinearFit,
 ) -> Result<Option<FurtherFit>, EstimateError> {
-    // The weights of the most likely noise make a missing term most visible in the residual.
+    // A missing term is most visible in the residual if the weights are those of the most likely
+    // noise.
     let weighted = search(records, measured, &fit.estimate, Weights::AnyNoise)?;
     let linearised = Linearised::new(records, measured, &weighted)?;
     let Some((start, p_value)) = linearised.start()? else { return Ok(None) };

@@ -102,7 +102,8 @@ fn coefficients_of_a_prescribed_response_come_out() {
         let values: Vec<f64> = found.parameters().iter().map(|p| p.estimate.value).collect();
         let expected = [vec![2.0, 5.0, 900.0], truth.clone()].concat();
         for (value, expected) in values.iter().zip(&expected) {
-            // Rounding of sums of some hundred lines, of forces a thousand times the smallest term.
+            // The tolerance allows for the rounding of sums over some hundred lines, with forces a
+            // thousand times as large as the smallest term.
             assert!((value / expected - 1.0).abs() < 1e-9, "{value} for {expected}");
         }
         assert!(found.unexplained()[0] < 1e-9);
@@ -111,7 +112,7 @@ fn coefficients_of_a_prescribed_response_come_out() {
         let range = found.ranges()[0];
         let largest = response.displacement().data().amax();
         assert!(range[0] >= largest && range[0] < 1.1 * largest);
-        // The force surface is that of the system.
+        // The identified restoring force is that of the system.
         let mut restoring = [0.0];
         system.restoring_force(&[0.4], &[2.0], &mut restoring);
         let surface = found.restoring_force(&[0.4], &[2.0]).unwrap();
@@ -119,14 +120,14 @@ fn coefficients_of_a_prescribed_response_come_out() {
     }
 }
 
-/// Judge: the springs and dampers of the system at the prescribed response, in closed form.
+/// Reference: the forces of the springs and dampers at the prescribed response, in closed form.
 #[test]
 fn points_of_the_surface_are_those_of_the_springs_and_dampers() {
     for (system, channels) in [(single("k2: x^2, c2: v^3", vec![40.0, 0.02]), 1), (coupled(), 2)] {
         let response = prescribed(channels);
         let force = system.force(&response).unwrap();
         let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
-        // The mean of x² is not on the lines of the fit, so that only the rest is compared.
+        // The mean of x² is not on the lines of the fit, so that the comparison excludes the mean.
         let found =
             fitted(&all, &system.terms().to_string(), &EquationErrorOptions::default()).unwrap();
         let points = &found.restoring_forces(&all).unwrap()[0];
@@ -150,8 +151,9 @@ fn points_of_the_surface_are_those_of_the_springs_and_dampers() {
     }
 }
 
-/// Judge: powers. The data determine a cubic spring up to one and a half times their range, but not
-/// a spring of fifth order, nor one that is hidden by noise.
+/// Reference: forces that are powers of the motion. The data determine a cubic spring up to one and
+/// a half times their range, but neither a spring of fifth order nor a term that is hidden by
+/// noise.
 #[test]
 fn terms_that_extrapolate_badly_are_told() {
     let response = prescribed(1);
@@ -244,7 +246,7 @@ fn phase_delay_and_bend_are_found_by_variable_projection() {
         ("p5", 2.5),
     ] {
         let value = found.parameter(name).unwrap().estimate.value;
-        // The derivatives by differences, and where the search calls itself settled.
+        // The tolerance allows for derivatives by differences, and for the end of the search.
         assert!((value / expected - 1.0).abs() < 1e-5, "{name} = {value}");
     }
     assert_eq!(found.covariance().nrows(), found.parameters().len());
@@ -260,7 +262,7 @@ fn a_prescribed_response_is_predicted_and_fitted() {
     let gap = |found: &Record, expected: &Record| {
         (found.data() - expected.data()).amax() / expected.data().amax()
     };
-    // The steps settle to 10⁻⁵.
+    // The refinement of the time step ends at an error of about 10⁻⁵.
     assert!(gap(found.displacement(), response.displacement()) < 1e-4);
     assert!(gap(found.acceleration(), response.acceleration()) < 1e-3);
 

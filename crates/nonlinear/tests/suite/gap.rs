@@ -1,4 +1,5 @@
-//! Stops with clearance, estimated from a given initial clearance and from that of least squares.
+//! Stops with clearance; the search starts from a given clearance, or from the clearance of a
+//! least-squares fit.
 
 use mechid_estimate::Unknowns;
 use mechid_model::{ResponseQuantity, Terms};
@@ -31,7 +32,8 @@ fn measure(amplitude: f64, seed: u64) -> [Record; 2] {
     [with(&force, 2 * seed), with(&response, 2 * seed + 1)]
 }
 
-/// Returns the error of the estimated clearance in its standard errors, or the reason of a failure.
+/// Returns the error of the estimated clearance in its standard errors, or the reason for a
+/// failure.
 fn search(amplitude: f64, clearance: f64, seed: u64) -> Result<f64, String> {
     let [force, response] = measure(amplitude, seed);
     let unknowns = Unknowns::unknown_mass(1).unwrap();

@@ -1,4 +1,5 @@
-//! Nonlinear terms, judged by exact steady states, seeded experiments and the Silverbox.
+//! Nonlinear terms, compared with exact steady states, seeded experiments and the measured
+//! Silverbox.
 
 mod exact;
 mod gap;

@@ -16,8 +16,9 @@ const DISPLACEMENT: ResponseQuantity = ResponseQuantity::Displacement;
 /// 2 kg, 4 N s/m, 2 Hz.
 const TRUTH: [(&str, f64); 4] = [("m", 2.0), ("c", 4.0), ("k", 315.827), ("k3", 110.0)];
 
-/// Returns 16 s from rest of the oscillator with a further force of displacement and velocity,
-/// under a random force from 0.06 to 5 Hz, with white noise of 0.5 % on force and response.
+/// Returns a record of 16 s, from rest, of the oscillator with a further force that depends on
+/// displacement and velocity. The excitation is a random force from 0.06 to 5 Hz; force and
+/// response have white noise of 0.5 %.
 fn from_rest(further: impl Fn(f64, f64) -> f64, seed: u64) -> SteppedRecord {
     let sampling = Sampling::new(1.0 / 64.0, 1024).unwrap();
     let lines = random_phases(1..=80, 10.0, seed);
@@ -33,7 +34,8 @@ fn from_rest(further: impl Fn(f64, f64) -> f64, seed: u64) -> SteppedRecord {
     SteppedRecord { force, response, extent: Extent::Open, periods: 1 }
 }
 
-/// Returns the fit with a cubic spring, started from a linear oscillator a few per cent off.
+/// Returns the fit with a cubic spring, started from a linear oscillator whose parameters are wrong
+/// by a few per cent.
 fn fitted(record: &SteppedRecord) -> NonlinearFit {
     let start = Estimate::new(EstimateParts {
         unknowns: Unknowns::unknown_mass(1).unwrap(),
@@ -49,8 +51,8 @@ fn fitted(record: &SteppedRecord) -> NonlinearFit {
     output_error_of_open_records(records, DISPLACEMENT, &start.unwrap(), &terms).unwrap()
 }
 
-/// Judge: the oscillator, by extrapolation of high order. Noise on the force colours the residual;
-/// the fit weights it by the noise that makes it most likely.
+/// Reference: the oscillator, simulated by extrapolation of high order. Noise on the force colours
+/// the residual; the fit weights the residual with the noise that makes it most likely.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn intervals_of_open_records_hold_with_noise_on_the_force() {
@@ -67,7 +69,7 @@ fn intervals_of_open_records_hold_with_noise_on_the_force() {
     assert_honest(&judged, runs);
 }
 
-/// Judge: the forces that the model lacks.
+/// Reference: the forces that the model lacks.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn terms_that_a_fit_lacks_are_found() {

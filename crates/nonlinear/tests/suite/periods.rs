@@ -21,8 +21,8 @@ const STIFFNESS: f64 = 315.827;
 const TRUTH: [(&str, f64); 4] =
     [("m", 2.0), ("c", 4.0), ("k", STIFFNESS), ("k3", 0.35 * STIFFNESS)];
 
-/// Oscillator 2 ẍ + 4 ẋ + k x + 0.35 k x³ with periods whose motion or force has some lines, from
-/// the first on.
+/// Oscillator 2 ẍ + 4 ẋ + k x + 0.35 k x³. The force or the motion of a period has lines up to the
+/// line `last`.
 struct Oscillator {
     sampling: Sampling,
     last: usize,
@@ -48,7 +48,7 @@ impl Oscillator {
         Self { sampling: Sampling::new(1.0 / 32.0, 1024).unwrap(), last: 127 }
     }
 
-    /// The response to a force on these lines.
+    /// Returns the response to a force on the lines up to `last`.
     fn driven(&self, levels: [f64; 2], seed: u64) -> [Record; 2] {
         let lines = random_phases(1..=self.last, 10.0, seed);
         let (force, response) = steady_after(6, self.sampling, &[lines], |x, v, f| {
@@ -57,7 +57,8 @@ impl Oscillator {
         with_noise([force, response], levels, seed)
     }
 
-    /// The response of the linear part with a friction (N) smoothed below 0.1 m/s.
+    /// Returns the response of the linear part with a friction force (N) that is smoothed below 0.1
+    /// m/s.
     fn rubbing(&self, friction: f64, seed: u64) -> [Record; 2] {
         let lines = random_phases(1..=self.last, 10.0, seed);
         let (force, response) = steady_after(6, self.sampling, &[lines], |x, v, f| {
@@ -67,8 +68,9 @@ impl Oscillator {
         with_noise([force, response], [0.01, 0.01], seed)
     }
 
-    /// Returns a motion on these lines, as that of the linear part under equal lines of force, and
-    /// the force in closed form, whose lines end at three times the last line of the motion.
+    /// Returns a motion, which is the response of the linear part to a force with equal lines, and
+    /// the force of the oscillator in closed form. The lines of this force end at three times the
+    /// last line of the motion.
     fn moved(&self, levels: [f64; 2], seed: u64) -> [Record; 2] {
         let phases = random_phases(8..=self.last, 3.5, seed);
         let record = |order: i32| {
@@ -109,8 +111,8 @@ impl Oscillator {
     }
 }
 
-/// Judge: the scatter over the seeds. With 40 runs of four parameters, the share of intervals that
-/// contain the truth has a standard deviation of 2 to 3 %.
+/// Reference: the scatter over the seeds. With 40 runs of four parameters, the share of intervals
+/// that contain the truth has a standard deviation of 2 to 3 %.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn intervals_of_a_short_record_hold_with_noise_on_the_force() {
@@ -124,7 +126,7 @@ fn intervals_of_a_short_record_hold_with_noise_on_the_force() {
                 let of = |(name, truth): &(&str, f64)| {
                     let estimate = fit.parameter(name).unwrap().estimate;
                     let [low, high] = estimate.interval(0.95).unwrap();
-                    // No wider than three standard errors to either side.
+                    // The interval extends at most three standard errors to either side.
                     assert!(high - low <= 6.0 * estimate.standard_error, "{estimate:?}");
                     let z = (estimate.value - truth) / estimate.standard_error;
                     (usize::from(low <= *truth && *truth <= high), z * z)
@@ -142,8 +144,8 @@ fn intervals_of_a_short_record_hold_with_noise_on_the_force() {
     }
 }
 
-/// Judge: the generator. The residual of a right model is noise; without the cubic spring it is
-/// larger.
+/// Reference: the generator. The residual of a correct model is noise; the residual without the
+/// cubic spring is larger.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn a_residual_is_compared_with_the_noise_of_the_periods() {
@@ -166,7 +168,7 @@ fn a_residual_is_compared_with_the_noise_of_the_periods() {
     assert!(wrong.len() >= 5 && wrong.iter().all(|p| *p < 1e-6), "{wrong:?}");
 }
 
-/// Judge: the generator. Most of the information of a record about a cubic spring is in a few
+/// Reference: the generator. Most of the information of a record about a cubic spring is in a few
 /// blocks of time, whose scatter has one degree of freedom: in one of ten records, a spring known
 /// to 0.4 % was not significant.
 #[test]
@@ -191,8 +193,9 @@ fn a_true_term_is_kept_and_a_false_one_is_not() {
     assert!(10 * more <= runs, "{chosen:?}");
 }
 
-/// Judge: the generator. The intervals hold with friction and without it, so that a friction that
-/// is stated but absent is not significant, and it is chosen from candidates only if it is there.
+/// Reference: the generator. The intervals contain the true values with friction and without it.
+/// Friction that is in the model but not in the system is not significant, and friction is chosen
+/// from candidates only if the system has it.
 #[test]
 fn friction_is_present_only_where_it_acts() {
     let (test, unknowns) = (Oscillator::short(), Unknowns::unknown_mass(1).unwrap());
@@ -223,8 +226,8 @@ fn friction_is_present_only_where_it_acts() {
             .collect();
         let [linear, held] = [0, 1].map(|at| each.iter().map(|(held, _)| held[at]).sum::<usize>());
         let runs = runs as usize;
-        // At 95 %, fewer than 26 of 30 and 79 of 90 intervals hold with probabilities of 0.02 and
-        // 0.003.
+        // If the coverage is 95 %, the probability that fewer than 26 of 30 intervals contain the
+        // true value is 0.02, and that fewer than 79 of 90 do is 0.003.
         assert!(30 * held >= 26 * runs, "{truth} N: {held} of {runs}");
         assert!(90 * linear >= 79 * 3 * runs, "{truth} N: {linear} of {}", 3 * runs);
         let right = if truth > 0.0 { "fc" } else { "" };

@@ -14,7 +14,7 @@ use mechid_spectra::Lines;
 
 const DISPLACEMENT: ResponseQuantity = ResponseQuantity::Displacement;
 
-/// A phase that both channels have in common, and constants inside the laws.
+/// The search estimates a phase that both channels have in common, and constants inside the laws.
 const SHAPE: ShapeConstants = ShapeConstants { laws: true, delay: false, phase: true };
 
 fn fit(data: &SteadyExperiments, terms: &str, options: EquationErrorOptions) -> NonlinearEstimate {
@@ -38,7 +38,7 @@ fn two_terms_explain_the_schroeder_record() {
     let mut data = SteadyExperiments::new(&lines, 1, DISPLACEMENT);
     data.push(&force, &response).unwrap();
 
-    // Before any model: what kind of nonlinearity.
+    // The kind of nonlinearity is tested before any nonlinear model is fitted.
     let unknowns = Unknowns::unknown_mass(1).unwrap();
     let seen = distortion(&lines, &[[&force, &response]], DISPLACEMENT, &unknowns).unwrap();
     let text = seen.to_string();
@@ -89,7 +89,8 @@ fn rmse(
     })
 }
 
-/// Ten parameters: m, c, k, k2, k3, a saturating damper with its bend, a constant force, two of phase.
+/// Ten parameters: m, c, k, k2, k3, a saturating damper with its constant b, a constant force, and
+/// two coefficients of the phase.
 const TEN: &str = "k2: x^2, k3: x^3, c3: v^3/(1 + (v/20)^2), f: x^0";
 
 #[test]

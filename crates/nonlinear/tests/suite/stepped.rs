@@ -1,5 +1,5 @@
-//! Responses of nonlinear systems by extrapolation of very high order: the judge of nonlinear
-//! estimators, which share no line with it.
+//! Responses of nonlinear systems by extrapolation of very high order: the reference for the
+//! nonlinear estimators, which share no code with it.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +18,8 @@ const SUBSTEPS: [usize; 6] = [2, 4, 6, 8, 10, 12];
 /// Force and displacement over a steady period of ẍ = acceleration(x, ẋ, F).
 ///
 /// Gragg's midpoint rule, extrapolated in h² (Hairer, Nørsett & Wanner, *Solving Ordinary
-/// Differential Equations I*, section II.9), one step a sample, the force exact at every instant.
+/// Differential Equations I*, section II.9), with one step per sample and the exact force at every
+/// instant.
 pub fn steady<const N: usize>(
     sampling: Sampling,
     forces: &[Vec<Cosine>; N],

@@ -33,7 +33,8 @@ fn duffing(cubic: f64) -> (Record, Record) {
     steady(sampling(), &[force], |x, v, f| [f[0] - 0.16 * v[0] - x[0] - cubic * x[0].powi(3)])
 }
 
-/// Two masses of 1 and 1.5, springs to the ground, a linear one and a cubic one between them.
+/// Two masses of 1 and 1.5 with springs to the ground, and with a linear and a cubic spring between
+/// them.
 fn coupled() -> (Record, Record) {
     let force = [5, 6].map(|seed| random_phases((1..=201).step_by(2), 0.06, seed));
     steady(sampling(), &force, |x, v, f| {
@@ -46,7 +47,7 @@ fn coupled() -> (Record, Record) {
     })
 }
 
-/// Periods with white noise on force and response, parts of their RMS.
+/// Returns periods with white noise on force and response, in fractions of their RMS values.
 fn noisy((force, response): &(Record, Record), level: f64, seed: u64) -> (Record, Record) {
     let with = |record: &Record, seed: u64| {
         let level = NoiseLevel::FractionOfRms(level);
@@ -74,8 +75,8 @@ fn identify(
     let (force, response) = (force.clone(), response.clone());
     let record = SteppedRecord { force, response, extent: Extent::WholePeriod, periods: PERIODS };
     let found = output_error(&[record], DISPLACEMENT, &start).unwrap().estimate;
-    // An estimated initial state depends on the first block alone; the intervals of the other
-    // parameters do not.
+    // An estimated initial state depends only on the first block; this does not affect the
+    // intervals of the other parameters.
     let freedom = found.linear().degrees_of_freedom();
     assert!(freedom >= 5, "{freedom} degrees of freedom, {:?}", found.standard_errors());
     found

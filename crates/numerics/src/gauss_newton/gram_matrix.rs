@@ -7,8 +7,8 @@ use crate::cholesky::Cholesky;
 
 /// Normal equations of a linearisation, with columns scaled to unit length.
 ///
-/// They square the condition number of the Jacobian, so the coordinates should be nearly
-/// orthogonal.
+/// Normal equations square the condition number of the Jacobian, so the coordinates should be
+/// nearly orthogonal.
 #[derive(Debug, Clone)]
 pub struct GramMatrix {
     gram: DMatrix<f64>,

@@ -15,18 +15,18 @@ use p_norm::PNorm;
 
 /// Exponents of the continuation, and the samples per Nyquist interval for each.
 ///
-/// Below 16 the norm is almost insensitive to the peak. Above 1024 it differs from the peak by less
-/// than the largest sample does: with 32 samples per Nyquist interval, a sine at the highest line
+/// Below 16 the norm is almost insensitive to the peak. Above 1024 the norm is closer to the peak
+/// than the largest sample is: with 32 samples per Nyquist interval, a sine at the highest line
 /// exceeds its largest sample by at most 0.1 %.
 const STAGES: [(&[i32], usize); 2] = [(&[16, 32, 64], 8), (&[128, 256, 512, 1024], 32)];
 
 /// A search for the phases of minimum crest factor. The result is the same in every run.
 ///
-/// The first start is close to the phases of the multisine (Schroeder's are good ones), all others
-/// are random. For 127 flat lines 16 starts reach a crest factor of 1.38 in a third of a second.
-/// The time per start grows with the third power of the number of lines up to some hundreds (half a
-/// second), and about linearly for more lines: ten seconds for 4,000 lines, for which a few starts
-/// are enough.
+/// The first starting point is close to the phases of the given multisine (Schroeder's phases are
+/// good ones); all others are random. For 127 flat lines 16 starts reach a crest factor of 1.38 in
+/// a third of a second. The time per start grows with the third power of the number of lines up to
+/// some hundreds (half a second), and about linearly for more lines: ten seconds for 4,000 lines,
+/// for which a few starts are enough.
 ///
 /// ```
 /// use mechid_signal::{CrestSearch, Multisine, Phases, lines};

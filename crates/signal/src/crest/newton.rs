@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DVector};
 use super::p_norm::{Derivatives, PNorm, norm};
 use crate::limits;
 
-/// Phases, and the norm and its derivatives at these phases.
+/// Phases, with the norm and the derivatives of the norm at these phases.
 pub(super) struct Point {
     pub(super) phases: Vec<f64>,
     signal: Vec<f64>,

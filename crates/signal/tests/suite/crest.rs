@@ -42,7 +42,7 @@ fn sloped_spectrum() {
     assert!(crest <= 1.25, "{crest} from {}", judged(&m));
 }
 
-/// One or two phases are free: every combination can be tried.
+/// Only one or two phases are free, so that every combination can be tried.
 #[test]
 fn few_lines_reach_the_global_optimum() {
     let steps = 360;
@@ -55,8 +55,8 @@ fn few_lines_reach_the_global_optimum() {
         let best = scanned.fold(f64::INFINITY, f64::min);
         let m = Multisine::flat(lines.clone(), 1.0, Phases::Zero).unwrap();
         let found = judged(&minimised(&m));
-        // The scan is up to half a degree off the optimum, and the norm for p = 1024 differs a
-        // little from the peak.
+        // The scan misses the optimum by up to half a degree, and the norm for p = 1024 differs
+        // slightly from the peak.
         assert!((found - best).abs() < 0.01, "{lines:?}: {found} against {best}");
     }
     // A shift in time makes one phase redundant, so that two of three are varied.
@@ -77,7 +77,7 @@ fn repeats_itself_and_never_makes_it_worse() {
     assert_eq!(low, search.minimise(&m).unwrap());
     let once_more = CrestSearch { starts: 1, seed: 9 }.minimise(&low).unwrap();
     assert!(once_more.crest_factor().unwrap() <= low.crest_factor().unwrap());
-    // Phases all zero are a stationary point: the search must leave it.
+    // If all phases are zero, the norm is stationary; the search must leave this point.
     let zero = Multisine::flat(1..=40, 1.0, Phases::Zero).unwrap();
     let left = CrestSearch { starts: 1, seed: 0 }.minimise(&zero).unwrap();
     assert!(judged(&left) < 1.6, "{}", judged(&left));

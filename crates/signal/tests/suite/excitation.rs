@@ -1,4 +1,4 @@
-//! What the excitations are chosen for.
+//! Properties for which the excitations are chosen.
 
 use mechid_signal::excitation::{HalfSine, Impulse, Prbs, Random, Sweep, SweepLaw};
 use mechid_signal::{CrestSearch, Multisine, Phases, Record, Sampling, Spectrum, measures};
@@ -24,8 +24,8 @@ fn prbs_autocorrelation_has_two_values() {
     }
 }
 
-/// The multisine with the same flat lines: Σ cos over lines 1 … N−1 of 2N samples correlates as
-/// A²/2 Σ cos(2π n k / 2N), which is −A²/2 at even and 0 at odd lags.
+/// A multisine of flat lines 1 … N−1 in 2N samples has the autocorrelation A²/2 Σ cos(2π n k / 2N),
+/// which is −A²/2 at even lags and 0 at odd lags.
 #[test]
 fn flat_multisine_is_as_white_as_its_lines_allow() {
     let m = Multisine::flat(1..=127, 2.0, Phases::SchroederBinary).unwrap();
@@ -63,7 +63,8 @@ fn excitations_side_by_side() {
     ];
     for (name, record, (crest, flatness, weakest)) in rows {
         let got = figures(&record.unwrap());
-        // As printed in the table: three figures, two decimals, four decimals.
+        // The table prints the crest factor with three digits, the flatness with two decimals and
+        // the weakest amplitude with four decimals.
         assert!((got.0 / crest - 1.0).abs() < 0.005, "{name}: crest factor {}", got.0);
         assert!((got.1 - flatness).abs() < 0.006, "{name}: flatness {}", got.1);
         assert!((got.2 - weakest).abs() < 0.0002, "{name}: weakest line {}", got.2);

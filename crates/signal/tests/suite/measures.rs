@@ -27,7 +27,8 @@ proptest! {
         }
     }
 
-    /// By definition, this is the largest order whose autocorrelation matrix is regular.
+    /// By definition, the order of excitation is the largest order whose autocorrelation matrix is
+    /// regular.
     #[test]
     fn excitation_order_is_the_rank_of_the_autocorrelation_matrix(
         amplitudes in prop::collection::vec(prop_oneof![Just(0.0), 1.0..3.0f64], 1..8),
@@ -40,7 +41,8 @@ proptest! {
         let r = circular_autocorrelation(&x);
         prop_assume!(r[0] > 0.1);
         let matrix = DMatrix::from_fn(19, 19, |i, j| r[(19 + i - j) % 19]);
-        // The weakest line has a power of 1/2 of at most 37; rounding leaves 1e-15 of it.
+        // The weakest line has a power of 1/2, and the total power is at most 37; rounding errors
+        // are 1e-15 of the total power.
         #[allow(clippy::disallowed_methods, reason = "mechid-signal has no linear algebra")]
         let rank = matrix.svd(false, false).rank(1e-6);
         let order = persistent_excitation_order(&Spectrum::from_record(&record(&x)), 0, 1e-9).unwrap();
@@ -62,7 +64,7 @@ fn levels_by_hand() {
 }
 
 /// Known figures of the two-valued sequence of 128 terms: side lobes below 0.15 N, and a signal
-/// with a relative peak factor of 1.47 where zero phases give 6.9.
+/// with a relative peak factor of 1.47, compared with 6.9 for zero phases.
 #[test]
 fn schroeders_binary_sequence() {
     let lines: Vec<usize> = (1..=128).collect();
@@ -84,7 +86,7 @@ fn flatness_by_hand() {
     let m = Multisine::new(vec![1, 2], vec![1.0, 2.0], Phases::Zero).unwrap();
     let spectrum = m.spectrum(Sampling::new(0.1, 9).unwrap()).unwrap();
     let flatness = |lines: std::ops::Range<usize>| spectral_flatness(&spectrum, 0, lines);
-    // Powers 1 and 4: √4 / 2.5.
+    // The powers 1 and 4 have a flatness of √4 / 2.5.
     assert!((flatness(1..3).unwrap() - 0.8).abs() < 1e-15);
     assert_eq!(flatness(1..4), Ok(0.0));
     assert_eq!(flatness(3..3), Err(SignalError::NoLines));
@@ -92,8 +94,8 @@ fn flatness_by_hand() {
     assert!(matches!(flatness(4..6), Err(SignalError::Range { value: 5.0, .. })));
 }
 
-/// The transform of a half sine of duration d is F_max (2d/π) |cos(π f d)| / |1 − (2 f d)²|, a
-/// tenth of its value at zero first at f d = 1.3033, found by bisection.
+/// The transform of a half sine of duration d is F_max (2d/π) |cos(π f d)| / |1 − (2 f d)²|, and
+/// first decreases to a tenth of its value at f = 0 at f d = 1.3033, which bisection gives.
 #[test]
 fn effective_band_of_a_hammer_blow() {
     let s = Sampling::new(1e-5, 100_000).unwrap(); // lines every 1 Hz
@@ -106,7 +108,7 @@ fn effective_band_of_a_hammer_blow() {
         if fall(middle) > 0.0 { low = middle } else { high = middle }
     }
     assert_eq!(band.low_hz, 1.0);
-    // Within one line, and the first line is a little below the value at zero.
+    // The tolerance is one line; the amplitude of line 1 is slightly below the value at zero.
     assert!((band.high_hz - low / 0.005).abs() <= 1.0, "{band:?}, {}", low / 0.005);
     let silent = Spectrum::from_record(&record(&[1.0; 8]));
     assert!(effective_band(&silent, 0, 20.0).is_err());

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use mechid_signal::{Multisine, Phases, Sampling, SignalError, Spectrum, lines};
 use proptest::prelude::*;
 
-/// Lines, amplitudes, phases and a number of samples that can carry them.
+/// Multisines with any lines, amplitudes and phases, each with a number of samples whose Nyquist
+/// line is above the last line.
 fn any_multisine() -> impl Strategy<Value = (Multisine, usize)> {
     let line = (any::<bool>(), 0.0..10.0f64, -4.0..4.0f64);
     (prop::collection::vec(line, 1..80), 0usize..50).prop_filter_map("no line", |(spec, extra)| {
@@ -27,7 +28,7 @@ proptest! {
         let record = m.sample(s).unwrap();
         let scale = m.amplitudes().iter().sum::<f64>().max(1.0);
         for (t, x) in s.times().zip(record.channel(0)) {
-            // Phases up to 80·2π carry rounding of about 80·2π·ε.
+            // Phases of up to 80·2π have a rounding error of about 80·2π·ε.
             prop_assert!((x - m.value(t, s.omega0())).abs() < 1e-12 * scale);
         }
     }
@@ -52,7 +53,8 @@ proptest! {
         let s = Sampling::new(0.02, len).unwrap();
         let scale = m.amplitudes().iter().sum::<f64>().max(1.0);
         let again = m.value(t + s.duration(), s.omega0());
-        // t = 50 is up to 2500 periods: ω0·t is known to 2500·2π·ε, line 80 to 80 times that.
+        // t = 50 is up to 2500 periods, so that ω0·t has an error of 2500·2π·ε, and the phase of
+        // line 80 has 80 times this error.
         prop_assert!((m.value(t, s.omega0()) - again).abs() < 1e-8 * scale);
         let record = m.sample(s).unwrap();
         let rms = (record.column(0).norm_squared() / len as f64).sqrt();
@@ -74,20 +76,21 @@ proptest! {
 fn crest_factors_by_hand() {
     let crest = |lines: Vec<usize>, p| Multisine::flat(lines, 3.0, p).unwrap().crest_factor();
     assert!((crest(vec![7], Phases::Zero).unwrap() - f64::sqrt(2.0)).abs() < 1e-12);
-    // N cosines in phase: N A over A √(N/2).
+    // The sum of N cosines in phase has the peak N A and the RMS value A √(N/2).
     let zero = crest(lines::all(32), Phases::Zero).unwrap();
     assert!((zero - f64::sqrt(64.0)).abs() < 1e-12, "{zero}");
     let silent = Multisine::flat(1..=3, 0.0, Phases::Zero).unwrap();
     assert_eq!(silent.crest_factor(), Err(SignalError::Silent { channel: 0 }));
 }
 
-/// Schroeder's point, with the figures known for 127 flat lines.
+/// Schroeder's phases have a low crest factor; the values for 127 flat lines are known.
 #[test]
 fn schroeder_phases_keep_the_peak_low() {
     let crest = |p| Multisine::flat(1..=127, 1.0, p).unwrap().crest_factor().unwrap();
     assert!(crest(Phases::Schroeder) < 1.75, "{}", crest(Phases::Schroeder));
     assert!(crest(Phases::SchroederBinary) < 2.2, "{}", crest(Phases::SchroederBinary));
-    // Random phases are like Gaussian noise: about √(2 ln 254) = 3.3, scattered.
+    // With random phases the signal is like Gaussian noise; its crest factor scatters around √(2 ln
+    // 254) = 3.3.
     let mut random: Vec<f64> = (0..21).map(|seed| crest(Phases::Random { seed })).collect();
     random.sort_by(f64::total_cmp);
     assert!((3.0..3.6).contains(&random[10]), "{random:?}");
@@ -104,7 +107,7 @@ fn levels_can_be_set() {
 #[test]
 fn value_keeps_its_digits_after_many_periods() {
     let m = Multisine::flat([1, 100], 1.0, Phases::Zero).unwrap();
-    // ω0 = 2π: whole seconds are whole periods, exactly.
+    // With ω0 = 2π, whole seconds are exactly whole periods.
     assert_eq!(m.value(1e6, TAU), 2.0);
 }
 

@@ -24,7 +24,7 @@ fn refined(x: &[f64], factor: usize, method: Interpolation) -> Vec<f64> {
 }
 
 /// The natural spline by its textbook equations for second derivatives m (m = 0 at both ends):
-/// m_{k−1} + 4 m_k + m_{k+1} = 6 (y_{k+1} − 2 y_k + y_{k−1}), solved densely, step 1.
+/// m_{k−1} + 4 m_k + m_{k+1} = 6 (y_{k+1} − 2 y_k + y_{k−1}) for a step of 1, with a dense matrix.
 fn natural_by_moments(y: &[f64], k: usize, u: f64) -> f64 {
     let n = y.len();
     let mut a = DMatrix::<f64>::identity(n, n);
@@ -59,7 +59,7 @@ proptest! {
         let x: Vec<f64> = (0..n).map(|k| cubic(0.5 * k as f64)).collect();
         let fine = refined(&x, 4, Interpolation::NotAKnotSpline);
         for (k, v) in fine.iter().enumerate() {
-            // Values reach 2·15³; the end equations cost a digit or two.
+            // The values are up to 2·15³, and the equations at the ends lose one or two digits.
             prop_assert!((v - cubic(0.125 * k as f64)).abs() < 1e-9);
         }
     }
@@ -79,7 +79,7 @@ proptest! {
             let fine = refined(&x, 5, method);
             for (k, w) in x.windows(2).enumerate() {
                 let piece = &fine[5 * k..=5 * (k + 1)];
-                // Monotone from one sample to the next, to rounding.
+                // The values between two samples are monotone, apart from rounding.
                 let rising = (w[1] - w[0]).signum();
                 prop_assert!(piece.windows(2).all(|p| (p[1] - p[0]) * rising > -1e-12), "{method:?}");
             }
@@ -95,7 +95,7 @@ proptest! {
         let m = Multisine::flat(1..=phases.len(), 1.0, Phases::Given(phases.clone())).unwrap();
         let s = Sampling::new(0.1, 2 * phases.len() + 1 + extra).unwrap();
         let i = Interpolator::new(&m.sample(s).unwrap(), Interpolation::BandLimited).unwrap();
-        // t is up to 70 periods: line 20 is known to 70·20·2π·ε.
+        // t is up to 70 periods, so that the phase of line 20 has an error of 70·20·2π·ε.
         prop_assert!((i.value(t, 0).unwrap() - m.value(t, s.omega0())).abs() < 1e-10);
     }
 }
@@ -114,13 +114,15 @@ fn natural_splines_forget_their_ends() {
 
 #[test]
 fn pchip_by_hand() {
-    // Secants 1, 3, 0: slopes at the samples (3·1 − 3)/2 = 0, 2·1·3/4 = 1.5, 0, and at the end
-    // (3·0 − 3)/2, turned against a secant of 0: 0. Middles (y0 + y1)/2 + (d0 − d1)/8.
+    // The secants are 1, 3 and 0. The slopes at the samples are (3·1 − 3)/2 = 0, 2·1·3/4 = 1.5, 0,
+    // and at the end 0, because (3·0 − 3)/2 is opposite to a secant of 0. The values in the middle
+    // are (y0 + y1)/2 + (d0 − d1)/8.
     let fine = refined(&[0.0, 1.0, 4.0, 4.0], 2, Interpolation::Pchip);
     assert_eq!(fine, [0.0, 0.3125, 1.0, 2.6875, 4.0, 4.0, 4.0]);
 }
 
-/// Errors of sin t fall as h² for lines, h⁴ for splines: the orders of the textbook.
+/// The errors of sin t decrease as h² for straight lines and as h⁴ for splines, the orders of the
+/// textbooks.
 #[test]
 fn orders_of_convergence() {
     let error = |n: usize, method| {
@@ -145,7 +147,8 @@ fn a_period_can_be_sampled_anew() {
     let m = Multisine::flat(1..=9, 1.0, Phases::Random { seed: 4 }).unwrap();
     let s = Sampling::new(0.1, 20).unwrap();
     let r = m.sample(s).unwrap();
-    // 33 samples of the same period by the fast way, 27 of another duration one by one.
+    // The 33 samples of the same period come from a transform, the 27 samples of another duration
+    // from sums of the Fourier series.
     for other in [Sampling::new(2.0 / 33.0, 33).unwrap(), Sampling::new(0.13, 27).unwrap()] {
         let again = resample(&r, other, Interpolation::BandLimited).unwrap();
         for (t, x) in other.times().zip(again.channel(0)) {

@@ -72,7 +72,7 @@ impl Mixed {
     pub fn system(&self) -> SecondOrderSystem {
         let [a, b] = self.oscillators;
         let matrix = |p: f64, q: f64| {
-            // X T⁻¹ by solving Tᵀ Xᵀ.
+            // X T⁻¹ is the transpose of the solution Y of Tᵀ Y = Xᵀ.
             let left = &self.load * dmatrix![p, 0.0; 0.0, q];
             self.shape.transpose().lu().solve(&left.transpose()).unwrap().transpose()
         };

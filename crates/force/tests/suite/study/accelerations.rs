@@ -6,8 +6,8 @@ use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use nalgebra::DMatrix;
 
-/// Masses of 20 kg in a row on springs, the first on the ground, with a natural frequency of a single
-/// one of `hz` and 3 % of critical damping.
+/// Returns masses of 20 kg in a row, connected by springs, the first one to the ground. One mass on
+/// one spring has the natural frequency `hz` and 3 % of critical damping.
 pub fn row(dof: usize, hz: f64) -> SecondOrderSystem {
     let omega = std::f64::consts::TAU * hz;
     let (mass, stiffness) = (20.0, 20.0 * omega * omega);
@@ -31,8 +31,9 @@ pub struct Found {
     pub held: f64,
 }
 
-/// A force of some 336 N from 0.2 to 60 Hz on the last mass, 1024 samples at 200 Hz of a steady
-/// state in closed form, white noise of `level` times the size of each acceleration.
+/// Identifies a force of some 336 N from 0.2 to 60 Hz on the last mass. The accelerations are 1024
+/// samples at 200 Hz of a steady state in closed form, with white noise of `level` times the size
+/// of each acceleration.
 pub fn found(dof: usize, hz: f64, level: f64, seed: u64) -> Found {
     let system = row(dof, hz);
     let sampling = Sampling::new(0.005, 1024).unwrap();

@@ -1,4 +1,4 @@
-//! How often the 95 % intervals of a force hold the truth, over many seeded records.
+//! Coverage of the 95 % intervals of a force over many seeded records.
 
 use mechid_force::{
     Filter, ForceUnknowns, IdentifiedForce, Measurement, Noise, Rule, Start, Tuning,
@@ -16,7 +16,8 @@ use super::machine;
 pub enum Shape {
     /// Lines of equal amplitude, phases drawn anew for each record.
     Flat(&'static str, usize, usize, usize),
-    /// A power falling as 1/f²: a random walk, in a period one that closes.
+    /// A random walk, whose power falls as 1/f²; in a period, a walk that returns to its first
+    /// value.
     Walk,
 }
 
@@ -87,7 +88,8 @@ pub fn draw(bearing: bool, shape: Shape, level: f64, open: Extent, seed: u64) ->
             let walk: Vec<f64> = walk.collect();
             let last = walk[walk.len() - 1]
                 + 20.0 * noise::white(sampling, 1, 1.0, 7777 + seed).unwrap().channel(0)[0];
-            // The line from its start to its end is subtracted, so that it becomes a period.
+            // The straight line from the start to the end of the walk is subtracted, so that the
+            // walk is periodic.
             let closing = |k: usize| {
                 if open != Extent::Period { 0.0 } else { last * k as f64 / walk.len() as f64 }
             };

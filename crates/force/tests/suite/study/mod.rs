@@ -170,7 +170,7 @@ pub const KNOWN: [Method; 3] = [
     }),
 ];
 
-/// The methods that do not use it.
+/// The methods that do not use the list of excited lines.
 pub const UNKNOWN: [Method; 13] = [
     ("continuous, differences for ẋ and ẍ", |c, m| {
         continuous(&c.system, &differenced(m.record())).unwrap()
@@ -204,7 +204,8 @@ pub fn rms_error(case: &Case, method: Method) -> f64 {
     (squares.sum::<f64>() / SEEDS as f64).sqrt()
 }
 
-/// Every parameter tried when the best one is sought, from strong to none.
+/// All values of the parameter that are tried in the search for the best one, from strong
+/// regularisation to none.
 fn parameters(case: &Case) -> Vec<f64> {
     let gain = case.system.stiffness().row(case.system.dof() - 1).amax().recip();
     // Channels are scaled to size 1, so the largest singular value is about gain over size.

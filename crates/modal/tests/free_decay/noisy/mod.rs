@@ -38,13 +38,14 @@ pub struct Outcome {
     pub runs: usize,
     pub too_few: usize,
     pub too_many: usize,
-    /// Errors over the standard deviation of the bound: of frequencies and damping ratios.
+    /// Errors divided by the standard deviation of the bound: of frequencies, then of damping
+    /// ratios.
     pub errors: [Vec<f64>; 2],
-    /// Number of intervals that contain the truth, and of all: of frequencies, damping ratios and
-    /// parts of shapes.
+    /// Number of intervals that contain the true value, and number of all intervals: for
+    /// frequencies, damping ratios, and the parts of shape entries.
     pub held: [[usize; 2]; 3],
-    /// Number of tested residuals; those that are not white, and those larger at the beginning,
-    /// with p < 0.01.
+    /// Number of tested residuals. The field `alarms` counts those that are not white, and those
+    /// that are larger at the beginning, both with p < 0.01.
     pub tested: usize,
     pub alarms: [usize; 2],
 }
@@ -125,8 +126,8 @@ impl Case {
         outcome
     }
 
-    /// A response whose modes are all visible, its samples, the standard deviation of its noise,
-    /// and the bounds of frequency (Hz) and damping ratio of each mode.
+    /// Returns a response whose modes are all visible, its samples, the standard deviation of the
+    /// noise of each channel, and the bounds of frequency (Hz) and damping ratio of each mode.
     fn visible(&self, rng: &mut ChaCha8Rng) -> (Truth, DMatrix<f64>, Vec<f64>, Vec<[f64; 2]>) {
         loop {
             let truth = self.draw(rng);
@@ -182,10 +183,12 @@ impl Truth {
         })
     }
 
-    /// Bounds of frequency and damping ratio of each mode; `None` if one is too weak to be visible.
+    /// Returns the bounds of frequency and damping ratio of each mode; `None` if a mode is too weak
+    /// to be visible.
     ///
-    /// They follow from the information of all samples about the real parameters: σ and ω of each
-    /// mode and, for each channel, the real and imaginary part of each amplitude and the constant.
+    /// The bounds follow from the information of all samples about the real parameters: σ and ω of
+    /// each mode and, for each channel, the real and imaginary part of each amplitude and the
+    /// constant.
     fn bound(&self, levels: &[f64], coloured: bool) -> Option<Vec<[f64; 2]>> {
         let (modes, channels) = self.amplitude.shape();
         let (poles, own) = (2 * modes, 2 * modes + 1);
@@ -327,7 +330,7 @@ impl Outcome {
         self.alarms.map(|alarms| 100.0 * alarms as f64 / self.tested as f64)
     }
 
-    /// Root mean square of the errors over the bound, of frequency and damping ratio.
+    /// Root mean square of the ratio of error to bound, for frequency and damping ratio.
     pub fn scatter(&self) -> [f64; 2] {
         let rms = |e: &Vec<f64>| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
         [rms(&self.errors[0]), rms(&self.errors[1])]
