@@ -216,10 +216,6 @@ pub(crate) const SAME_FREQUENCY: f64 = 1e-6;
 /// is rounding of the file, or the coherence was not computed.
 pub const COHERENCE_OF_ONE: f64 = 1e-6;
 
-/// Number of lines per unknown of the fits that decide whether a force is held or linear between
-/// its samples.
-pub const LINES_PER_UNKNOWN: usize = 40;
-
 /// Maximum number of fits with a force that is held or linear between its samples.
 pub const ACQUISITION_ROUNDS: usize = 8;
 

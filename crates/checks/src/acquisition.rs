@@ -6,6 +6,7 @@ use mechid_model::{Discretisation, SecondOrderSystem};
 use mechid_signal::Extent;
 use mechid_spectra::FrequencyData;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::alternative::{Alternative, Cause};
 use super::finding::{Channel, Finding, Quantity};
@@ -113,35 +114,46 @@ struct Residuals<'a> {
 impl Residuals<'_> {
     /// Returns the faults with plausible and significant amounts.
     fn significant(&self, faults: Vec<Fault>) -> Vec<(Fault, Score)> {
+        let Some(unchanged) = self.weighted(None) else { return Vec::new() };
         let is_significant = |score: &Score| score.amount.abs() > STANDARD_ERRORS * score.error;
-        let scored = faults.into_iter().filter_map(|fault| {
-            let score = self.score(fault, 0.0)?;
+        let scored = faults.into_par_iter().filter_map(|fault| {
+            let score = self.score(fault, 0.0, &unchanged)?;
             let is_likely = fault.is_plausible(score.amount) && is_significant(&score);
             is_likely.then_some((fault, score))
         });
         scored.collect()
     }
 
-    /// Returns the score of a fault in data from which `amount` of this fault has been removed.
+    /// Returns the weighted residuals of all records, without an amount of a fault if one is given.
+    fn weighted(&self, without: Option<(Fault, f64)>) -> Option<Vec<DVector<f64>>> {
+        let of_record = |at: usize| match without {
+            None => self.weighing.residual_of(at, &self.records[at]),
+            Some((fault, amount)) => self.without(fault, amount, at),
+        };
+        (0..self.records.len()).map(of_record).collect()
+    }
+
+    /// Returns the weighted residuals of a record without an amount of a fault.
+    fn without(&self, fault: Fault, amount: f64, at: usize) -> Option<DVector<f64>> {
+        let removed = fault.removed(&self.records[at], self.system, self.dt, amount)?;
+        self.weighing.residual_of(at, &removed)
+    }
+
+    /// Returns the score of a fault in data from which `amount` of this fault has been removed; the
+    /// `residuals` of all records are those of these data.
     ///
     /// # Source
     /// Rao's score test.
-    fn score(&self, fault: Fault, amount: f64) -> Option<Score> {
+    fn score(&self, fault: Fault, amount: f64, residuals: &[DVector<f64>]) -> Option<Score> {
         let mut directions = Vec::new();
-        for (at, data) in self.records.iter().enumerate() {
+        for (at, (data, before)) in self.records.iter().zip(residuals).enumerate() {
             let lowest = data.omega().iter().copied().fold(f64::INFINITY, f64::min);
             let step = match fault {
                 Fault::Between(_) => 1.0,
                 _ => HIGH_PASS_STEP * lowest,
             };
-            let residual = |amount: f64| {
-                let removed = match fault {
-                    Fault::Between(_) if amount == 0.0 => data.clone(),
-                    _ => fault.removed(data, self.system, self.dt, amount)?,
-                };
-                self.weighing.residual_of(at, &removed)
-            };
-            directions.push((residual(amount + step)? - residual(amount)?) / step);
+            let after = self.without(fault, amount + step, at)?;
+            directions.push((after - before) / step);
         }
         let fewest = self.after.iter().map(|after| after.explained().ncols()).min()?;
         let parameters = fewest.min(self.parameters);
@@ -280,12 +292,13 @@ pub fn forces_between_samples(
     let (weighing, system) = (&weighing, &system);
     let parameters = estimate.unknowns().independent();
     let residuals = Residuals { records, after, weighing, system, dt, parameters };
+    let Some(unchanged) = residuals.weighted(None) else { return Vec::new() };
     let is_significant = |between: &Discretisation| {
-        let score = residuals.score(Fault::Between(*between), 0.0);
+        let score = residuals.score(Fault::Between(*between), 0.0, &unchanged);
         score.is_some_and(|score| score.amount.abs() > STANDARD_ERRORS * score.error)
     };
     let kinds = [Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold];
-    kinds.into_iter().filter(is_significant).collect()
+    kinds.into_par_iter().filter(is_significant).collect()
 }
 
 /// Finds AC coupling that explains the residual of a maximum-likelihood `fit` to hits
@@ -374,7 +387,10 @@ fn removed(
         }
         let weighing = &weighing;
         let now = Residuals { after: &after, records, system, dt, weighing, parameters };
-        let Some(step) = now.score(fault, amount) else { return Ok(None) };
+        let residuals = now.weighted(Some((fault, amount)));
+        let Some(step) = residuals.and_then(|of| now.score(fault, amount, &of)) else {
+            return Ok(None);
+        };
         amount += step.amount;
         if step.amount.abs() < 0.1 * step.error {
             break;

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use mechid_checks::{Alternative, Cause, Finding, after_spectral_fit, is_noise};
 use mechid_estimate::frequency_domain::{
-    OutputErrorFit, equivalent_force, output_error_from, output_error_pooling,
+    OutputErrorFit, equivalent_force, output_error_from, output_error_pooling, thin_step,
 };
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::{Discretisation, SecondOrderSystem};
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::open_records::joined;
 use crate::AnalysisError;
-use crate::limits::{ACQUISITION_ROUNDS, ACQUISITION_SETTLED, LINES_PER_UNKNOWN};
+use crate::limits::{ACQUISITION_ROUNDS, ACQUISITION_SETTLED};
 use crate::measurement::Block;
 
 /// Properties of the acquisition that the fit of open records takes into account.
@@ -170,6 +170,7 @@ impl Acquisition {
 /// Force that is held or linear between its samples, as an explanation of a residual.
 pub(super) struct BetweenSamples {
     kind: Discretisation,
+    fit: OutputErrorFit,
     /// Ratio of the residual power with this force to that of the fit with a band-limited force:
     /// the geometric mean over the channels, as in the likelihood of white noise.
     pub(super) remaining: f64,
@@ -178,11 +179,20 @@ pub(super) struct BetweenSamples {
 }
 
 impl BetweenSamples {
-    /// Returns the finding that names this kind of force as the cause of the residual.
-    pub(super) fn finding(&self) -> Finding {
+    /// Returns this kind of force as the cause of the residual.
+    pub(super) fn explanation(self) -> Explanation {
         let cause = Cause::BetweenSamples { between_samples: self.kind };
-        Finding::Alternative(Alternative { cause, remaining: self.remaining })
+        let finding = Finding::Alternative(Alternative { cause, remaining: self.remaining });
+        Explanation { finding, fit: Some(self.fit) }
     }
+}
+
+/// Cause of a residual.
+pub(super) struct Explanation {
+    pub(super) finding: Finding,
+    /// Fit with this cause taken into account, on the lines of a [`BandLimitedFit`]; `None` if there
+    /// is no such fit.
+    pub(super) fit: Option<OutputErrorFit>,
 }
 
 /// Fit of open records with a band-limited force, with which the fits of other explanations are
@@ -204,11 +214,16 @@ impl<'a> BandLimitedFit<'a> {
         pooling: Pooling,
     ) -> Option<Self> {
         let unknowns = fit.estimate.unknowns();
-        let lines: usize = records.iter().map(FrequencyData::len).sum();
-        let step = (lines / (LINES_PER_UNKNOWN * unknowns.independent()).max(1)).max(1);
-        let thinned: Option<Vec<_>> = records.iter().map(|record| record.thinned(step)).collect();
-        let records = thinned?;
-        let fit = output_error_from(&joined(&records).ok()?, unknowns, fit, pooling).ok()?;
+        let step = thin_step(&joined(records).ok()?, unknowns);
+        let (records, fit) = if step > 1 {
+            let thinned: Option<Vec<_>> =
+                records.iter().map(|record| record.thinned(step)).collect();
+            let thinned = thinned?;
+            let fit = output_error_from(&joined(&thinned).ok()?, unknowns, fit, pooling).ok()?;
+            (thinned, fit)
+        } else {
+            (records.to_vec(), fit.clone())
+        };
         let level = level(&fit, &records)?;
         Some(Self { records, fit, level, unknowns, pooling })
     }
@@ -269,15 +284,20 @@ impl<'a> BandLimitedFit<'a> {
         let remaining = self.remaining(&fit, &equivalent)?;
         let after = after_spectral_fit(&closed(&fit, &equivalent)?, &fit.estimate, Extent::Open);
         let leaves_noise = remaining < 1.0 && after.is_ok_and(|after| is_noise(&after.records));
-        Some(BetweenSamples { kind, remaining, leaves_noise })
+        Some(BetweenSamples { kind, fit, remaining, leaves_noise })
     }
 
-    /// Returns the fraction of the residual power that remains after a new search with changed
-    /// records; `None` if the fit fails.
-    pub(super) fn after(&self, change: impl Fn(&FrequencyData) -> FrequencyData) -> Option<f64> {
+    /// Returns the fit of a new search with changed records, and the fraction of the residual power
+    /// that remains; `None` if the fit fails.
+    pub(super) fn after(
+        &self,
+        change: impl Fn(&FrequencyData) -> FrequencyData,
+    ) -> Option<(OutputErrorFit, f64)> {
         let changed: Vec<FrequencyData> = self.records.iter().map(change).collect();
-        let fit = output_error_pooling(&joined(&changed).ok()?, self.unknowns, self.pooling);
-        self.remaining(&fit.ok()?, &changed)
+        let fit =
+            output_error_pooling(&joined(&changed).ok()?, self.unknowns, self.pooling).ok()?;
+        let remaining = self.remaining(&fit, &changed)?;
+        Some((fit, remaining))
     }
 
     /// Returns the residual power of a fit to `records`, relative to that with the band-limited

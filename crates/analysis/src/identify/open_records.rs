@@ -1,6 +1,7 @@
 //! Fits of the spectral lines of open records, such as those of random tests.
 
 use std::f64::consts::TAU;
+use std::sync::OnceLock;
 
 use mechid_checks::limits::DELAY_REMAINING;
 use mechid_checks::{
@@ -10,17 +11,19 @@ use mechid_checks::{
     linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
-    EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
+    EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, change_of_parameters,
+    equivalent_force, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{Discretisation, ResponseQuantity};
 use mechid_numerics::time_limit;
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
+use nalgebra::DMatrix;
 
-use super::acquisition::{Acquisition, BandLimitedFit, BetweenSamples};
+use super::acquisition::{Acquisition, BandLimitedFit, BetweenSamples, Explanation};
 use super::compared::{Compared, rows_of};
-use super::disagreement::{Disagreement, squared_change};
+use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Residual};
 use super::force_noise::ForceNoise;
 use super::keywords::Domain;
@@ -162,12 +165,8 @@ pub(super) fn fit(
         || agreement(&data, &fit, &residuals, excitation),
     );
     let likelier = likelier?;
+    let (likelier, explained) = likelier.unzip();
     let Compared { parts, omitted } = compared?.beside(likelier.as_ref().map(remaining));
-    let quantity = records[0].held.response().1;
-    let refit =
-        |finding| refitted_with(finding, (&with_pulses, &fit), quantity, unknowns, noise.response);
-    let explained = likelier.as_ref().and_then(refit);
-    let explained = explained.map(|other| squared_change(&fit.estimate, &other));
     let sinusoids = sinusoid_rows(records, &fit);
     let joint = joined(&closed)?;
     let between = acquisition.between_samples.unwrap_or(Discretisation::FirstOrderHold);
@@ -179,7 +178,7 @@ pub(super) fn fit(
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
         frequency: lines.into_iter().next().map(|lines| (lines, joint)),
         after_all: bias.into_iter().chain(likelier).chain(parts).collect(),
-        disagreement: Disagreement::new(omitted, explained),
+        disagreement: Disagreement::new(omitted, explained.flatten()),
         residuals: Residual::from_lines(residuals),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
@@ -256,51 +255,94 @@ struct Tested<'a> {
 }
 
 impl Tested<'_> {
-    /// Finds a delay or a fault of the acquisition that explains the residual.
+    /// Finds a delay or a fault of the acquisition that explains the residual. Also returns the
+    /// square of the change of the parameters by this cause, `None` if a fit fails.
     fn cause(
         &self,
         dt: f64,
         unknowns: &Unknowns,
         pooling: Pooling,
         excitation: Excitation<'_>,
-    ) -> Result<Option<Finding>, AnalysisError> {
+    ) -> Result<Option<(Finding, Option<DMatrix<f64>>)>, AnalysisError> {
         let Self { records, closed, fit, residuals } = *self;
-        let fault = match excitation {
-            Excitation::Hits(_) => fault_of_hits(records, closed, dt, fit, residuals),
-            Excitation::Lasting => self.fault(dt, pooling)?,
+        let band_limited = OnceLock::new();
+        let compared = || {
+            let new = || BandLimitedFit::new(records, fit, pooling);
+            band_limited.get_or_init(new).as_ref()
         };
-        let below = fault.as_ref().map_or(1.0, remaining);
-        Ok(delay_of_open_records(records, dt, unknowns, fit, residuals, below).or(fault))
+        let fault = match excitation {
+            Excitation::Hits(_) => fault_of_hits(records, closed, dt, fit, residuals)
+                .map(|finding| Explanation { finding, fit: None }),
+            Excitation::Lasting => self.fault(dt, compared)?,
+        };
+        let below = fault.as_ref().map_or(1.0, |fault| remaining(&fault.finding));
+        let delay = delay_of_open_records(records, dt, unknowns, fit, residuals, below);
+        let explanation = delay.map(|finding| Explanation { finding, fit: None }).or(fault);
+        let Some(Explanation { finding, fit: explained }) = explanation else { return Ok(None) };
+        let quantity = closed[0].measured();
+        let explained = explained.or_else(|| {
+            let change = without_cause(&finding, quantity)?;
+            Some(compared()?.after(change)?.0)
+        });
+        let change = explained.and_then(|explained| {
+            let changed: Option<Vec<FrequencyData>> = match between_samples(&finding) {
+                Some(between) => {
+                    let system = explained.estimate.system().ok()?;
+                    let records = records.iter();
+                    records.map(|record| equivalent_force(record, &system, dt, between)).collect()
+                }
+                None => Some(records.iter().map(without_cause(&finding, quantity)?).collect()),
+            };
+            let changed = fit.without_pulse_errors(&changed?).ok()?;
+            change_of_parameters(&joined(&changed).ok()?, unknowns, fit, &explained).ok()
+        });
+        Ok(Some((finding, change.map(|change| &change * change.transpose()))))
     }
 
     /// Finds a force between samples or AC coupling that explains the residual.
-    fn fault(&self, dt: f64, pooling: Pooling) -> Result<Option<Finding>, AnalysisError> {
-        let Self { records, closed, fit, residuals } = *self;
+    fn fault<'a>(
+        &self,
+        dt: f64,
+        compared: impl Fn() -> Option<&'a BandLimitedFit<'a>> + Sync,
+    ) -> Result<Option<Explanation>, AnalysisError> {
+        let Self { closed, fit, residuals, .. } = *self;
         let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
-        let compared =
-            if kinds.is_empty() { None } else { BandLimitedFit::new(records, fit, pooling) };
-        let between = compared.as_ref().and_then(|compared| compared.between_samples(&kinds, dt));
-        let fault = fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)?;
-        let Some(compared) = compared else { return Ok(fault) };
+        let (between, fault) = time_limit::join(
+            || if kinds.is_empty() { None } else { compared()?.between_samples(&kinds, dt) },
+            || fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open),
+        );
+        let fault = fault?;
+        let compared = if kinds.is_empty() { None } else { compared() };
+        let Some(compared) = compared else {
+            return Ok(fault.map(|finding| Explanation { finding, fit: None }));
+        };
         let leaves_less = |fault: &Finding| {
             between.as_ref().is_none_or(|b| !b.leaves_noise || remaining(fault) < b.remaining)
         };
-        let fault = fault.filter(leaves_less);
         // The fit may be at a wrong minimum, so a new search is needed for each of the two possible
         // causes: the force between samples (above) and AC coupling.
-        let again = |fault: &Finding| compared.after(uncoupled(fault, closed[0].measured())?);
-        let after = fault.as_ref().and_then(again);
-        let fault = fault.map(|fault| with_remaining(fault, after));
-        let fault = fault.filter(|fault| remaining(fault) < 1.0);
+        let again = |finding: Finding| {
+            let change = without_cause(&finding, closed[0].measured());
+            match change.and_then(|change| compared.after(change)) {
+                None => Explanation { finding, fit: None },
+                Some((fit, remaining)) => {
+                    let finding = with_remaining(finding, remaining);
+                    Explanation { finding, fit: Some(fit) }
+                }
+            }
+        };
+        let fault = fault.filter(leaves_less).map(again);
+        let fault = fault.filter(|fault| remaining(&fault.finding) < 1.0);
         let explains = |b: &BetweenSamples| b.leaves_noise || b.remaining < DELAY_REMAINING;
         let between = between.filter(explains);
-        Ok(likelier(fault, between.as_ref().map(BetweenSamples::finding)))
+        Ok(likelier(fault, between.map(BetweenSamples::explanation)))
     }
 }
 
 /// Returns the explanation that reduces the power of a residual most.
-fn likelier(one: Option<Finding>, other: Option<Finding>) -> Option<Finding> {
-    one.into_iter().chain(other).min_by(|a, b| remaining(a).total_cmp(&remaining(b)))
+fn likelier(one: Option<Explanation>, other: Option<Explanation>) -> Option<Explanation> {
+    let power = |of: &Explanation| remaining(&of.finding);
+    one.into_iter().chain(other).min_by(|a, b| power(a).total_cmp(&power(b)))
 }
 
 /// Returns the fraction of the residual power that remains with the explanation of a finding.
@@ -312,71 +354,55 @@ fn remaining(finding: &Finding) -> f64 {
     }
 }
 
-/// Returns the finding with the fraction of the residual power that remains after a new search, if
-/// it is known.
-fn with_remaining(finding: Finding, remaining: Option<f64>) -> Finding {
-    match (finding, remaining) {
-        (Finding::Alternative(alternative), Some(remaining)) => {
+/// Returns the finding with the fraction of the residual power that remains after a new search.
+fn with_remaining(finding: Finding, remaining: f64) -> Finding {
+    match finding {
+        Finding::Alternative(alternative) => {
             Finding::Alternative(Alternative { remaining, ..alternative })
         }
-        (finding, _) => finding,
+        finding => finding,
     }
 }
 
-/// Returns a function that gives all channels of a record the same AC coupling; the responses of
-/// the record have the given `quantity`. `None` if the finding does not name AC coupling.
-fn uncoupled(
-    finding: &Finding,
-    quantity: ResponseQuantity,
-) -> Option<impl Fn(&FrequencyData) -> FrequencyData> {
-    let Finding::Alternative(Alternative {
-        cause: Cause::AcCoupling { channels, corner_hz }, ..
-    }) = finding
-    else {
-        return None;
-    };
-    let of = |wanted: Quantity| -> Vec<usize> {
-        let channels = channels.iter().filter(|channel| channel.quantity == wanted);
-        channels.map(|channel| channel.index).collect()
-    };
-    let (responses, forces) = (of(Quantity::Response(quantity)), of(Quantity::Force));
-    let corner = TAU * corner_hz;
-    Some(move |data: &FrequencyData| data.with_high_pass_alike(&responses, &forces, corner))
+/// Returns the kind of force between samples that a finding names.
+fn between_samples(finding: &Finding) -> Option<Discretisation> {
+    match finding {
+        Finding::Alternative(Alternative {
+            cause: Cause::BetweenSamples { between_samples },
+            ..
+        }) => Some(*between_samples),
+        _ => None,
+    }
 }
 
-/// Returns the estimate with the delay or the fault of the acquisition that a finding names; `None`
-/// for another finding, or if the new fit fails. The responses of the records have the given
-/// quantity.
-fn refitted_with(
+/// Returns a function that removes a delay, or AC coupling, from a record with responses of the
+/// given `quantity`: it delays the force, too, or gives all channels the same coupling. `None` for
+/// another finding.
+fn without_cause(
     finding: &Finding,
-    (records, before): (&[FrequencyData], &OutputErrorFit),
     quantity: ResponseQuantity,
-    unknowns: &Unknowns,
-    pooling: Pooling,
-) -> Option<Estimate> {
-    let fit = |records: &[FrequencyData]| {
-        output_error_pooling(&joined(records).ok()?, unknowns, pooling).ok()
-    };
-    let changed = |change: &dyn Fn(&FrequencyData) -> FrequencyData| -> Vec<FrequencyData> {
-        records.iter().map(change).collect()
-    };
+) -> Option<Box<dyn Fn(&FrequencyData) -> FrequencyData>> {
     let cause = match finding {
         Finding::Delay(delay) => &Cause::Delay { seconds: delay.seconds },
         Finding::Alternative(alternative) => &alternative.cause,
         _ => return None,
     };
-    let refitted = match cause {
-        Cause::Delay { seconds } => fit(&changed(&|data| data.with_later_force(*seconds)))?,
-        Cause::AcCoupling { .. } => fit(&changed(&uncoupled(finding, quantity)?))?,
-        Cause::BetweenSamples { between_samples } => {
-            let acquisition =
-                Acquisition { between_samples: Some(*between_samples), ..Acquisition::default() };
-            let dt = records[0].open_record(0)?.sampling.dt();
-            acquisition.refitted(before.clone(), records, dt, unknowns, pooling).ok()?.0
+    match cause {
+        Cause::Delay { seconds } => {
+            let seconds = *seconds;
+            Some(Box::new(move |data| data.with_later_force(seconds)))
         }
-        _ => return None,
-    };
-    Some(refitted.estimate)
+        Cause::AcCoupling { channels, corner_hz } => {
+            let of = |wanted: Quantity| -> Vec<usize> {
+                let channels = channels.iter().filter(|channel| channel.quantity == wanted);
+                channels.map(|channel| channel.index).collect()
+            };
+            let (responses, forces) = (of(Quantity::Response(quantity)), of(Quantity::Force));
+            let corner = TAU * corner_hz;
+            Some(Box::new(move |data| data.with_high_pass_alike(&responses, &forces, corner)))
+        }
+        _ => None,
+    }
 }
 
 /// Returns the failure of a search. If the responses are delayed, the delay is added as a reason.

@@ -73,9 +73,11 @@ pub use delayed_force::DelayedForce;
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
+pub use multi_start::thin_step;
 pub use output_error::in_units_of_noise;
 pub use output_error::{
-    output_error, output_error_from, output_error_near, output_error_of_table, output_error_pooling,
+    change_of_parameters, output_error, output_error_from, output_error_near,
+    output_error_of_table, output_error_pooling,
 };
 pub use output_error_fit::{EndLoads, OutputErrorFit};
 pub use parts::{

@@ -147,8 +147,12 @@ pub(super) fn thinned(
     (step > 1).then(|| data.thinned(step).zip(noise.thinned(step))).flatten()
 }
 
-/// Returns the ratio of the number of all lines to the number of lines on which searches begin.
-pub(super) fn thin_step(data: &FrequencyData, unknowns: &Unknowns) -> usize {
+/// Returns the ratio of the number of all lines to the number of lines on which searches begin and
+/// explanations of a residual are compared.
+///
+/// # Source
+/// Ours.
+pub fn thin_step(data: &FrequencyData, unknowns: &Unknowns) -> usize {
     let parameters = unknowns.independent() + transient::len(data);
     (data.len() / (THIN_LINES * parameters).max(1)).min(THIN_STEP)
 }

@@ -14,7 +14,8 @@ use super::line_correlation::variance_ratio;
 use super::misfit::Misfit;
 use super::multi_start::{search, thinned};
 use super::output_error_fit::{
-    OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare, uncertain_weights,
+    OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
+    uncertain_weights,
 };
 use super::unknown_noise::{with_response_noise, with_unknown_noise};
 use crate::relations::Relations;
@@ -133,6 +134,29 @@ pub fn output_error_from(
 ) -> Result<OutputErrorFit, EstimateError> {
     equation_error(data, unknowns)?.check_determined()?;
     with_unknown_noise(data, unknowns, None, Some(fit.minimum(unknowns)), residual)
+}
+
+/// Returns the change of the free entries of M, C and K, in their units and in the order of
+/// [`Unknowns::free`], if a `fit` is repeated with changed `data` and the same noise spectrum. The
+/// search begins at `near`, a fit to such data or to a part of their lines.
+///
+/// # Errors
+/// As [`output_error`].
+///
+/// # Source
+/// As [`output_error`].
+pub fn change_of_parameters(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    fit: &OutputErrorFit,
+    near: &OutputErrorFit,
+) -> Result<DVector<f64>, EstimateError> {
+    let mut misfit = Misfit::new(data, unknowns, &fit.spectrum)?;
+    let minimum = near.minimum(unknowns).followed(&mut misfit)?.minimum;
+    let (independent, _) = parts(data, &minimum.parameters);
+    let before: DVector<f64> =
+        fit.estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
+    Ok(entries(unknowns, independent) - before)
 }
 
 fn search_near(
