@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use mechid_checks::{Alternative, Cause, Finding, after_spectral_fit, is_noise};
 use mechid_estimate::frequency_domain::{
-    OutputErrorFit, equivalent_force, output_error_from, output_error_pooling, thin_step,
+    ChangedRecords, OutputErrorFit, equivalent_force, output_error_from, output_error_pooling,
+    thin_step,
 };
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::{Discretisation, SecondOrderSystem};
@@ -114,25 +115,12 @@ impl Acquisition {
         unknowns: &Unknowns,
         pooling: Pooling,
     ) -> Result<(OutputErrorFit, Vec<FrequencyData>), AnalysisError> {
-        self.rounds(ACQUISITION_ROUNDS, fit, records, dt, unknowns, pooling)
-    }
-
-    /// Returns the fit after at most `most` rounds.
-    fn rounds(
-        &self,
-        most: usize,
-        fit: OutputErrorFit,
-        records: &[FrequencyData],
-        dt: f64,
-        unknowns: &Unknowns,
-        pooling: Pooling,
-    ) -> Result<(OutputErrorFit, Vec<FrequencyData>), AnalysisError> {
         let mut last = (fit, records.to_vec());
         let Some(between) = self.between_samples else { return Ok(last) };
         let mut settled = pooling == Pooling::AllLines;
         // Change of the last round, and its ratio to that of the round before.
         let (mut change, mut decrease) = (f64::INFINITY, 1.0);
-        for round in 0..most {
+        for round in 0..ACQUISITION_ROUNDS {
             let system = last.0.estimate.system()?;
             let equivalent =
                 records.iter().map(|record| equivalent_force(record, &system, dt, between));
@@ -142,7 +130,7 @@ impl Acquisition {
             };
             let data = joined(&equivalent)?;
             // The fits assume white noise until the equivalent force hardly changes.
-            let is_last = round + 1 == most;
+            let is_last = round + 1 == ACQUISITION_ROUNDS;
             let of_round = if settled || is_last { pooling } else { Pooling::AllLines };
             // The first round searches anew, because the band-limited force may have led to a wrong
             // minimum.
@@ -229,8 +217,8 @@ impl<'a> BandLimitedFit<'a> {
     }
 
     /// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best instead of
-    /// the band-limited force. If a kind leaves only noise, another one is fitted only if its first
-    /// round leaves less power. `None` without kinds, or if no fit succeeds.
+    /// the band-limited force. If a kind leaves only noise, another one is fitted only if it leaves
+    /// less power with the noise of this kind. `None` without kinds, or if no fit succeeds.
     ///
     /// # Source
     /// Maximum likelihood with the levels of the channels eliminated.
@@ -242,8 +230,7 @@ impl<'a> BandLimitedFit<'a> {
         let mut best: Option<BetweenSamples> = None;
         for kind in self.likeliest_first(kinds, dt) {
             let noise = best.as_ref().filter(|best| best.leaves_noise);
-            let has_chance = noise
-                .is_none_or(|best| self.first_round(kind, dt).is_some_and(|p| p < best.remaining));
+            let has_chance = noise.is_none_or(|best| self.leaves_less(kind, best, dt));
             let fitted = has_chance.then(|| self.between_samples_as(kind, dt)).flatten();
             best =
                 fitted.into_iter().chain(best).min_by(|a, b| a.remaining.total_cmp(&b.remaining));
@@ -251,23 +238,34 @@ impl<'a> BandLimitedFit<'a> {
         best
     }
 
-    /// Returns the fraction of the residual power that remains after the first round of a fit with
-    /// one kind of force.
-    fn first_round(&self, kind: Discretisation, dt: f64) -> Option<f64> {
-        let acquisition = Acquisition { between_samples: Some(kind), ..Acquisition::default() };
-        let (fit, pooling) = (self.fit.clone(), Pooling::AllLines);
-        let round = acquisition.rounds(1, fit, &self.records, dt, self.unknowns, pooling);
-        let (fit, equivalent) = round.ok()?;
-        self.remaining(&fit, &equivalent)
+    /// Returns whether one kind of force leaves less power than the best kind so far. The searches
+    /// begin at the fit with this best kind and at the band-limited fit.
+    fn leaves_less(&self, kind: Discretisation, best: &BetweenSamples, dt: f64) -> bool {
+        let log_power = |kind: Discretisation, near: &OutputErrorFit| {
+            let data = joined(&self.equivalent(near, kind, dt)?).ok()?;
+            ChangedRecords::from_fit(&data, self.unknowns, near)?.log_residual_power(&data)
+        };
+        let least = log_power(best.kind, &best.fit).unwrap_or(f64::INFINITY);
+        let near = [&best.fit, &self.fit];
+        near.into_iter().any(|near| log_power(kind, near).is_some_and(|power| power < least))
+    }
+
+    /// Returns the records with the band-limited forces that have the same response, by the system
+    /// of a fit, as one kind of force between samples.
+    fn equivalent(
+        &self,
+        fit: &OutputErrorFit,
+        kind: Discretisation,
+        dt: f64,
+    ) -> Option<Vec<FrequencyData>> {
+        let system = fit.estimate.system().ok()?;
+        self.records.iter().map(|record| equivalent_force(record, &system, dt, kind)).collect()
     }
 
     /// Returns the kinds in rising order of the residual power with the band-limited fit.
     fn likeliest_first(&self, kinds: &[Discretisation], dt: f64) -> Vec<Discretisation> {
         let power = |kind: Discretisation| {
-            let system = self.fit.estimate.system().ok()?;
-            let records = self.records.iter();
-            let equivalent = records.map(|record| equivalent_force(record, &system, dt, kind));
-            self.remaining(&self.fit, &equivalent.collect::<Option<Vec<_>>>()?)
+            self.remaining(&self.fit, &self.equivalent(&self.fit, kind, dt)?)
         };
         let mut ranked: Vec<(f64, Discretisation)> =
             kinds.iter().map(|kind| (power(*kind).unwrap_or(f64::INFINITY), *kind)).collect();

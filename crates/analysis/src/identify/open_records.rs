@@ -11,8 +11,8 @@ use mechid_checks::{
     linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
-    EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, change_of_parameters,
-    equivalent_force, output_error_pooling,
+    EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, equivalent_force,
+    output_error_pooling, with_noise_of,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{Discretisation, ResponseQuantity};
@@ -294,7 +294,7 @@ impl Tested<'_> {
                 None => Some(records.iter().map(without_cause(&finding, quantity)?).collect()),
             };
             let changed = fit.without_pulse_errors(&changed?).ok()?;
-            change_of_parameters(&joined(&changed).ok()?, unknowns, fit, &explained).ok()
+            Some(with_noise_of(fit, &joined(&changed).ok()?, unknowns, &explained).ok()?.change)
         });
         Ok(Some((finding, change.map(|change| &change * change.transpose()))))
     }

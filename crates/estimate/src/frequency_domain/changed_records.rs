@@ -13,7 +13,7 @@ use super::multi_start::{GlobalMinimum, search, thinned};
 use super::output_error_fit::{plausible, spare};
 use super::pulse_fit::PulseFit;
 use super::unknown_noise::{white_noise_at, with_unknown_noise};
-use crate::limits::DELAY_STEPS;
+use crate::limits::{COLOURED_ROUNDS, DELAY_STEPS};
 use crate::{EstimateError, Unknowns};
 
 /// Maximum likelihood for the lines of open records with changed channels, such as a delayed force;
@@ -92,6 +92,21 @@ impl<'a> ChangedRecords<'a> {
             PulseFit::new(changed, self.unknowns, &self.theta, noise, before)?.amplitudes;
         let of_pulses: f64 = self.amplitudes.iter().map(|amplitude| amplitude.powi(2)).sum();
         Some(self.minimise(changed)? + of_pulses)
+    }
+
+    /// Estimates the parameters of `changed` data and the levels of white noise in alternation.
+    /// Returns the mean over the channels of the logarithms of the residual power, which is in the
+    /// squared unit of the measured quantity.
+    pub fn log_residual_power(&mut self, changed: &FrequencyData) -> Option<f64> {
+        for _ in 0..COLOURED_ROUNDS {
+            self.minimise(changed)?;
+            let changed = corrected(changed, &self.amplitudes)?;
+            self.noise = white_noise_at(changed.as_ref(), self.unknowns, &self.theta).ok()?;
+        }
+        let (noise, omega) = (self.noise.covariance(0), changed.omega()[0]);
+        let per_displacement = changed.measured().per_displacement(omega).norm_sqr();
+        let level = |channel: usize| (noise[(channel, channel)].re * per_displacement).ln();
+        Some((0..changed.dof()).map(level).sum::<f64>() / changed.dof() as f64)
     }
 
     /// Estimates the parameters of `changed` data and, from their residual, the noise, as

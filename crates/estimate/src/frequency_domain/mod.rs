@@ -76,8 +76,8 @@ pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use multi_start::thin_step;
 pub use output_error::in_units_of_noise;
 pub use output_error::{
-    change_of_parameters, output_error, output_error_from, output_error_near,
-    output_error_of_table, output_error_pooling,
+    Refit, output_error, output_error_from, output_error_near, output_error_of_table,
+    output_error_pooling, with_noise_of,
 };
 pub use output_error_fit::{EndLoads, OutputErrorFit};
 pub use parts::{

@@ -136,27 +136,36 @@ pub fn output_error_from(
     with_unknown_noise(data, unknowns, None, Some(fit.minimum(unknowns)), residual)
 }
 
-/// Returns the change of the free entries of M, C and K, in their units and in the order of
-/// [`Unknowns::free`], if a `fit` is repeated with changed `data` and the same noise spectrum. The
-/// search begins at `near`, a fit to such data or to a part of their lines.
+/// Result of [`with_noise_of`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refit {
+    /// Change of the free entries of M, C and K, in their units and in the order of
+    /// [`Unknowns::free`].
+    pub change: DVector<f64>,
+    /// Sum of squares in units of the noise, a pure number.
+    pub cost: f64,
+}
+
+/// Repeats a `fit` with changed `data` and the same noise spectrum. The search begins at `near`, a
+/// fit to such data or to a part of their lines.
 ///
 /// # Errors
 /// As [`output_error`].
 ///
 /// # Source
 /// As [`output_error`].
-pub fn change_of_parameters(
+pub fn with_noise_of(
+    fit: &OutputErrorFit,
     data: &FrequencyData,
     unknowns: &Unknowns,
-    fit: &OutputErrorFit,
     near: &OutputErrorFit,
-) -> Result<DVector<f64>, EstimateError> {
+) -> Result<Refit, EstimateError> {
     let mut misfit = Misfit::new(data, unknowns, &fit.spectrum)?;
     let minimum = near.minimum(unknowns).followed(&mut misfit)?.minimum;
     let (independent, _) = parts(data, &minimum.parameters);
     let before: DVector<f64> =
         fit.estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
-    Ok(entries(unknowns, independent) - before)
+    Ok(Refit { change: entries(unknowns, independent) - before, cost: minimum.cost })
 }
 
 fn search_near(
