@@ -52,7 +52,7 @@ impl Check for Coherence {
         )?;
         f.write_str(match self.verdict() {
             Verdict::Good => "",
-            _ => ": noise, leakage, or other forces; use longer segments, or more of them",
+            _ => ". Possible causes: noise, leakage, other forces. Use longer segments, or more segments",
         })
     }
 }

@@ -54,7 +54,7 @@ impl Check for ConstantChannel {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} is {} in all {} samples: no response there, or a dead channel; check the sensor",
+            "{} is {} in all {} samples: no response at this point, or a dead channel; check the sensor",
             names.channel(self.channel),
             message::number(self.level),
             self.samples

@@ -142,8 +142,8 @@ impl Check for DropOut {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} is {} from sample {} on, for {}, but changes before and after these samples: {}; \
-             choose a window without them",
+            "{} is {} from sample {} on, for {}, but changes before and after these samples: {}; choose a window \
+             without these samples",
             names.channel(self.channel),
             message::number(self.level),
             self.sample + 1,

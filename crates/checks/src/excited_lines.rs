@@ -67,8 +67,8 @@ impl Check for ExcitedLines {
         )?;
         f.write_str(match self.verdict() {
             Verdict::Good => "",
-            Verdict::Doubtful => "; no redundancy to estimate the noise",
-            Verdict::Bad => "; excite more lines",
+            Verdict::Doubtful => "; no equation remains to estimate the noise",
+            Verdict::Bad => "; too few equations: excite more lines",
         })
     }
 }

@@ -192,8 +192,8 @@ impl ModeLimit {
             }
             (ModeLimit::BetweenSamples, Verdict::Good) => String::new(),
             (ModeLimit::BetweenSamples, Verdict::Doubtful) => {
-                ", so few that the change of the force between samples matters: sample faster, or \
-                 state how it changes (`between_samples`)"
+                ", so few that the change of the force between samples matters: sample faster, or state how the \
+                 force changes (`between_samples`)"
                     .into()
             }
             (ModeLimit::AtSamples | ModeLimit::BetweenSamples, _) => {

@@ -136,7 +136,7 @@ impl Check for Kinematics {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} changes {} times as much as {} predicts: check the units, columns and signs of both",
+            "{} changes {} times as much as {} predicts: check the units, columns and signs of both channels",
             names.response(self.quantity, self.dof),
             six_digits(self.gain),
             names.response(self.derivative, self.dof)

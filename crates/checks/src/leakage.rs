@@ -92,14 +92,15 @@ impl Check for Leakage {
             (Verdict::Good, _) => Ok(()),
             (_, true) => write!(
                 f,
-                ": this is too narrow to separate its damping from leakage, and the intervals are not reliable; \
-                 use segments of {samples_needed} samples or more, or fit the record as an open one (without \
-                 `from_frf`)"
+                ". This is too narrow to separate the damping of this mode from leakage, and the intervals are not \
+                 reliable: use segments of {samples_needed} samples or more, or fit the record as an open one \
+                 (without `from_frf`)"
             ),
             (_, false) => write!(
                 f,
-                ", and the bias of the window could not be separated from its damping: the intervals are not reliable; \
-                 use segments of {samples_needed} samples or more, or fit the record as an open one (without `from_frf`)"
+                ". The bias of the window could not be separated from the damping of this mode, and the intervals \
+                 are not reliable: use segments of {samples_needed} samples or more, or fit the record as an open \
+                 one (without `from_frf`)"
             ),
         }
     }

@@ -100,15 +100,16 @@ impl Concentration {
         let share = (100.0 * self.share).floor();
         write!(
             f,
-            "{share} % of the misfit is at {} Hz: run-out, mains or another disturbance? Exclude with \
-             `without_hz` {}",
+            "{share} % of the power above the noise is at {} Hz. Possible causes: run-out, mains, another \
+             disturbance. Exclude these lines with `without_hz` {}",
             listed(&hz),
             hz.join(",")
         )?;
         match self.multiples_of_hz.map(line_hz) {
             Some(of) => write!(
                 f,
-                "; all are near multiples of {of} Hz; if this is a speed of rotation, `without_hz` {of}:multiples"
+                ". All these lines are near multiples of {of} Hz; if this is a speed of rotation, use `without_hz` \
+                 {of}:multiples"
             ),
             None => Ok(()),
         }
@@ -124,12 +125,12 @@ impl Misfit {
                  state the noise with `force_noise`"
             }
             _ if self.ratio < 1.0 => {
-                "the periods differ by more than noise (hits of unequal strength, a drift, a transient), and \
-                 the standard errors are too large; average frequency responses instead"
+                "the periods differ by more than noise (hits of unequal strength, a drift, a transient), and the \
+                 standard errors are too large; average frequency responses over the periods instead"
             }
             _ => {
-                "it exceeds the noise. Possible causes: a wrong model (nonlinearity, missing degree of freedom, wrong \
-                 known mass), spectral leakage, or a biased estimate. Do not rely on the intervals"
+                "the residual exceeds the noise. Possible causes: a wrong model (nonlinearity, missing degree of \
+                 freedom, wrong known mass), spectral leakage, or a biased estimate. Do not rely on the intervals"
             }
         }
     }

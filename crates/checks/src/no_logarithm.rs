@@ -30,9 +30,8 @@ impl Check for NoLogarithm {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the transition from sample to sample has the eigenvalue {:.3e}, zero or \
-             negative: the sampling interval is too long for a mode, or the data hold mostly noise; \
-             sample faster",
+            "the transition from sample to sample has the eigenvalue {:.3e}, which should be positive: the \
+             sampling interval is too long for a mode, or the data contain mostly noise; sample faster",
             self.eigenvalue
         )
     }

@@ -79,8 +79,8 @@ impl Check for Quantisation {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} has only {} different values, in steps of {}: the range of the converter is far too \
-             wide, or it has too few bits; choose a narrower range and measure again",
+            "{} has only {} different values, in steps of {}: the range of the converter is far too wide, or the \
+             converter has too few bits; choose a narrower range and measure again",
             names.channel(self.channel),
             self.levels,
             six_digits(self.step)

@@ -73,7 +73,7 @@ impl Check for Seam {
         f.write_str(match self.verdict() {
             Verdict::Good => "consistent with a whole period",
             Verdict::Doubtful => "probably not a steady state over one whole period",
-            Verdict::Bad => "not a whole period; fit it as an open record",
+            Verdict::Bad => "not a whole period; fit the window as an open record",
         })
     }
 }

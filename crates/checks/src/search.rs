@@ -37,8 +37,8 @@ impl Check for SearchAgreement {
         f.write_str(match self.verdict() {
             Verdict::Good => "",
             _ => {
-                ": there may be a higher likelihood; give better initial values, bounds, or more \
-                 searches (`starts`)"
+                ": other searches may reach a still higher likelihood; give better initial values or bounds, or \
+                 more searches (`starts`)"
             }
         })
     }

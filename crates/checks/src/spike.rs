@@ -71,8 +71,8 @@ impl Check for Spike {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "sample {} of {} is a spike, {} times as sharp as any other: an error of the \
-             transmission; leave it out of the window",
+            "sample {} of {} is a spike, {} times as sharp as any other: an error of the transmission; leave this \
+             sample out of the window",
             self.sample + 1,
             names.channel(self.channel),
             six_digits(self.ratio)

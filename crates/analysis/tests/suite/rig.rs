@@ -295,7 +295,7 @@ fn lines_of_a_disturbance_are_left_out() {
     for (found, expected) in named.frequencies_hz.iter().zip(run_out) {
         assert!((found - expected).abs() < 1e-9, "{named:?}");
     }
-    assert!(spoilt.to_string().contains("Exclude with `without_hz`"), "{spoilt}");
+    assert!(spoilt.to_string().contains("Exclude these lines with `without_hz`"), "{spoilt}");
 
     let lines = LeftOut { lines: Some("12,24,36".parse().unwrap()), ..LeftOut::default() };
     let rotation = Disturbance::rotation(12.0 * line_hz);
