@@ -47,8 +47,8 @@ pub enum EstimateError {
     /// An equation of motion has neither a force nor a known entry: it determines only ratios of
     /// its entries.
     #[error(
-        "no force acts on degree of freedom {dof} and none of its parameters ({parameters}) is known: \
-         its equation of motion fixes their ratios only; give one of the masses, or apply a force there"
+        "no force acts on degree of freedom {dof} and none of its parameters ({parameters}) is known: its equation \
+         of motion determines only the ratios of these parameters; give one of the masses, or apply a force there"
     )]
     OnlyRatios {
         /// Degree of freedom, counted from 1.
@@ -167,8 +167,8 @@ pub enum EstimateError {
     },
     /// The noise covariance of a line cannot be inverted.
     #[error(
-        "the noise covariance at {frequency_hz} Hz is singular: a displacement has no noise, or the \
-         number of periods does not exceed the number of degrees of freedom; pool the covariance over more lines"
+        "the noise covariance at {frequency_hz} Hz is singular: a displacement has no noise, or the periods are \
+         too few (there must be more periods than degrees of freedom); pool the covariance over more lines"
     )]
     SingularNoise {
         /// Frequency, in Hz.

@@ -293,7 +293,8 @@ fn bad_descriptions_are_told_by_name() {
     machine["elements"].as_array_mut().unwrap().push(beside);
     write(at, "beside.json", &machine);
     let text = mechid(at, "identify rig.csv --machine beside.json --period 512");
-    let told = "the data determine s1.k and beside only through their sum s1.k + beside";
+    let told =
+        "the data do not determine s1.k and beside separately, but only their sum s1.k + beside";
     assert!(text.contains(told), "{text}");
     let message = refused(at, "identify rig.csv --machine three.json --mass 3");
     assert!(message.contains("cannot be used with"), "{message}");

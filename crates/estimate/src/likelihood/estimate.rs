@@ -94,12 +94,12 @@ impl fmt::Display for Combination {
         if self.has_common_factor() {
             return write!(
                 f,
-                "the data determine {names} only up to one common factor: state one of them"
+                "the data determine {names} except for one common factor: state one of these values"
             );
         }
         let sums = self.determined.iter().map(|coefficients| self.combination(coefficients));
         let sums: Vec<String> = sums.collect();
-        write!(f, "the data determine {names} only through {}", sums.join(" and "))
+        write!(f, "the data do not determine {names} separately, but only {}", sums.join(" and "))
     }
 }
 

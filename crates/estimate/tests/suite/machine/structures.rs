@@ -168,7 +168,7 @@ fn springs_in_series_and_side_by_side_are_named() {
     assert_eq!(estimate.combinations.len(), 1);
     assert_eq!(
         estimate.combinations[0].to_string(),
-        "the data determine k3 and k4 only through their sum k3 + k4"
+        "the data do not determine k3 and k4 separately, but only their sum k3 + k4"
     );
     let k3 = estimate.parameter("k3").unwrap();
     assert!(k3.standard_error.is_none() && k3.interval_kind == IntervalKind::Open);
@@ -182,7 +182,7 @@ fn springs_in_series_and_side_by_side_are_named() {
     let estimate = identified(&data, &series, &instruments);
     assert_eq!(
         estimate.combinations[0].to_string(),
-        "the data determine k3 and k4 only through their series sum 1/(1/k3 + 1/k4)"
+        "the data do not determine k3 and k4 separately, but only their series sum 1/(1/k3 + 1/k4)"
     );
     let values = ["k3", "k4"].map(|name| estimate.parameter(name).unwrap().value);
     let sum = values.iter().map(|k| k.recip()).sum::<f64>().recip();
