@@ -126,7 +126,8 @@ impl BearingData {
             (0..d.len()).partition(|row| is_kept(d.omega()[*row]));
         if keep.is_empty() {
             return Err(apart(
-                "every frequency is a multiple of the frequency of rotation or was left out",
+                "every frequency is a multiple of the rotation frequency (`rotation_hz`) or excluded \
+                 (`without_hz`): measure frequencies between these multiples",
             ));
         }
         let data = film_data(&d, &a, &keep, how.stator_mass, noise.is_some())?;

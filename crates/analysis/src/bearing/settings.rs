@@ -64,7 +64,10 @@ impl IdentifyBearing {
     /// Returns the settings for tables of frequency responses.
     pub(super) fn response_settings(&self) -> Result<IdentifyResponses, AnalysisError> {
         let numbered = |setting| {
-            let why = "frequency responses have no numbered lines: choose a band".into();
+            let why =
+                "the lines of frequency responses have no numbers: choose a band (`band_hz`), or \
+                 exclude frequencies (`without_hz`)"
+                    .into();
             Err(AnalysisError::Setting { setting, why })
         };
         let band = match &self.lines {

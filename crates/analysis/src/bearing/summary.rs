@@ -134,8 +134,8 @@ impl Amplitude {
     fn remark(self) -> Option<String> {
         let ratio = self.over_clearance.filter(|ratio| *ratio > LARGEST_AMPLITUDE)?;
         Some(format!(
-            "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} of it the film is \
-             not linear, and the coefficients depend on the amplitude; use smaller forces",
+            "the housing moves by up to {} of the clearance. Above {LARGEST_AMPLITUDE} of the clearance the film \
+             is not linear, and the coefficients depend on the amplitude: use smaller forces",
             significant(ratio, 2)
         ))
     }
@@ -226,8 +226,8 @@ impl BearingSummary {
         let mut remarks = Vec::new();
         match self.error_scale {
             None => remarks.push(format!(
-                "no standard errors and intervals are given: the residual power is {} × that of the noise, so the \
-                 coefficients do not describe the tests",
+                "the residual power is {} × the noise power, so the coefficients do not describe the tests, and \
+                 have no standard errors and intervals",
                 significant(film.excess, 3)
             )),
             Some(scale) if scale > 1.0 => remarks.push(format!(
@@ -246,16 +246,17 @@ impl BearingSummary {
         };
         if self.error_scale.is_some() && (0..film.values().len()).any(is_moved) {
             remarks.push(
-                "twelve coefficients were chosen by a significance test, which favours large mass coefficients; the \
-                 intervals include this effect. They are narrower if `coefficients` twelve is set beforehand"
+                "twelve coefficients were chosen by a significance test, which favours large mass coefficients; \
+                 the intervals include this effect. If `coefficients` twelve is set, there \
+                 is no such test, and the intervals are narrower"
                     .into(),
             );
         }
         let speed = if self.error_scale.is_none() { speed_of_misfit(tests) } else { None };
         if let Some([low, high]) = speed {
             remarks.push(format!(
-                "the tests agree if the lines at multiples of a frequency from {} to {} Hz are left out: \
-                 if the shaft rotates at this frequency, its run-out disturbs these lines \
+                "the tests agree if the lines at multiples of a frequency from {} to {} Hz are left out: if the \
+                 shaft rotates at this frequency, run-out of the shaft disturbs these lines; state the speed \
                  (`rotation_hz`)",
                 compact(low, 3),
                 compact(high, 3)

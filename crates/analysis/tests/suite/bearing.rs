@@ -186,9 +186,9 @@ fn tables_of_frequency_responses_give_the_same() {
     refused(&[], &how, "no record");
     let numbered =
         IdentifyBearing { lines: "3:9".parse().map(LineChoice::Lines).unwrap(), ..how.clone() };
-    refused(&tables, &numbered, "`lines`: frequency responses have no numbered lines");
+    refused(&tables, &numbered, "`lines`: the lines of frequency responses have no numbers");
     let still = IdentifyBearing { rotation_hz: Some(4.0), ..how };
-    refused(&tables, &still, "every frequency is a multiple of the frequency of rotation");
+    refused(&tables, &still, "every frequency is a multiple of the rotation frequency");
 }
 
 /// Records of `count` periods in x and as many in y, and the tables of d/f and a/f that `mechid
@@ -367,7 +367,7 @@ fn a_result_tells_what_a_bearing_engineer_asks() {
     assert_eq!(serde_json::to_value(&machine).unwrap()["elements"][0]["kind"], "bearing");
 
     let loud = identify_bearing(&tests(2000.0), None, &how).unwrap();
-    assert!(loud.summary().remarks[0].contains("of the clearance: above 0.05"));
+    assert!(loud.summary().remarks[0].contains("of the clearance. Above 0.05"));
 
     let stability = found.summary().stability.clone().unwrap();
     let table = BearingTable::new([loud, found]).csv();
