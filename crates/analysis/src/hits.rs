@@ -127,7 +127,7 @@ fn excluded(hits: &[HitRow]) -> Vec<String> {
             let first = message::list(alike.iter().map(|hit| hit.brief()), "; ", LISTED);
             let reason = hit.reasons.first().map_or("", String::as_str);
             texts.push(format!(
-                "{} left out, {}: {first}; the first: {reason}",
+                "{} left out, {}: {first}; reason for the first hit: {reason}",
                 message::count(alike.len(), "hit"),
                 kind(hit),
             ));

@@ -198,7 +198,8 @@ fn settle(
     };
     if kinds.is_empty() || kinds.iter().any(missing) {
         return wrong(
-            "the initial state is fitted to the response of every degree of freedom".into(),
+            "the fit of the initial state needs a measured response of every degree of freedom"
+                .into(),
         );
     }
     Ok(samples)

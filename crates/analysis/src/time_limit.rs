@@ -39,7 +39,7 @@ pub fn within<T, E: From<AnalysisError> + Display>(
     let limit = seconds.map(|seconds| {
         time_limit::TimeLimit::from_seconds(seconds).ok_or_else(|| AnalysisError::Setting {
             setting: "time_limit",
-            why: format!("a finite number that is not negative is needed, got {seconds}"),
+            why: format!("a finite number of at least 0 is needed, got {seconds}"),
         })
     });
     time_limit::within(limit.transpose()?, || work().map_err(with_limit))

@@ -27,7 +27,7 @@ pub fn all<T: DeserializeOwned>() -> &'static [&'static str] {
 pub fn read<T: DeserializeOwned>(word: &str) -> Result<T, String> {
     let deserializer: serde::de::value::StrDeserializer<'_, Error> = word.into_deserializer();
     T::deserialize(deserializer)
-        .map_err(|_| format!("\"{word}\" is none of {}", all::<T>().join(", ")))
+        .map_err(|_| format!("\"{word}\" is not one of {}", all::<T>().join(", ")))
 }
 
 /// Records the variants of the requested enum.

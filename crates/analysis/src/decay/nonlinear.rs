@@ -127,7 +127,7 @@ impl DecaySummary {
         }
         if self.analysis.modes.is_none() && self.modes.len() == self.analysis.max_modes {
             remarks.push(format!(
-                "the maximum number of modes was found ({}): there may be more modes (`max_modes`)",
+                "as many modes were found as `max_modes` allows ({}): there may be more modes; raise `max_modes`",
                 self.modes.len()
             ));
         }

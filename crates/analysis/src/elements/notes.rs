@@ -128,7 +128,10 @@ impl fmt::Display for ElementNote {
                     compact(*standard_error, 2)
                 )?;
                 if let Some([before, after]) = misfit.map(|both| both.map(|one| significant(one, 3))) {
-                    write!(f, ", and the misfit falls from {before} to {after}")?;
+                    write!(
+                        f,
+                        ", and with the estimate the residual power falls from {before} to {after} × the noise power"
+                    )?;
                 }
                 f.write_str(
                     ": the stated value may be wrong; standard errors and intervals include the changes \

@@ -156,8 +156,8 @@ impl Signals {
         let record = |columns: Vec<Option<&[f64]>>| -> Result<Record, AnalysisError> {
             let columns = columns.into_iter().map(|column| column.map(DVector::from_column_slice));
             let columns: Vec<_> = columns.collect::<Option<_>>().ok_or_else(|| {
-                let why =
-                    "the columns of the record are not those of the sensors and inputs of the machine".into();
+                let why = "the record needs a column for each sensor and each input of the machine"
+                    .into();
                 AnalysisError::Setting { setting: "machine", why }
             })?;
             Ok(Record::new(block.force.sampling(), DMatrix::from_columns(&columns))?)

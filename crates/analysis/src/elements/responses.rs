@@ -183,7 +183,10 @@ fn receptance_of(
         }
     }
     if let Some(at) = is_known.iter().position(|known| !known) {
-        let why = format!("no table has the measured degree of freedom {:?}", measured[at]);
+        let why = format!(
+            "no table has a response or a force at {:?}, a measured degree of freedom",
+            measured[at]
+        );
         return Err(refused("part", why));
     }
     Ok(MeasuredReceptance { receptance, variance: is_stated.then_some(variance) })
@@ -216,7 +219,11 @@ fn rows_at(part: &FrequencyResponses, omega: &[f64]) -> Result<Vec<usize>, Analy
         let is_same = |of: &f64| (of - hz).abs() <= SAME_FREQUENCY * hz;
         part.frequency_hz.iter().position(is_same).ok_or_else(|| {
             let why =
-                format!("{} has no response at {hz} Hz, a frequency of the other data", part.file);
+                format!(
+                    "{} has no response at {hz} Hz, but the other data have this frequency: all data need the same \
+                     frequencies",
+                    part.file
+                );
             refused("part", why)
         })
     };

@@ -40,8 +40,9 @@ impl ElementData {
         how.machine.assembly().map_err(AnalysisError::machine)?;
         how.refuse_force_noise("synchronous responses")?;
         if how.machine.instruments.speed != Speed::Synchronous {
-            let why = "a table over the speed needs \"speed\": \"synchronous\"".into();
-            return Err(AnalysisError::Setting { setting: "machine", why });
+            let why = "a table over the speed needs \"speed\": \"synchronous\" in the description of the \
+                       machine";
+            return Err(AnalysisError::Setting { setting: "machine", why: why.into() });
         }
         joined(tables.iter().map(|table| from_table(table, how)))
     }
@@ -91,7 +92,9 @@ fn from_table(table: &Table, how: &IdentifyElements) -> Result<ElementData, Anal
     }
     let band =
         |omega: f64| how.band.is_none_or(|b| (b.low_hz..=b.high_hz).contains(&(omega / TAU)));
-    let lines = lines.retained(band).ok_or_else(|| refused(table, "no speed lies in the band"))?;
+    let lines = lines
+        .retained(band)
+        .ok_or_else(|| refused(table, "no speed lies in the band (`band_hz`)"))?;
     let lines = ElementData::kept(lines, 0.0, how)?;
     let test = TestRow { file: table.file().to_owned(), kind: TestKind::Speeds, window: None };
     let noise = match source {
@@ -105,7 +108,7 @@ fn from_table(table: &Table, how: &IdentifyElements) -> Result<ElementData, Anal
 /// Returns the speeds, in Hz.
 fn speeds_hz(table: &Table) -> Result<Vec<f64>, AnalysisError> {
     let named_column = SPEEDS.iter().find_map(|(name, hz)| Some((table.find(name).ok()?, *hz)));
-    let missing = "it needs a column speed_rpm, speed_hz or speed_rad_s";
+    let missing = "a column speed_rpm, speed_hz or speed_rad_s is missing";
     let (column, hz) = named_column.ok_or_else(|| refused(table, missing))?;
     let stated = table.unit(column).filter(|unit| unit.quantity == Quantity::Frequency);
     let factor = hz.or(stated.map(|unit| unit.in_si)).ok_or_else(|| {
@@ -149,7 +152,8 @@ fn amplitudes(
         _ => Err(refused(
             table,
             &format!(
-                "it needs {name}_real and {name}_imaginary, or {name}_amplitude and {name}_phase_deg"
+                "columns of {name} are missing: {name}_real and {name}_imaginary, or {name}_amplitude and \
+                 {name}_phase_deg"
             ),
         )),
     }

@@ -96,8 +96,9 @@ impl Fleet {
     ) -> Result<Self, AnalysisError> {
         analysis.check()?;
         if records_per_part == 0 {
-            let why = "a part is a group of records and needs at least one record".into();
-            return Err(AnalysisError::Setting { setting: "part_records", why });
+            let why = "the results are written in parts, one part for a group of records; a part needs at least \
+                       one record";
+            return Err(AnalysisError::Setting { setting: "part_records", why: why.into() });
         }
         let folder = folder.as_ref();
         let mut files: Vec<PathBuf> = Vec::new();
@@ -234,7 +235,7 @@ fn refuse_results(record: &Path, results: &Path) -> Result<(), AnalysisError> {
     let Ok(record) = record.canonicalize() else { return Ok(()) };
     if record == results || record.parent() == Some(&results) {
         let why = format!(
-            "the results would be written among the records, in {}: choose another folder",
+            "{} is a folder of records, and the results must not be among the records: choose another folder",
             escaped(&path_text(&results))
         );
         return Err(AnalysisError::Setting { setting: "output", why });

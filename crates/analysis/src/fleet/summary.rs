@@ -105,8 +105,8 @@ impl fmt::Display for FleetSummary {
         if self.other_parts > 0 {
             writeln!(
                 f,
-                "note: the folder also contains {} from other records or from a different analysis: a program \
-                 that reads the whole folder also reads these",
+                "note: the folder also contains {} from other records or from a different analysis: a program that \
+                 reads the whole folder also reads these parts",
                 message::count(self.other_parts, "part")
             )?;
         }

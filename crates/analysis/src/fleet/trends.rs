@@ -453,7 +453,8 @@ impl fmt::Display for Trends {
             let count = message::count(self.without_interval, "value");
             writeln!(
                 f,
-                "note: {count} without an interval, because the record states no standard error: drawn as points alone"
+                "note: {count} without an interval, because the record states no standard error: the figure shows \
+                 only their points"
             )?;
         }
         write!(f, "\n{}", self.table())?;

@@ -192,7 +192,7 @@ impl Worker {
                 }
                 Ok(None) => {
                     drop(running.end());
-                    let how = "it sent something other than a row of results".into();
+                    let how = "its answer was not a row of results".into();
                     return Ok(Some(AnalysisError::RecordProcess { how }));
                 }
                 Err(RecvTimeoutError::Disconnected) => {

@@ -462,18 +462,18 @@ impl Responses {
         let forces = if listed.len() == 1 { "force" } else { "forces" };
         let idle = (!listed.is_empty()).then(|| {
             format!(
-                "{of_record}only noise in {forces} {}: a weak signal that is not coherent with \
-                 the other forces and the response",
+                "{of_record}only noise in {forces} {}: the signal is weak, and not coherent with the other forces \
+                 and the response, so it has no frequency responses",
                 listed.join(", ")
             )
         });
         let following = self.following.iter().map(|one| {
             let (force, driver) = (one.force + 1, one.driver + 1);
             format!(
-                "{of_record}force {force} is coherent with force {driver} (at {} % of the amplitude of \
-                 force {driver}) and has no independent part: the responses to force {driver} include this \
-                 percentage of the responses to force {force}. To separate them, use a record in which force \
-                 {force} dominates",
+                "{of_record}force {force} is coherent with force {driver} (at {} % of the amplitude of force \
+                 {driver}) and has no independent part: the responses to force {driver} include this percentage of \
+                 the responses to force {force}. To separate the responses, use a record in which force {force} \
+                 dominates",
                 significant(100.0 * one.share, 2)
             )
         });

@@ -73,7 +73,7 @@ impl FromStr for Settings {
                 ));
             }
             if steps >= (LONGEST - settings.len().min(LONGEST)) as f64 {
-                return Err(format!("more than {LONGEST} settings"));
+                return Err(format!("a sweep has at most {LONGEST} settings"));
             }
             settings.extend((0..=steps as usize).map(|k| first + k as f64 * step));
         }

@@ -180,7 +180,7 @@ fn a_second_hit_and_the_largest_number_of_modes_are_said() {
     assert!((at - 3.0).abs() < 0.1, "{found}");
     let few = DecaySettings { max_modes: 1, ..DecaySettings::default() };
     let found = decay(&measured(sampling, one, 0.005, 6), &few).unwrap();
-    assert!(told(&found, "the maximum number of modes was found"), "{found}");
+    assert!(told(&found, "as many modes were found as `max_modes` allows"), "{found}");
 }
 
 /// With little noise, an autoregression describes two decays of the same phase better than one

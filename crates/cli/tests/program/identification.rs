@@ -451,7 +451,7 @@ fn frequency_responses_are_estimated_and_fitted() {
     for (segment, part) in [
         ("1024:100", "at least 0 and below 100 %, got 100"),
         ("1024:-1", "at least 0 and below 100 %, got -1"),
-        ("1024:50:hanning", "is none of hann, hamming, blackman, rectangular"),
+        ("1024:50:hanning", "is not one of hann, hamming, blackman, rectangular"),
         ("0", "is not a number of samples"),
     ] {
         refused(folder, &format!("frf r.csv {other} {segment}"), &[part]);
