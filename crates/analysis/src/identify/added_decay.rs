@@ -19,7 +19,7 @@ pub(crate) fn common_rate(tables: &[FrequencyResponses]) -> Result<Option<f64>, 
         None => Ok(first.added_decay),
         Some(other) => {
             let why = format!(
-                "the windows of {} and {} add different decay rates: identify from each of them separately",
+                "the windows of {} and {} add different decay rates: identify from each table separately",
                 first.file, other.file
             );
             Err(AnalysisError::Setting { setting: "exponential_percent", why })
@@ -70,8 +70,8 @@ pub(super) fn unknowns(unknowns: &Unknowns, rate: f64) -> Result<Unknowns, Analy
             };
             let (known, free) = (name(known)?, name(free)?);
             let why = format!(
-                "the exponential window of the table mixes {known}, which is known, with {free}, which is not: \
-                 do not state {known}, or state {free} as well"
+                "the exponential window of the table couples the known {known} with the unknown {free}: leave \
+                 {known} unknown, or state {free} as well"
             );
             Err(AnalysisError::Setting { setting: "structure", why })
         };

@@ -239,7 +239,8 @@ impl Keywords {
             ));
         }
         if self.criterion.is_some() && self.candidates.is_none() {
-            return Err(refused("criterion", "it belongs to `candidates`"));
+            let why = "it applies only to the selection of terms: give `candidates`, or leave `criterion` out";
+            return Err(refused("criterion", why));
         }
         let likelihood = matches!(self.method, None | Some(Method::MaximumLikelihood));
         if self.noise.is_some_and(|noise| noise != Pooling::Automatic) && !likelihood {
@@ -274,7 +275,7 @@ impl Keywords {
                 "it is for open records: for whole periods, the scatter of the force shows its noise",
             )),
             Some(Extent::WholePeriod) if self.hits.is_some() => {
-                Err(refused("extent", "a hit is not a period"))
+                Err(refused("extent", "a hit is not a whole period: leave `extent` or `hits` out"))
             }
             Some(Extent::WholePeriod) if !acquisition.is_default() => {
                 let setting = match acquisition.between_samples {

@@ -94,9 +94,9 @@ impl ExtrapolationRow {
         let error = percent(self.relative_error[1]);
         self.poor.then(|| {
             format!(
-                "{term} extrapolates badly: its force grows with the power {order} of the motion. At the \
-                 largest amplitude of the data it is {near} of the restoring force, at {REACH} times this \
-                 amplitude {far}; there the standard error of the restoring force is {error}. Do not predict \
+                "{term} extrapolates badly: its force grows with the power {order} of the motion. At the largest \
+                 amplitude of the data this force is {near} of the restoring force. At {REACH} times this \
+                 amplitude it is {far}, and the standard error of the restoring force is {error}. Do not predict \
                  beyond the measured amplitudes"
             )
         })
@@ -277,7 +277,8 @@ fn select(
     if how.criterion == Criterion::HeldOut && data.count() < HELD_OUT_RECORDS {
         let got = data.count();
         let why = format!(
-            "held-out needs at least {HELD_OUT_RECORDS} records or windows; it leaves out one at a time; got {got}"
+            "held-out leaves out one record or window at a time, and needs at least {HELD_OUT_RECORDS} records or \
+             windows, got {got}"
         );
         return Err(AnalysisError::Setting { setting: "criterion", why });
     }

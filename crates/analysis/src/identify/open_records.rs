@@ -461,8 +461,8 @@ fn remarks(
         force_noise.iter().any(|noise| noise.levels_n.iter().flatten().any(|n| *n > 0.0));
     let are_apart = matches!(excitation, Excitation::Hits(_)) && is_noisy;
     let of_pulses = (are_apart && fit.pulse_amplitudes.is_empty()).then(|| {
-        "the noise of the force was taken as independent from line to line, because the pulses could not be \
-         fitted (there may be too many): the checks of the residual may warn of this noise"
+        "the noise of the force was taken as independent from line to line, because the pulses could not be fitted \
+         (there may be too many): this noise may cause warnings of the checks of the residual"
             .into()
     });
     one_motion_of(&records[0].held)

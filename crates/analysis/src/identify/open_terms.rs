@@ -31,7 +31,7 @@ pub(super) fn fit(
     if !candidates.is_empty() {
         return refuse(
             "candidates",
-            "terms are chosen from whole periods: an open record has none",
+            "terms are chosen from whole periods, and an open record has no whole periods",
         );
     }
     if search.delay || search.phase {

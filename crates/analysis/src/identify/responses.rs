@@ -35,7 +35,9 @@ const BLUNTED: f64 = 0.5;
 
 /// Remark on records that are neither whole periods nor short enough to be fitted as open records
 /// without a request.
-pub(super) const UNTRIED: &str = "the windows are not whole periods, and their lines and unknowns are too many to estimate the transients without a request: frequency responses were averaged over segments; `extent` open estimates the transients";
+pub(super) const UNTRIED: &str = "the windows are not whole periods, and have too many lines and unknowns to estimate \
+                                  the transients by default: frequency responses were averaged over segments. \
+                                  `extent` open estimates the transients";
 
 /// Returns whether averages over segments suit the records better than whole windows do: a window
 /// is not a whole period, the force is not a series of hits, and no lines were chosen by their

@@ -267,7 +267,8 @@ impl SampleFit {
         if let Some((factor, way)) = self.refinement() {
             let open = way != Interpolation::BandLimited && self.extent() == Extent::WholePeriod;
             remarks.push(format!(
-                "{} in every sampling interval; the standard errors count only measured samples{}",
+                "the record was interpolated, with {} in every sampling interval; the standard errors count only \
+                 measured samples{}",
                 message::count(factor, "step"),
                 if open { ", and the interpolation treats the window as open" } else { "" }
             ));

@@ -73,8 +73,8 @@ impl SinusoidRow {
         let list = message::list(named.iter().map(name), ", ", NAMED);
         (!named.is_empty()).then(|| {
             format!(
-                "{} not caused by the forces {} fitted together with the machine and subtracted from the responses: \
-                 {list}: run-out, an unbalance or mains?",
+                "{} not caused by the forces {} fitted together with the machine and subtracted from the \
+                 responses: {list}. Possible causes: run-out, an unbalance, mains",
                 message::count(named.len(), "sinusoid"),
                 if named.len() == 1 { "was" } else { "were" },
             )

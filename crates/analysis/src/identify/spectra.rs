@@ -481,8 +481,8 @@ fn preferred(
         return Ok(plain);
     }
     let reason = format!(
-        "maximum likelihood was used: least squares is biased by noise and does not explain \
-         {} % of the motion; with maximum likelihood this part is {} %",
+        "maximum likelihood was used: least squares is biased by noise and does not explain {} % of the motion; \
+         maximum likelihood does not explain {} %",
         significant(100.0 * of_plain, 3),
         significant(100.0 * of_likely, 3)
     );

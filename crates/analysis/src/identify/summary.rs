@@ -450,9 +450,9 @@ pub(crate) fn least_squares_remark(fitted: &Fitted, checks: &[CheckRow]) -> Opti
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     let explained = checks.iter().any(CheckRow::is_bad);
     (fitted.least_squares && warned(When::After) && !warned(When::Before) && !explained).then(|| {
-        "least squares treats the measured response as exact, and noise on it biases the parameters; \
-         this alone may explain the warnings after the fit. Repeat with `method` maximum-likelihood: \
-         warnings that remain concern the model"
+        "least squares treats the measured response as exact, and noise on it biases the parameters; this bias \
+         alone may explain the warnings after the fit. Repeat with `method` maximum-likelihood: warnings that \
+         remain concern the model"
             .into()
     })
 }

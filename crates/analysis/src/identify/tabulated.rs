@@ -93,7 +93,7 @@ fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
     if table.functions.iter().any(|f| f.response == force) {
         return "";
     }
-    "; by reciprocity a row of responses also serves as a column (`structure` symmetric)"
+    "; by reciprocity (`structure` symmetric) a row of responses also serves as a column"
 }
 
 /// Returns a table with missing responses replaced by the reciprocal responses, with a remark.
@@ -300,7 +300,7 @@ fn noise_remarks(
     }
     if is_certain {
         remarks.push(format!(
-            "{}: a coherence of 1 states no noise; the noise was estimated from the residual",
+            "{}: a coherence of 1 shows no noise; the noise was estimated from the residual",
             table.file
         ));
     }
@@ -415,7 +415,7 @@ fn quantity(
         (Some(of_file), _) => match stated.find(|quantity| *quantity != of_file) {
             None => Ok(of_file),
             Some(other) => refuse(format!(
-                "{} has responses of {of_file} and of {other}: choose `points` of one kind",
+                "{} has responses of {of_file} and of {other}: choose `points` with one quantity",
                 table.file
             )),
         },
