@@ -190,9 +190,9 @@ fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
         DropReason::OutsideBand => "it is outside of the band".into(),
         DropReason::OverDamped { .. } => "its damping is too high for a mode".into(),
         DropReason::NumberReached { number } => {
-            format!("the maximum number of modes, {number}, was found before it")
+            format!("the maximum number of modes, {number}, was found before this candidate")
         }
-        _ => "with it, the likelihood has no maximum".into(),
+        _ => "the likelihood has no maximum with this candidate".into(),
     };
     let DroppedCandidate { natural_frequency_hz, damping_ratio, .. } = *candidate;
     DroppedRow { frequency_hz: natural_frequency_hz, damping_ratio, reason }

@@ -41,7 +41,7 @@ impl Properties {
         let first = quantities.next().flatten().filter(|one| quantities.all(|q| q == Some(*one)));
         if self.real_shapes {
             let Some(quantity) = first else {
-                let why = "the responses must all be displacements, velocities or accelerations";
+                let why = "all responses must have the same quantity: displacement, velocity or acceleration";
                 return Err(settings.refused("real_shapes", why.into()));
             };
             let derivative = derivative(quantity) as i32;
@@ -57,8 +57,8 @@ impl Properties {
             }
             if points.len() < 2 || first.is_none() {
                 let why = format!(
-                    "it needs responses of one kind, and at least two driving points (a force and a response at one \
-                     point; there are {}): state the points (`force_at`, `response_at`)",
+                    "it needs responses of one quantity, and at least two driving points (a force and a response \
+                     at one point; there are {}): state the points (`force_at`, `response_at`)",
                     points.len()
                 );
                 return Err(settings.refused("reciprocal", why));

@@ -138,7 +138,8 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
             significant(required, 3)
         ),
         DropReason::UndeterminedDamping { standard_error } => format!(
-            "its damping ratio is not above zero (± {} %), like that of a sinusoid: the candidate stays in the model",
+            "its damping ratio is not significantly above zero (standard error {} %), like that of a sinusoid: the \
+             candidate stays in the model",
             significant(100.0 * standard_error, 2)
         ),
         DropReason::Undetermined => "the data do not determine it beside the other modes".into(),
@@ -192,8 +193,8 @@ pub(super) fn notes(estimate: &ModalEstimate, outputs: &[Output]) -> Vec<String>
     let mut notes: Vec<String> = delay_note(estimate.delays(), outputs).into_iter().collect();
     if has_several_quantities(outputs) {
         notes.push(
-            "the responses are of several kinds: each entry of a shape is in the unit of its response, \
-             and modal masses are left out"
+            "the responses have different quantities: each entry of a shape is in the unit of its response, and \
+             modal masses are left out"
                 .into(),
         );
     }

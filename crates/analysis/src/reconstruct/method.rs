@@ -84,7 +84,7 @@ pub fn choose(
         return Ok((Method::Continuous, "the machine has nonlinear terms".into()));
     }
     if request.method != Method::Auto {
-        return Ok((request.method, "it was asked for".into()));
+        return Ok((request.method, "it was requested".into()));
     }
     let (method, why) = if request.periodic && request.lines.is_some() {
         (Method::FrequencyDomain, "whole periods, and the lines with force are given".into())
@@ -412,7 +412,7 @@ fn smoothed(
     let is_at_rest = request.start == Start::InMotion
         && starts_at_rest(machine.system(), motion, forced, noise_std).unwrap_or(false);
     let (start, why) = if is_at_rest {
-        (Start::FromRest, format!("{why}, which begins at rest"))
+        (Start::FromRest, format!("{why}; the record begins at rest"))
     } else {
         (request.start, why)
     };

@@ -63,7 +63,8 @@ pub fn reconstruct_with_modes(
     let mut remarks: Vec<String> = periods::remark(&recorded, &window).into_iter().collect();
     if is_open && how.at_rest {
         remarks.push(
-            "the record is assumed to begin and end at rest: motion at its ends is attributed to the forces, and the standard errors do not include this"
+            "the record is assumed to begin and end at rest: motion at the beginning or end is attributed to the \
+             forces, and the standard errors do not include this effect"
                 .into(),
         );
     }

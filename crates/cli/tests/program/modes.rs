@@ -117,7 +117,7 @@ fn what_means_nothing_is_refused() {
         ("hammer-1.csv --force force --acceleration a1 --band-hz 300:400", "no spectral line"),
         (
             "hammer-1.csv --force force --acceleration a1,a2 --reciprocal",
-            "--reciprocal: it needs responses of one kind, and at least two driving points",
+            "--reciprocal: it needs responses of one quantity, and at least two driving points",
         ),
         (
             "decay.csv --displacement displacement --real-shapes",

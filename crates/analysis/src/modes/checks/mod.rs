@@ -77,7 +77,7 @@ fn explained_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
 pub(super) fn prediction_checks(predicted: &[f64], names: &[String]) -> Vec<ModalCheck> {
     let words = [
         "the modes predict",
-        "in the part that was not fitted",
+        "in the part of the records that was not fitted",
         ": the fitted data contain more than the response of the structure to these forces",
     ];
     share_checks("predicted", predicted, names, words)

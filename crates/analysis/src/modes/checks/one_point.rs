@@ -27,9 +27,9 @@ pub(in crate::modes) fn one_point_check(
         "the force acts at the same point in all records".to_owned()
     } else {
         format!(
-            "the records are explained far better if the force in the first record acts at another point \
-             (−2 log L falls by {}, and {} is needed): for a roving hammer, state the points (`force_at`, \
-             one for each record)",
+            "the records are explained far better if the force in the first record acts at another point than in \
+             the other records (−2 log L falls by {}, and {} is needed): for a roving hammer, state the points \
+             (`force_at`, one for each record)",
             significant(gain, 3),
             significant(required, 3)
         )

@@ -60,7 +60,7 @@ fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
         )
     } else {
         format!(
-            "{}: median coherence {median:.4} in the band: noise, leakage, or other forces",
+            "{}: median coherence {median:.4} in the band. Possible causes: noise, leakage, other forces",
             table.file
         )
     };
@@ -89,15 +89,15 @@ fn leakage(
         Some(_) if passed => "a segment",
         None if passed => "the table",
         Some(_) if settled => {
-            "a segment: this is too narrow to separate its damping from the bias of the window, and its \
-             intervals are not reliable; use longer segments, or fit the record itself"
+            "a segment. This is too narrow to separate the damping of this mode from the bias of the window, and \
+             the intervals of this mode are not reliable: use longer segments, or fit the record itself"
         }
         Some(_) => {
-            "a segment: the bias of the window could not be separated from its damping, and its intervals \
-             are not reliable; use longer segments, or fit the record itself"
+            "a segment. The bias of the window could not be separated from the damping of this mode, and the \
+             intervals of this mode are not reliable: use longer segments, or fit the record itself"
         }
         None => {
-            "the table, which does not state its segments: if the responses are averages under a window, the \
+            "the table. The table does not state its segments: if the responses are averages under a window, the \
              damping may be that of the window; fit the record itself"
         }
     };
