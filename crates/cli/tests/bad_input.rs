@@ -154,7 +154,7 @@ fn ragged_rows() {
     identify(
         &with_line(20, "0.072,1"),
         "",
-        &["a.csv, line 20: 2 fields where the first line has 3"],
+        &["a.csv, line 20: this line has 2 fields, but the first line has 3"],
     );
     identify(&with_line(20, "0.072,1,2,3"), "", &["a.csv, line 20: 4 fields"]);
 }

@@ -161,7 +161,7 @@ pub enum IoError {
         found: &'static str,
     },
     /// A line has more or fewer fields than the first line.
-    #[error("{}", Message(format_args!("{file}, line {line}: {} where the first line has {expected}", message::count(*got, "field"))))]
+    #[error("{}", Message(format_args!("{file}, line {line}: this line has {}, but the first line has {expected}", message::count(*got, "field"))))]
     Ragged {
         /// The file.
         file: String,
@@ -417,7 +417,8 @@ pub enum IoError {
         source: SignalError,
     },
     /// The file is not JSON.
-    #[error("{}", Message(format_args!("{file} is not JSON: an experiment, a machine or a report is an object in braces, {{ … }}")))]
+    #[error("{}", Message(format_args!("{file} is not JSON: an experiment, a machine or a saved result is an object \
+        in braces, {{ … }}")))]
     NotJson {
         /// The file.
         file: String,

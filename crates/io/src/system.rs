@@ -207,8 +207,9 @@ impl SystemSource {
         };
         let (file, Machine { system, nonlinear }) = json::read::<Machine>(&path)?;
         let Self::Described(mut system) = system else {
-            let what = "its `system` is the name of another file: name that file instead".into();
-            return Err(IoError::Description { file, what });
+            let what =
+                "the `system` in this file is the name of another file: name that other file";
+            return Err(IoError::Description { file, what: what.into() });
         };
         let mut files = system.files(json::folder(&path));
         let sparse = system.load(&file, json::folder(&path))?;

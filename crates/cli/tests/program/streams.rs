@@ -126,7 +126,7 @@ fn a_record_may_come_from_standard_input() {
     let ragged = shell(folder.path(), "printf 't,x\\n0,1\\n1\\n' | mechid info -");
     assert_eq!(
         text(&ragged.stderr),
-        "error: standard input, line 3: 1 field where the first line has 2\n"
+        "error: standard input, line 3: this line has 1 field, but the first line has 2\n"
     );
     // A file named `-` exists, too.
     fs::write(folder.path().join("-"), "t,x\n0,1\n1,2\n").unwrap();

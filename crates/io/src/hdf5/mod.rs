@@ -95,7 +95,8 @@ impl Reader {
         self.groups += 1;
         if depth > MAX_DEPTH || self.groups > MAX_GROUPS {
             let what = format!(
-                "groups in groups deeper than {MAX_DEPTH}, or more than {MAX_GROUPS} of them (a cycle of links?)"
+                "groups are nested more than {MAX_DEPTH} deep, or there are more than {MAX_GROUPS} groups (a cycle \
+                 of links?)"
             );
             return Err(Fault::new(0, what));
         }
@@ -216,7 +217,10 @@ impl Reader {
         depth: usize,
     ) -> Result<(), Fault> {
         if depth > MAX_DEPTH {
-            return Err(Fault::new(0, format!("references deeper than {MAX_DEPTH} (a cycle?)")));
+            return Err(Fault::new(
+                0,
+                format!("references are nested more than {MAX_DEPTH} deep (a cycle?)"),
+            ));
         }
         let before = (self.contents.columns.len(), self.contents.scalars.len());
         for (number, object) in (1..).zip(objects) {

@@ -113,7 +113,7 @@ pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Trouble>) -> Result<T,
 
 fn reader<R: ChunkReader + 'static>(source: R) -> Result<SerializedFileReader<R>, Trouble> {
     if !footer::is_possible(&source) {
-        return Err(Trouble::Damaged("its footer contradicts its length".into()));
+        return Err(Trouble::Damaged("the footer contradicts the length of the file".into()));
     }
     Ok(SerializedFileReader::new(source)?)
 }

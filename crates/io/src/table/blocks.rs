@@ -41,7 +41,7 @@ impl TextEnd {
     pub fn remark(self) -> Option<String> {
         let bytes =
             message::count(usize::try_from(self.padding).ok().filter(|n| *n > 0)?, "zero byte");
-        Some(format!("left out: {bytes} after the last line (a preallocated file not filled?)"))
+        Some(format!("left out: {bytes} after the last line (was a preallocated file not filled?)"))
     }
 }
 

@@ -224,7 +224,9 @@ fn same_frequencies(
     }
     let (len, got) = (responses.frequency_hz.len(), frequency_hz.len());
     if len != got {
-        return Err(id.fault(format!("{got} frequencies, but the first function has {len}")));
+        return Err(id.fault(format!(
+            "this function has {got} frequencies, but the first function has {len}"
+        )));
     }
     let pairs = responses.frequency_hz.iter().zip(&frequency_hz);
     match pairs.into_iter().find(|(a, b)| (*a - *b).abs() > SAME_FREQUENCY * a.abs().max(b.abs())) {

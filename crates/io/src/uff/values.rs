@@ -20,7 +20,7 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
         let line = lines.required("the file is cut short within the values of a dataset 58")?;
         if is_mark(line.text) {
             let what = format!(
-                "a function of {} ends after {}",
+                "a function should have {}, but it ends after {}",
                 message::count(expected, "number"),
                 values.len()
             );
@@ -29,7 +29,10 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
         row(header, &line, &mut values)?;
     }
     if values.len() > expected {
-        let what = format!("a function of {} has more", message::count(expected, "number"));
+        let what = format!(
+            "a function should have {}, but it has more",
+            message::count(expected, "number")
+        );
         return Err(Fault::new(lines.at().saturating_sub(1), what));
     }
     Ok(values)
@@ -109,8 +112,9 @@ impl Binary {
             && ends_after(lines.rest(), narrow);
         let len = if is_mixed { narrow } else { plain };
         if !ends_after(lines.rest(), len) {
-            let what =
-                format!("the end of the dataset does not follow {len} bytes of binary values");
+            let what = format!(
+                "the dataset should end after {len} bytes of binary values, but it does not"
+            );
             return Err(Fault::new(lines.at(), what));
         }
         let mut bytes = lines.take(len);

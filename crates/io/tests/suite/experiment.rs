@@ -291,7 +291,10 @@ fn the_system_may_be_that_of_another_file() {
     assert_eq!(names, ["m.mtx", "found.json"]);
     written("again.json", &description("\"run.json\"", FORCE, ""));
     let error = Experiment::read(folder.path().join("again.json")).unwrap_err().to_string();
-    assert!(error.contains("run.json: its `system` is the name of another file"), "{error}");
+    assert!(
+        error.contains("run.json: the `system` in this file is the name of another file"),
+        "{error}"
+    );
 
     written("run.json", &description("\"results/lost.json\"", FORCE, ""));
     let error = Experiment::read(folder.path().join("run.json")).unwrap_err();

@@ -193,9 +193,18 @@ fn bad_fields_are_named_with_line_and_column() {
 
 #[test]
 fn ragged_rows_are_named() {
-    assert_eq!(refused("t,f\n0,1\n1\n2,3\n"), "a.csv, line 3: 1 field where the first line has 2");
-    assert_eq!(refused("t,f\n0,1\n1,2,3\n"), "a.csv, line 3: 3 fields where the first line has 2");
-    assert_eq!(refused("1 2\n3 4\n5\n"), "a.csv, line 3: 1 field where the first line has 2");
+    assert_eq!(
+        refused("t,f\n0,1\n1\n2,3\n"),
+        "a.csv, line 3: this line has 1 field, but the first line has 2"
+    );
+    assert_eq!(
+        refused("t,f\n0,1\n1,2,3\n"),
+        "a.csv, line 3: this line has 3 fields, but the first line has 2"
+    );
+    assert_eq!(
+        refused("1 2\n3 4\n5\n"),
+        "a.csv, line 3: this line has 1 field, but the first line has 2"
+    );
 }
 
 #[test]

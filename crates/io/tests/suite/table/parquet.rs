@@ -226,10 +226,10 @@ fn a_schema_that_claims_more_than_it_has_is_refused() {
     };
     // A root of 2³¹ − 1 children, which would take 17 GB.
     let root = forged(&[element(&[0xfe, 0xff, 0xff, 0xff, 0x0f])], &[0x01]);
-    assert_eq!(refused(&root), "its footer contradicts its length");
+    assert_eq!(refused(&root), "the footer contradicts the length of the file");
     // A hundred thousand nested groups, which would exhaust the stack.
     let nested = forged(&vec![element(&[0x02]); 100_000], &[0xa0, 0x8d, 0x06]);
-    assert_eq!(refused(&nested), "its footer contradicts its length");
+    assert_eq!(refused(&nested), "the footer contradicts the length of the file");
 }
 
 /// Constant columns take hardly any space in a file.

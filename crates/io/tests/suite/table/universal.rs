@@ -170,11 +170,11 @@ fn broken_files_are_refused_with_the_line() {
         ),
         (
             with("4         8         1", "4         9         1", 0),
-            "a.unv, line 27: a function of 9 numbers ends after 8",
+            "a.unv, line 27: a function should have 9 numbers, but it ends after 8",
         ),
         (
             with("4         8         1", "4         7         1", 0),
-            "a.unv, line 26: a function of 7 numbers has more",
+            "a.unv, line 26: a function should have 7 numbers, but it has more",
         ),
         (
             with("4         8         1", "3         8         1", 0),
