@@ -37,8 +37,8 @@ pub enum AmbientError {
     },
     /// A channel is a multiple of another channel.
     #[error(
-        "channels {} and {} are copies of one another: only a fraction of {unexplained:.0e} of their \
-         power is not common; leave one out",
+        "channels {} and {} are copies of one another: only a fraction of {unexplained:.0e} of their power \
+         differs; leave one channel out",
         first.saturating_add(1), second.saturating_add(1)
     )]
     CopiedChannel {
