@@ -252,7 +252,7 @@ pub enum ForceError {
     )]
     NoLikelihood,
     /// No force reaches the measured channels, or all channels are zero.
-    #[error("no force reaches the measured channels, or all of them are zero: measure elsewhere")]
+    #[error("no force reaches the measured channels, or all channels are zero: measure elsewhere")]
     Silent,
     /// Two force records have different numbers of channels.
     #[error(
