@@ -190,7 +190,7 @@ impl ElementForm {
         match self.given().into_iter().find(|field| !belongs(field)) {
             Some(field) => {
                 let kind = format!("{kind:?}").to_lowercase();
-                Err(self.error(format!("`{field}` does not belong to the kind {kind}")))
+                Err(self.error(format!("an element of `kind` {kind} has no `{field}`")))
             }
             None => Ok(()),
         }

@@ -145,7 +145,7 @@ mod tests {
             from_value::<Machine>(value).unwrap_err().to_string()
         };
         let message = refused(&|v| v["elements"][0]["kxx"] = json!(1.0));
-        assert_eq!(message, "element \"m\": `kxx` does not belong to the kind mass");
+        assert_eq!(message, "element \"m\": an element of `kind` mass has no `kxx`");
         let message = refused(&|v| v["elements"][4]["between"] = json!(["x", "y"]));
         assert_eq!(message, "element \"seal\": a link needs either `between` or `at`");
         let message = refused(&|v| v["elements"][3]["at"] = json!("x"));
