@@ -119,8 +119,8 @@ fn candidates(found: &ElementSummary) -> Markup {
         @if !rows.is_empty() {
             (Table { caption: "Possible additional measurements", header: &header, numbers_from: 1, rows }.html())
             p.note {
-                "Information: natural logarithm of a ratio of two volumes, those of the confidence region of all \
-                 unknowns without and with the measurement."
+                "Information: natural logarithm of a ratio. The ratio is the volume of the confidence region of \
+                 all unknowns without the measurement, divided by the volume with the measurement."
             }
         }
     }

@@ -51,7 +51,10 @@ pub fn trends_page(trends: &Trends, settings: &PageSettings) -> Result<String, R
                     section id="quantities" data-filter aria-labelledby="quantities-heading" {
                         h2 id="quantities-heading" { "Quantities" }
                         (quantities.html_with_categories(&categories))
-                        p.note { "Spread: 1.4826 times the median distance from the median; for normally distributed values it is the standard deviation. If it is larger than the standard error, the machine changes from record to record, or the standard errors are too small." }
+                        p.note { "Spread: 1.4826 times the median distance from the median; for normally \
+                                  distributed values it is the standard deviation. If the spread is larger than \
+                                  the standard error, the machine changes from record to record, or the standard \
+                                  errors are too small." }
                         div.figures { @for (one, category) in figures.iter().zip(&categories) { div data-category=(category) { (figure(one)) } } }
                     }
                     @if !outliers.rows.is_empty() {
