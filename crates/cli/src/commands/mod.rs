@@ -132,7 +132,7 @@ impl Command {
             _ if self.report().quiet => None,
             Command::Multisine(_) => Some("designing the multisine"),
             Command::Simulate(_) => Some("simulating"),
-            Command::Force(_) => Some("looking for the force"),
+            Command::Force(_) => Some("reconstructing the force"),
             Command::Bearing(_) | Command::Identify(_) | Command::Report(_) => Some("identifying"),
             _ => Some("working"),
         }
