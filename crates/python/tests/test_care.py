@@ -133,14 +133,14 @@ def test_wrong_arguments_are_of_this_package(wrong: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"threads": True}, "`threads` is a whole number, got True"),
-        ({"threads": "2"}, "`threads` is a whole number, got '2'"),
-        ({"unit": "g"}, "`unit` is a mapping of names of columns"),
-        ({"unit": {"x": 3}}, "`unit` of 'x' is a text, got 3"),
-        ({"scale": {"x": "two"}}, "`scale` of 'x' is a number, got 'two'"),
-        ({"scale": 2.0}, "`scale` is a mapping of names of columns"),
-        ({"time": 3}, "`time` is a text, got 3"),
-        ({"displacement": 2}, "`displacement` of a file or table is a name of a column"),
+        ({"threads": True}, "`threads` must be a whole number, got True"),
+        ({"threads": "2"}, "`threads` must be a whole number, got '2'"),
+        ({"unit": "g"}, "`unit` must be a mapping of names of columns"),
+        ({"unit": {"x": 3}}, "`unit` of 'x' must be a text, got 3"),
+        ({"scale": {"x": "two"}}, "`scale` of 'x' must be a number, got 'two'"),
+        ({"scale": 2.0}, "`scale` must be a mapping of names of columns"),
+        ({"time": 3}, "`time` must be a text, got 3"),
+        ({"displacement": 2}, "`displacement` of a file or table must be the name of a column"),
     ],
 )
 def test_values_of_a_wrong_type_are_refused_in_a_sentence(wrong: dict[str, Any], said: str) -> None:
@@ -156,7 +156,7 @@ def test_values_of_a_wrong_type_are_refused_in_a_sentence(wrong: dict[str, Any],
 
 
 def test_lines_to_skip_are_a_whole_number() -> None:
-    with pytest.raises(TypeError, match="`skip_lines` is a whole number, got 1.5"):
+    with pytest.raises(TypeError, match="`skip_lines` must be a whole number, got 1.5"):
         mechid.identify("examples/machine.csv", force="force", displacement="displacement", skip_lines=1.5)
 
 
@@ -189,7 +189,7 @@ def test_rates_of_sep_5_are_in_the_channels() -> None:
     with pytest.raises(ValueError, match=r"several sampling rates: \[64\.0, 128\.0\] Hz"):
         mechid.identify(channels, **how)
     channels = [{"name": "f", "data": force, "fs": "fast"}, {"name": "x", "data": x, "fs": 128}]
-    with pytest.raises(TypeError, match="`fs` is a number, got 'fast'"):
+    with pytest.raises(TypeError, match="`fs` must be a number, got 'fast'"):
         mechid.identify(channels, **how)
 
 

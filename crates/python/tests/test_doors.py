@@ -135,7 +135,7 @@ def test_a_comparison_is_that_of_the_program(program: Callable[..., str], tmp_pa
     assert changed["difference"] == pytest.approx(0.05 * 31, rel=1e-2) and changed["p_value"] < 1e-6
     with pytest.raises(ValueError, match="`shape` has the shape"):
         mechid.compare_modes(first, {"natural_frequency_hz": [1.0], "shape": [1.0]})
-    with pytest.raises(TypeError, match="modes are a result"):
+    with pytest.raises(TypeError, match="modes must be a result"):
         mechid.compare_modes(first, 3)
 
 

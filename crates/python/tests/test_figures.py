@@ -299,7 +299,7 @@ def test_axes_and_panels_are_those_that_were_asked_for(results: Pages) -> None:
         with pytest.raises(KeyError, match=message):
             found.plot(**wrong)
     for wrong in ({"show": "x"}, {"scale": "x"}, {"phase": "x"}, {"quantity": "x"}):
-        with pytest.raises(ValueError, match="is one of"):
+        with pytest.raises(ValueError, match="must be one of"):
             found.plot(**wrong)
     with pytest.raises(ValueError, match="this figure has none"):
         found.plot("fit", quantity="mobility")

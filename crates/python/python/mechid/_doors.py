@@ -816,7 +816,7 @@ def modes(
         tables = [one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in sources]  # type: ignore[arg-type]
     records = [] if tables else [one._inner for one in measurements(sources, "modes", record)]
     if ambient and decay:
-        raise ValueError("`ambient` and `decay` exclude each other: with `ambient` forces act, with `decay` none does")
+        raise ValueError("`ambient` and `decay` exclude each other: forces act with `ambient`, but not with `decay`")
     if settings is None:
         if decay:
             test: dict[str, Any] = {"decay": {}}
@@ -905,7 +905,7 @@ def _mode_set(source: object) -> tuple[str | os.PathLike[str], str | None]:
         return "modes", json.dumps({"modes": modes, "response_names": points})
     told = getattr(source, "to_json", None)
     if told is None:
-        raise TypeError(f"modes are a result, a path or a mapping of arrays, not {type(source).__name__}")
+        raise TypeError(f"modes must be a result, a path or a mapping of arrays, not {type(source).__name__}")
     return type(source).__name__, told()
 
 
@@ -1140,7 +1140,7 @@ def simulate(
     """
     described = description_of(experiment)
     if described is None:
-        raise TypeError("an experiment is a mapping, or the path of a .json file")
+        raise TypeError("an experiment must be a mapping, or the path of a .json file")
     return Simulation(_mechid.simulate(*described, memory_gb))
 
 
@@ -1359,7 +1359,7 @@ def multisine(
         raise TypeError(f"give either `{given[0][0]}` or `{given[1][0]}`, not both")
     laws = ("schroeder", "schroeder-binary", "random", "zero", "low-crest")
     if phases not in laws:
-        raise ValueError(f"`phases` is one of {', '.join(laws)}, got {phases!r}")
+        raise ValueError(f"`phases` must be one of {', '.join(laws)}, got {phases!r}")
     search = starts if phases == "low-crest" else 0
     law = "schroeder" if phases == "low-crest" else phases
     found = _mechid.multisine(
@@ -1422,5 +1422,5 @@ def _structure(structure: str | Sequence[str]) -> list[str]:
 def _vector(name: str, values: ArrayLike) -> list[float]:
     given = np.atleast_1d(np.asarray(values))
     if given.ndim != 1 or given.dtype.kind not in "fiu":
-        raise TypeError(f"`{name}` is a number, or one for each degree of freedom")
+        raise TypeError(f"`{name}` must be a number, or one number for each degree of freedom")
     return [float(value) for value in given]

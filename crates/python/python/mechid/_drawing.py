@@ -13,7 +13,7 @@ try:
     from matplotlib import pyplot
     from matplotlib.ticker import MultipleLocator
 except ImportError:
-    raise ImportError("this needs matplotlib, which is not installed: pip install matplotlib") from None
+    raise ImportError("drawing needs matplotlib, which is not installed: pip install matplotlib") from None
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

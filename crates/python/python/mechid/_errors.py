@@ -77,7 +77,7 @@ def careful(door: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]:
         threads = named.get("threads")
         # The compiled module takes a truth value as the number 0 or 1.
         if threads is not None and (type(threads).__name__ in ("bool", "bool_") or not hasattr(threads, "__index__")):
-            raise TypeError(f"`threads` is a whole number, got {threads!r}")
+            raise TypeError(f"`threads` must be a whole number, got {threads!r}")
         try:
             return door(*given, **named)
         except OverflowError as error:

@@ -400,7 +400,7 @@ def _index(names: Sequence[str], wanted: str | int, what: str) -> int:
 
 def _check(name: str, value: object, known: Any) -> None:
     if value not in known.__args__:
-        raise ValueError(f"`{name}` is one of {', '.join(known.__args__)}, got {value!r}")
+        raise ValueError(f"`{name}` must be one of {', '.join(known.__args__)}, got {value!r}")
 
 
 def _decoded(text: str) -> Values:

@@ -822,11 +822,11 @@ def measurements(
         return [Measurement.open(source, **options) for source in sources]  # type: ignore[arg-type]
     for name in _OF_FILES:
         if name in options:
-            raise TypeError(f"`{name}` is only for files")
+            raise TypeError(f"`{name}` applies only to files")
     if sources and all(_is_table(source) for source in sources):
         return [Measurement.from_table(source, **options) for source in sources]  # type: ignore[arg-type, misc]
     if len(sources) > 2:
-        raise TypeError(f"{threads_of} takes a force and a displacement as arrays, got {len(sources)}")
+        raise TypeError(f"{threads_of} takes a force and a displacement as arrays, got {len(sources)} arrays")
     arrays = dict(options)
     for kind, values in zip(_KINDS, sources, strict=False):
         if kind in arrays:
@@ -1089,7 +1089,7 @@ def _segments(given: Mapping[str, Any]) -> list[float]:
             raise TypeError(f"`segments` needs its `{name}`")
     window = given.get("window")
     if window is not None and window not in windows:
-        raise ValueError(f"`window` of `segments` is one of {', '.join(windows)}, got {window!r}")
+        raise ValueError(f"`window` of `segments` must be one of {', '.join(windows)}, got {window!r}")
     code = 0 if window is None else windows.index(window) + 1
     samples = float(given["samples"])
     return [samples, float(given.get("hop", samples)), float(given["count"]), float(code), float(given["fs"])]
@@ -1177,11 +1177,11 @@ def _count(name: str, value: object) -> int | None:
 
 def _index(name: str, value: object) -> int:
     if isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"`{name}` is a whole number, got {value!r}")
+        raise TypeError(f"`{name}` must be a whole number, got {value!r}")
     try:
         return value.__index__()  # type: ignore[attr-defined, no-any-return]
     except AttributeError:
-        raise TypeError(f"`{name}` is a whole number, got {value!r}") from None
+        raise TypeError(f"`{name}` must be a whole number, got {value!r}") from None
 
 
 def _rate(fs: float | None) -> float | None:
@@ -1191,7 +1191,7 @@ def _rate(fs: float | None) -> float | None:
 def _text(name: str, value: object) -> str | None:
     if value is None or isinstance(value, str):
         return value
-    raise TypeError(f"`{name}` is a text, got {value!r}")
+    raise TypeError(f"`{name}` must be a text, got {value!r}")
 
 
 def _pairs(name: str, given: object) -> dict[str, object]:
@@ -1199,7 +1199,7 @@ def _pairs(name: str, given: object) -> dict[str, object]:
     if given is None:
         return {}
     if not isinstance(given, Mapping) or not all(isinstance(column, str) for column in given):
-        raise TypeError(f"`{name}` is a mapping of names of columns, such as {{'acc': …}}, got {given!r}")
+        raise TypeError(f"`{name}` must be a mapping of names of columns, such as {{'acc': …}}, got {given!r}")
     return dict(given)
 
 
@@ -1207,7 +1207,7 @@ def _units(given: object) -> dict[str, str]:
     units = _pairs("unit", given)
     for column, unit in units.items():
         if not isinstance(unit, str):
-            raise TypeError(f"`unit` of {column!r} is a text, got {unit!r}")
+            raise TypeError(f"`unit` of {column!r} must be a text, got {unit!r}")
     return units  # type: ignore[return-value]
 
 
@@ -1217,17 +1217,17 @@ def _scales(given: object) -> dict[str, float]:
         try:
             scales[column] = _number("scale", factor)
         except TypeError:
-            raise TypeError(f"`scale` of {column!r} is a number, got {factor!r}") from None
+            raise TypeError(f"`scale` of {column!r} must be a number, got {factor!r}") from None
     return scales
 
 
 def _number(name: str, value: object) -> float:
     if isinstance(value, (bool, np.bool_, str, bytes)):
-        raise TypeError(f"`{name}` is a number, got {value!r}")
+        raise TypeError(f"`{name}` must be a number, got {value!r}")
     try:
         return float(value)  # type: ignore[arg-type]
     except TypeError:
-        raise TypeError(f"`{name}` is a number, got {value!r}") from None
+        raise TypeError(f"`{name}` must be a number, got {value!r}") from None
 
 
 def _names(kind: str, given: object) -> list[str]:
@@ -1235,7 +1235,7 @@ def _names(kind: str, given: object) -> list[str]:
         return [name.strip() for name in given.split(",")]
     if isinstance(given, Sequence) and all(isinstance(name, str) for name in given):
         return list(given)
-    raise TypeError(f"`{kind}` of a file or table is a name of a column, or several, got {given!r}")
+    raise TypeError(f"`{kind}` of a file or table must be the name of a column, or several names, got {given!r}")
 
 
 def no_column(name: str, known: object) -> Exception:

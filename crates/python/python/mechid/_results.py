@@ -31,7 +31,7 @@ def labelled() -> Any:
         from . import _labelled
     except ImportError as error:
         raise ImportError(
-            f'this needs {error.name or "xarray"}, which is not installed: pip install "mechid[tables]"'
+            f'this function needs {error.name or "xarray"}, which is not installed: pip install "mechid[tables]"'
         ) from None
     return _labelled
 
@@ -41,7 +41,7 @@ def _pandas() -> Any:
     try:
         import pandas
     except ImportError:
-        raise ImportError("this needs pandas, which is not installed: pip install pandas") from None
+        raise ImportError("this function needs pandas, which is not installed: pip install pandas") from None
     return pandas
 
 
@@ -1062,7 +1062,7 @@ class Machine(Bare, Shaped):
         n = b.shape[1]
         rows = {"displacement": np.eye(2 * n)[:n], "velocity": a[:n], "acceleration": a[n:]}
         if output not in rows:
-            raise ValueError(f"`output` is one of {', '.join(rows)}, got {output!r}")
+            raise ValueError(f"`output` must be one of {', '.join(rows)}, got {output!r}")
         d = b[n:] if output == "acceleration" else np.zeros((n, n))
         return a, b, rows[output], d
 
@@ -1898,14 +1898,14 @@ def listed(value: object) -> object:
         }
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    raise TypeError(f"a description has numbers, text, lists and matrices, got {type(value).__name__}")
+    raise TypeError(f"a description can hold only numbers, text, lists and matrices, got {type(value).__name__}")
 
 
 def one(sources: Sequence[object], door: str, record: RecordOptions) -> Measurement:
     """Return the only record that a call names."""
     found = measurements(sources, door, record)
     if len(found) != 1:
-        raise TypeError(f"{door} takes one record, got {len(found)}")
+        raise TypeError(f"{door} takes one record, got {len(found)} records")
     return found[0]
 
 
@@ -1965,5 +1965,5 @@ def _square(name: str, values: ArrayLike) -> NDArray[np.float64]:
     if array.dtype.kind not in "fiu":
         raise TypeError(f"`{name}` holds {array.dtype}, not real numbers")
     if array.ndim not in (0, 2):
-        raise ValueError(f"`{name}` is a number or a matrix, got {array.ndim} dimensions")
+        raise ValueError(f"`{name}` must be a number or a matrix, got {array.ndim} dimensions")
     return np.array(array.reshape(array.shape or (1, 1)), dtype=np.float64)

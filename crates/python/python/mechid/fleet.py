@@ -155,7 +155,7 @@ def simulate(
     """
     described = description_of(experiment)
     if described is None:
-        raise TypeError("an experiment is a mapping, or the path of a .json file")
+        raise TypeError("an experiment must be a mapping, or the path of a .json file")
     count: int | None = None
     fields: list[tuple[str, NDArray[np.float64]]] = []
     if isinstance(runs, Mapping):
