@@ -134,7 +134,7 @@ mod tests {
         assert_eq!(read("period"), Ok(Extent::WholePeriod));
         assert_eq!(all::<Method>(), ["least-squares", "instrumental", "maximum-likelihood"]);
         let wrong = read::<Method>("ml").unwrap_err();
-        assert_eq!(wrong, "\"ml\" is none of least-squares, instrumental, maximum-likelihood");
+        assert_eq!(wrong, "\"ml\" is not one of least-squares, instrumental, maximum-likelihood");
         assert!(all::<f64>().is_empty());
     }
 }

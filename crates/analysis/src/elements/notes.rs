@@ -97,7 +97,8 @@ impl fmt::Display for ElementNote {
         match self {
             Self::AtBound { parameter, bound } => write!(
                 f,
-                "{parameter} lies at its bound {}: without the bound the estimate would lie beyond it; its interval is one-sided",
+                "{parameter} lies at its bound {}: the data favour a value beyond this bound, and the interval is \
+                 one-sided",
                 compact(*bound, 6)
             ),
             Self::ScaledErrors { factor, checks } => f.write_str(&scaled_errors(*factor, checks)),

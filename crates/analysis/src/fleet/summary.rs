@@ -89,7 +89,10 @@ impl fmt::Display for FleetSummary {
             writeln!(f, "  left out: {path}")?;
         }
         match self.computed_parts {
-            0 => writeln!(f, "all parts had been computed before, so no record was computed")?,
+            0 => writeln!(
+                f,
+                "all parts were computed by an earlier run, so no record was computed again"
+            )?,
             computed => {
                 let rate = self.computed_records as f64 / self.elapsed_s;
                 writeln!(

@@ -318,7 +318,8 @@ pub(super) fn omitted_covariance_remark(estimate: &Estimate) -> Option<String> {
     let count = estimate.parameters().len();
     (!carries_covariance(estimate)).then(|| {
         format!(
-            "the result omits the covariance of {count} parameters (at most {MOST_WITH_COVARIANCE} are included): programs that read the machine from it treat M, C and K as exactly known"
+            "the result omits the covariance of {count} parameters (at most {MOST_WITH_COVARIANCE} are included): \
+             programs that read the machine from this result treat M, C and K as exactly known"
         )
     })
 }

@@ -25,9 +25,8 @@ pub(super) fn force_checks(modes: &[IdentifiedMode], inputs: &[String]) -> Vec<M
         let words = [
             format!("force {name} drives a mode"),
             format!(
-                "force {name} drives no mode significantly (p = {}): is its shaker on, and \
-                 does it have its own signal? If no independent force acts there, leave it out \
-                 of `force`",
+                "force {name} drives no mode significantly (p = {}): is its shaker on, and does the shaker have \
+                 its own signal? If no independent force acts there, leave it out of `force`",
                 significant(p_value, 2)
             ),
         ];
@@ -55,8 +54,8 @@ pub(in crate::modes) fn response_checks(
         let words = [
             format!("{name} moves in a mode"),
             format!(
-                "{name} does not move significantly in any mode (p = {}): is the sensor connected? \
-                 If it measures no motion, leave its column out",
+                "{name} does not move significantly in any mode (p = {}): is the sensor connected? If the sensor \
+                 measures no motion, leave its column out",
                 significant(p_value, 2)
             ),
         ];
