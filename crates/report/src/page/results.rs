@@ -377,7 +377,7 @@ pub fn record_words(inspected: &Inspected) -> Words {
         let Cut { level, samples } = channel.clipping.as_ref()?;
         let (title, level) = (channel.title(), significant(*level, 5));
         Some(format!(
-            "column {title} is cut off at {level}: {samples} samples have this value, always three or more in a row"
+            "column {title} is clipped at {level}: {samples} samples have this value, always three or more in a row"
         ))
     };
     let mut warnings: Vec<String> = summary.channels.iter().filter_map(clipped).collect();
