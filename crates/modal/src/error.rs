@@ -17,7 +17,10 @@ pub enum ModalError {
     )]
     NoExcitation,
     /// The number of lines is smaller than the number of unknowns of one mode.
-    #[error("the band has {lines} lines; one mode of these data needs at least {required}")]
+    #[error(
+        "the band has {lines} lines, but one mode of these data needs at least {required}: widen the band, or \
+         use a longer record"
+    )]
     TooFewLines {
         /// Number of lines.
         lines: usize,
