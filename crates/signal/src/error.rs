@@ -51,7 +51,7 @@ pub enum SignalError {
         needed: usize,
     },
     /// Two series that belong together differ in length.
-    #[error("one series has {}, the other {right}", message::count(*left, "sample"))]
+    #[error("two series need the same length, but one has {}, the other {right}", message::count(*left, "sample"))]
     PairLength {
         /// Number of samples of the first.
         left: usize,

@@ -77,8 +77,8 @@ impl FromStr for HitRule {
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let wrong = || {
                 format!(
-                    "\"{part}\" is none of trigger=PERCENT, double=PERCENT, weak=PERCENT, bounce=SECONDS, \
-                     before=SAMPLES and samples=SAMPLES"
+                    "\"{part}\" is not one of trigger=PERCENT, double=PERCENT, weak=PERCENT, bounce=SECONDS, \
+                     before=SAMPLES, samples=SAMPLES"
                 )
             };
             let (name, value) = part.split_once('=').ok_or_else(wrong)?;
