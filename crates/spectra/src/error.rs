@@ -32,7 +32,7 @@ pub enum SpectraError {
         highest_hz: f64,
     },
     /// A frequency is not positive, or an amplitude is not finite.
-    #[error("line {row}: {value} is not a finite amplitude or a positive frequency")]
+    #[error("line {row}: {value} is neither a finite amplitude nor a positive frequency")]
     NotFinite {
         /// Row of the line, counted from 0.
         row: usize,
@@ -67,7 +67,7 @@ pub enum SpectraError {
         value: f64,
     },
     /// Two experiments measured different quantities.
-    #[error("one experiment measured {left}, the other {right}")]
+    #[error("all experiments need the same quantity, but one measured {left}, the other {right}")]
     MixedQuantities {
         /// Quantity of the first.
         left: mechid_model::ResponseQuantity,
