@@ -57,7 +57,7 @@ pub enum CliError {
     Simulate(#[from] mechid::SimulateError),
     /// A record with too many numbers.
     #[error(
-        "a record of {numbers} numbers is too large, {largest} is the limit: use fewer --samples, \
+        "a record of {numbers} numbers is too large, the limit is {largest} numbers: use fewer --samples, \
          --periods or --inputs"
     )]
     RecordSize {
