@@ -260,7 +260,8 @@ impl FrfTable {
         let response =
             self.responses.iter().find(|r| (r.motion, r.force) == (peak.motion + 1, force))?;
         Some(format!(
-            "the peak of {} at {} Hz is {} wide: the window widens it, and a damping ratio read from it is too large; a longer `segment` resolves it better",
+            "the peak of {} at {} Hz is {} wide: the window widens the peak, and a damping ratio read from this \
+             peak is too large; a longer `segment` resolves the peak better",
             self.pair(response),
             significant(self.frequency_hz[peak.at], 5),
             message::count(peak.lines, "line")

@@ -233,8 +233,8 @@ fn read(
         spectra.push((periods(recorded, &lines)?, lines));
     }
     if noise == Pooling::PerLine && spectra.iter().any(|(periods, _)| periods.count() < 2) {
-        let why = "per-line takes the noise of each line from the scatter of two or more periods, but \
-                   there is only one period: give `period`, or choose another noise";
+        let why = "per-line takes the noise of each line from the scatter of two or more periods, but there is \
+                   only one period: give `period`, or choose another `noise`";
         return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
     }
     Ok(spectra)

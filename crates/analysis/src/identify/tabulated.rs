@@ -136,8 +136,8 @@ fn with_reciprocal<'a>(
     }
     completed.retain(|f| whole.contains(&f.reference));
     let remark = format!(
-        "{0} has responses at {1} to forces at other points. By reciprocity they are also \
-         used as the responses at these other points to a force at {1}",
+        "{0} has responses at {1} to forces at other points. By reciprocity these responses are also used as the \
+         responses at the other points to a force at {1}",
         table.file,
         whole.join(", ")
     );

@@ -154,8 +154,8 @@ impl Inspection<'_> {
         }
         summary.remarks.extend(open_line.map(|line| {
             format!(
-                "line {line} is the last and has no line break: the file may be cut off \
-                 there, so that its last number is incomplete"
+                "the last line, {line}, has no line break: the file may be cut off there, and its last number may \
+                 be incomplete"
             )
         }));
         Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })

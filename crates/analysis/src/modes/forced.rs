@@ -167,7 +167,7 @@ fn notes_of_tables(tables: &Tables) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(decay) = tables.added_decay {
         notes.push(format!(
-            "an exponential window adds {} 1/s to the decay rate of every mode of the tables: it was \
+            "an exponential window adds {} 1/s to the decay rate of every mode of the tables: this rate was \
              subtracted",
             significant(decay, 4)
         ));

@@ -83,8 +83,8 @@ fn undetermined(natural_hz: &[f64], scales: &[Option<f64>], what: &str) -> Optio
     let missing = message::list(missing.map(|(hz, _)| significant(*hz, 4)), ", ", LISTED);
     (!missing.is_empty()).then(|| {
         format!(
-            "one half of {what} alone does not determine the modes at {missing} Hz, so they could \
-             not be compared between the halves"
+            "one half of {what} alone does not determine the modes at {missing} Hz, so these modes could not be \
+             compared between the halves"
         )
     })
 }

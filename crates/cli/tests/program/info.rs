@@ -217,12 +217,8 @@ fn a_last_line_that_nothing_ends_is_told() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text, told) in [
         ("whole.csv", "t,x\n0,1.25\n1,2.5\n2,3.75\n", None),
-        ("cut.csv", "t,x\n0,1.25\n1,2.5\n2,3", Some("line 4 is the last and has no line break")),
-        (
-            "words.txt",
-            "# rig\n0 1.25\n1 2.5\n2 3.7",
-            Some("line 4 is the last and has no line break"),
-        ),
+        ("cut.csv", "t,x\n0,1.25\n1,2.5\n2,3", Some("the last line, 4, has no line break")),
+        ("words.txt", "# rig\n0 1.25\n1 2.5\n2 3.7", Some("the last line, 4, has no line break")),
         ("crlf.csv", "t,x\r\n0,1.25\r\n1,2.5\r\n2,3.75\r\n", None),
     ] {
         fs::write(folder.path().join(name), text).unwrap();
