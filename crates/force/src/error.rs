@@ -80,8 +80,8 @@ pub enum ForceError {
     },
     /// The time step is so long that the end of a step does not depend on the force during it.
     #[error(
-        "the time step {dt} s is too long for the machine: the motion at the end of a step does not \
-         depend on the force during it (reciprocal condition {reciprocal_condition:.1e}); sample faster"
+        "the time step {dt} s is too long for the machine: the motion at the end of a step does not depend on the \
+         force during the step (reciprocal condition {reciprocal_condition:.1e}); sample faster"
     )]
     StepTooLong {
         /// The time step, in seconds.
@@ -148,7 +148,7 @@ pub enum ForceError {
     },
     /// Too few lines remain outside the chosen lines to estimate the noise.
     #[error(
-        "the noise level is estimated from the lines that are not chosen, but only {outside} of them remain \
+        "the noise level is estimated from the lines that are not chosen, but only {outside} such lines remain, \
          and {needed} are needed: choose fewer lines, give a longer period, or state the level (`noise`)"
     )]
     TooFewOutsideLines {
