@@ -252,9 +252,9 @@ pub enum IntegrateError {
     },
     /// Newton's method found no periodic response of a nonlinear system.
     #[error(
-        "no response that repeats every {period} s was found from this initial motion: the best one \
-         still changes by {missed:.1e} of its size in a period; choose an initial motion nearer to \
-         the periodic response, or a longer settling time",
+        "no response that repeats every {period} s was found from this initial motion: the best response still \
+         changes by {missed:.1e} of its size in a period; choose an initial motion nearer to the periodic \
+         response, or a longer settling time",
         period = message::number(*period)
     )]
     NoOrbit {
@@ -266,8 +266,8 @@ pub enum IntegrateError {
     },
     /// Newton's method found no solution of the nonlinear equation of a step.
     #[error(
-        "the nonlinear equation of motion was not solved at t = {time} s: Newton's method leaves an error of \
-         {residual:.1e} m/s² in the accelerations; choose smaller steps",
+        "the nonlinear equation of motion was not solved at t = {time} s: after Newton's method the accelerations \
+         still have an error of {residual:.1e} m/s²; choose smaller steps",
         time = message::number(*time)
     )]
     NotSolved {
@@ -277,7 +277,7 @@ pub enum IntegrateError {
         residual: f64,
     },
     /// The system has nonlinear forces, which this scheme or analysis does not support.
-    #[error("{what} is for linear systems, and this one has nonlinear forces")]
+    #[error("{what} is for linear systems, and this system has nonlinear forces")]
     LinearOnly {
         /// Scheme or analysis.
         what: &'static str,
