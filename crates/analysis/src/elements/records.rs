@@ -255,8 +255,9 @@ fn with_noise(
     let count = periods.count();
     if count < 2 {
         if noise == Pooling::PerLine {
-            let why = "per-line takes the noise of each line from the scatter of two or more periods, but there is only one period".into();
-            return Err(AnalysisError::Setting { setting: "noise", why });
+            let why = "per-line takes the noise of each line from the scatter of two or more periods, but there is \
+                       only one period: measure more periods, or choose another noise";
+            return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
         }
         return Ok((periods.mean()?, None));
     }

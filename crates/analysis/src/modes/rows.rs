@@ -148,7 +148,7 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
         }
         DropReason::OutsideBand => "its frequency left the band".into(),
         DropReason::Twin { other_hz } => format!(
-            "its shape is that of the mode at {} Hz, and it is within the width of that mode",
+            "its shape is that of the mode at {} Hz, and its frequency is within the width of that mode",
             significant(other_hz, 5)
         ),
         DropReason::Undriven { ratio } => format!(

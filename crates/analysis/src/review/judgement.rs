@@ -23,7 +23,7 @@ pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     if let Some(misfit) =
         contents.identified.fitted().misfit.filter(|misfit| misfit.ratio < OVERSTATED)
     {
-        let why = "the noise was assumed larger than it is, and the standard errors are too large";
+        let why = "the assumed noise is larger than the real noise, and the standard errors are too large";
         doubts.push(format!("{misfit}: {why}"));
     }
     doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
