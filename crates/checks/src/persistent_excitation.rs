@@ -67,7 +67,7 @@ impl Check for PersistentExcitation {
         if order == 0 {
             return write!(
                 f,
-                "{force} is zero: it is excluded, and no mass can be identified from it"
+                "{force} is zero: this force is excluded, and no mass can be identified from it"
             );
         }
         let more = if order < needed { "; excite more lines" } else { "" };

@@ -82,9 +82,8 @@ impl Check for PowerFlow {
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the forces extract power from the machine ({:.1} % of the apparent power): force and \
-             response are interchanged, one of them has the wrong sign or a delay, or something \
-             else drives the machine",
+            "the forces extract power from the machine ({:.1} % of the apparent power): force and response are \
+             interchanged, one of the two has the wrong sign or a delay, or something else drives the machine",
             -100.0 * self.fraction
         )
     }

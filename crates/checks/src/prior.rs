@@ -55,7 +55,7 @@ impl Check for PriorAgreement {
         )?;
         f.write_str(match self.verdict() {
             Verdict::Good => "prior and data agree",
-            _ => "prior and data contradict each other; one of them, or the model, is wrong",
+            _ => "prior and data contradict each other: the prior, the data or the model is wrong",
         })
     }
 }

@@ -131,10 +131,10 @@ impl Check for MassSymmetry {
         }
         write!(
             f,
-            "M is not symmetric, but the kinetic energy of a machine requires symmetry: m{i}{j} is {above} kg \
-             and m{j}{i} {below} kg, {errors} standard errors apart ({p_value}). Possible causes: \
-             crosstalk between forces or between responses, a gain that is wrong, a sensor that is not \
-             at the point and in the direction of its force"
+            "M is not symmetric, but the kinetic energy of a machine requires symmetry: m{i}{j} is {above} kg and \
+             m{j}{i} {below} kg, {errors} standard errors apart ({p_value}). Possible causes: crosstalk between \
+             forces or between responses, a wrong gain, a sensor that is not at the point or not in the direction \
+             of its force"
         )
     }
 }
