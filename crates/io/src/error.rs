@@ -161,7 +161,8 @@ pub enum IoError {
         found: &'static str,
     },
     /// A line has more or fewer fields than the first line.
-    #[error("{}", Message(format_args!("{file}, line {line}: this line has {}, but the first line has {expected}", message::count(*got, "field"))))]
+    #[error("{}", Message(format_args!("{file}, line {line}: this line has {}, but the first line has \
+        {expected}", message::count(*got, "field"))))]
     Ragged {
         /// The file.
         file: String,
