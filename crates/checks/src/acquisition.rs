@@ -139,8 +139,8 @@ impl Residuals<'_> {
         self.weighing.residual_of(at, &removed)
     }
 
-    /// Returns the score of a fault in data from which `amount` of this fault has been removed; the
-    /// `residuals` of all records are those of these data.
+    /// Returns the score of a fault in data without `amount` of this fault; the `residuals` of all
+    /// records are those of these data.
     ///
     /// # Source
     /// Rao's score test.

@@ -156,7 +156,7 @@ fn ragged_rows() {
         "",
         &["a.csv, line 20: this line has 2 fields, but the first line has 3"],
     );
-    identify(&with_line(20, "0.072,1,2,3"), "", &["a.csv, line 20: 4 fields"]);
+    identify(&with_line(20, "0.072,1,2,3"), "", &["a.csv, line 20: this line has 4 fields"]);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::limits::GROUP_HALF_WIDTHS;
 use crate::lines::Lines;
 use crate::modal_model::{ModalGroup, ModalModel, ModalTerm};
 use crate::mode::{DroppedCandidate, IdentifiedMode};
-use crate::mode_parameters::ModeParameters;
+use crate::mode_parameters::{MassNormalised, ModeParameters};
 use crate::model::ResidualPowers;
 use crate::noise::{Noise, shapes};
 use crate::order::{removal_losses, required_gain};
@@ -147,19 +147,18 @@ impl ModalEstimate {
     }
 
     /// Returns the mass-normalised shape of a mode, in kg^(−1/2): its shape with a largest entry of
-    /// 1, divided by the root of its modal mass. Each entry has the standard errors of its real and
-    /// imaginary parts. Arguments are those of [`modal_mass`](Self::modal_mass); `None` if the
-    /// modal mass is not positive.
+    /// 1, divided by the root of its modal mass. Arguments are those of
+    /// [`modal_mass`](Self::modal_mass); `None` if the modal mass is not positive.
     ///
     /// # Source
-    /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.2 (mass-normalised mode shapes); the
-    /// standard errors are to first order.
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.2 (mass-normalised mode shapes) and 3.5
+    /// (a row of a response matrix is as good as a column); the standard errors are to first order.
     pub fn mass_normalised_shape(
         &self,
         mode: usize,
         point: DrivingPoint,
         derivative: i32,
-    ) -> Option<Vec<(C, C)>> {
+    ) -> Option<MassNormalised> {
         let parameters = self.parameters.get(mode)?;
         let exists = point.output < parameters.outputs && point.input < parameters.inputs;
         if exists { parameters.mass_normalised_shape(point, derivative) } else { None }

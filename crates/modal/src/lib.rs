@@ -66,5 +66,6 @@ pub use identify::{ModalSettings, identify_modes, refit_modes};
 pub use initial_poles::{initial_mode_count, stabilisation_of};
 pub use modal_model::{ModalGroup, ModalModel, ModalTerm};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode};
+pub use mode_parameters::MassNormalised;
 pub use model::ResidualPowers;
 pub use parts::PartsComparison;

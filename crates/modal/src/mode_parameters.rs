@@ -26,6 +26,31 @@ pub(crate) struct ModeParameters {
     pub(crate) degrees_of_freedom: usize,
 }
 
+/// Mass-normalised shape of a mode, in kg^(−1/2). Each entry has the standard errors of its real
+/// and imaginary parts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MassNormalised {
+    /// Entries at the outputs.
+    pub outputs: Vec<(C, C)>,
+    /// Entries at the points and in the directions of the inputs, which must be forces on one
+    /// structure: those of a roving hammer, for example.
+    pub inputs: Vec<(C, C)>,
+}
+
+/// Complex function of the parameters, with its derivatives.
+struct Differentiated {
+    value: C,
+    gradient: DVector<C>,
+}
+
+impl Differentiated {
+    /// Adds the derivative with respect to the complex parameter at `index`.
+    fn add(&mut self, index: usize, derivative: C) {
+        self.gradient[index] += derivative;
+        self.gradient[index + 1] += derivative * C::i();
+    }
+}
+
 impl ModeParameters {
     /// Returns the index of the first parameter of an entry of the shape.
     pub(crate) fn shape_index(output: usize) -> usize {
@@ -155,36 +180,55 @@ impl ModeParameters {
         (mass, gradient)
     }
 
-    /// Returns the shape with a largest entry of 1, divided by the root of the modal mass. Each
-    /// entry has the standard errors of its real and imaginary parts. `None` unless the mass is
-    /// determined and positive.
+    /// Returns the shape with a largest entry of 1, divided by the root of the modal mass: its
+    /// entries at the outputs and at the inputs. Each entry has the standard errors of its real and
+    /// imaginary parts. `None` unless the mass is determined and positive.
     pub(crate) fn mass_normalised_shape(
         &self,
         point: DrivingPoint,
         derivative: i32,
-    ) -> Option<Vec<(C, C)>> {
+    ) -> Option<MassNormalised> {
         let mass = self.modal_mass(point, derivative).filter(|mass| mass.value > 0.0)?.value;
         let (_, by_mass) = self.complex_mass(point, derivative);
         let largest = self.largest_output();
         let scale = self.shape(largest);
-        let entry = |output: usize| {
-            let value = self.shape(output) / scale / mass.sqrt();
-            let factor = 1.0 / (scale * mass.sqrt());
-            let mut by_part = [&by_mass * (-0.5 * value.re), &by_mass * (-0.5 * value.im)];
-            let mut add = |index: usize, factor: C| {
-                by_part[0][index] += factor.re;
-                by_part[0][index + 1] -= factor.im;
-                by_part[1][index] += factor.im;
-                by_part[1][index + 1] += factor.re;
+        let at_output = |output: usize| {
+            let mut entry = Differentiated {
+                value: self.shape(output) / scale / mass.sqrt(),
+                gradient: by_mass.map(C::from),
             };
+            entry.gradient *= entry.value * -0.5;
             if output != largest {
-                add(Self::shape_index(output), factor);
-                add(Self::shape_index(largest), -value / scale);
+                entry.add(Self::shape_index(output), 1.0 / (scale * mass.sqrt()));
+                entry.add(Self::shape_index(largest), -entry.value / scale);
             }
-            let [re, im] = by_part.map(|by| by.dot(&(&self.covariance * &by)).max(0.0).sqrt());
-            (value, C::new(re, im))
+            entry
         };
-        Some((0..self.outputs).map(entry).collect())
+        // The participations are proportional to the shape at the inputs, by reciprocity.
+        let at_point = at_output(point.output);
+        let reference = self.participation(point.input);
+        let at_input = |input: usize| {
+            let ratio = self.participation(input) / reference * point.sign();
+            let mut entry = Differentiated {
+                value: at_point.value * ratio,
+                gradient: &at_point.gradient * ratio,
+            };
+            if input != point.input {
+                let factor = at_point.value * point.sign() / reference;
+                entry.add(self.participation_index(input), factor);
+                entry.add(self.participation_index(point.input), -entry.value / reference);
+            }
+            entry
+        };
+        let with_errors = |entry: Differentiated| {
+            let deviation = |by: DVector<f64>| by.dot(&(&self.covariance * &by)).max(0.0).sqrt();
+            let [re, im] = [entry.gradient.map(|z| z.re), entry.gradient.map(|z| z.im)];
+            (entry.value, C::new(deviation(re), deviation(im)))
+        };
+        Some(MassNormalised {
+            outputs: (0..self.outputs).map(at_output).map(with_errors).collect(),
+            inputs: (0..self.inputs).map(at_input).map(with_errors).collect(),
+        })
     }
 
     /// Returns the mode with these parameters. Its shape is divided by the largest entry, and its

@@ -12,7 +12,8 @@ use crate::spectrum::Spectrum;
 
 /// A periodic signal F(t) = Σ A_n cos(n ω0 t + φ_n), known exactly at any t.
 ///
-/// The multisine does not contain the fundamental ω0, so that it can be used with any period.
+/// The multisine does not contain the fundamental ω0 (rad/s), so that it can be used with any
+/// period. The amplitudes have the unit of the signal.
 ///
 /// ```
 /// use mechid_signal::{Multisine, Phases, Sampling, lines};

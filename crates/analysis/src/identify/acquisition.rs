@@ -178,8 +178,8 @@ impl BetweenSamples {
 /// Cause of a residual.
 pub(super) struct Explanation {
     pub(super) finding: Finding,
-    /// Fit with this cause taken into account, on the lines of a [`BandLimitedFit`]; `None` if there
-    /// is no such fit.
+    /// Fit with this cause taken into account, on the lines of a [`BandLimitedFit`]; `None` if
+    /// there is no such fit.
     pub(super) fit: Option<OutputErrorFit>,
 }
 

@@ -164,6 +164,7 @@ fn row(mode: &AmbientMode) -> ModalModeRow {
         modal_mass: None,
         modal_mass_standard_error: None,
         mass_normalised_shape: Vec::new(),
+        mass_normalised_shape_at_forces: Vec::new(),
         decay_times: Some(mode.decay_times),
     }
 }

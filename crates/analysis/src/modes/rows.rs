@@ -2,7 +2,8 @@
 
 use mechid_io::derivative;
 use mechid_modal::{
-    DrivingPoint, DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, OutputDelay,
+    DrivingPoint, DropReason, DroppedCandidate, IdentifiedMode, MassNormalised, ModalEstimate,
+    OutputDelay,
     indicators::{self, Indicator},
 };
 use nalgebra::{Complex, DMatrix, DVector};
@@ -14,11 +15,11 @@ use crate::limits::{LISTED_DELAYS, NOTED_UNMEASURED};
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, significant};
 
-/// Modal mass of a mode, in kg, and its mass-normalised shape with standard errors, in kg^(−1/2);
-/// the shape is empty if the mass is not positive.
+/// Modal mass of a mode, in kg, and its mass-normalised shape; the shape does not exist if the mass
+/// is not positive.
 pub(super) struct Scaling {
     mass: mechid_modal::Uncertain,
-    shape: Vec<(Complex<f64>, Complex<f64>)>,
+    shape: Option<MassNormalised>,
 }
 
 /// Returns the row of a mode with its modal mass.
@@ -36,9 +37,10 @@ pub(super) fn row(
         values.iter().zip(errors).map(entry).collect::<Vec<_>>()
     };
     let (mass, normalised) = scaling.map(|one| (one.mass, one.shape)).unzip();
-    let normalised = normalised.unwrap_or_default().into_iter().map(|(value, error)| ShapeEntry {
-        value: part(&value),
-        standard_error: Some(part(&error)),
+    let [at_responses, at_forces] = normalised.flatten().map_or_else(Default::default, |shape| {
+        let entry =
+            |(value, error)| ShapeEntry { value: part(&value), standard_error: Some(part(&error)) };
+        [shape.outputs, shape.inputs].map(|entries| entries.into_iter().map(entry).collect())
     });
     let largest = mode.participation.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
     let scale = largest.filter(|z| z.norm() > 0.0).unwrap_or(Complex::from(1.0));
@@ -56,7 +58,8 @@ pub(super) fn row(
         driven_share: mode.driven_share,
         modal_mass: mass.map(|mass| mass.value),
         modal_mass_standard_error: mass.map(|mass| mass.standard_error),
-        mass_normalised_shape: normalised.collect(),
+        mass_normalised_shape: at_responses,
+        mass_normalised_shape_at_forces: at_forces,
         decay_times: None,
     }
 }
@@ -78,7 +81,7 @@ pub(super) fn scaling(
     let masses = points.iter().filter_map(mass);
     let (mass, point, derivative) =
         masses.min_by(|a, b| relative_error(&a.0).total_cmp(&relative_error(&b.0)))?;
-    let shape = estimate.mass_normalised_shape(mode, point, derivative).unwrap_or_default();
+    let shape = estimate.mass_normalised_shape(mode, point, derivative);
     Some(Scaling { mass, shape })
 }
 

@@ -199,6 +199,11 @@ pub struct ModalModeRow {
     /// empty without a positive modal mass.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mass_normalised_shape: Vec<ShapeEntry>,
+    /// The same shape with one entry per force, at its point and in its direction, in kg^(−1/2): by
+    /// reciprocity, the shape at the points of a roving hammer. Empty without a positive modal
+    /// mass.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mass_normalised_shape_at_forces: Vec<ShapeEntry>,
     /// Length of an ambient record in decay times of the mode, ζωT, a pure number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay_times: Option<f64>,

@@ -299,20 +299,24 @@ fn right_tables_rarely_fail_the_tests() {
     }
 }
 
-/// Ratios of error and standard error of the mass-normalised shapes and of the MAC of each pair of
-/// modes, with [`SHAPES`] as reference.
-fn scaled_errors(found: &Modes) -> [Vec<f64>; 2] {
-    let (mut of_shapes, mut of_mac) = (Vec::new(), Vec::new());
+/// Ratios of error and standard error of the mass-normalised shapes at the responses, of those at
+/// the forces, and of the MAC of each pair of modes, with [`SHAPES`] as reference.
+fn scaled_errors(found: &Modes) -> [Vec<f64>; 3] {
+    let (mut of_shapes, mut at_forces, mut of_mac) = (Vec::new(), Vec::new(), Vec::new());
     let norm = |shape: &[f64; 4]| shape.iter().map(|x| x * x).sum::<f64>();
     for (at, (row, shape)) in found.summary().modes.iter().zip(SHAPES).enumerate() {
         let larger = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
         let sign = shape.into_iter().max_by(larger).unwrap().signum();
+        let ratios = |value: [f64; 2], error: Option<[f64; 2]>, truth: f64| {
+            let [re, im] = error.unwrap();
+            let imaginary = (im > 0.0).then(|| value[1] / im);
+            std::iter::once((value[0] - sign * truth) / re).chain(imaginary)
+        };
         for (entry, truth) in row.mass_normalised_shape.iter().zip(shape) {
-            let [re, im] = entry.standard_error.unwrap();
-            of_shapes.push((entry.value[0] - sign * truth) / re);
-            if im > 0.0 {
-                of_shapes.push(entry.value[1] / im);
-            }
+            of_shapes.extend(ratios(entry.value, entry.standard_error, truth));
+        }
+        for (entry, point) in row.mass_normalised_shape_at_forces.iter().zip(FORCES) {
+            at_forces.extend(ratios(entry.value, entry.standard_error, shape[point]));
         }
         for (other, another) in SHAPES[..at].iter().enumerate() {
             let product: f64 = shape.iter().zip(another).map(|(a, b)| a * b).sum();
@@ -322,7 +326,7 @@ fn scaled_errors(found: &Modes) -> [Vec<f64>; 2] {
         }
         assert!(row.phase_collinearity_standard_error.unwrap() < 0.05);
     }
-    [of_shapes, of_mac]
+    [of_shapes, at_forces, of_mac]
 }
 
 /// Returns the modes of a table with the properties imposed.
@@ -350,7 +354,7 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
         table
     };
     let (mut failed_checks, mut inside, mut ratios) = (0, 0, Vec::new());
-    let (mut of_shapes, mut of_mac) = (Vec::new(), Vec::new());
+    let (mut of_shapes, mut at_forces, mut of_mac) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 0..20 {
         let table = noisy(seed, &|_| C::from(1.0));
         let (free, imposed) = (modes(&table), with_properties(&table));
@@ -358,8 +362,9 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
             .into_iter()
             .filter(|code| !check(&imposed, code).passed)
             .count();
-        let [shapes, mac] = scaled_errors(&free);
+        let [shapes, forces, mac] = scaled_errors(&free);
         of_shapes.extend(shapes);
+        at_forces.extend(forces);
         of_mac.extend(mac);
         let rows = free.summary().modes.iter().zip(&imposed.summary().modes);
         for ((free, imposed), shape) in rows.zip(SHAPES) {
@@ -378,6 +383,9 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
         |ratios: &[f64]| (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
     // The limits are three standard deviations of the RMS of 420 and of 60 ratios.
     assert!(of_shapes.len() == 420 && (0.9..1.1).contains(&rms(&of_shapes)), "{of_shapes:?}");
+    // The limits are three standard deviations of the RMS of 100 independent ratios: those of the two
+    // points of a mode are correlated.
+    assert!(at_forces.len() >= 180 && (0.79..1.21).contains(&rms(&at_forces)), "{at_forces:?}");
     assert!(of_mac.len() == 60 && (0.73..1.27).contains(&rms(&of_mac)), "{of_mac:?}");
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     assert!(mean < 0.95 && ratios.iter().all(|ratio| *ratio < 1.02), "{mean}, {ratios:?}");

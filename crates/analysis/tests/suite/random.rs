@@ -349,7 +349,7 @@ fn frequency_responses_tell_of_a_peak_that_the_window_blunts() {
         let how =
             FrfSettings { segments: Segmentation::with_samples(samples), ..FrfSettings::default() };
         let table = frf(&measured(rig.measure(1).unwrap(), 1), &how).unwrap();
-        table.remarks.iter().any(|remark| remark.contains("the window widens it"))
+        table.remarks.iter().any(|remark| remark.contains("the window widens the peak"))
     };
     assert!(told(rig(), 256));
     assert!(!told(damped(), 1024));

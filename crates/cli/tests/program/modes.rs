@@ -59,7 +59,8 @@ fn a_hammer_that_roves_gives_the_shapes() {
     are_those_of_the_machine(&roving);
     let column = modes(
         folder.path(),
-        "hammer-1.csv --force force --acceleration a1,a2 --hits --band-hz 2:100",
+        "hammer-1.csv --force force --force-at 1 --acceleration a1,a2 --response-at 1,2 --hits \
+         --band-hz 2:100",
     );
     are_those_of_the_machine(&column);
     let entry =
@@ -70,6 +71,19 @@ fn a_hammer_that_roves_gives_the_shapes() {
             .map(|(mode, field)| entry(mode, field, 0) / entry(mode, field, 1));
         assert!((a / b - 1.0).abs() < 0.01, "mode {number}: {a} {b}");
         assert!(row["modal_mass"].as_f64().unwrap() > 0.0);
+        let sign = entry(row, "mass_normalised_shape_at_forces", 0).signum()
+            * entry(column, "mass_normalised_shape", 0).signum();
+        for point in 0..2 {
+            let [struck, sensed] = [
+                &row["mass_normalised_shape_at_forces"][point],
+                &column["mass_normalised_shape"][point],
+            ];
+            let real = |entry: &Value, field: &str| entry[field][0].as_f64().unwrap();
+            let error = real(struck, "standard_error").hypot(real(sensed, "standard_error"));
+            let difference = real(struck, "value") - sign * real(sensed, "value");
+            assert!(difference.abs() < 4.0 * error, "mode {number}: {struck} {sensed}");
+            assert!(error < 0.01 * real(sensed, "value").abs(), "mode {number}: {sensed}");
+        }
     }
 }
 

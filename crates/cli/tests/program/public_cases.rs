@@ -191,7 +191,7 @@ fn responses_of_several_kinds_give_no_modal_mass() {
     assert!((one["modes"][0]["modal_mass"].as_f64().unwrap() / 25.0 - 1.0).abs() < 0.01, "{one}");
     let two = modes("--displacement displacement --acceleration acceleration", "1,1");
     assert!(two["modes"][0]["modal_mass"].is_null(), "{two}");
-    assert!(two["notes"].to_string().contains("of several kinds"), "{}", two["notes"]);
+    assert!(two["notes"].to_string().contains("different quantities"), "{}", two["notes"]);
 }
 
 /// Masses of a machine with two points; its dampers and springs follow.

@@ -97,6 +97,11 @@ impl<'a> ChangedRecords<'a> {
     /// Estimates the parameters of `changed` data and the levels of white noise in alternation.
     /// Returns the mean over the channels of the logarithms of the residual power, which is in the
     /// squared unit of the measured quantity.
+    ///
+    /// # Source
+    /// As [`output_error`].
+    ///
+    /// [`output_error`]: super::output_error()
     pub fn log_residual_power(&mut self, changed: &FrequencyData) -> Option<f64> {
         for _ in 0..COLOURED_ROUNDS {
             self.minimise(changed)?;

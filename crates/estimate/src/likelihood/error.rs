@@ -33,7 +33,7 @@ pub enum LikelihoodError {
     /// Every coefficient is known.
     #[error("every coefficient is known: at least one must be unknown")]
     NoParameter,
-    /// There are at least as many unknowns as measured numbers.
+    /// The data have at most as many measured numbers as there are unknowns.
     #[error(
         "{} cannot determine {}: use more lines or sensors, or state coefficients",
         message::count(*numbers, "measured number"),

@@ -56,6 +56,7 @@ mod tests {
             modal_mass: None,
             modal_mass_standard_error: None,
             mass_normalised_shape: Vec::new(),
+            mass_normalised_shape_at_forces: Vec::new(),
             decay_times: None,
         }
     }

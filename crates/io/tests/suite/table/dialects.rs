@@ -149,8 +149,9 @@ proptest! {
             writeln!(text, "7,{},\"{}\",9", pair[0].replace('\n', ""), pair[1]).unwrap();
         }
         let rows = by_csv(&text, b',');
-        // Other rows are refused by both readers.
-        if rows.iter().any(|row| row.len() != 4) {
+        // Rows of other lengths are refused by both readers, and a row that begins with a semicolon is
+        // a comment for one of them.
+        if rows.iter().any(|row| row.len() != 4 || row[0].starts_with(b";")) {
             return Ok(());
         }
         let table = Table::parse("a.csv", text.as_bytes()).unwrap();

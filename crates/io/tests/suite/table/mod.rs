@@ -287,7 +287,7 @@ fn what_stands_above_the_table_is_left_out_when_told() {
         }
     }
     // Comments, and a wrong row further down, do not count as text above the table.
-    assert!(refused("# rig\nt,f\n0,1\n1,2\n3\n").contains("line 5: 1 field where"));
+    assert!(refused("# rig\nt,f\n0,1\n1,2\n3\n").contains("line 5: this line has 1 field"));
     let path = folder.path().join("a.csv");
     std::fs::write(&path, "t,f\n0,1\n").unwrap();
     assert!(matches!(read_below(&path, 9), Err(IoError::Empty { .. })));
