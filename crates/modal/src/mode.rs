@@ -116,7 +116,7 @@ impl DropReason {
         match self {
             Self::Insignificant { .. } => "not significant",
             Self::UndeterminedDamping { .. } => "damping not above zero",
-            Self::Undetermined => "not determined beside the other modes",
+            Self::Undetermined => "not determined by the data",
             Self::TooDamped => "too much damping for a mode",
             Self::OutsideBand => "outside of the band",
             Self::Twin { .. } => "the same as another mode",

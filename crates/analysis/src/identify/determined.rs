@@ -84,8 +84,8 @@ pub(super) fn check_nonlinear(fit: &NonlinearEstimate) -> Result<(), AnalysisErr
     {
         let percent = significant(100.0 * unrelated.explained, 3);
         let why = format!(
-            "the model explains {percent} % of the fitted data, and would explain as much of pure noise. If noise \
-             biases least squares, use several periods or maximum likelihood (`method`)"
+            "the model explains {percent} % of the fitted data, and would explain as much of pure noise. Noise may \
+             have biased least squares: use several periods or maximum likelihood (`method`)"
         );
         return Err(AnalysisError::NothingDetermined { why });
     }

@@ -137,8 +137,8 @@ impl Disagreement {
         let explanation = checks.iter().find(|check| check.is_explanation());
         let explanation = explanation.filter(|_| self.explained.is_some()).map(|check| {
             format!(
-                "standard errors and intervals include the difference from the parameters of the model that \
-                 explains the residual (check: {})",
+                "standard errors and intervals include the difference between these parameters and those of the \
+                 model that explains the residual (check: {})",
                 check.subject
             )
         });

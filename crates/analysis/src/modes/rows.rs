@@ -145,7 +145,10 @@ pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
              candidate stays in the model",
             significant(100.0 * standard_error, 2)
         ),
-        DropReason::Undetermined => "the data do not determine it beside the other modes".into(),
+        DropReason::Undetermined => {
+            "the data do not determine its parameters separately from those of the other modes"
+                .into()
+        }
         DropReason::TooDamped => {
             "its damping is too high for a mode: it represents modes outside of the band".into()
         }

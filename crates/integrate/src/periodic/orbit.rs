@@ -309,7 +309,8 @@ fn by_products(
                 shooting.derivative(&state, direction, derivative)
             })?;
         log::debug!(
-            "a gap of {missed:.1e}: after {} products {:.1e} of it remains",
+            "relative change of the state over a period: {missed:.1e}; Newton step from {} products, relative \
+             residual {:.1e}",
             step.products,
             step.residual
         );
