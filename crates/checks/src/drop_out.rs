@@ -11,7 +11,8 @@ use super::limits::{
 };
 use super::{Subject, Verdict};
 
-/// Channel that keeps one value for some samples within its motion: a drop-out of the transmission.
+/// Channel that keeps one value for some samples, but changes before and after them: a drop-out of
+/// the transmission.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct DropOut {

@@ -106,7 +106,7 @@ findings! {
     Quantisation in quantisation,
     /// One sample of a channel is far outside its neighbours.
     Spike in spike,
-    /// A channel keeps one value for some samples within its motion.
+    /// A channel keeps one value for some samples, but changes before and after them.
     DropOut in drop_out,
     /// Two measured response quantities of one degree of freedom are not derivatives of each other.
     Kinematics in kinematics,

@@ -111,9 +111,9 @@ pub struct Kinematics {
     /// Degree of freedom.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub dof: usize,
-    /// Quantity of the lower derivative.
+    /// Measured quantity with fewer time derivatives: displacement or velocity.
     pub quantity: ResponseQuantity,
-    /// Quantity of the higher derivative.
+    /// Measured quantity that is the first or second time derivative of `quantity`.
     pub derivative: ResponseQuantity,
     /// Ratio of the change of `quantity` to the change that `derivative` predicts; 1 if they agree
     /// (pure number).

@@ -231,7 +231,8 @@ pub(crate) const SAMPLES_PER_UNKNOWN: usize = 4;
 /// Maximum of 1 − coherence (median over the lines) that counts as rounding.
 pub(crate) const RESPONSE_ROUNDING: f64 = 1e-10;
 
-/// Largest distance of lines that Hann's window correlates, the usual window of analysers.
+/// Largest distance, in lines, over which Hann's window (the usual window of analysers) correlates
+/// lines.
 pub(crate) const WINDOW_REACH: usize = 2;
 
 /// Maximum number of distances between lines at which residuals are correlated.

@@ -20,9 +20,9 @@ pub(crate) struct Components {
     pub frequency: Vec<f64>,
     /// Lowest frequency in each component, in Hz.
     pub lowest_hz: Vec<f64>,
-    /// Energy of the measurement outside the space of the forces.
+    /// Energy of the part of the measurement that no force can cause.
     pub outside_energy: f64,
-    /// Number of real data outside the space of the forces.
+    /// Number of real data in this part.
     pub outside_weight: f64,
 }
 

@@ -93,7 +93,7 @@ pub(crate) struct Solution {
 }
 
 impl Solution {
-    /// Creates the solver for the steps of a system under this rule.
+    /// Creates the solver for the steps of a system with the given discretisation.
     pub fn from_rule(
         system: &SecondOrderSystem,
         dt: f64,
@@ -172,7 +172,8 @@ fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceEr
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
     // In step units, the input matrix of a short step is about I. The smallest singular value is
-    // therefore compared with at least 1, so that the test also works for a single force.
+    // therefore divided by the largest one, but by at least 1: for a single force, smallest and
+    // largest are equal.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });

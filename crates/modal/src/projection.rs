@@ -27,7 +27,7 @@ impl Weights {
 pub(crate) trait Design: Sync {
     /// Returns the number of columns of all blocks.
     fn columns(&self, lines: &Lines) -> usize;
-    /// Returns the indices of the columns that act on a block.
+    /// Returns the indices of the columns that are not zero on the lines of a block.
     fn block_columns(&self, lines: &Lines, block: &Block) -> Vec<usize>;
     /// Writes the whitened columns of a block; each has the real parts above the imaginary parts.
     fn fill(&self, lines: &Lines, block: &Block, weight: &[f64], columns: &mut [f64]);

@@ -54,8 +54,8 @@ pub struct Distortion {
     pub even: Option<Level>,
     /// Level on odd lines that are not driven: odd nonlinearities, such as x³.
     pub odd: Option<Level>,
-    /// Fraction (RMS) of the force on the lines of the band that a linear model does not explain;
-    /// the lines are weighted by the response of the linear model to this force.
+    /// Fraction (RMS) of the force that a linear model does not explain, on the lines of the band.
+    /// Each line is weighted by the receptance of the linear model.
     pub linear_leaves: f64,
     /// Kinds of terms, by decreasing explained fraction.
     pub kinds: Vec<Kind>,

@@ -166,7 +166,7 @@ pub fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     let ratio = mean / unit;
     match ChiSquared::new(ratio * ratio) {
         Ok(distribution) if sum.is_finite() => distribution.sf(sum / unit * ratio),
-        // The sum of variables without variance is never larger than a positive value.
+        // Without variance, the sum of squares is 0, which is never above a positive value.
         _ => f64::from(!(sum > 0.0 && mean <= 0.0)),
     }
 }

@@ -32,7 +32,7 @@ pub enum View {
 }
 
 impl Artefact {
-    /// Name of the file for a reader.
+    /// Returns the name of the file that a reader opens (Markdown or SVG).
     fn file(&self) -> String {
         format!("{}.{}", self.name, self.view.ending())
     }

@@ -149,7 +149,7 @@ impl BearingTable {
     }
 }
 
-/// Returns a cell of the table with its comma; an empty cell without a number.
+/// Returns a comma and the cell of a value; the cell is empty if the value is `None`.
 fn cell(value: Option<f64>) -> String {
     value.map_or_else(|| ",".to_owned(), |value| format!(",{value:?}"))
 }

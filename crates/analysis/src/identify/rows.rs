@@ -230,7 +230,7 @@ impl Uncertain {
         }
     }
 
-    /// Creates a given value.
+    /// Creates a known value, without standard error and interval.
     pub(crate) fn known(value: f64) -> Self {
         Self { value, standard_error: None, interval: None }
     }

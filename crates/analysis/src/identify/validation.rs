@@ -1,4 +1,4 @@
-//! Prediction of a record by the identified system, in per cent.
+//! Prediction of a record by the identified system, and its fit to each channel in per cent.
 
 use mechid_estimate::{StartFit, fit_percent, predict};
 use mechid_model::Discretisation;

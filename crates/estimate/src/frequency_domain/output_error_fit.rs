@@ -203,8 +203,8 @@ impl EndLoads {
     }
 }
 
-/// Returns the range in which the noise explains a sum of squares. The sum has `spare` degrees of
-/// freedom, and the variance of its weights has `known` degrees of freedom.
+/// Returns the range of a sum of squares that noise alone explains. The sum has `spare` degrees of
+/// freedom, and the noise variance in its weights has `known` degrees of freedom.
 pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
     let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
     Plausible { expected, factor: 1.0 + FIT_PLAUSIBLE * spread }

@@ -10,7 +10,7 @@ pub(crate) struct Ordering {
 }
 
 impl Ordering {
-    /// Returns the order of the narrower band: the natural one or reverse Cuthill–McKee.
+    /// Returns the ordering with the smaller bandwidth: the natural one or reverse Cuthill–McKee.
     ///
     /// # Source
     /// Cuthill & McKee (1969); George & Liu, *Computer Solution of Large Sparse Positive Definite

@@ -75,7 +75,7 @@ struct Freed {
     assembly: Assembly,
     model: MachineModel,
     space: ParameterSpace,
-    /// Index of the further unknown.
+    /// Index, among the parameters, of the known coefficient that became an unknown.
     further: usize,
 }
 

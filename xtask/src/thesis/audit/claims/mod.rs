@@ -119,7 +119,7 @@ pub struct Claim {
     pub statement: &'static str,
     /// Test of the claim: the question of each counted test.
     pub test: &'static str,
-    /// Support that the dissertation offers.
+    /// Kind of evidence that the dissertation gives for the claim.
     pub support: Support,
     judge: Judge,
 }
