@@ -52,7 +52,8 @@ fn exact_responses_agree_with_the_matrix_exponential() {
             (ours.acceleration(), judge.acceleration()),
         ] {
             let other = DMatrix::from_fn(256, system.dof(), |k, c| other.data()[(DENSER * k, c)]);
-            // The linear force differs from the cosine by up to (ωΔt)²/8 of it, 2.7e-4 at line 60.
+            // A force that is linear between samples differs from the cosine by at most (ωΔt)²/8 of
+            // its amplitude: 2.7e-4 at line 60.
             assert!(largest_difference(ours.data(), &other) < 3e-4);
         }
     }

@@ -17,7 +17,7 @@ use mechid::signal::{CrestSearch, Multisine, Phases, Sampling, Spectrum, measure
 use mechid::spectra::{Lines, Pooling, RepeatedPeriods};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    // The expected frequency is about 20 Hz: the lines are 0.5 Hz apart from 5 to 40 Hz, the
+    // The expected frequency is about 20 Hz: the lines from 5 to 40 Hz are 0.5 Hz apart, the
     // sampling rate is 256 Hz, and the period lasts 2 s.
     let sampling = Sampling::new(1.0 / 256.0, 512)?;
     let schroeder = Multisine::flat(10..=80, 2.0, Phases::Schroeder)?;

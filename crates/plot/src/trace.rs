@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_cloud_of_markers_stays_small_and_covers_the_same() {
-        // Every tenth of a pixel of a square, and one marker far from it.
+        // Markers at every tenth of a pixel of a square, and one marker far from them.
         let square = (0..250_000).map(|i| (f64::from(i % 500) * 0.1, f64::from(i / 500) * 0.1));
         let points: Vec<Point> = square.chain([(400.0, 100.0)]).collect();
         let kept = thin_markers(points.clone(), 500.0, 1.25);

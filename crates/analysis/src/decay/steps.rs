@@ -111,7 +111,7 @@ mod tests {
         }
         assert_eq!(coarse(&decay(20.0, 0.0)), [(0, 39)]);
         assert_eq!(coarse(&decay(1024.0, 0.0)), []);
-        // With noise of a few steps, the whole decay is used.
+        // With noise of a few quantisation steps, the whole decay is used.
         assert_eq!(last_shown(&decay(1024.0, 4.0)), None);
         let sampling = Sampling::new(0.01, 500).unwrap();
         let smooth = Record::from_fn(sampling, |t| (-t).exp() * (9.0 * t).cos()).unwrap();

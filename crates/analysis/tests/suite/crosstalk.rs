@@ -131,7 +131,7 @@ fn interleaved_shakers(crosstalk: f64, level: f64, seed: u64) -> (SecondOrderSys
     (system, frf(&measured, &FrfSettings::default()).unwrap())
 }
 
-/// Reference: (K − ω²M + iωC)⁻¹. Two shakers have every second line each, with 1 % noise in all
+/// Reference: (K − ω²M + iωC)⁻¹. Two shakers excite alternate lines, with 1 % noise in all
 /// channels. Each response is given only on the lines of its own force, and agrees with the
 /// machine.
 #[test]

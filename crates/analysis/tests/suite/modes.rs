@@ -376,8 +376,8 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
         }
     }
     assert!(failed_checks <= 1, "{failed_checks} of 40");
-    // The limit is three standard deviations of the number of 60 intervals that contain the true
-    // value.
+    // The limit is three standard deviations below the expected number, 57 of 60 intervals that
+    // contain the true value.
     assert!(inside >= 52, "{inside} of 60");
     let rms =
         |ratios: &[f64]| (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();

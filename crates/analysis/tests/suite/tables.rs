@@ -288,8 +288,8 @@ fn a_record_and_its_table_agree() {
     assert!(!checks.is_empty() && checks.iter().all(|check| !check.is_conspicuous()));
 }
 
-/// Channels with the names that universal files give them: both kinds of files keep the points, and
-/// given points replace the names in a universal file.
+/// The channels are named after points of a universal file, such as `12+Z`. The CSV table and the
+/// universal file keep these points; points given by the caller replace them in the universal file.
 #[test]
 fn points_in_names_of_channels_are_kept() {
     let sampling = Sampling::from_rate_hz(128.0, 1024).unwrap();

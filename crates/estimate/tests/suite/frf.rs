@@ -239,8 +239,9 @@ fn windows_and_overlap_are_the_callers() {
         let estimator = FrfEstimator::H1;
         Frf::estimate(&force, motion.displacement(), quantity, segments, 5..60, estimator)
     };
-    // Without overlap, all segments are independent. Hann's window shares 0.65915 of its power with
-    // itself after a quarter of its length, 1/6 after half, 0.00751 after three quarters.
+    // Without overlap, all segments are independent. The normalised autocorrelation of Hann's
+    // window is 0.65915 at a shift of a quarter of its length, 1/6 at half and 0.00751 at three
+    // quarters.
     assert_eq!(frf(256, Window::Rectangular).unwrap().averages(), 16.0);
     let count = 61.0;
     let lost: f64 = [(1.0, 0.659_155), (2.0, 1.0 / 6.0), (3.0, 0.007_512)]

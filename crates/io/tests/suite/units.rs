@@ -278,7 +278,8 @@ fn a_name_is_what_stands_beside_the_unit() {
     ] {
         assert_eq!(table(name).short_name(0), bare, "{name}");
     }
-    // In upper or lower case, and with the other brackets kept.
+    // The column is found in upper or lower case, with or without the unit, and with or without the
+    // other brackets.
     let columns = table("Force [N] (left)");
     for wanted in ["Force [N] (left)", "Force (left)", "Force", "force"] {
         assert_eq!(columns.find(wanted).unwrap(), 0, "{wanted}");
@@ -597,7 +598,8 @@ fn last_words_that_are_units_are_taken_or_reported() {
         for (unit, right) in units {
             for style in STYLES {
                 let name = header(style, word, unit);
-                // After a slash, the unit is that of the numbers, and a wrong one is refused.
+                // Text after a slash is always the unit of the numbers; a unit of another quantity
+                // is then refused, not only reported.
                 let stated = stated_unit(&name, "", Some(quantity));
                 let refused = stated.as_ref().and_then(|stated| stated.used());
                 if style == "W / U" && refused.is_some_and(|unit| unit.quantity != quantity) {

@@ -111,7 +111,8 @@ fn a_bound_is_active_and_its_interval_one_sided() {
     assert!(damper.interval[1] > 3.0 && damper.interval[1] < 3.5, "{:?}", damper.interval);
 }
 
-/// 40 seeds of a damper that is weak against the noise: its interval comes from the profile.
+/// A damper with a small effect compared with the noise, for 40 seeds: its interval comes from the
+/// profile likelihood.
 #[test]
 fn profile_intervals_of_weak_parameters_hold() {
     let machine = Machine::new(["x"])

@@ -166,8 +166,9 @@ fn a_rate_stated_by_its_name_is_the_time_axis() {
         let other = table.record(&TimeAxis::RateHz(8.0), &["x"]).unwrap();
         assert_eq!(other.sampling().dt(), 0.125);
     }
-    // Two equal statements; a contradiction; a nonsensical value, another number, and a column of
-    // instants.
+    // Two equal statements of the rate are a time axis, and a contradiction is an error. A rate
+    // that is not positive, or a number with another name, is no time axis. A column of instants
+    // has priority over a stated rate.
     assert!(of(&[("Fs", &[4.0]), ("dt", &[0.25]), x]).has_time_axis());
     let table = of(&[("Fs", &[5.0]), ("dt", &[0.25]), x]);
     let told = table.record(&TimeAxis::OfFile, &["x"]).unwrap_err().to_string();
