@@ -137,7 +137,7 @@ mod tests {
         assert!(parse_details("date,F,x\n0,1,2\n").is_empty());
     }
 
-    /// Judge: the example of the specification of National Instruments.
+    /// Reference: the example of the specification of National Instruments.
     #[test]
     fn the_header_of_a_labview_file_has_operator_and_date() {
         let text = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t1\nSeparator\tTab\n\

@@ -367,7 +367,7 @@ mod tests {
         assert_eq!(rotation, [[[0.0; 2]; 3]; 2]);
     }
 
-    /// Judge: reading back what was written, and the field widths of the format.
+    /// Reference: reading back what was written, and the field widths of the format.
     #[test]
     fn a_universal_file_keeps_points_lines_and_shapes() {
         let geometry = Geometry::parse("g", "10 0 0 0\n20 0.5 0 0.125\nline 10 20\n").unwrap();

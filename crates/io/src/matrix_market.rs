@@ -307,7 +307,7 @@ mod tests {
         Ok(DMatrix::from(&sparse))
     }
 
-    /// Judge: the matrices, written by hand as the format says.
+    /// Reference: the matrices, written by hand as the format says.
     #[test]
     fn formats_and_symmetries_are_those_of_the_format() {
         let general = "%%MatrixMarket matrix coordinate real general\n% a comment\n\n3 3 4\n\

@@ -212,7 +212,7 @@ mod tests {
         Complex::new(number(at), number(at + 57))
     }
 
-    /// Judge: sums over the explicit rows of 45 lines and 5 regressors, with few and with many
+    /// Reference: sums over the explicit rows of 45 lines and 5 regressors, with few and with many
     /// degrees of freedom.
     #[test]
     fn products_are_those_of_the_rows() {

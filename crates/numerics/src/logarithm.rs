@@ -217,8 +217,8 @@ mod tests {
 
     use super::*;
 
-    /// Difference quotients judge the derivative, for states with complex, real and unit
-    /// eigenvalues (a free body) and two inputs.
+    /// Reference: difference quotients, for states with complex, real and unit eigenvalues (a free
+    /// body) and two inputs.
     #[test]
     fn the_derivative_is_that_of_the_logarithm() {
         let free = dmatrix![1.0, 0.3; 0.0, 1.0] - DMatrix::identity(2, 2);

@@ -279,8 +279,8 @@ mod tests {
     }
 
     proptest! {
-        /// Judge: the Gram matrix, formed explicitly. The factor is unique except for the signs of
-        /// its rows.
+        /// Reference: the Gram matrix, formed explicitly. The factor is unique except for the signs
+        /// of its rows.
         #[test]
         fn the_factor_has_the_gram_matrix_of_the_rows(
             (cut, a) in (1usize..700).prop_flat_map(|rows| (0..rows, matrix(rows, 5)))

@@ -213,7 +213,7 @@ mod tests {
         VISION.map(seen).map(difference).into_iter().fold(f64::INFINITY, |a, b| a.min(100.0 * b))
     }
 
-    /// Judge: WCAG 1.4.11 requires a contrast of 3:1. A difference of 2 % of that of black and
+    /// Reference: WCAG 1.4.11 requires a contrast of 3:1. A difference of 2 % of that of black and
     /// white is just visible side by side, and one of 6 % elsewhere.
     #[test]
     fn colours_of_curves_are_seen_and_told_apart_on_both_papers() {

@@ -363,7 +363,7 @@ fn band(svg: &str) -> Vec<f64> {
     numbers.chunks(2).map(|point| point[1]).collect()
 }
 
-/// Judge: the band of levels in decibels is that of the magnitude on a logarithmic axis.
+/// Reference: the band of levels in decibels is that of the magnitude on a logarithmic axis.
 #[test]
 fn an_error_has_the_same_band_on_every_scale() {
     let x: Vec<f64> = (1..=50).map(f64::from).collect();

@@ -197,7 +197,7 @@ mod tests {
         Record::from_channels(sampling, &[a.channel(0), b.channel(0)]).unwrap()
     }
 
-    /// Judge: the definition of each fault, for each line of the spectrum or for each sample.
+    /// Reference: the definition of each fault, for each line of the spectrum or for each sample.
     #[test]
     fn faults_are_what_they_say() {
         let clean = two_sines();

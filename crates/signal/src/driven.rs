@@ -185,7 +185,7 @@ mod tests {
         assert!(driven_lines(&record, 190).unwrap().len() > 80);
     }
 
-    /// Judge: the distribution function at F, in closed form, and its limit e^(−F).
+    /// Reference: the distribution function at F, in closed form, and its limit e^(−F).
     #[test]
     fn fishers_quantile_has_its_probability() {
         for (probability, freedom) in [(0.05, 4.0), (1e-6, 33.0), (1e-3, 1e7)] {

@@ -155,7 +155,7 @@ mod tests {
 
     use super::*;
 
-    /// The definition, term by term: the judge of the fast transform.
+    /// The definition, term by term: the reference for the fast transform.
     fn direct_sum(x: &[f64], n: usize) -> Complex<f64> {
         let len = x.len();
         let sum: Complex<f64> = x

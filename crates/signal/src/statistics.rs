@@ -206,7 +206,7 @@ mod tests {
         (0..count).map(|k| scale * (offset + (0.7 * k as f64).sin())).collect()
     }
 
-    /// Judge: two passes over all samples.
+    /// Reference: two passes over all samples.
     fn two_pass(samples: &[f64]) -> (f64, f64) {
         let count = samples.len() as f64;
         let mean = samples.iter().sum::<f64>() / count;

@@ -242,9 +242,9 @@ mod tests {
         Multisine::flat(1..=9, 1.0, Phases::SchroederBinary).unwrap().sample(sampling).unwrap()
     }
 
-    /// Judge: the map of every scheme, formed as a matrix. With the weaker damping, nearly half of
-    /// the 140 modes still have a tenth of their motion after a period, so that (I − Φ)⁻¹ amplifies
-    /// rounding errors.
+    /// Reference: the map of every scheme, formed as a matrix. With the weaker damping, nearly half
+    /// of the 140 modes still have a tenth of their motion after a period, so that (I − Φ)⁻¹
+    /// amplifies rounding errors.
     #[test]
     fn a_search_finds_what_the_whole_map_gives() {
         let force = record(160);

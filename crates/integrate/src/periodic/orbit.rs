@@ -365,7 +365,7 @@ mod tests {
     use crate::schemes::newmark::Newmark;
     use crate::schemes::runge_kutta::RungeKutta4;
 
-    /// Judge: the derivative formed as a matrix, for the state and the largest multiplier.
+    /// Reference: the derivative formed as a matrix, for the state and the largest multiplier.
     #[test]
     fn products_lead_to_the_orbit_of_the_whole_derivative() {
         let dof = 12;

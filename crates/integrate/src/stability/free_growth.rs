@@ -130,7 +130,7 @@ mod tests {
         SparseSystem::new(band(n, &[(0, 1.0)]), c, k).unwrap()
     }
 
-    /// Judge: the largest real part of all eigenvalues.
+    /// Reference: the largest real part of all eigenvalues.
     fn rightmost(system: &SparseSystem) -> f64 {
         let [m, c, k] =
             mechid_model::Matrix::ALL.map(|w| nalgebra::DMatrix::from(system.matrix(w)));

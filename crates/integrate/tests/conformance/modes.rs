@@ -18,7 +18,7 @@ fn chain(n: usize, fixed: bool) -> SparseSystem {
     SparseSystem::new(band(n, &[(0, 2.0)]), band(n, &[]), stiffness).unwrap()
 }
 
-/// Judge: ω = 2 √(k/m) sin(r π / 2(n + 1)), shape sin(r π i / (n + 1)).
+/// Reference: ω = 2 √(k/m) sin(r π / 2(n + 1)), shape sin(r π i / (n + 1)).
 #[test]
 fn a_chain_has_the_frequencies_of_its_closed_form() {
     let n = 2000;
@@ -84,7 +84,7 @@ fn assert_same(found: &[SparseMode], expected: &[&Mode]) {
     }
 }
 
-/// Judge: all modes by the dense QR iteration.
+/// Reference: all modes by the dense QR iteration.
 #[test]
 fn a_gyroscopic_system_has_the_modes_of_its_dense_form() {
     let dense = rotor(30);
@@ -124,7 +124,7 @@ fn repeated_frequencies_have_independent_shapes() {
     }
 }
 
-/// Judge: ω = 2 √(k/m) sin(r π / 2n), where r = 0 is the rigid-body motion.
+/// Reference: ω = 2 √(k/m) sin(r π / 2n), where r = 0 is the rigid-body motion.
 #[test]
 fn a_free_chain_drifts_and_oscillates() {
     let n = 300;
@@ -140,7 +140,7 @@ fn a_free_chain_drifts_and_oscillates() {
     }
 }
 
-/// Judge: the closed form. The highest of the frequencies is about sixty times the lowest.
+/// Reference: the closed form. The highest of the frequencies is about sixty times the lowest.
 #[test]
 fn many_modes_of_a_chain_are_found_from_one_shift() {
     let n = 150;

@@ -129,9 +129,9 @@ fn backbone(k: f64, cubic: f64, amplitude: f64) -> f64 {
     square.sqrt() * a
 }
 
-/// Judge: a force equal to the damping force sustains the undamped free motion, at the frequency of
-/// the backbone. Harmonic balance with one harmonic gives this frequency within 2.2 % at any
-/// amplitude.
+/// Reference: a force equal to the damping force sustains the undamped free motion, at the
+/// frequency of the backbone. Harmonic balance with one harmonic gives this frequency within 2.2 %
+/// at any amplitude.
 ///
 /// # Source
 /// Nayfeh & Mook, *Nonlinear Oscillations* (1979), section 4.1.

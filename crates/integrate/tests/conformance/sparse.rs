@@ -154,7 +154,7 @@ fn selections_that_do_not_fit_are_refused() {
     );
 }
 
-/// Judge: the receptance of the dense form, line by line.
+/// Reference: the receptance of the dense form, line by line.
 #[test]
 fn the_steady_state_of_a_sparse_system_is_that_of_its_receptance() {
     let n = 30;

@@ -99,8 +99,8 @@ fn a_long_chain_is_refused_just_beyond_the_limit() {
     }
 }
 
-/// C and K are full and not symmetric: the exact spectral radius is the judge, below and above the
-/// limit of the schemes that have one.
+/// C and K are full and not symmetric: the exact spectral radius is the reference, below and above
+/// the limit of the schemes that have one.
 #[test]
 fn full_systems_without_symmetry_are_judged_by_their_eigenvalues() {
     let wilson = WilsonTheta::new(1.4).unwrap();
@@ -165,7 +165,7 @@ fn the_spectral_radius_of_a_long_chain_is_that_of_its_fastest_mode() {
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
 }
 
-/// Judge: the number of eigenvalues of a tridiagonal pencil above a value, by the signs of its
+/// Reference: the number of eigenvalues of a tridiagonal pencil above a value, by the signs of its
 /// pivots (Sturm's sequence). With unequal masses only a few masses take part in the fastest
 /// motion, and iterations converge to this motion slowly.
 #[test]

@@ -148,7 +148,7 @@ fn seconds(text: &str) -> Option<(f64, bool)> {
 mod tests {
     use super::*;
 
-    /// Judge: `date -d … +%s` for the days, and the clock by hand.
+    /// Reference: `date -d … +%s` for the days, and the clock by hand.
     #[test]
     fn instants_of_dates_and_clocks_are_read() {
         for (text, day, seconds) in [

@@ -219,7 +219,7 @@ mod tests {
         Some(([l, t, f], in_si))
     }
 
-    /// Judge: the definitions of the units, worked by hand.
+    /// Reference: the definitions of the units, worked by hand.
     #[test]
     fn products_and_quotients_have_their_dimension_and_size() {
         let acceleration = [1, -2, 0];

@@ -256,7 +256,7 @@ fn the_system_of_a_report_is_read_back() {
     assert!(read_system(&path).unwrap_err().to_string().contains("missing field `system`"));
 }
 
-/// Judge: the same machine in the description itself.
+/// Reference: the same machine in the description itself.
 #[test]
 fn the_system_may_be_that_of_another_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -303,7 +303,7 @@ fn the_system_may_be_that_of_another_file() {
     assert!(error.contains("a system with its mass, or the name of a JSON file"), "{error}");
 }
 
-/// Judge: closed forms in this test.
+/// Reference: closed forms in this test.
 #[test]
 fn every_kind_of_excitation_is_sampled() {
     let force = |excitation: &str| {

@@ -1,5 +1,5 @@
-//! Frequency responses in and out of files. Judge of universal files: pyuff wrote `printed.unv` and
-//! `binary.unv` (`data/make.py`).
+//! Frequency responses in and out of files. Reference for universal files: pyuff wrote
+//! `printed.unv` and `binary.unv` (`data/make.py`).
 
 use mechid_io::{
     AveragedSegments, CoherenceFunction, Evidence, FrequencyResponses, IoError, Quantity,
@@ -120,7 +120,7 @@ fn stated_units_become_si_units() {
     assert!(found.remarks[0].contains("multiplied by 0.0254"), "{:?}", found.remarks);
 }
 
-/// Judge: 2π rad per cycle, 60 s per minute. The numbers of the file are 1 and 2.
+/// Reference: 2π rad per cycle, 60 s per minute. The numbers of the file are 1 and 2.
 #[test]
 fn labels_of_the_abscissa_state_the_unit_of_the_frequencies() {
     let text = two_by_one(vec![1.0, 2.0]).to_universal_file().unwrap();
@@ -177,7 +177,7 @@ fn tables_in_every_form() {
     assert_eq!(whole.coherence[1].reference.as_deref(), Some("1"));
 }
 
-/// Judge: 20 log₁₀ of the magnitude, and the order times the speed.
+/// Reference: 20 log₁₀ of the magnitude, and the order times the speed.
 #[test]
 fn levels_orders_and_points_in_brackets() {
     let level =
@@ -279,7 +279,7 @@ fn written(header: &str, rows: impl Fn(f64, Complex<f64>) -> Vec<f64>) -> String
     format!("{header}\n{}", hz.iter().zip(&values).map(row).collect::<String>())
 }
 
-/// Judge: the closed form of one degree of freedom, written in the unit that the header states.
+/// Reference: the closed form of one degree of freedom, written in the unit that the header states.
 #[test]
 fn units_of_axes_and_responses_are_read() {
     use std::f64::consts::TAU;
@@ -367,7 +367,7 @@ fn what_is_not_understood_in_a_table_of_responses_is_reported_or_refused() {
     }
 }
 
-/// Judge: the one-sided table in rising order.
+/// Reference: the one-sided table in rising order.
 #[test]
 fn mirrored_and_unsorted_tables_are_the_one_sided_ones() {
     let n = 16_i32;
@@ -404,7 +404,7 @@ fn mirrored_and_unsorted_tables_are_the_one_sided_ones() {
     assert!(twice.contains("twice"), "{twice}");
 }
 
-/// Judge: H in dB is 20 log |H/reference|.
+/// Reference: H in dB is 20 log |H/reference|.
 #[test]
 fn levels_in_decibels_are_read_with_their_reference() {
     const G: f64 = 9.80665;

@@ -1,4 +1,4 @@
-//! Frequency responses in arrays of complex numbers. Judge: SciPy and h5py wrote the files
+//! Frequency responses in arrays of complex numbers. Reference: SciPy and h5py wrote the files
 //! (`data/make_arrays.py`); each value contains its position: line + 1 + 10 point + 100 reference +
 //! i line.
 
@@ -129,7 +129,7 @@ fn what_is_missing_or_does_not_go_together_is_said() {
     assert!(responses.remarks.iter().any(|r| r.contains("left out: z")), "{:?}", responses.remarks);
 }
 
-/// Judge: the definitions of the units; with g/N, 1 is 9.80665 m/s² per N.
+/// Reference: the definitions of the units; with g/N, 1 is 9.80665 m/s² per N.
 #[test]
 fn units_in_the_names_of_arrays_are_read() {
     let three: &[f64] = &[1.0, 2.0, 3.0];
@@ -174,7 +174,7 @@ fn units_in_the_names_of_arrays_are_read() {
     assert!(error.contains("um/N") && error.contains("contradicts this name"), "{error}");
 }
 
-/// Judge: the definitions of the units; the values are the frequencies + i.
+/// Reference: the definitions of the units; the values are the frequencies + i.
 #[cfg(feature = "hdf5")]
 #[test]
 fn units_in_attributes_of_arrays_are_read() {

@@ -127,8 +127,8 @@ fn header(style: &str, word: &str, unit: &str) -> String {
     style.replace('W', "\u{1}").replace('U', unit).replace('\u{1}', word)
 }
 
-/// Judge: the definitions of the units. A header in brackets gives the right factor; a header of
-/// another style gives it, or a finding reports the doubt.
+/// Reference: the definitions of the units. A header in brackets gives the right factor; a header
+/// of another style gives it, or a finding reports the doubt.
 #[test]
 fn generated_headers_have_the_right_factor_or_a_finding() {
     let (mut all, mut right) = (0, 0);
@@ -209,7 +209,7 @@ fn a_text_that_is_not_understood_or_may_be_a_unit_is_reported() {
     }
 }
 
-/// Judge: with 11.2 mV per newton, 1 mV is 1/11.2 N.
+/// Reference: with 11.2 mV per newton, 1 mV is 1/11.2 N.
 #[test]
 fn a_sensitivity_beside_the_unit_gives_the_factor() {
     for (name, quantity, factor) in [
@@ -321,7 +321,7 @@ fn a_unit_or_a_factor_may_be_stated() {
     assert!(Unit::parse("furlong").is_none());
 }
 
-/// Judge: the definitions of the units.
+/// Reference: the definitions of the units.
 #[test]
 fn a_unit_may_stand_before_the_name_or_be_a_sign() {
     let lbf = 0.45359237 * G;
@@ -346,7 +346,8 @@ fn a_unit_may_stand_before_the_name_or_be_a_sign() {
     assert_eq!(stated_unit("N 12 left", "", Some(Quantity::Force)), None);
 }
 
-/// Judge: the definitions of the units. Languages of spreadsheets, signs of LaTeX and of a wrong encoding.
+/// Reference: the definitions of the units. Languages of spreadsheets, signs of LaTeX and of a
+/// wrong encoding.
 #[test]
 fn headers_of_other_languages_and_encodings_are_read() {
     let lbf = 0.45359237 * G;
@@ -374,7 +375,8 @@ fn headers_of_other_languages_and_encodings_are_read() {
     }
 }
 
-/// Judge: the definitions of the units. A unit that is not used is in the finding, with its factor.
+/// Reference: the definitions of the units. A unit that is not used is in the finding, with its
+/// factor.
 #[test]
 fn factors_and_lost_signs_are_reported_with_what_they_would_make() {
     for (name, quantity, factor) in [
@@ -405,7 +407,8 @@ fn factors_and_lost_signs_are_reported_with_what_they_would_make() {
     }
 }
 
-/// Judge: the definitions of the units. A factor beside a unit is not applied; the finding has it.
+/// Reference: the definitions of the units. A factor beside a unit is not applied; the finding has
+/// it.
 #[test]
 fn fractions_of_a_unit_are_reported() {
     for (name, quantity, factor) in [
@@ -445,7 +448,7 @@ fn fractions_of_a_unit_are_reported() {
     }
 }
 
-/// Judge: the definitions of the units.
+/// Reference: the definitions of the units.
 #[test]
 fn the_word_in_before_a_unit_is_no_inch() {
     let (stated, likely) = (Evidence::Stated, Evidence::Likely);
@@ -587,8 +590,8 @@ fn answer(name: &str, quantity: Quantity) -> Answer {
     }
 }
 
-/// Judge: the definitions of the units, and what a person would read. A unit of the column after a
-/// mark is used; a unit of another quantity is reported.
+/// Reference: the definitions of the units, and what a person would read. A unit of the column
+/// after a mark is used; a unit of another quantity is reported.
 #[test]
 fn last_words_that_are_units_are_taken_or_reported() {
     const STYLES: [&str; 8] =
@@ -701,7 +704,8 @@ const RESPONSES: [&str; 30] = [
     "sensor A",
 ];
 
-/// Judge: what a person would read. The names are of places, channels, treatments and conditions.
+/// Reference: what a person would read. The names are of places, channels, treatments and
+/// conditions.
 #[test]
 fn last_words_that_are_no_units_are_not_reported() {
     let columns = FORCES.map(|name| (name, Quantity::Force)).into_iter();

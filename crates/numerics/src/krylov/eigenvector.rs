@@ -100,7 +100,7 @@ impl HessenbergFactors {
 mod tests {
     use super::*;
 
-    /// Judge: the matrix itself, and the dense factors of nalgebra.
+    /// Reference: the matrix itself, and the dense factors of nalgebra.
     #[test]
     fn factors_of_few_diagonals_solve_as_dense_ones_do() {
         for (size, below) in [(1, 0), (1, 3), (3, 1), (4, 4), (9, 0), (9, 1), (12, 4)] {

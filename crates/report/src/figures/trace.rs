@@ -178,7 +178,7 @@ impl FigureStyle {
 mod tests {
     use super::*;
 
-    /// Judge: 20 log₁₀ of (1 ± 2·1 %) of the magnitude.
+    /// Reference: 20 log₁₀ of (1 ± 2·1 %) of the magnitude.
     #[test]
     fn levels_in_decibels_keep_the_error_of_their_magnitude() {
         let style = FigureStyle { magnitude: MagnitudeScale::Decibel, ..FigureStyle::default() };

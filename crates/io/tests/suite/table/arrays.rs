@@ -1,4 +1,4 @@
-//! Cell arrays and arrays of structs. Judge: SciPy and h5py wrote the files
+//! Cell arrays and arrays of structs. Reference: SciPy and h5py wrote the files
 //! (`data/make_arrays.py`); the numbers are in this test.
 
 use mechid_io::{Quantity, Table, TimeAxis};

@@ -1,5 +1,5 @@
-//! Decimal signs, quotes, and rows longer than a block. Judge: the csv crate, and the number parser
-//! of Rust.
+//! Decimal signs, quotes, and rows longer than a block. Reference: the csv crate, and the number
+//! parser of Rust.
 
 use std::fmt::Write as _;
 

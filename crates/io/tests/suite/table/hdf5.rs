@@ -1,5 +1,5 @@
-//! HDF5 and MATLAB 7.3. Judge: h5py wrote the files (`data/make_hdf5.py`); the numbers are in this
-//! test.
+//! HDF5 and MATLAB 7.3. Reference: h5py wrote the files (`data/make_hdf5.py`); the numbers are in
+//! this test.
 
 use mechid_io::{IoError, Limits, Quantity, ReadOptions, Table, TimeAxis};
 use proptest::prelude::*;
@@ -83,7 +83,7 @@ fn what_is_no_array_of_real_numbers_is_named() {
     }
 }
 
-/// Judge: the numbers −4 to 3, times the factor, plus the offset.
+/// Reference: the numbers −4 to 3, times the factor, plus the offset.
 #[test]
 fn factors_and_offsets_of_attributes_are_applied() {
     let table = Table::parse("a.h5", UNITS).unwrap();
@@ -117,7 +117,7 @@ fn what_cannot_be_read_and_is_not_used_does_no_harm() {
     }
 }
 
-/// Judge: the data sets as h5py wrote them; the links to them are skipped.
+/// Reference: the data sets as h5py wrote them; the links to them are skipped.
 #[test]
 fn groups_of_the_old_format_with_soft_links_are_read() {
     let table = Table::parse("a.h5", include_bytes!("../../data/links.h5")).unwrap();

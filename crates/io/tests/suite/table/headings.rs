@@ -46,7 +46,7 @@ fn a_comment_above_the_table_names_its_columns() {
     }
 }
 
-/// Judge: the definitions of the units; with its unit, the force of the first row is 1 kN.
+/// Reference: the definitions of the units; with its unit, the force of the first row is 1 kN.
 #[test]
 fn names_and_units_above_other_lines_are_read() {
     let blanks = ROWS.replace(',', " ");
@@ -84,7 +84,7 @@ fn names_and_units_above_other_lines_are_read() {
     }
 }
 
-/// Judge: the definitions of the units; with its unit, the force of the first row is 1 kN.
+/// Reference: the definitions of the units; with its unit, the force of the first row is 1 kN.
 #[test]
 fn definitions_of_columns_in_lines_of_their_own_are_read() {
     let mut texts = Vec::new();
@@ -132,7 +132,7 @@ fn definitions_of_columns_in_lines_of_their_own_are_read() {
     }
 }
 
-/// Judge: the definitions of the units; with its unit, the force of the first row is 1 kN.
+/// Reference: the definitions of the units; with its unit, the force of the first row is 1 kN.
 #[test]
 fn names_of_several_words_above_aligned_columns_are_read() {
     let rows = ROWS.replace(',', "      ");
@@ -206,7 +206,7 @@ fn one_name_more_than_fields_does_no_harm() {
     assert_eq!(table.sampling(&TimeAxis::Column("1"), &["2"]).unwrap().dt(), 0.5);
 }
 
-/// Judge: half a second from row to row.
+/// Reference: half a second from row to row.
 #[test]
 fn instants_of_dates_and_clocks_are_a_time_axis() {
     for (name, instants) in [

@@ -1,4 +1,4 @@
-//! MATLAB files. Judge: SciPy wrote them (`data/make.py`); the numbers are in this test.
+//! MATLAB files. Reference: SciPy wrote them (`data/make.py`); the numbers are in this test.
 
 use mechid_io::{IoError, Table, TimeAxis};
 use proptest::prelude::*;

@@ -1,5 +1,5 @@
-//! Timetables of MATLAB 7.3. Judge: mat-io wrote the file (`data/make_timetable.py`); the numbers
-//! are in this test.
+//! Timetables of MATLAB 7.3. Reference: mat-io wrote the file (`data/make_timetable.py`); the
+//! numbers are in this test.
 
 use mechid_io::{Quantity, Table, TimeAxis};
 use proptest::prelude::*;

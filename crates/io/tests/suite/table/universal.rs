@@ -1,4 +1,4 @@
-//! Universal files. Judge: pyuff wrote them (`data/make.py`); the numbers are in this test.
+//! Universal files. Reference: pyuff wrote them (`data/make.py`); the numbers are in this test.
 
 use mechid_io::{IoError, Table, TimeAxis};
 use proptest::prelude::*;
