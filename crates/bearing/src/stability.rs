@@ -83,7 +83,7 @@ impl Threshold {
 
         let by_equivalent = SVector::from([cyy, -cyx, -cxy, cxx, -y, -kyx, -kxy, -x]) / trace;
         // The entries are the derivatives of x y − kxy kyx − ω_w² det C for constant k_eq and ω_w.
-        let apart = SVector::from([
+        let explicit_derivatives = SVector::from([
             -y,
             -kyx,
             -kxy,
@@ -95,7 +95,7 @@ impl Threshold {
         ]);
         let gradient = Gradient {
             equivalent_stiffness: by_equivalent,
-            whirl_squared: (apart + by_equivalent * (x + y)) / determinant,
+            whirl_squared: (explicit_derivatives + by_equivalent * (x + y)) / determinant,
         };
         Ok(Self { omega, equivalent_stiffness: equivalent, whirl_squared, gradient })
     }

@@ -47,16 +47,16 @@ impl<'a> Search<'a> {
             let (mut load, mut tangent) = (Vector2::zeros(), Matrix2x4::zeros());
             self.films.clear();
             for &pad in self.bearing.bore.pads() {
-                let mut film = self.begun(pad, mesh)?;
+                let mut film = self.initial_film(pad, mesh)?;
                 if let Some(film) = &mut film {
-                    let step = self.relaxed(film, tolerance)?;
+                    let step = self.converge_fronts(film, tolerance)?;
                     load += step.load;
                     tangent += step.tangent;
                 }
                 self.films.push(film);
             }
             let moved;
-            (moved, wanted) = self.moved(load, &tangent)?;
+            (moved, wanted) = self.journal_step(load, &tangent)?;
             self.position += moved;
             if wanted < tolerance * self.bearing.bore.thinnest(self.position) {
                 return Ok(());
@@ -77,7 +77,7 @@ impl<'a> Search<'a> {
                 if pad.converging(self.position).is_none() {
                     self.films[index] = None;
                 } else if self.films[index].is_none() {
-                    self.films[index] = self.begun(pad, mesh)?;
+                    self.films[index] = self.initial_film(pad, mesh)?;
                 }
             }
             let (mut load, mut tangent) = (Vector2::zeros(), Matrix2x4::zeros());
@@ -89,7 +89,7 @@ impl<'a> Search<'a> {
                 steps.push(step);
             }
             let moved;
-            (moved, wanted) = self.moved(load, &tangent)?;
+            (moved, wanted) = self.journal_step(load, &tangent)?;
             self.position += moved;
             let mut front: f64 = 0.0;
             for (film, step) in self.films.iter_mut().flatten().zip(&steps) {
@@ -104,7 +104,7 @@ impl<'a> Search<'a> {
     }
 
     /// Returns a film over the converging part of a pad, with its pressure.
-    fn begun(&self, pad: Pad, mesh: Mesh) -> Result<Option<Film>, BearingError> {
+    fn initial_film(&self, pad: Pad, mesh: Mesh) -> Result<Option<Film>, BearingError> {
         let mut film = Film::new(pad, self.position, self.bearing.length_over_diameter, mesh);
         if let Some(film) = &mut film {
             settle(film, self.position)?;
@@ -114,7 +114,7 @@ impl<'a> Search<'a> {
 
     /// Moves the fronts of a film to convergence with the journal fixed; returns the Newton step at
     /// the converged film.
-    fn relaxed(&self, film: &mut Film, tolerance: f64) -> Result<Step, BearingError> {
+    fn converge_fronts(&self, film: &mut Film, tolerance: f64) -> Result<Step, BearingError> {
         let mut change = f64::NAN;
         for _ in 0..limits::NEWTON_STEPS {
             let step = Step::new(film, self.position)?;
@@ -129,7 +129,7 @@ impl<'a> Search<'a> {
 
     /// Returns the bounded step of the journal towards the equilibrium, and its length before the
     /// bound.
-    fn moved(
+    fn journal_step(
         &self,
         load: Vector2<f64>,
         tangent: &Matrix2x4<f64>,
