@@ -101,7 +101,7 @@ impl BearingData {
         how.check()?;
         let tests = tables.chunks(2).map(|test| match test {
             [displacement, acceleration] => Self::from_tables(displacement, acceleration, how),
-            _ => Err(apart(&format!(
+            _ => Err(setting_error(&format!(
                 "a test needs two tables, one of displacement and one of acceleration; the number of tables is {}",
                 tables.len()
             ))),
@@ -125,7 +125,7 @@ impl BearingData {
         let (keep, rotating): (Vec<usize>, Vec<usize>) =
             (0..d.len()).partition(|row| is_kept(d.omega()[*row]));
         if keep.is_empty() {
-            return Err(apart(
+            return Err(setting_error(
                 "every frequency is a multiple of the rotation frequency (`rotation_hz`) or excluded \
                  (`without_hz`): measure frequencies between these multiples",
             ));
@@ -258,10 +258,10 @@ fn matching_responses(
     let (d, noise) = read(displacement, ResponseQuantity::Displacement)?;
     let (a, noise_of_a) = read(acceleration, ResponseQuantity::Acceleration)?;
     if (d.dof(), a.dof()) != (2, 2) {
-        return Err(apart("a bearing has two directions: choose two `points`"));
+        return Err(setting_error("a bearing has two directions: choose two `points`"));
     }
     if d.omega() != a.omega() || d.force() != a.force() {
-        return Err(apart(&format!(
+        return Err(setting_error(&format!(
             "{} and {} need the same frequencies and forces",
             displacement.file, acceleration.file
         )));
@@ -307,7 +307,7 @@ fn film_data(
     Ok(data.with_noise(NoiseSpectrum::new(omega, covariance.collect())?)?)
 }
 
-fn apart(why: &str) -> AnalysisError {
+fn setting_error(why: &str) -> AnalysisError {
     AnalysisError::Setting { setting: "frf_table", why: why.into() }
 }
 

@@ -102,7 +102,7 @@ impl Film {
             film.widen(before_choice);
             return Ok(film);
         }
-        film.take_eight(reduced, reduced_base, &common)?;
+        film.replace_by_eight(reduced, reduced_base, &common)?;
         if base.is_none() {
             film.fit = rig.with_mass(tests, &rig.least_mass())?;
         }
@@ -113,7 +113,7 @@ impl Film {
 
     /// Replaces the coefficients by eight from fits in which tests and baseline have the same known
     /// mass, `common`.
-    fn take_eight(
+    fn replace_by_eight(
         &mut self,
         rig: OutputErrorFit,
         baseline: Option<OutputErrorFit>,

@@ -162,7 +162,7 @@ impl ModeRow {
 
     /// Returns whether the mode at an index, counted from 0, belongs to a pair that an earlier mode
     /// already reports.
-    pub(super) fn is_told_before(&self, at: usize) -> bool {
+    pub(super) fn is_reported_before(&self, at: usize) -> bool {
         self.partner.is_some_and(|number| number <= at)
     }
 
@@ -171,7 +171,9 @@ impl ModeRow {
     /// reported once.
     pub fn quantities(modes: &[Self], damped: bool) -> Vec<(String, Uncertain, &'static str)> {
         let mut quantities = Vec::new();
-        for (at, mode) in modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at)) {
+        for (at, mode) in
+            modes.iter().enumerate().filter(|(at, mode)| !mode.is_reported_before(*at))
+        {
             let this_mode = (at + 1, mode.pole);
             let partner = mode.partner.map(|number| (number, modes[number - 1].pole));
             let numbers = [Some(this_mode), partner].into_iter().flatten();

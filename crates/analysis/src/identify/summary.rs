@@ -302,7 +302,7 @@ impl IdentificationSummary {
     pub fn title(&self) -> String {
         let name = Path::new(&self.file).file_name().unwrap_or_default().to_string_lossy();
         let rows = self.modes.iter().map(|mode| &mode.row).enumerate();
-        let once = rows.filter(|(at, mode)| !mode.is_told_before(*at));
+        let once = rows.filter(|(at, mode)| !mode.is_reported_before(*at));
         let modes: Vec<String> = once
             .map(|(_, mode)| {
                 let (hz, ratio) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);

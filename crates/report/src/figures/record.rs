@@ -79,7 +79,7 @@ fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
     let panel = |y: Axis, title: String, curve: Curve| {
         Panel::new(frequency, y).title(title).curve(curve.color(Color::VERMILION))
     };
-    let Some((low, high)) = reach(&points) else {
+    let Some((low, high)) = amplitude_range(&points) else {
         let nothing = Curve::line("", &[0.0, half], &[0.0, 0.0]);
         return panel(Axis::linear("Amplitude", unit(column)), "constant".into(), nothing);
     };
@@ -100,7 +100,7 @@ fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
 }
 
 /// Returns the range of an axis for these amplitudes; `None` without any.
-fn reach(points: &[(f64, f64)]) -> Option<(f64, f64)> {
+fn amplitude_range(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let amplitudes = points.iter().map(|(_, amplitude)| *amplitude);
     let strongest = amplitudes.clone().reduce(f64::max)?;
     let faintest =

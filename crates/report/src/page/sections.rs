@@ -68,7 +68,7 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
                 (Table { caption: "Channels over the window", header: &header, numbers_from: 3, rows }.html())
             }
             @for remark in &part.held().unit_remarks { p.note { (remark) "." } }
-            @if let Some(note) = part_held(part) { p.note { (note) } }
+            @if let Some(note) = buffered_part(part) { p.note { (note) } }
             (figures_of(&drawn))
         })
     })?;
@@ -80,7 +80,7 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
 
 /// Returns a sentence that says, for a long record, which statements refer to all samples and which
 /// to a part.
-fn part_held(part: &RecordReview<'_>) -> Option<String> {
+fn buffered_part(part: &RecordReview<'_>) -> Option<String> {
     let (first, last) = (part.held().first_sample, part.held().held_to()?);
     Some(format!(
         "The record is long: levels, time histories and averages over periods or segments are those of \
