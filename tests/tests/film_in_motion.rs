@@ -209,7 +209,7 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
 
 /// Motion of a rotor of `masses` times the critical mass, released at a distance of `beside`
 /// clearances from its equilibrium, with 200 steps per turn of the shaft.
-fn let_go(masses: f64, beside: f64, turns: usize) -> Record {
+fn released_orbit(masses: f64, beside: f64, turns: usize) -> Record {
     let rotor = free(masses * critical().0);
     let system = on_the_film(&rotor);
     let mut start = geometry().1;
@@ -230,7 +230,7 @@ fn critical() -> (f64, f64) {
 /// Growth rate of a small whirl of the nonlinear rotor, in 1/s, from two successive sections of ten
 /// whirl periods each.
 fn growth(masses: f64) -> f64 {
-    let x = let_go(masses, 1e-5, 60);
+    let x = released_orbit(masses, 1e-5, 60);
     let rest = geometry().1;
     let stretch = (10.0 * 200.0 / critical().1).round() as usize;
     let power = |from: usize| -> f64 {
@@ -275,7 +275,7 @@ fn the_film_in_motion_is_what_the_book_shows() {
     let mut whirl = Panel::new(across(), along()).title("oil whirl").curve(clearance());
     for masses in [1.2, 1.05] {
         // The last eight turns of the shaft, during which the rotor whirls four times.
-        let x = let_go(masses, 0.02, 200);
+        let x = released_orbit(masses, 0.02, 200);
         let last = x.len() - 8 * 200;
         let orbit = path(format!("mass {masses}"), &x, last, 8);
         let [low, high] = [f64::min, f64::max].map(|f| orbit.y().iter().copied().fold(0.0, f));

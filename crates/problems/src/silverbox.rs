@@ -47,7 +47,7 @@ pub fn start_of(realisation: usize) -> usize {
 }
 
 /// Returns one channel of the samples `start .. start + len`.
-pub fn part(record: &Record, channel: usize, start: usize, len: usize) -> Record {
+pub fn channel_window(record: &Record, channel: usize, start: usize, len: usize) -> Record {
     let window = record.window(start, len).unwrap();
     Record::from_channel(window.sampling(), window.channel(channel).to_vec()).unwrap()
 }

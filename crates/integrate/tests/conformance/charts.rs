@@ -17,7 +17,7 @@ fn amplification(scheme: &dyn Scheme, zeta: f64, angle: f64) -> Matrix3<f64> {
 
 /// Converts a matrix that Bathe (1982), section 9.4, prints for (ẍ, ẋ, x) to the order (x, Δt ẋ,
 /// Δt² ẍ).
-fn turned(printed: [[f64; 3]; 3]) -> Matrix3<f64> {
+fn reordered(printed: [[f64; 3]; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| printed[2 - i][2 - j])
 }
 
@@ -26,7 +26,7 @@ fn printed_newmark(alpha: f64, delta: f64, zeta: f64, w: f64) -> Matrix3<f64> {
     let b = 1.0 / (1.0 / (w * w) + 2.0 * zeta * delta / w + alpha);
     let k = zeta * b / w;
     let h = 0.5 - alpha;
-    turned([
+    reordered([
         [-h * b - 2.0 * (1.0 - delta) * k, -b - 2.0 * k, -b],
         [
             1.0 - delta - h * delta * b - 2.0 * (1.0 - delta) * delta * k,
@@ -46,7 +46,7 @@ fn printed_wilson(theta: f64, zeta: f64, w: f64) -> Matrix3<f64> {
     let b = 1.0 / (theta / (w * w) + zeta * theta * theta / w + theta.powi(3) / 6.0);
     let k = zeta * b / w;
     let t = theta;
-    turned([
+    reordered([
         [1.0 - b * t * t / 3.0 - 1.0 / t - k * t, -b * t - 2.0 * k, -b],
         [1.0 - 0.5 / t - b * t * t / 6.0 - k * t / 2.0, 1.0 - b * t / 2.0 - k, -b / 2.0],
         [

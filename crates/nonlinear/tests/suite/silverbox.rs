@@ -8,7 +8,7 @@ use mechid_nonlinear::{
     SteadyExperiments, SteppedRecord, Weighting, distortion, equation_error, output_error, predict,
     select_terms,
 };
-use mechid_problems::silverbox::{REALISATION, part, realisations, schroeder, start_of};
+use mechid_problems::silverbox::{REALISATION, channel_window, realisations, schroeder, start_of};
 use mechid_signal::{Extent, Record};
 use mechid_spectra::Lines;
 
@@ -33,7 +33,8 @@ fn two_terms_explain_the_schroeder_record() {
     let record = record.without_mean();
     // Periods 3 to 10 after the switch-on.
     let (start, len) = (11608 + 2 * 1024, 8 * 1024);
-    let (force, response) = (part(&record, 0, start, len), part(&record, 1, start, len));
+    let (force, response) =
+        (channel_window(&record, 0, start, len), channel_window(&record, 1, start, len));
     let lines = Lines::new(record.sampling().with_len(1024).unwrap(), 1..=335).unwrap();
     let mut data = SteadyExperiments::new(&lines, 1, DISPLACEMENT);
     data.push(&force, &response).unwrap();
@@ -64,7 +65,7 @@ fn realised(record: &Record, which: &[usize]) -> SteadyExperiments {
     let lines = Lines::new(period, 1..=2683).unwrap();
     let mut data = SteadyExperiments::new(&lines, 1, DISPLACEMENT);
     for q in which {
-        let of = |channel| part(record, channel, start_of(*q), REALISATION);
+        let of = |channel| channel_window(record, channel, start_of(*q), REALISATION);
         data.push(&of(0), &of(1)).unwrap();
     }
     data
@@ -78,7 +79,7 @@ fn rmse(
     channels: ChannelPhase,
     which: [usize; 2],
 ) -> [f64; 2] {
-    let whole = |channel| part(record, channel, 0, record.len());
+    let whole = |channel| channel_window(record, channel, 0, record.len());
     let (force, _) = channels.correct(&whole(0), &whole(1)).unwrap();
     let found = predict(system, &force, Extent::Open, &InitialState::rest(1)).unwrap();
     let shown = channels.as_measured(found.displacement()).unwrap();
@@ -118,8 +119,8 @@ fn output_error_predicts_as_well() {
     let options = EquationErrorOptions { shape: SHAPE, ..EquationErrorOptions::default() };
     let start = fit(&realised(&record, &[1, 2]), TEN, options);
     let stepped = [1, 2].map(|q| SteppedRecord {
-        force: part(&record, 0, start_of(q), REALISATION),
-        response: part(&record, 1, start_of(q), REALISATION),
+        force: channel_window(&record, 0, start_of(q), REALISATION),
+        response: channel_window(&record, 1, start_of(q), REALISATION),
         extent: Extent::WholePeriod,
         periods: 1,
     });
