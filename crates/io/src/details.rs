@@ -51,7 +51,7 @@ pub fn record_details(path: impl AsRef<Path>) -> Vec<(String, String)> {
     #[cfg(feature = "parquet")]
     if head.starts_with(b"PAR1") {
         let keys = crate::parquet::read_parquet_metadata(path).unwrap_or_default();
-        return once(keys.iter().filter_map(|(name, value)| known(name, value)));
+        return first_of_each_name(keys.iter().filter_map(|(name, value)| known(name, value)));
     }
     if head.contains(&0) {
         return Vec::new();
@@ -63,14 +63,14 @@ pub fn record_details(path: impl AsRef<Path>) -> Vec<(String, String)> {
 fn parse_details(head: &str) -> Vec<(String, String)> {
     let lines: Vec<&str> = head.lines().collect();
     if lines.first().is_some_and(|line| line.trim() == "-1") {
-        return once(universal_details(&lines));
+        return first_of_each_name(universal_details(&lines));
     }
     // In a LabVIEW header, name and value are separate fields; in other files such a line is a row
     // of names.
     let is_labview = lines.first().is_some_and(|line| line.starts_with("LabVIEW Measurement"));
     let signs: &[char] = if is_labview { &['\t', ',', ';'] } else { &[':', '='] };
     let above_table = lines.iter().take_while(|line| !begins_table(line));
-    once(above_table.filter_map(|line| {
+    first_of_each_name(above_table.filter_map(|line| {
         let line = line.trim().trim_start_matches(['#', '%', '!', ';', '*', '"']).trim_start();
         let (name, value) = line.split_once(signs)?;
         known(name, value)
@@ -111,7 +111,7 @@ fn known(name: &str, value: &str) -> Option<(String, String)> {
 }
 
 /// Keeps the first detail of each name.
-fn once(details: impl Iterator<Item = (String, String)>) -> Vec<(String, String)> {
+fn first_of_each_name(details: impl Iterator<Item = (String, String)>) -> Vec<(String, String)> {
     let mut first: Vec<(String, String)> = Vec::new();
     for (name, value) in details {
         if first.iter().all(|(other, _)| *other != name) {

@@ -81,20 +81,20 @@ struct Chunk<'a> {
 type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
-    /// Opens a file, or standard input as `-`; at most `held` rows of a text are kept in memory.
+    /// Opens a file, or standard input as `-`; at most `buffered_rows` rows of a text are kept in memory.
     ///
     /// # Errors
     /// As [`Table::read_with`].
     pub fn open(
         path: impl AsRef<Path>,
         options: &ReadOptions,
-        held: usize,
+        buffered_rows: usize,
     ) -> Result<Self, IoError> {
         let path = path.as_ref().to_owned();
         let source = Source::open(&path)?;
         let file = !standard::is_input(&path) && fs::metadata(&path).is_ok_and(|m| m.is_file());
         let again = file && source.kind() == Kind::Text;
-        let limit = if again { held } else { usize::MAX };
+        let limit = if again { buffered_rows } else { usize::MAX };
         let FirstRows { table: head, is_whole: whole, decimal, stored } =
             Table::first_rows(source, options, limit)?;
         let whole_file = fs::metadata(&path).ok().filter(|_| file);

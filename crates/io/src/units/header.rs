@@ -99,7 +99,7 @@ fn other_units(
         words.evidence == Evidence::Stated && !is_ambiguous(&words.text) && words.unit.is_some()
     };
     let words = unit_from_words(outside, wanted).filter(is_clear);
-    let words = unit_after_stroke(outside).filter(is_clear).or(words);
+    let words = unit_after_slash(outside).filter(is_clear).or(words);
     let texts: Vec<&str> = notes_of(text).collect();
     // A sensitivity beside the unit of an amplifier states the unit of the numbers.
     let is_sensitivity = |note: &&str| number_and_rest(note).is_some();
@@ -149,7 +149,7 @@ fn first_stated(
         let is_time = statement.unit.as_ref().is_some_and(|unit| unit.quantity == Quantity::Time);
         is_time && wanted.is_some_and(|wanted| wanted != Quantity::Time)
     };
-    let after_stroke = unit_after_stroke(outside).filter(|statement| !is_of_unit(statement));
+    let after_slash = unit_after_slash(outside).filter(|statement| !is_of_unit(statement));
     let notes: Vec<&str> = notes_of(text).collect();
     // Several words without a unit are a description of the channel.
     let is_description = text.split_whitespace().count() > MAX_UNIT_WORDS;
@@ -160,13 +160,13 @@ fn first_stated(
         let words = unit_from_words(outside, wanted);
         words.filter(|words| in_brackets.is_none() || is_unclear && words.unit.is_some())
     };
-    after_stroke
+    after_slash
         .clone()
         .filter(|statement| in_brackets.is_none() && is_used(statement))
         .or_else(|| of_text.clone().filter(is_used))
         .or_else(from_words)
         .or(in_brackets.clone())
-        .or(after_stroke)
+        .or(after_slash)
         .or(of_text)
 }
 
@@ -183,7 +183,7 @@ pub(crate) fn without_unit(name: &str) -> String {
     if !removed.is_empty() {
         return without_spans(name, removed.into_iter());
     }
-    if let Some((before, _)) = stroke(name) {
+    if let Some((before, _)) = split_at_slash(name) {
         return before.trim_end().into();
     }
     if Expression::parse(name).is_some() {
@@ -237,7 +237,7 @@ fn without_copy_number(name: &str) -> &str {
 }
 
 /// Splits a name at the slash before its unit: `F / kN`, `v / mm/s`.
-fn stroke(name: &str) -> Option<(&str, Expression)> {
+fn split_at_slash(name: &str) -> Option<(&str, Expression)> {
     let (before, after) = name.split_once('/')?;
     let unit = Expression::parse(after)?;
     // The slash of `vel_m/s` belongs to the unit.
@@ -260,8 +260,8 @@ fn stroke(name: &str) -> Option<(&str, Expression)> {
     (is_name && is_unit).then_some((before, unit))
 }
 
-fn unit_after_stroke(name: &str) -> Option<StatedUnit> {
-    if stroke(name).is_some() {
+fn unit_after_slash(name: &str) -> Option<StatedUnit> {
+    if split_at_slash(name).is_some() {
         let (_, text) = name.split_once('/')?;
         return Some(StatedUnit::new(text, Unit::parse(text), Evidence::Stated));
     }
