@@ -17,8 +17,8 @@ fn a_loss_of_coverage_is_noticed() {
     assert!(differences.is_empty(), "{}", differences.join("\n"));
     // The same counts with two per cent fewer intervals that contain the true value.
     let lost = coverages.into_iter().map(|of| {
-        let held = of.held - (LOSS * of.experiments as f64) as u64;
-        Coverage { held, ..of }
+        let containing_truth = of.containing_truth - (LOSS * of.experiments as f64) as u64;
+        Coverage { containing_truth, ..of }
     });
     let lost: Vec<Coverage> = lost.collect();
     assert!(alarms(&lost).unwrap().len() * 2 > lost.len(), "{lost:?}");

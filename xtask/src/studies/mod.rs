@@ -48,7 +48,7 @@ pub struct Coverage {
     /// Number of experiments.
     pub experiments: u64,
     /// Number of intervals that contain the true value.
-    pub held: u64,
+    pub containing_truth: u64,
     /// Number of identifications that failed.
     pub failed: u64,
 }
@@ -60,7 +60,7 @@ impl Coverage {
             kind,
             parameter,
             experiments: of().count() as u64,
-            held: of().filter(|interval| interval.holds()).count() as u64,
+            containing_truth: of().filter(|interval| interval.holds()).count() as u64,
             failed: of().filter(|interval| interval.estimate.is_none()).count() as u64,
         }
     }
@@ -72,10 +72,11 @@ impl Coverage {
     /// A message if there are no experiments.
     pub fn alarm(&self) -> Result<Option<String>, String> {
         let Limits { fewest, .. } = Limits::new(self.experiments)?;
-        let Self { kind, parameter, experiments, held, failed } = self;
-        Ok((*held < fewest).then(|| {
+        let Self { kind, parameter, experiments, containing_truth, failed } = self;
+        Ok((*containing_truth < fewest).then(|| {
             format!(
-                "{kind}: {held} of {experiments} intervals of {parameter} hold ({failed} fits failed), where {fewest} are the fewest expected"
+                "{kind}: {containing_truth} of {experiments} intervals of {parameter} hold ({failed} fits failed), where \
+                 {fewest} are the fewest expected"
             )
         }))
     }

@@ -19,12 +19,12 @@ pub(super) fn table(coverages: &[Coverage]) -> Result<String, String> {
     let mut text = String::from(
         "| Experiment | Parameter | Experiments | Hold | Hold, % | Alarm below | Wide above | Failed |\n|---|---|---|---|---|---|---|---|\n",
     );
-    for Coverage { kind, parameter, experiments, held, failed } in coverages {
+    for Coverage { kind, parameter, experiments, containing_truth, failed } in coverages {
         let limits = Limits::new(*experiments)?;
         let _ = writeln!(
             text,
-            "| {kind} | {parameter} | {experiments} | {held} | {:.2} | {} | {} | {failed} |",
-            100.0 * *held as f64 / *experiments as f64,
+            "| {kind} | {parameter} | {experiments} | {containing_truth} | {:.2} | {} | {} | {failed} |",
+            100.0 * *containing_truth as f64 / *experiments as f64,
             limits.fewest,
             limits.most
         );
@@ -116,14 +116,18 @@ pub fn differences(root: &Path, coverages: &[Coverage]) -> Result<Vec<String>, S
     if rows.len() != coverages.len() {
         return Ok(vec![format!("{} rows, and {} computed", rows.len(), coverages.len())]);
     }
-    for (row, Coverage { kind, parameter, experiments, held, .. }) in rows.iter().zip(coverages) {
+    for (row, Coverage { kind, parameter, experiments, containing_truth, .. }) in
+        rows.iter().zip(coverages)
+    {
         let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
         let is_same = cells.len() == 8
             && [cells[0], cells[1]] == [*kind, *parameter]
             && cells[2].parse() == Ok(*experiments)
-            && cells[3].parse().is_ok_and(|committed: u64| committed.abs_diff(*held) <= ROUNDING);
+            && cells[3]
+                .parse()
+                .is_ok_and(|committed: u64| committed.abs_diff(*containing_truth) <= ROUNDING);
         if !is_same {
-            differences.push(format!("{row}\n{held} of {experiments} computed"));
+            differences.push(format!("{row}\n{containing_truth} of {experiments} computed"));
         }
     }
     Ok(differences)

@@ -14,9 +14,9 @@ use super::slips::Slip;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Key {
     /// `true` for the frequency domain, `false` for the time domain.
-    pub frequency: bool,
+    pub is_frequency_domain: bool,
     /// `true` for the bearing, `false` for the single degree of freedom.
-    pub bearing: bool,
+    pub is_bearing: bool,
     /// Tables 5.3.1 and 5.3.2 leave the coefficient of the force free in two columns.
     pub free_force: bool,
     /// Samples of one period.
@@ -36,8 +36,8 @@ impl Key {
         let free_force = matches!(cell.table.as_str(), "5.3.1" | "5.3.2")
             && matches!(cell.method, Method::Rk4 | Method::CentralDifference);
         Some(Self {
-            frequency: cell.domain == "frequency",
-            bearing: cell.parameter.len() == 3,
+            is_frequency_domain: cell.domain == "frequency",
+            is_bearing: cell.parameter.len() == 3,
             free_force,
             nt: cell.nt?,
             npi_tenths: (cell.npi? * 10.0).round() as u32,
@@ -50,8 +50,8 @@ impl Key {
         match slip {
             Slip::CentralDifferenceLead => self.method == Method::CentralDifference,
             Slip::WilsonLoadLag => self.method == Method::WilsonTheta,
-            Slip::HarmonicOffset => self.frequency,
-            Slip::StiffnessSign => self.bearing && self.method != Method::Rk4,
+            Slip::HarmonicOffset => self.is_frequency_domain,
+            Slip::StiffnessSign => self.is_bearing && self.method != Method::Rk4,
             Slip::RungeKuttaStageLoads => self.method == Method::Rk4,
             Slip::FreeForceCoefficient => self.free_force,
             Slip::LostSigns => false,
@@ -60,7 +60,7 @@ impl Key {
 
     /// Returns the simulation of this key.
     pub fn case(self) -> Case {
-        let machine = if self.bearing {
+        let machine = if self.is_bearing {
             Machine::Bearing { kyx: mechid::model::KyxSign::Minus }
         } else {
             Machine::SDOF
@@ -139,7 +139,7 @@ impl Results {
 fn estimate(key: Key) -> Result<Estimates, String> {
     let right = correct(key.case(), key.method)?;
     let fit: fn(&Sequences) -> Listed =
-        if key.frequency { estimates::frequency } else { estimates::time };
+        if key.is_frequency_domain { estimates::frequency } else { estimates::time };
     Ok(Estimates {
         slipped: replay(key, None)?,
         correct: fit(&right)?,
@@ -153,7 +153,7 @@ fn replay(key: Key, undone: Option<Slip>) -> Listed {
     let sequences = slipped_but(key.case(), key.method, undone)?;
     let offset = undone != Some(Slip::HarmonicOffset);
     let free_force = key.free_force && undone != Some(Slip::FreeForceCoefficient);
-    match (key.frequency, offset, free_force) {
+    match (key.is_frequency_domain, offset, free_force) {
         (false, _, _) => estimates::time(&sequences),
         (true, true, true) => estimates::frequency_offset_free_force(&sequences),
         (true, true, false) => estimates::frequency_offset(&sequences),

@@ -82,20 +82,22 @@ pub fn slipped_but(case: Case, method: Method, undone: Option<Slip>) -> Result<S
         integrate_periodic(scheme(method).as_ref(), &system, &force).map_err(words)?
     };
     let response = match method {
-        Method::CentralDifference if applied(Slip::CentralDifferenceLead) => lead(&response),
-        Method::WilsonTheta if applied(Slip::WilsonLoadLag) => lag(&response),
+        Method::CentralDifference if applied(Slip::CentralDifferenceLead) => {
+            displacement_early(&response)
+        }
+        Method::WilsonTheta if applied(Slip::WilsonLoadLag) => all_early(&response),
         _ => response,
     };
     Ok(Sequences { machine, response, force })
 }
 
 /// Returns the response with only the displacement stored one sample early.
-fn lead(response: &Response) -> Response {
+fn displacement_early(response: &Response) -> Response {
     stored(response, response.velocity().clone(), response.acceleration().clone())
 }
 
 /// Returns the response with all quantities stored one sample early.
-fn lag(response: &Response) -> Response {
+fn all_early(response: &Response) -> Response {
     let (velocity, acceleration) = (response.velocity(), response.acceleration());
     stored(response, one_sample_early(velocity), one_sample_early(acceleration))
 }
