@@ -81,7 +81,8 @@ struct Chunk<'a> {
 type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
-    /// Opens a file, or standard input as `-`; at most `buffered_rows` rows of a text are kept in memory.
+    /// Opens a file, or standard input as `-`; at most `buffered_rows` rows of a text are kept in
+    /// memory.
     ///
     /// # Errors
     /// As [`Table::read_with`].
