@@ -236,17 +236,19 @@ impl Spread<'_> {
     /// Returns the standard errors of the real and imaginary parts of dφ = −U f, where f is the
     /// change of the equations of motion due to the parameters.
     fn shape_error(&self, sensitivity: &Sensitivity) -> DVector<Complex<f64>> {
-        let answers = &sensitivity.answers;
-        let n = answers.ncols();
-        if sensitivity.push.iter().any(|p| !(p.re.is_finite() && p.im.is_finite())) {
+        let response = &sensitivity.response;
+        let n = response.ncols();
+        if sensitivity.force_change.iter().any(|p| !(p.re.is_finite() && p.im.is_finite())) {
             return DVector::from_element(n, Complex::new(f64::INFINITY, f64::INFINITY));
         }
-        let of_push = self.covariance.covariance_of_sums(&sensitivity.push, self.equations, n);
-        let deviation = |weights: DVector<f64>| weights.dot(&(&of_push * &weights)).max(0.0).sqrt();
+        let of_force_change =
+            self.covariance.covariance_of_sums(&sensitivity.force_change, self.equations, n);
+        let deviation =
+            |weights: DVector<f64>| weights.dot(&(&of_force_change * &weights)).max(0.0).sqrt();
         DVector::from_fn(n, |entry, _| {
-            let answer = |i: usize| answers[(entry, i % n)];
-            let re = |i: usize, _| if i < n { answer(i).re } else { -answer(i).im };
-            let im = |i: usize, _| if i < n { answer(i).im } else { answer(i).re };
+            let response_to = |i: usize| response[(entry, i % n)];
+            let re = |i: usize, _| if i < n { response_to(i).re } else { -response_to(i).im };
+            let im = |i: usize, _| if i < n { response_to(i).im } else { response_to(i).re };
             let deviations =
                 [DVector::from_fn(2 * n, re), DVector::from_fn(2 * n, im)].map(deviation);
             Complex::new(deviations[0], deviations[1])
@@ -301,9 +303,9 @@ struct Sensitivity {
     eigenvalue: DVector<Complex<f64>>,
     /// Derivative of each parameter's equation of motion with respect to this parameter, at fixed
     /// λ.
-    push: Vec<Complex<f64>>,
+    force_change: Vec<Complex<f64>>,
     /// Matrix U of dφ = −U f for changes f of the equations of motion, n×n.
-    answers: DMatrix<Complex<f64>>,
+    response: DMatrix<Complex<f64>>,
 }
 
 impl Sensitivity {
@@ -331,7 +333,7 @@ impl Sensitivity {
         // A change of entry (i, j) affects only equation i, so n right-hand sides are enough.
         let mut unit = DMatrix::identity(n + 1, n);
         let regular = bordered.lu().solve_mut(&mut unit);
-        let push = |parameter: &Parameter| {
+        let force_change = |parameter: &Parameter| {
             let power = match parameter.matrix() {
                 Matrix::Mass => lambda * lambda,
                 Matrix::Damping => lambda,
@@ -339,13 +341,13 @@ impl Sensitivity {
             };
             if regular { power * shape[parameter.column()] } else { Complex::from(f64::NAN) }
         };
-        let push: Vec<Complex<f64>> = parameters.iter().map(push).collect();
+        let force_change: Vec<Complex<f64>> = parameters.iter().map(force_change).collect();
         let of_eigenvalue =
-            parameters.iter().zip(&push).map(|(p, push)| unit[(n, p.row())] * -push);
+            parameters.iter().zip(&force_change).map(|(p, change)| unit[(n, p.row())] * -change);
         Self {
             eigenvalue: DVector::from_iterator(parameters.len(), of_eigenvalue),
-            answers: unit.rows(0, n).into_owned(),
-            push,
+            response: unit.rows(0, n).into_owned(),
+            force_change,
         }
     }
 }

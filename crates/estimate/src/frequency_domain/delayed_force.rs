@@ -4,7 +4,7 @@ use mechid_model::Matrix;
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVectorView};
 
-use super::equation_error::{late_weight, motions, real_rows, weighted_rows};
+use super::equation_error::{delay_weight, motions, real_rows, weighted_rows};
 use crate::Unknowns;
 use crate::equation_of_motion::{Columns, equations_by_columns};
 use crate::relations::Relations;
@@ -36,7 +36,7 @@ impl<'a> DelayedForce<'a> {
     /// Prepares the fit for forces on the degrees of freedom `driven`, counted from 0. `None` if
     /// the data do not determine an entry; this does not depend on the delay.
     pub fn new(data: &'a FrequencyData, unknowns: &Unknowns, driven: &[usize]) -> Option<Self> {
-        Self::weighted(data, late_weight(data), unknowns, driven)
+        Self::weighted(data, delay_weight(data), unknowns, driven)
     }
 
     /// Prepares the fit with given weights, a pure number for each line.

@@ -82,7 +82,7 @@ pub(super) fn weighted_equation_errors<'a>(
 
 /// Returns a weight for each row of a search for a delay. The weight follows from the stated noise
 /// and is 0 on lines with much noise; it is 1 if no noise is stated.
-pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
+pub(super) fn delay_weight(data: &FrequencyData) -> Vec<f64> {
     match noise_weight(data, WEIGHTING_CLEAR) {
         Some(weight) => (0..data.len()).map(weight).collect(),
         None => vec![1.0; data.len()],

@@ -26,7 +26,7 @@ pub(super) struct InitialEstimates<'a> {
     /// Data as measured. Open records are under a Hann window, which reduces their transients.
     data: Cow<'a, FrequencyData>,
     /// Number of unknown transient loads; their initial estimates are zero.
-    ends: usize,
+    transient_loads: usize,
     unknowns: &'a Unknowns,
     noise: Cow<'a, NoiseSpectrum>,
     equations: Vec<Equation>,
@@ -66,8 +66,8 @@ impl<'a> InitialEstimates<'a> {
         };
         let equations =
             (0..unknowns.dof()).map(equation).filter(|e| !e.parameters.is_empty()).collect();
-        let ends = transient::len(data);
-        let lines = match ends {
+        let transient_loads = transient::len(data);
+        let lines = match transient_loads {
             0 => Cow::Borrowed(data),
             _ => Cow::Owned(data.under_hann_window()),
         };
@@ -79,7 +79,7 @@ impl<'a> InitialEstimates<'a> {
         };
         Self {
             data,
-            ends,
+            transient_loads,
             unknowns,
             noise,
             equations,
@@ -117,15 +117,15 @@ impl<'a> InitialEstimates<'a> {
         let families = std::iter::once(total).chain(ordinary);
         let families = families.chain(single.map(|start| vec![start]));
         let relations = Relations::from_unknowns(self.unknowns);
-        let with_ends = |start: DVector<f64>| {
+        let with_transient_loads = |start: DVector<f64>| {
             let independent = match &relations {
                 None => start,
                 Some(relations) => relations.unknowns(start.as_slice()),
             };
-            let len = independent.len() + self.ends;
+            let len = independent.len() + self.transient_loads;
             independent.resize_vertically(len, 0.0)
         };
-        families.map(|family| family.into_iter().map(with_ends).collect()).collect()
+        families.map(|family| family.into_iter().map(with_transient_loads).collect()).collect()
     }
 
     /// Returns the estimates of every round of weighting, beginning with the weights of `start`;

@@ -81,15 +81,15 @@ pub(super) fn search<P: Restartable>(
             None => None,
         });
         let needed = if ends.explained() { RESTART_CONFIRMED } else { CONFIRMED_OTHERWISE };
-        if (ends.searches >= needed && !ends.many()) || time_limit::is_over() {
+        if (ends.searches >= needed && !ends.is_ambiguous()) || time_limit::is_over() {
             break;
         }
     }
     if !ends.all_agree() {
         restart(problem, &mut ends);
     }
-    if let Some(open) = ends.open() {
-        ends.push(minimise(problem, open, SEARCH_STEPS));
+    if let Some(unconverged) = ends.unconverged() {
+        ends.push(minimise(problem, unconverged, SEARCH_STEPS));
     }
     let failed = EstimateError::NotConverged { searches: ends.searches, steps: SEARCH_STEPS };
     let is_result = |end: &End| end.minimum.converged || time_limit::is_over();
@@ -171,7 +171,7 @@ fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
         problem.resample(None);
         let gained = ends.push(moved.and_then(|m| minimise(problem, m.parameters, STEPS_MORE)));
         without_gain = if gained { 0 } else { without_gain + 1 };
-        let enough = if ends.many() { RESTARTS_AMONG_MANY } else { RESTART_RESTARTS };
+        let enough = if ends.is_ambiguous() { RESTARTS_AMONG_MANY } else { RESTART_RESTARTS };
         if without_gain >= enough {
             return;
         }
@@ -262,7 +262,7 @@ impl Ends {
 
     /// Returns whether the noise explains the difference between the two smallest sums of squares,
     /// or the best search has not converged.
-    fn many(&self) -> bool {
+    fn is_ambiguous(&self) -> bool {
         let Some(best) = self.distinct.first() else { return true };
         let bound = best.minimum.cost * self.plausible.factor;
         let close = self.distinct.get(1).is_some_and(|next| next.minimum.cost <= bound);
@@ -270,14 +270,15 @@ impl Ends {
     }
 
     /// Returns the best point if its search has not converged.
-    fn open(&self) -> Option<DVector<f64>> {
+    fn unconverged(&self) -> Option<DVector<f64>> {
         let best = &self.distinct.first()?.minimum;
         (!best.converged).then(|| best.parameters.clone())
     }
 
     /// Returns one of the best points, in turn.
     fn turn(&self, at: usize) -> Option<DVector<f64>> {
-        let count = if self.many() { RESTART_RESTARTED.min(self.distinct.len()) } else { 1 };
+        let count =
+            if self.is_ambiguous() { RESTART_RESTARTED.min(self.distinct.len()) } else { 1 };
         let end = self.distinct.get(at.checked_rem(count)?)?;
         Some(end.minimum.parameters.clone())
     }

@@ -276,7 +276,7 @@ fn interval<M: ResponseModel>(
     if fit.minimum.at_bound[at] {
         let rise = (fit.error_scale() * fit.quantile(confidence)).powi(2);
         let first = (fit.space.start[at] - value).abs().max(1e-6 * value.abs());
-        let end = |direction| profile::end(fit, at, direction, 0.01 * first, rise);
+        let end = |direction| profile::limit(fit, at, direction, 0.01 * first, rise);
         let interval = if value <= min { [value, end(1.0)] } else { [end(-1.0), value] };
         return (interval, IntervalKind::OneSided);
     }
@@ -287,7 +287,7 @@ fn interval<M: ResponseModel>(
         return (wald, IntervalKind::Wald);
     }
     let rise = (fit.error_scale() * quantile).powi(2);
-    let end = |direction| profile::end(fit, at, direction, quantile * error, rise);
+    let end = |direction| profile::limit(fit, at, direction, quantile * error, rise);
     ([end(-1.0), end(1.0)], IntervalKind::Profile)
 }
 

@@ -16,7 +16,7 @@ use super::search::{Bounds, Effort, minimise};
 /// # Source
 /// Venzon & Moolgavkar (1988), Applied Statistics 37, 87–94; Raue et al. (2009), Bioinformatics 25,
 /// 1923–1929.
-pub(super) fn end<M: ResponseModel>(
+pub(super) fn limit<M: ResponseModel>(
     fit: &Fit<'_, M>,
     parameter: usize,
     direction: f64,

@@ -129,7 +129,7 @@ impl<'a> Local<'a> {
     }
 
     /// Returns the decrease of the sum of squares that the linearisation predicts for a change.
-    fn promise(&self, change: &DVector<f64>) -> f64 {
+    fn predicted_decrease(&self, change: &DVector<f64>) -> f64 {
         let moved = &self.linearisation.jacobian * change;
         -(2.0 * self.linearisation.residual.dot(&moved) + moved.norm_squared())
     }
@@ -254,12 +254,16 @@ fn descend<P: LeastSquaresProblem>(
                 parameters.iter().zip(step.iter()).map(|(value, by)| value + by).collect();
             bounds.clamp(&mut next);
             let change = DVector::from_fn(next.len(), |at, _| next[at] - parameters[at]);
-            let promise = local.promise(&change);
+            let predicted_decrease = local.predicted_decrease(&change);
             let lower = problem
                 .evaluate(&next)
                 .map(|evaluation| (problem.residual(&evaluation).norm_squared(), evaluation));
             if let Some((lower, evaluation)) = lower.filter(|(lower, _)| *lower < cost) {
-                let gain = if promise > 0.0 { (cost - lower) / promise } else { 0.0 };
+                let gain = if predicted_decrease > 0.0 {
+                    (cost - lower) / predicted_decrease
+                } else {
+                    0.0
+                };
                 *damping *= f64::max(0.1, 1.0 - (2.0 * gain - 1.0).powi(3));
                 *damping = if *damping < LEAST_DAMPING { 0.0 } else { *damping };
                 return Some((next, evaluation));

@@ -40,7 +40,7 @@ struct Explained {
     /// covariance V of s.
     p_value: f64,
     /// Fraction of the residual power that the term explains.
-    part: f64,
+    fraction: f64,
     columns: usize,
     changes: DVector<f64>,
     covariance: DMatrix<f64>,
@@ -82,7 +82,7 @@ impl PartsOfFit<'_> {
         let errors = best.covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
         Some(OmittedTerms {
             term: best.term,
-            explained: best.part,
+            explained: best.fraction,
             // This is Bonferroni's bound for the smallest p-value of all terms.
             p_value: (explained.len() as f64 * least).min(1.0),
             changes: best.changes.clone(),
@@ -129,7 +129,7 @@ impl PartsOfFit<'_> {
         Some(Explained {
             term,
             p_value: law.sf(squares / (rank as f64 * level)),
-            part: squares / self.linear.cost(),
+            fraction: squares / self.linear.cost(),
             columns: rank,
             changes,
             covariance: &to_parameters * covariance * to_parameters.transpose() * level,
@@ -141,7 +141,8 @@ impl Explained {
     /// Returns half of the difference in Schwarz's criterion: the model with the term minus the
     /// model without it.
     fn evidence(&self, fit: &PartsOfFit<'_>) -> f64 {
-        let (count, left) = (fit.linear.residual.len() as f64, (1.0 - self.part).max(f64::EPSILON));
+        let (count, left) =
+            (fit.linear.residual.len() as f64, (1.0 - self.fraction).max(f64::EPSILON));
         0.5 * (count * left.ln() + self.columns as f64 * count.ln())
     }
 }
