@@ -75,8 +75,8 @@ impl Coverage {
         let Self { kind, parameter, experiments, containing_truth, failed } = self;
         Ok((*containing_truth < fewest).then(|| {
             format!(
-                "{kind}: {containing_truth} of {experiments} intervals of {parameter} hold ({failed} fits failed), where \
-                 {fewest} are the fewest expected"
+                "{kind}: {containing_truth} of {experiments} intervals of {parameter} hold ({failed} fits \
+                 failed), where {fewest} are the fewest expected"
             )
         }))
     }
