@@ -123,7 +123,7 @@ impl SpectralResidual {
     }
 
     /// Sets the lines with most of the misfit of all records.
-    pub(super) fn hold_misfit(&mut self, lines: Option<Concentration>) {
+    pub(super) fn set_concentration(&mut self, lines: Option<Concentration>) {
         self.concentration = lines;
     }
 

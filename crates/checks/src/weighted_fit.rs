@@ -257,14 +257,14 @@ impl<'a> Weighing<'a> {
     /// Returns the columns that are projected out of the residual of a record. For an open record
     /// these are steps between the final and initial values of each channel; for periods whose
     /// noise is the response to an unmeasured force, they are the transients of this response.
-    fn jumps(&self, at: usize, values: &DVector<f64>) -> Vec<DVector<f64>> {
+    fn end_effects(&self, at: usize, values: &DVector<f64>) -> Vec<DVector<f64>> {
         let entries = self.entries_of(values);
         let weighted = |data: FrequencyData| {
             let covariance = |row| self.covariance(at, row);
             Whitened::residual_of(&data, self.estimate.unknowns(), &entries, covariance)
         };
         let (record, channels) = (&self.records[at], 0..self.records[at].dof());
-        let jumps: Vec<FrequencyData> = match self.extent {
+        let end_effects: Vec<FrequencyData> = match self.extent {
             Extent::Open => channels.map(|channel| record.step_data(channel)).collect(),
             Extent::WholePeriod if has_unmeasured_force(record) => {
                 let loads = |dof| (0..FIT_LOADS as usize).map(move |power| (dof, power));
@@ -272,7 +272,7 @@ impl<'a> Weighing<'a> {
             }
             Extent::WholePeriod => Vec::new(),
         };
-        jumps.into_iter().filter_map(weighted).map(|jump| jump.residual).collect()
+        end_effects.into_iter().filter_map(weighted).map(|effect| effect.residual).collect()
     }
 
     /// Returns the residual of a record, given its values and the columns that the parameters
@@ -281,13 +281,13 @@ impl<'a> Weighing<'a> {
         &self,
         at: usize,
         system: Option<&SecondOrderSystem>,
-        jumps: &[DVector<f64>],
+        end_effects: &[DVector<f64>],
         (values, explained): (DVector<f64>, DMatrix<f64>),
     ) -> SpectralResidual {
         let (data, is_stated) = (&self.records[at], self.noise.is_some());
         let is_noise = self.extent == Extent::WholePeriod && has_unmeasured_force(data);
         let with_ends = is_noise.then(|| (values.clone(), explained.clone()));
-        let (values, explained) = without(jumps, values, explained);
+        let (values, explained) = without(end_effects, values, explained);
         let force_noise = if is_stated { None } else { force_decides(data, self.estimate) };
         let likely =
             system.and_then(|system| likely_force(data, system, |row| self.covariance(at, row)));
@@ -311,14 +311,14 @@ impl WeightedFit {
         let residuals = weighted.into_iter().zip(explained).enumerate();
         let residuals = residuals.map(|(at, (weighted, explained))| {
             let remainder = weighted.residual - &explained * &coefficients;
-            let jumps = weighing.jumps(at, &values);
-            weighing.residual(at, system.as_ref(), &jumps, (remainder, explained))
+            let end_effects = weighing.end_effects(at, &values);
+            weighing.residual(at, system.as_ref(), &end_effects, (remainder, explained))
         });
         let mut records: Vec<SpectralResidual> = residuals.collect();
         let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
         if parts.len() == records.len() {
             let lines = concentration(&parts);
-            records.iter_mut().for_each(|record| record.hold_misfit(lines.clone()));
+            records.iter_mut().for_each(|record| record.set_concentration(lines.clone()));
         }
         let noise_stated = weighing.noise.is_some();
         Some(Self { records, noise_stated, step: weighing.small.then_some(step) })
