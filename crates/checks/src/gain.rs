@@ -8,7 +8,7 @@ use mechid_model::Parameter;
 
 use super::digits::three_digits;
 use super::finding::{Check, Finding, Names};
-use super::limits::{GAIN_AGREES, GAIN_NEAR, GAIN_SHOWS};
+use super::limits::{GAIN_AGREES, GAIN_NEAR, GAIN_SIGNIFICANT};
 use super::{Subject, Verdict};
 
 /// Damping and stiffness that are symmetric except for one factor between two degrees of freedom,
@@ -60,7 +60,7 @@ pub fn gain_symmetry(estimate: &Estimate) -> Option<Finding> {
             + spread.variance_of(q) / below.powi(2)
             - 2.0 * spread.between(p, q) / (above * below);
         let log = (above / below).ln();
-        (log.is_finite() && variance > 0.0 && log * log > GAIN_SHOWS.powi(2) * variance)
+        (log.is_finite() && variance > 0.0 && log * log > GAIN_SIGNIFICANT.powi(2) * variance)
             .then_some([log, variance])
     };
     let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));

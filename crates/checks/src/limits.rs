@@ -113,7 +113,7 @@ pub const UNMEASURED_FORCE: f64 = 0.1;
 /// Minimum deviation of the ratio of two mirrored entries from 1, in standard errors, for a gain to
 /// be reported. Both ratios, in damping and in stiffness, must have this deviation; a smaller
 /// deviation may be due to noise.
-pub const GAIN_SHOWS: f64 = 5.0;
+pub const GAIN_SIGNIFICANT: f64 = 5.0;
 
 /// Maximum difference, in standard errors, between the ratios of mirrored entries in damping and in
 /// stiffness that count as the same gain.
@@ -171,7 +171,7 @@ pub(crate) const PARABOLAS: usize = 8;
 pub(crate) const LONGEST_STEP: f64 = 2.0;
 
 /// Minimum ratio of successive parabola widths in the search for a delay or a corner frequency.
-pub(crate) const LEAST_PART: f64 = 0.1;
+pub(crate) const LEAST_WIDTH_RATIO: f64 = 0.1;
 
 /// Parabola width, in samples, that ends the search for a delay.
 pub(crate) const DELAY_RESOLVED: f64 = 0.005;

@@ -4,7 +4,7 @@ use mechid_estimate::frequency_domain::ChangedRecords;
 use mechid_signal::Extent;
 use mechid_spectra::FrequencyData;
 
-use super::limits::{LEAST_PART, LONGEST_STEP, PARABOLAS};
+use super::limits::{LEAST_WIDTH_RATIO, LONGEST_STEP, PARABOLAS};
 use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::after_spectral_fit;
 
@@ -53,7 +53,7 @@ pub(super) fn minimum_near(
         if !promises(least, step.abs() < LONGEST_STEP) {
             return None;
         }
-        width *= f64::clamp(step.abs(), LEAST_PART, 1.0);
+        width *= f64::clamp(step.abs(), LEAST_WIDTH_RATIO, 1.0);
         if width < resolved {
             break;
         }

@@ -79,7 +79,7 @@ pub(crate) const MAX_PERIODS: usize = 16;
 pub(crate) const MIN_PERIODS: usize = 3;
 
 /// Maximum number of buffered samples over all channels: 8 MB.
-pub(crate) const MAX_HELD: usize = 1 << 20;
+pub(crate) const MAX_BUFFERED: usize = 1 << 20;
 
 /// Maximum number of Fisher scoring steps for the level of white noise; a few are usually enough.
 pub(crate) const LEVEL_ROUNDS: usize = 60;
@@ -223,7 +223,7 @@ pub(crate) const SINUSOID_BESIDE: f64 = 0.1;
 pub(crate) const SINUSOID_MOST: usize = 16;
 
 /// Maximum number of candidate lines in the search for sinusoids.
-pub(crate) const LOOKED_AT: usize = 96;
+pub(crate) const MAX_CANDIDATES: usize = 96;
 
 /// Number of frequencies per line at which receptances are averaged for the level around a line.
 pub(crate) const GAINS_PER_LINE: usize = 16;

@@ -15,7 +15,7 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::frequency_data::FrequencyData;
 use crate::limits::{
-    GAINS_PER_LINE, LOOKED_AT, SINUSOID_AROUND, SINUSOID_BESIDE, SINUSOID_CONSPICUOUS,
+    GAINS_PER_LINE, MAX_CANDIDATES, SINUSOID_AROUND, SINUSOID_BESIDE, SINUSOID_CONSPICUOUS,
     SINUSOID_EXPLAINED, SINUSOID_FEWEST, SINUSOID_FITTED, SINUSOID_FREQUENCIES, SINUSOID_LEFT,
     SINUSOID_MOST, SINUSOID_NEXT, SINUSOID_ROUNDS, SINUSOID_SECTIONS,
 };
@@ -196,7 +196,7 @@ impl<'a> Search<'a> {
         });
         let mut windowed = hann(&self.residual);
         let mut least = SINUSOID_CONSPICUOUS;
-        for _ in 0..LOOKED_AT {
+        for _ in 0..MAX_CANDIDATES {
             let Some((ratio, at)) = self.most_conspicuous(&windowed) else { break };
             if ratio <= least || sinusoids.len() >= SINUSOID_MOST {
                 break;

@@ -4,7 +4,7 @@
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::limits::{MAX_HELD, MAX_PERIODS, MIN_PERIODS};
+use crate::limits::{MAX_BUFFERED, MAX_PERIODS, MIN_PERIODS};
 
 /// Consecutive periods, buffered until their spectrum can be taken as the spectrum of one record.
 ///
@@ -28,7 +28,7 @@ pub(crate) struct BetweenLines {
 ///
 /// The groups have nearly equal sizes; a group is as large as the buffer allows.
 pub(crate) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
-    let most = (MAX_HELD / (period * channels).max(1)).min(MAX_PERIODS);
+    let most = (MAX_BUFFERED / (period * channels).max(1)).min(MAX_PERIODS);
     if most.min(remaining) < MIN_PERIODS {
         return 1;
     }
@@ -124,6 +124,6 @@ mod tests {
             assert_eq!(parts, expected, "{periods}");
         }
         // A period has as many samples as the buffer, half as many, or a third as many.
-        assert_eq!([1, 2, 3].map(|parts| periods_as_one(6, MAX_HELD / parts, 1)), [1, 1, 3]);
+        assert_eq!([1, 2, 3].map(|parts| periods_as_one(6, MAX_BUFFERED / parts, 1)), [1, 1, 3]);
     }
 }
