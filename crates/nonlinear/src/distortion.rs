@@ -56,7 +56,7 @@ pub struct Distortion {
     pub odd: Option<Level>,
     /// Fraction (RMS) of the force that a linear model does not explain, on the lines of the band.
     /// Each line is weighted by the receptance of the linear model.
-    pub linear_leaves: f64,
+    pub linear_unexplained: f64,
     /// Kinds of terms, by decreasing explained fraction.
     pub kinds: Vec<Kind>,
 }
@@ -90,7 +90,7 @@ pub fn distortion(
     for [force, response] in experiments {
         data.push(force, response)?;
     }
-    let (linear_leaves, kinds) = kinds(&data, unknowns)?;
+    let (linear_unexplained, kinds) = kinds(&data, unknowns)?;
     let lines = Lines::new(lines.sampling(), data.lines().iter().copied())?;
     let [mut even, mut odd] = [None::<Level>; 2];
     for [force, response] in experiments {
@@ -101,7 +101,7 @@ pub fn distortion(
             }
         }
     }
-    Ok(Distortion { even, odd, linear_leaves, kinds })
+    Ok(Distortion { even, odd, linear_unexplained, kinds })
 }
 
 /// Returns the levels on the lines without force, first for even lines, then for odd lines, if only

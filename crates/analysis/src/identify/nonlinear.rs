@@ -386,7 +386,7 @@ impl NonlinearSummary {
             distortion: distortion.as_ref().map(|distortion| DistortionRow {
                 even: distortion.even,
                 odd: distortion.odd,
-                linear_leaves: distortion.linear_leaves,
+                linear_leaves: distortion.linear_unexplained,
                 text: distortion.to_string(),
             }),
             extrapolation: fit.extrapolations()?.into_iter().map(ExtrapolationRow::new).collect(),

@@ -255,9 +255,9 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the residuals of a record, samples × channels.
-    fn gaps(&self, at: usize, record: &Prepared) -> DMatrix<f64> {
-        let gaps: Vec<_> = (0..self.dof()).map(|dof| self.gap(at, record, dof)).collect();
-        DMatrix::from_columns(&gaps)
+    fn residuals(&self, at: usize, record: &Prepared) -> DMatrix<f64> {
+        let residuals: Vec<_> = (0..self.dof()).map(|dof| self.gap(at, record, dof)).collect();
+        DMatrix::from_columns(&residuals)
     }
 
     /// Returns the residuals of a record, or derivatives of them, with their weights.
@@ -289,9 +289,9 @@ impl<'a> Problem<'a> {
     fn weigh(&self, residual: &mut DVector<f64>) {
         let mut at = 0;
         for (number, record) in self.records.iter().enumerate() {
-            let gaps = self.weighted(number, self.gaps(number, record));
-            residual.rows_mut(at, gaps.len()).copy_from_slice(gaps.as_slice());
-            at += gaps.len();
+            let residuals = self.weighted(number, self.residuals(number, record));
+            residual.rows_mut(at, residuals.len()).copy_from_slice(residuals.as_slice());
+            at += residuals.len();
         }
     }
 
@@ -396,7 +396,7 @@ impl<'a> Problem<'a> {
     /// values `rmse`.
     fn white_residuals(&self, rmse: &[f64]) -> Result<Vec<Record>, EstimateError> {
         let residuals = self.records.iter().enumerate().map(|(at, record)| {
-            let mut residuals = self.weighted(at, self.gaps(at, record));
+            let mut residuals = self.weighted(at, self.residuals(at, record));
             for (mut column, rmse) in residuals.column_iter_mut().zip(rmse) {
                 let size = (column.norm_squared() / column.len() as f64).sqrt();
                 column *= if size > 0.0 { rmse / size } else { 0.0 };

@@ -138,8 +138,8 @@ impl Problem<'_> {
             lines_of(record, deviations.columns(0, n) - force_response)
         });
         let noise: Vec<_> = noise.collect::<Option<_>>()?;
-        let gaps: Vec<DVector<f64>> = (0..n).map(|dof| self.gap(at, record, dof)).collect();
-        let residual = lines_of(record, DMatrix::from_columns(&gaps))?;
+        let residuals: Vec<DVector<f64>> = (0..n).map(|dof| self.gap(at, record, dof)).collect();
+        let residual = lines_of(record, DMatrix::from_columns(&residuals))?;
         let response = lines_of(record, record.response.data().clone())?;
         let (len, periods) = (record.response.len(), noise.len());
         for line in 0..residual.nrows() {
@@ -174,7 +174,7 @@ impl Problem<'_> {
             let path = NoisePath::new(&motion);
             let varies = |force: &[f64]| force.iter().any(|value| *value != force[0]);
             let driven: Vec<bool> = (0..n).map(|dof| varies(record.plain.channel(dof))).collect();
-            let variances = most_likely(&path, &self.gaps(at, record), &driven)?;
+            let variances = most_likely(&path, &self.residuals(at, record), &driven)?;
             let filter = path.filter(&variances)?;
             Some((path, filter))
         };
@@ -185,7 +185,7 @@ impl Problem<'_> {
     pub(super) fn is_white(&self) -> bool {
         let level = SIGNIFICANT / (self.records.len() * self.dof()) as f64;
         self.records.iter().enumerate().all(|(at, record)| {
-            let residual = self.weighted(at, self.gaps(at, record));
+            let residual = self.weighted(at, self.residuals(at, record));
             let lags = WHITE_LAGS.min(residual.nrows() / 4);
             residual.column_iter().all(|column| {
                 whiteness(column.as_slice(), lags).is_ok_and(|test| test.p_value >= level)
@@ -199,7 +199,7 @@ impl Problem<'_> {
         inverse: &DMatrix<f64>,
     ) -> (DMatrix<f64>, StandardErrors, usize) {
         let residuals: Vec<DMatrix<f64>> = (self.records.iter().enumerate())
-            .map(|(at, record)| self.weighted(at, self.gaps(at, record)))
+            .map(|(at, record)| self.weighted(at, self.residuals(at, record)))
             .collect();
         let square: f64 = residuals.iter().map(DMatrix::norm_squared).sum();
         let freedom = self.len().saturating_sub(theta.len());
