@@ -42,7 +42,7 @@ pub fn frequency_domain(
     lines: &[usize],
     noise: &Noise,
 ) -> Result<IdentifiedForce, ForceError> {
-    let places = system.places();
+    let places = system.inputs();
     measured.check(system.sensors().max(places), forced)?;
     if let Some(&dof) = forced.iter().find(|dof| **dof >= places) {
         return Err(ForceError::NoSuchDof { dof, dofs: places });

@@ -20,7 +20,7 @@ pub struct IdentifiedForce {
     spectrum: OnceLock<Spectrum>,
     standard_error: Option<Record>,
     /// Residual of the measured channels; `None` if there are not more channels than forces.
-    rest: Option<Residual>,
+    residual: Option<Residual>,
     /// Band of record and standard error; `None`: all frequencies.
     band_hz: Option<[f64; 2]>,
 }
@@ -34,7 +34,13 @@ impl PartialEq for IdentifiedForce {
 impl IdentifiedForce {
     /// Creates a force of unknown uncertainty.
     pub(crate) fn from_record(record: Record) -> Self {
-        Self { record, spectrum: OnceLock::new(), standard_error: None, rest: None, band_hz: None }
+        Self {
+            record,
+            spectrum: OnceLock::new(),
+            standard_error: None,
+            residual: None,
+            band_hz: None,
+        }
     }
 
     /// Returns the same force with its standard error, on the same time axis.
@@ -44,8 +50,8 @@ impl IdentifiedForce {
     }
 
     /// Returns the same force with the residual of the measured channels.
-    pub(crate) fn with_residual(mut self, rest: Option<Residual>) -> Self {
-        self.rest = rest;
+    pub(crate) fn with_residual(mut self, residual: Option<Residual>) -> Self {
+        self.residual = residual;
         self
     }
 
@@ -96,7 +102,7 @@ impl IdentifiedForce {
     }
 
     pub(crate) fn residual(&self) -> Option<&Residual> {
-        self.rest.as_ref()
+        self.residual.as_ref()
     }
 
     /// Force F̂(t), in N: samples × degrees of freedom.
@@ -128,6 +134,6 @@ impl IdentifiedForce {
     /// `None` if there are as many forces as channels, and for [`continuous`](crate::continuous())
     /// and [`discretised`](crate::discretised()), which have no residual.
     pub fn unexplained(&self) -> Option<&[Unexplained]> {
-        self.rest.as_ref().map(Residual::channels)
+        self.residual.as_ref().map(Residual::channels)
     }
 }

@@ -13,12 +13,12 @@ type Line = Complex<f64>;
 /// Ratio of measured channels to forces, frequency by frequency, from M, C and K or from modes.
 pub trait FrequencyResponse {
     /// Returns the number of places where a force can act.
-    fn places(&self) -> usize;
+    fn inputs(&self) -> usize;
 
     /// Returns the number of places where a channel can measure; [`Channel::dof`] is an index of
     /// these places.
     fn sensors(&self) -> usize {
-        self.places()
+        self.inputs()
     }
 
     /// Returns measured channels × forces at ω (rad/s); `None` where it is not finite.
@@ -51,7 +51,7 @@ pub trait FrequencyResponse {
 }
 
 impl FrequencyResponse for SecondOrderSystem {
-    fn places(&self) -> usize {
+    fn inputs(&self) -> usize {
         self.dof()
     }
 
@@ -131,7 +131,7 @@ impl Transfer<'_> {
     }
 
     fn measures_everything_once(&self) -> bool {
-        let n = self.system.places();
+        let n = self.system.inputs();
         let mut measured = vec![false; n];
         self.channels.iter().filter(|c| c.dof < n).for_each(|c| measured[c.dof] = true);
         self.forced.len() == n && self.channels.len() == n && measured.iter().all(|m| *m)

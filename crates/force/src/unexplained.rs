@@ -19,7 +19,7 @@ use crate::transfer::{FrequencyResponse, Transfer};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unexplained {
     /// Measured response minus the response to the identified force, in the unit of the channel.
-    pub rest: f64,
+    pub residual: f64,
     /// The larger of the measured response and the response to the identified force, in the unit of
     /// the channel.
     pub motion: f64,
@@ -29,7 +29,7 @@ pub struct Unexplained {
     pub noise: Option<f64>,
     /// Residual expected from the uncertainty of the system, in the unit of the channel, from
     /// [`with_uncertain_system`](crate::with_uncertain_system); otherwise `None`.
-    pub machine: Option<f64>,
+    pub system: Option<f64>,
 }
 
 impl Unexplained {
@@ -39,7 +39,7 @@ impl Unexplained {
     /// The larger of the two responses is the reference, since the response of a dead sensor is
     /// zero.
     pub fn share(&self) -> f64 {
-        if self.motion > 0.0 { self.rest / self.motion } else { 0.0 }
+        if self.motion > 0.0 { self.residual / self.motion } else { 0.0 }
     }
 }
 
@@ -55,15 +55,15 @@ impl Residual {
     fn new(measured: &DMatrix<f64>, residual: DMatrix<f64>, noise: Option<Vec<f64>>) -> Self {
         let channels = (0..residual.ncols())
             .map(|c| {
-                let (rest, seen) = (residual.column(c), measured.column(c));
+                let (column, seen) = (residual.column(c), measured.column(c));
                 Unexplained {
-                    rest: rms(rest.norm_squared(), residual.nrows()),
+                    residual: rms(column.norm_squared(), residual.nrows()),
                     motion: rms(
-                        seen.norm_squared().max((seen - rest).norm_squared()),
+                        seen.norm_squared().max((seen - column).norm_squared()),
                         residual.nrows(),
                     ),
                     noise: noise.as_ref().map(|level| level[c]),
-                    machine: None,
+                    system: None,
                 }
             })
             .collect();
@@ -183,7 +183,7 @@ impl Residual {
     /// system.
     pub fn with_machine(mut self, variance: &DMatrix<f64>) -> Self {
         for (channel, variance) in self.channels.iter_mut().zip(variance.column_iter()) {
-            channel.machine = Some(rms(variance.sum(), variance.len()));
+            channel.system = Some(rms(variance.sum(), variance.len()));
         }
         self
     }

@@ -170,7 +170,7 @@ impl ModalSystem {
 }
 
 impl FrequencyResponse for ModalSystem {
-    fn places(&self) -> usize {
+    fn inputs(&self) -> usize {
         self.inputs.len()
     }
 

@@ -62,13 +62,13 @@ impl Measured {
 /// Returns the expected unexplained share of the response due to noise and the uncertainty of the
 /// machine.
 fn expected(unexplained: &Unexplained) -> Option<f64> {
-    let level = unexplained.noise?.hypot(unexplained.machine.unwrap_or(0.0));
+    let level = unexplained.noise?.hypot(unexplained.system.unwrap_or(0.0));
     (unexplained.motion > 0.0).then_some(level / unexplained.motion)
 }
 
 fn is_too_much(unexplained: &Unexplained) -> bool {
-    let machine = unexplained.machine.unwrap_or(0.0);
-    let known = unexplained.rest > TOO_MUCH * unexplained.noise.unwrap_or(0.0).hypot(machine);
+    let system = unexplained.system.unwrap_or(0.0);
+    let known = unexplained.residual > TOO_MUCH * unexplained.noise.unwrap_or(0.0).hypot(system);
     known && unexplained.share() > if unexplained.noise.is_some() { LITTLE } else { SELDOM_NOISE }
 }
 

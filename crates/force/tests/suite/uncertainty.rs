@@ -138,7 +138,7 @@ fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
     let uncertain = uncertain(&["c11", "k12"], &dmatrix![0.2, 0.0; 0.3, 0.4]);
     let rests = |s: &SecondOrderSystem| -> Vec<f64> {
         let found = frequency_domain(s, &measured, &[1], &LINES, &noise).unwrap();
-        found.unexplained().unwrap().iter().map(|channel| channel.rest).collect()
+        found.unexplained().unwrap().iter().map(|channel| channel.residual).collect()
     };
     let found =
         with_uncertain_system(&uncertain, |s| frequency_domain(s, &measured, &[1], &LINES, &noise));
@@ -153,8 +153,8 @@ fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
     for (channel, sum) in found.unexplained().unwrap().iter().zip(sums) {
         let seen = (sum / draws as f64).sqrt();
 
-        assert!(channel.rest < 1e-9 * seen);
-        let ratio = channel.machine.unwrap() / seen;
+        assert!(channel.residual < 1e-9 * seen);
+        let ratio = channel.system.unwrap() / seen;
         // The limits allow for the accuracy of 2,000 draws and for second-order effects.
         assert!((ratio - 1.0).abs() < 0.04, "{ratio:.3}");
     }

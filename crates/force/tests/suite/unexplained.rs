@@ -74,12 +74,12 @@ fn on_lines_the_rest_is_that_of_least_squares() {
     }
     for (c, channel) in found.unexplained().unwrap().iter().enumerate() {
         let [rest, seen, made] = powers[c].map(f64::sqrt);
-        close(channel.rest, rest, 1e-9);
+        close(channel.residual, rest, 1e-9);
         close(channel.motion, seen.max(made), 1e-9);
         close(channel.share(), rest / seen.max(made), 1e-9);
         // Four lines of 64 samples hold 8 of 64 real parts of white noise.
         close(channel.noise.unwrap(), level[c] * (8.0_f64 / 64.0).sqrt(), 1e-12);
-        assert!(channel.share() > 0.01 && channel.machine.is_none());
+        assert!(channel.share() > 0.01 && channel.system.is_none());
     }
 }
 
@@ -115,7 +115,7 @@ fn a_dead_sensor_is_wholly_unexplained() {
     let channel = found.unexplained().unwrap()[1];
     // The other sensor is much more accurate and thus determines the force and the expected
     // response.
-    close(channel.rest, size, 1e-9);
+    close(channel.residual, size, 1e-9);
     close(channel.share(), 1.0, 1e-12);
 }
 
@@ -132,7 +132,7 @@ fn noise_leaves_what_its_level_says() {
         let noise = Noise::PerChannel(level.to_vec());
         let found = frequency_domain(&bearing(), &noisy, &[0], &LINES, &noise).unwrap();
         let channels = found.unexplained().unwrap();
-        sum += channels.iter().map(|c| (c.rest / c.noise.unwrap()).powi(2)).sum::<f64>();
+        sum += channels.iter().map(|c| (c.residual / c.noise.unwrap()).powi(2)).sum::<f64>();
     }
     // Two channels and one force leave one of two complex numbers per line. χ² with eight degrees
     // of freedom, divided by eight, has a standard deviation of 1/2; its mean over 400 runs has a
@@ -170,7 +170,7 @@ fn is_rest_of(
         let (seen, made) = (measured.record().column(c), made.record().column(c));
         let size = (seen.len() as f64).sqrt();
         assert!(channel.share() > 0.02, "{}", channel.share());
-        close(channel.rest, (seen - made).norm() / size, 1e-6);
+        close(channel.residual, (seen - made).norm() / size, 1e-6);
         close(channel.motion, seen.norm().max(made.norm()) / size, 1e-6);
     }
 }
@@ -199,7 +199,7 @@ fn on_open_records_the_rest_is_that_of_the_motion_which_the_force_makes() {
             ResponseQuantity::Acceleration => continue,
         };
         let rest = measured.record().column(c) - found.column(described.dof);
-        close(channel.rest, rest.norm() / 120f64.sqrt(), 1e-9);
+        close(channel.residual, rest.norm() / 120f64.sqrt(), 1e-9);
     }
     assert!(channels.iter().all(|c| c.noise.is_none()));
 }
