@@ -84,14 +84,14 @@ impl Covariance {
         let blocks: Vec<BlockProducts> =
             lines.blocks.par_iter().zip(&projection.blocks).map(products).collect();
         let outputs = lines.outputs.len();
-        let (mut meat, sensor) =
+        let (mut score_variance, sensor) =
             sensor_variance(fit, noise, &mean, &blocks, &pairs, &shapes, &scale);
         let scores = Scores { pairs: &pairs, shapes: &shapes, scale: &scale };
-        let add = |mode| scores.add_process(fit, noise, mode, &blocks, &mut meat);
+        let add = |mode| scores.add_process(fit, noise, mode, &blocks, &mut score_variance);
         let process: Vec<ProcessEffect> = (0..modes).map(add).collect();
         let inverse = symmetric_inverse(&normal.curvature, size)?;
-        let meat = DMatrix::from_vec(size, size, meat);
-        let parameters = &inverse * meat * &inverse;
+        let score_variance = DMatrix::from_vec(size, size, score_variance);
+        let parameters = &inverse * score_variance * &inverse;
         let columns = projection.triangle.size;
         let unknowns_by_parameter = DMatrix::from_fn(2 * modes, size, |row, column| {
             unknowns_by_parameter[column * columns + row]
@@ -342,19 +342,19 @@ fn sensor_variance(
 ) -> (Vec<f64>, Vec<DMatrix<f64>>) {
     let (modes, size) = (fit.model.modes(), 2 * pairs.len());
     let outputs = fit.lines.outputs.len();
-    let mut meat = vec![0.0; size * size];
+    let mut score_variance = vec![0.0; size * size];
     let mut unknowns = vec![DMatrix::zeros(2 * modes, 2 * modes); outputs];
     for (block, products) in fit.lines.blocks.iter().zip(blocks) {
         let ratios = noise_ratios(fit, noise, mean, block);
         let weighted: Vec<f64> =
             shapes.iter().enumerate().map(|(k, x)| x * ratios[k % outputs].sqrt()).collect();
         let turned = turn(&products.gram, pairs, &ShapeProducts::new(&weighted, modes), scale);
-        meat.iter_mut().zip(&turned).for_each(|(to, part)| *to += part);
+        score_variance.iter_mut().zip(&turned).for_each(|(to, part)| *to += part);
         for (unknowns, ratio) in unknowns.iter_mut().zip(&ratios) {
             unknowns.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);
         }
     }
-    (meat, unknowns)
+    (score_variance, unknowns)
 }
 
 /// Returns, for every line, the mean over the outputs of the ratio of the sensor noise variance to

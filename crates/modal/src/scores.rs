@@ -93,15 +93,15 @@ pub(crate) struct Scores<'a> {
 }
 
 impl Scores<'_> {
-    /// Adds to `meat` the variance of the score due to the unmeasured force on one mode, and
-    /// returns the effect of this force on the shape of the mode.
+    /// Adds to `score_variance` the variance of the score due to the unmeasured force on one mode,
+    /// and returns the effect of this force on the shape of the mode.
     pub(crate) fn add_process(
         &self,
         fit: &Fit<'_>,
         noise: &Noise,
         mode: usize,
         blocks: &[BlockProducts],
-        meat: &mut [f64],
+        score_variance: &mut [f64],
     ) -> ProcessEffect {
         let (lines, size) = (fit.lines, 2 * self.pairs.len());
         let (along, direction) = self.along(mode, lines.outputs.len());
@@ -139,7 +139,7 @@ impl Scores<'_> {
                 }
             }
             let part = transposed_product(&scores, &scores, rows);
-            meat.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
+            score_variance.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
             let influence = &products.influence[4 * mode * n..(4 * mode + 4) * n];
             let unknown = |row: usize, line: usize| {
                 let derivatives = &influence[2 * row * n..(2 * row + 2) * n];
