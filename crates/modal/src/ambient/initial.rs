@@ -45,7 +45,7 @@ pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let lines = SearchLines { pooled: &pooled, coarse: &pooled, span: band.span };
     let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
         let initial = initial_parameters(modes, band.outputs(), &pooled, band, kernel, phase);
-        search(initial, lines, Effort::HELD)
+        search(initial, lines, Effort::FIXED_POLES)
     });
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     let rough = search(best.parameters, lines, Effort::SHORT)?;

@@ -46,7 +46,7 @@ pub(super) const POOLING: f64 = 0.1;
 /// Maximum difference between the mean spectrum of pooled lines and the spectrum at their centre,
 /// relative to that spectrum in each direction of the outputs; a group with a larger difference is
 /// divided.
-pub(super) const EVEN: f64 = 0.01;
+pub(super) const MAX_POOLING_CHANGE: f64 = 0.01;
 
 /// Width of pooled lines for the comparison of initial estimates and for the information of a step,
 /// as a share of the distance to the nearest pole.
@@ -64,7 +64,7 @@ pub(super) const MOST_NOISE_TERMS: usize = 15;
 
 /// Gain in log-likelihood of a step below which a search ends: a step with a smaller gain moves the
 /// parameters by less than a twentieth of their standard errors.
-pub(super) const ENOUGH: f64 = 1e-3;
+pub(super) const MIN_GAIN: f64 = 1e-3;
 
 /// Largest step of the logarithm of a damping ratio or of another unknown of unit scale.
 pub(super) const LARGEST_STEP: f64 = 0.7;

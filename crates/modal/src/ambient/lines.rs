@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
 use super::likelihood::{noise, positive_factor};
-use super::limits::EVEN;
+use super::limits::MAX_POOLING_CHANGE;
 use super::parameters::{Parameters, Span};
 use super::spectrum::Coefficients;
 use super::transient::Transient;
@@ -127,7 +127,7 @@ impl BandLines {
         let whitened = lower
             .solve_lower_triangular(&change)
             .and_then(|half| lower.solve_lower_triangular(&half.adjoint()));
-        whitened.is_some_and(|whitened| whitened.norm() < EVEN)
+        whitened.is_some_and(|whitened| whitened.norm() < MAX_POOLING_CHANGE)
     }
 
     /// Returns groups of neighbouring lines, see [`Self::pooled`].

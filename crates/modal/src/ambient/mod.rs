@@ -114,7 +114,7 @@ pub fn identify_ambient(
     let (chosen, dropped) = choose(&candidates, &band, requested);
     let [from_hz, to_hz] = band_hz;
     let none = AmbientError::NoMode { candidates: dropped.len(), from_hz, to_hz };
-    let Chosen { fitted, sound: accepted } = chosen.ok_or(none)?;
+    let Chosen { fitted, accepted } = chosen.ok_or(none)?;
     let identified = accepted.len();
     if let Some(asked) = settings.modes.filter(|asked| *asked > identified) {
         return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
@@ -135,7 +135,7 @@ pub fn identify_ambient(
         log_likelihood: -fitted.cost,
         misfit,
         force_correlation: &factor * factor.transpose(),
-        spectrum: FittedSpectrum { parameters, scale: band.scale, sound: accepted, excluded_hz },
+        spectrum: FittedSpectrum { parameters, scale: band.scale, accepted, excluded_hz },
     })
 }
 
@@ -143,7 +143,7 @@ impl AmbientEstimate {
     /// Fits the spectrum again to `record`, a part of the original record, and returns the modes of
     /// this part.
     pub(crate) fn refitted(&self, record: &Record) -> Result<Vec<AmbientMode>, AmbientError> {
-        let FittedSpectrum { parameters, scale, sound, excluded_hz } = &self.spectrum;
+        let FittedSpectrum { parameters, scale, accepted, excluded_hz } = &self.spectrum;
         let record = harmonics::subtracted(record, excluded_hz)?;
         let band = band_lines(&record, self.band_hz, excluded_hz)?;
         let start = parameters.with_units(scale, &band.scale);
@@ -152,7 +152,7 @@ impl AmbientEstimate {
         let fitted = search_pooled(start, &band, Effort::FULL)
             .and_then(|fit| search_with_transient(fit, &band))
             .ok_or(failed)?;
-        fitted_modes(&fitted, &band, sound, &[])
+        fitted_modes(&fitted, &band, accepted, &[])
     }
 }
 
@@ -170,7 +170,7 @@ fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2])
 fn fitted_modes(
     fitted: &FitWithTransient,
     band: &BandLines,
-    sound: &[usize],
+    accepted: &[usize],
     sinusoids: &[Harmonic],
 ) -> Result<Vec<AmbientMode>, AmbientError> {
     let FitWithTransient { fit, lines, .. } = fitted;
@@ -182,7 +182,7 @@ fn fitted_modes(
     let bias = fit.bias(&pooled, band.span).unwrap_or_else(|| DVector::zeros(size));
     let statistics = Statistics { covariance: &covariance, bias: &bias };
     let scale = RecordScale { span: band.span, scale: &band.scale };
-    ambient_modes(fit, statistics, sound, scale, sinusoids)
+    ambient_modes(fit, statistics, accepted, scale, sinusoids)
 }
 
 fn ambient_modes(

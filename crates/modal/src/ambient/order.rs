@@ -30,7 +30,7 @@ pub(super) struct Wanted {
 pub(super) struct Chosen {
     pub fitted: FitWithTransient,
     /// Indices of the poles that are modes; the other poles explain a background or noise.
-    pub sound: Vec<usize>,
+    pub accepted: Vec<usize>,
 }
 
 struct Choice<'a> {
@@ -66,7 +66,8 @@ pub(super) fn choose(
             None => Some(known),
         })
         .map(|known| choice.confirmed(known));
-    let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
+    let chosen =
+        fit.map(|fit| choice.select_modes(fit)).filter(|chosen| !chosen.accepted.is_empty());
     (chosen, choice.dropped)
 }
 
@@ -107,33 +108,33 @@ impl Choice<'_> {
     }
 
     /// Separates modes from other poles, and keeps at most the requested number.
-    fn judged(&mut self, fitted: FitWithTransient) -> Chosen {
+    fn select_modes(&mut self, fitted: FitWithTransient) -> Chosen {
         let fit = &fitted.fit;
-        let mut sound = Vec::new();
+        let mut accepted = Vec::new();
         for mode in 0..fit.parameters.layout.modes {
             match self.broken_rule(fit, mode) {
                 Some(reason) => self.drop_mode(&fit.parameters, mode, reason),
-                None => sound.push(mode),
+                None => accepted.push(mode),
             }
         }
         let number = self.wanted.exactly.unwrap_or(self.wanted.most);
         let covariance = fit.covariance();
-        while sound.len() > number {
+        while accepted.len() > number {
             let evidence =
                 |mode: &usize| covariance.as_ref().map_or(0.0, |c| wald(&fit.parameters, c, *mode));
-            let weakest = (0..sound.len())
-                .min_by(|a, b| evidence(&sound[*a]).total_cmp(&evidence(&sound[*b])))
+            let weakest = (0..accepted.len())
+                .min_by(|a, b| evidence(&accepted[*a]).total_cmp(&evidence(&accepted[*b])))
                 .unwrap_or(0);
-            let mode = sound.remove(weakest);
+            let mode = accepted.remove(weakest);
             self.drop_mode(&fit.parameters, mode, DropReason::NumberReached { number });
         }
         // A search may change the order of the poles by frequency.
         let omega = |mode: &usize| fit.parameters.omega(*mode);
-        sound.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
-        Chosen { fitted, sound }
+        accepted.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
+        Chosen { fitted, accepted }
     }
 
-    fn sound_modes(&self, fit: &Fit) -> usize {
+    fn accepted_modes(&self, fit: &Fit) -> usize {
         let modes = 0..fit.parameters.layout.modes;
         modes.filter(|mode| self.broken_rule(fit, *mode).is_none()).count()
     }
@@ -141,10 +142,10 @@ impl Choice<'_> {
     /// Removes insignificant modes, one after another.
     fn pruned(&mut self, mut fit: Fit) -> Fit {
         while fit.parameters.layout.modes > 0 && !time_limit::is_over() {
-            if self.wanted.exactly.is_some_and(|n| self.sound_modes(&fit) <= n) {
+            if self.wanted.exactly.is_some_and(|n| self.accepted_modes(&fit) <= n) {
                 break;
             }
-            let Some((next, mode, reason)) = self.refused(&fit) else { break };
+            let Some((next, mode, reason)) = self.without_insignificant_mode(&fit) else { break };
             self.drop_mode(&fit.parameters, mode, reason);
             fit = next;
         }
@@ -165,7 +166,7 @@ impl Choice<'_> {
 
     /// Returns the fit without an insignificant mode, if there is such a mode; strong modes are not
     /// tested.
-    fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
+    fn without_insignificant_mode(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
         let needed = self.penalty();
         let gain = |next: &Fit| {
             let penalty = self.penalty_of_noise(next) - self.penalty_of_noise(fit);
@@ -198,7 +199,7 @@ impl Choice<'_> {
         &self,
         known: &FitWithTransient,
     ) -> Option<(FitWithTransient, usize, DropReason)> {
-        if self.wanted.exactly.is_some_and(|n| self.sound_modes(&known.fit) <= n) {
+        if self.wanted.exactly.is_some_and(|n| self.accepted_modes(&known.fit) <= n) {
             return None;
         }
         let needed = self.penalty();
@@ -239,7 +240,7 @@ impl Choice<'_> {
         let mut refused: Vec<f64> = Vec::new();
         while refusals < REFUSALS && !time_limit::is_over() {
             let poles = fit.parameters.layout.modes;
-            let full = self.sound_modes(&fit) >= limit || poles >= limit + NUISANCE_POLES;
+            let full = self.accepted_modes(&fit) >= limit || poles >= limit + NUISANCE_POLES;
             let Some(candidates) = scan(&fit.parameters, self.band) else { break };
             let near = |omega: f64, other: &f64| (omega - other).abs() < 0.01 * omega;
             let fresh = candidates.into_iter().find(|candidate| {
@@ -249,7 +250,7 @@ impl Choice<'_> {
             let Some(candidate) = fresh else { break };
             // The scan only estimates the gain, for one direction at an approximate pole.
             let promising = candidate.gain > 0.5 * self.penalty();
-            let is_stated = self.wanted.exactly.is_some_and(|n| self.sound_modes(&fit) < n);
+            let is_stated = self.wanted.exactly.is_some_and(|n| self.accepted_modes(&fit) < n);
             if !promising && !is_stated {
                 break;
             }
@@ -261,8 +262,8 @@ impl Choice<'_> {
                 Ok(next) => {
                     // A pole that is not a mode may explain a background, but only a few such poles
                     // are useful.
-                    let modes = self.sound_modes(&next);
-                    refusals += usize::from(modes <= self.sound_modes(&fit));
+                    let modes = self.accepted_modes(&next);
+                    refusals += usize::from(modes <= self.accepted_modes(&fit));
                     fit = next;
                 }
                 Err(reason) => {

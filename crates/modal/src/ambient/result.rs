@@ -189,7 +189,7 @@ pub(super) struct FittedSpectrum {
     /// Unit of each output in the parameters.
     pub scale: Vec<f64>,
     /// Indices of the poles that are modes.
-    pub sound: Vec<usize>,
+    pub accepted: Vec<usize>,
     /// Frequencies of the excluded sinusoids, in Hz.
     pub excluded_hz: Vec<f64>,
 }

@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::information::information;
 use super::likelihood::{cost, gradient};
-use super::limits::{COARSE_POOLING, ENOUGH, LARGEST_STEP, POOLING};
+use super::limits::{COARSE_POOLING, LARGEST_STEP, MIN_GAIN, POOLING};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Parameters, Span};
 use crate::decomposition::hermitian_eigen;
@@ -59,7 +59,8 @@ impl Effort {
     /// Effort to compare quantities at initial estimates. The initial poles are more accurate than
     /// the initial amplitudes. With wrong amplitudes, a search with free poles would move a damping
     /// ratio to nearly zero, the value for a sinusoid, and no later search would increase it again.
-    pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true, even_pools: false };
+    pub const FIXED_POLES: Self =
+        Self { iterations: 20, slow: 0.5, holds_poles: true, even_pools: false };
     /// Effort to approach the maximum with coarsely pooled lines.
     pub const SHORT: Self =
         Self { iterations: 6, slow: 0.5, holds_poles: false, even_pools: false };
@@ -132,7 +133,7 @@ fn search_with_information(
             continue;
         }
         slow += 1;
-        if slow >= SLOW_STEPS || (gain < ENOUGH && path.updates == 0) {
+        if slow >= SLOW_STEPS || (gain < MIN_GAIN && path.updates == 0) {
             break;
         }
         path.renew(&mut fit)?;
@@ -175,7 +176,7 @@ impl Path<'_> {
                     self.updates += 1;
                     return Some(gain);
                 }
-                if -0.5 * step.dot(&self.slope) < ENOUGH {
+                if -0.5 * step.dot(&self.slope) < MIN_GAIN {
                     break;
                 }
             }
