@@ -95,7 +95,7 @@ impl<'a> Inverse<'a> {
     /// For modes far above the unit, the numerical range of the operator has a size of 1/unit
     /// around zero. Until these modes converge, the estimates of their eigenvalues lie anywhere in
     /// this range.
-    pub(super) fn suits(&mut self, omega: f64) -> bool {
+    pub(super) fn rescale_if_far(&mut self, omega: f64) -> bool {
         let is_far = self.shift == Complex::ZERO
             && omega > limits::VELOCITY_SCALE_RATIO * self.scale
             && omega.is_finite();

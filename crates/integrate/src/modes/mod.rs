@@ -168,7 +168,7 @@ fn search_modes(
             }
             best = best.max(usable);
             if let Some(last) = modes.get(count - 1)
-                && inverse.suits(last.mode.mode.natural_frequency())
+                && inverse.rescale_if_far(last.mode.mode.natural_frequency())
             {
                 space = Space::new(len);
                 continue;

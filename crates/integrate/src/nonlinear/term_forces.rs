@@ -31,7 +31,8 @@ impl TermForces {
     /// [`ModelError::Coefficients`] unless there is one finite coefficient for each term.
     pub fn new(terms: &Terms, coefficients: &[f64]) -> Result<Self, ModelError> {
         terms.check_coefficients(coefficients)?;
-        let mut dofs: Vec<usize> = terms.iter().flat_map(|term| ends(term.coordinate())).collect();
+        let mut dofs: Vec<usize> =
+            terms.iter().flat_map(|term| dofs_of(term.coordinate())).collect();
         dofs.sort_unstable();
         dofs.dedup();
         let index = |dof: usize| dofs.binary_search(&dof).expect("an end of a term");
@@ -46,7 +47,7 @@ impl TermForces {
 }
 
 /// The degrees of freedom of a coordinate.
-fn ends(coordinate: Coordinate) -> Vec<usize> {
+fn dofs_of(coordinate: Coordinate) -> Vec<usize> {
     match coordinate {
         Coordinate::Dof(i) => vec![i],
         Coordinate::Difference(i, j) => vec![i, j],

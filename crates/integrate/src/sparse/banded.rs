@@ -40,16 +40,16 @@ struct Band {
 impl Band {
     fn from_matrix(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> Self {
         let n = matrix.nrows();
-        let places = ordering.places(n);
+        let new_indices = ordering.new_indices(n);
         let (mut lower, mut upper) = (0, 0);
         for (i, j, _) in matrix.triplet_iter() {
-            let (i, j) = (places[i], places[j]);
+            let (i, j) = (new_indices[i], new_indices[j]);
             lower = lower.max(i.saturating_sub(j));
             upper = upper.max(j.saturating_sub(i));
         }
         let mut band = Self { n, lower, upper, entries: vec![0.0; n * (2 * lower + upper + 1)] };
         for (i, j, value) in matrix.triplet_iter() {
-            let at = band.at(places[i], places[j]);
+            let at = band.at(new_indices[i], new_indices[j]);
             band.entries[at] = *value;
         }
         band

@@ -32,14 +32,14 @@ impl Ordering {
     }
 
     /// Returns the new index of every old index.
-    pub(crate) fn places(&self, n: usize) -> Vec<usize> {
-        let mut places: Vec<usize> = (0..n).collect();
+    pub(crate) fn new_indices(&self, n: usize) -> Vec<usize> {
+        let mut new_indices: Vec<usize> = (0..n).collect();
         if let Some(old) = &self.old {
             for (new, &old) in old.iter().enumerate() {
-                places[old as usize] = new;
+                new_indices[old as usize] = new;
             }
         }
-        places
+        new_indices
     }
 
     /// Copies `from` in the old order to `to` in the new one.
@@ -65,11 +65,11 @@ impl Ordering {
 
     /// Returns the largest distance of an entry from the diagonal.
     fn width(&self, pattern: &SparsityPattern) -> usize {
-        let places = self.places(pattern.major_dim());
+        let new_indices = self.new_indices(pattern.major_dim());
         let mut width = 0;
-        for (i, &place) in places.iter().enumerate() {
+        for (i, &new) in new_indices.iter().enumerate() {
             for &j in pattern.lane(i) {
-                width = width.max(place.abs_diff(places[j]));
+                width = width.max(new.abs_diff(new_indices[j]));
             }
         }
         width

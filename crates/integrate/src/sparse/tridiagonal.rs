@@ -31,10 +31,10 @@ impl Tridiagonal {
         if n < 4 {
             return None;
         }
-        let places = ordering.places(n);
+        let new_indices = ordering.new_indices(n);
         let [mut below, mut pivots, mut above] = [(); 3].map(|()| vec![0.0; n]);
         for (i, j, value) in matrix.triplet_iter() {
-            let (i, j) = (places[i], places[j]);
+            let (i, j) = (new_indices[i], new_indices[j]);
             match j.checked_sub(i) {
                 Some(0) => pivots[i] = *value,
                 Some(_) => above[i] = *value,

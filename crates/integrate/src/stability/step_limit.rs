@@ -25,7 +25,7 @@ pub(crate) struct Examined<'a> {
 type Prepare<'a> = dyn Fn(&dyn System, f64) -> Result<Box<dyn Stepper>, IntegrateError> + 'a;
 
 /// The system, if it is small enough for its whole amplification matrix.
-fn whole(system: &dyn System) -> Option<&SecondOrderSystem> {
+fn small_dense(system: &dyn System) -> Option<&SecondOrderSystem> {
     match system.matrices() {
         Matrices::Dense(dense) if dense.dof() <= limits::AMPLIFICATION_DOF => Some(dense),
         _ => None,
@@ -46,7 +46,7 @@ impl Examined<'_> {
         if passive && self.is_known_stable(system, dt) {
             return Ok(());
         }
-        let radius = match whole(system) {
+        let radius = match small_dense(system) {
             Some(dense) => small_growth(stepper, dense, dt, limits::TOLERATED_GROWTH)?,
             None if passive => self.growth_of_fastest(system, dt)?,
             None => {
@@ -142,7 +142,7 @@ impl Examined<'_> {
     }
 
     pub(super) fn limit(&self, fastest: &Fastest<'_>) -> Result<Option<f64>, IntegrateError> {
-        if let Some(dense) = whole(fastest.system) {
+        if let Some(dense) = small_dense(fastest.system) {
             return self.small_limit(dense);
         }
         let motions = match self.stable_steps {

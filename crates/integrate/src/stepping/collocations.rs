@@ -313,7 +313,7 @@ struct ProbeState {
     unit: Option<usize>,
     asked: Vec<Asked>,
     /// True while Newton's method continues at the last collocation.
-    goes_on: bool,
+    continues_at_last: bool,
 }
 
 /// Instant (s), displacement and velocity of the last evaluation at a collocation.
@@ -349,7 +349,7 @@ impl NonlinearForce for Probe {
         let mut state = self.state();
         // After Newton's method has read the tangent of a constant force, it evaluates the force
         // exactly once more.
-        if std::mem::take(&mut state.goes_on) {
+        if std::mem::take(&mut state.continues_at_last) {
             state.asked.pop();
         }
         let at = state.asked.len();
@@ -358,7 +358,7 @@ impl NonlinearForce for Probe {
     }
 
     fn tangents(&self, _: f64, _: &[f64], _: &[f64], tangents: &mut Tangents) -> bool {
-        self.state().goes_on = true;
+        self.state().continues_at_last = true;
         tangents.stiffness.fill(0.0);
         tangents.damping.fill(0.0);
         true

@@ -119,7 +119,7 @@ pub(crate) struct Simulation {
     pub(crate) state: Vec<f64>,
     change: Vec<f64>,
     /// Accumulated rounding errors of `state`.
-    owed: Vec<f64>,
+    rounding_errors: Vec<f64>,
     /// The forces of the present step, by [`Instant`](crate::Instant).
     rows: [Vec<f64>; 4],
     /// Zeros, for a step without force.
@@ -147,9 +147,9 @@ impl Simulation {
             Collocations::from_scheme(scheme, system, dt).map(Small::Nonlinear)
         };
         let rows = [(); 4].map(|()| vec![0.0; n]);
-        let [state, change, owed] = [(); 3].map(|()| vec![0.0; len]);
+        let [state, change, rounding_errors] = [(); 3].map(|()| vec![0.0; len]);
         let none = vec![0.0; n];
-        Ok(Self { stepper, dt, small, state, change, owed, rows, none })
+        Ok(Self { stepper, dt, small, state, change, rounding_errors, rows, none })
     }
 
     /// Starts the stepper and stores its initial state.
@@ -165,7 +165,7 @@ impl Simulation {
     /// Continues from `state`.
     pub(crate) fn restart(&mut self, state: &[f64]) {
         self.state.copy_from_slice(state);
-        self.owed.fill(0.0);
+        self.rounding_errors.fill(0.0);
     }
 
     pub(crate) fn stepper(&mut self) -> &mut dyn Stepper {
@@ -198,7 +198,7 @@ impl Simulation {
                 aside = 0;
                 let (ahead, _) = self.advance_small(table, done, to, motion);
                 if ahead > done {
-                    self.owed.fill(0.0);
+                    self.rounding_errors.fill(0.0);
                 }
                 done = ahead;
             }
@@ -217,13 +217,13 @@ impl Simulation {
         }
         let [now, middle, next, beyond] = &self.rows;
         let loads = Loads { time: k as f64 * self.dt, now, middle, next, beyond };
-        self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
+        self.stepper.step(&mut self.state, &mut self.rounding_errors, &loads, &mut self.change)
     }
 
     /// Takes one step without force through the stepper itself.
     pub(crate) fn free_step(&mut self) -> Result<(), IntegrateError> {
         let loads = Loads::none(&self.none);
-        self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
+        self.stepper.step(&mut self.state, &mut self.rounding_errors, &loads, &mut self.change)
     }
 
     /// Takes as many steps as possible with arrays of fixed size; returns the next step, and
