@@ -1,6 +1,6 @@
 //! Correlation of a residual from line to line.
 
-use mechid_signal::correlation::{Correlation, share_above_of};
+use mechid_signal::correlation::{Correlation, probability_above_of};
 use nalgebra::Complex;
 
 use super::limits::{LINES_PER_CORRELATION, MAX_DISTANCES};
@@ -58,7 +58,7 @@ pub(crate) fn correlation_of_lines(
         statistic,
         // The squared magnitude of a complex number is a sum of two squares, each with half of its
         // mean.
-        p_value: share_above_of(statistic, (last + 1 - first) as f64, 0.5 * square),
+        p_value: probability_above_of(statistic, (last + 1 - first) as f64, 0.5 * square),
     })
 }
 

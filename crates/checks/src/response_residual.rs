@@ -3,7 +3,7 @@
 use mechid_estimate::frequency_domain::in_units_of_noise;
 use mechid_estimate::{Estimate, EstimateError};
 use mechid_signal::Extent;
-use mechid_signal::correlation::{Correlation, correlated, share_above_of};
+use mechid_signal::correlation::{Correlation, correlated, probability_above_of};
 use mechid_spectra::FrequencyData;
 use mechid_spectra::frf::Frf;
 use nalgebra::{Complex, DMatrix};
@@ -104,7 +104,7 @@ struct Expected {
 
 impl Expected {
     fn misfit(&self, power: f64, source: NoiseSource) -> Finding {
-        let p_value = PValue::new(share_above_of(power, self.mean, 0.5 * self.variance));
+        let p_value = PValue::new(probability_above_of(power, self.mean, 0.5 * self.variance));
         Finding::Misfit(Misfit { ratio: power / self.mean, p_value, source, concentration: None })
     }
 }
@@ -193,7 +193,7 @@ impl<'a> Series<'a> {
         }
         let mean = distances.len() as f64 * covariance[0];
         // Real and imaginary part have half of the variance each.
-        let p_value = share_above_of(sum, mean, 0.5 * square);
+        let p_value = probability_above_of(sum, mean, 0.5 * square);
         let bound = 1.96 * (0.5 * covariance[0] / count).sqrt();
         Some((Correlation { coefficients, bound, statistic: sum, p_value }, distances[0]))
     }

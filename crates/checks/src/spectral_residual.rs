@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 use mechid_numerics::products::transposed_product;
-use mechid_signal::correlation::{Correlation, share_above_of};
+use mechid_signal::correlation::{Correlation, probability_above_of};
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
@@ -252,7 +252,7 @@ impl SpectralResidual {
             let spread = (count - 2.0 * gram.trace() + gram.norm_squared()) / count;
             // Real and imaginary parts have unit variance each.
             let power = 0.5 * values.norm_squared();
-            (power, mean * free, share_above_of(power, mean * free, 0.5 * variance * spread))
+            (power, mean * free, probability_above_of(power, mean * free, 0.5 * variance * spread))
         };
         let (values, explained) = self.whole();
         let (power, mean, above) = power_of(values, explained);
@@ -362,7 +362,7 @@ impl SpectralResidual {
                 coefficients: sums.iter().map(|product| product / size).collect(),
                 bound: 1.96 * (mean / weights.ncols() as f64).sqrt() / size,
                 statistic: sums.norm_squared() / mean * weights.ncols() as f64,
-                p_value: share_above_of(sums.norm_squared(), mean, covariance.norm_squared()),
+                p_value: probability_above_of(sums.norm_squared(), mean, covariance.norm_squared()),
             })
         };
         (0..dof).map(channel_correlation).collect()
@@ -470,7 +470,7 @@ mod tests {
                 let expected = sums.norm_squared() / all.trace() * sums.len() as f64;
                 let found = residual.with_force(force)[channel].clone().unwrap();
                 assert!((found.statistic / expected - 1.0).abs() < 1e-12);
-                let p = share_above_of(sums.norm_squared(), all.trace(), all.norm_squared());
+                let p = probability_above_of(sums.norm_squared(), all.trace(), all.norm_squared());
                 assert!((found.p_value - p).abs() < 1e-12, "{} {p}", found.p_value);
             }
         }

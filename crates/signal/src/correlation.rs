@@ -135,7 +135,7 @@ impl Correlation {
     ) -> Self {
         // The coefficients hardly scatter if the spectra of input and residual hardly overlap.
         let variance = covariance[0].max(f64::EPSILON);
-        let p_value = share_above(sum, coefficients.len(), covariance, shared);
+        let p_value = probability_above(sum, coefficients.len(), covariance, shared);
         let bound = 1.96 * (variance / count).sqrt();
         Self { coefficients, bound, statistic: sum / variance, p_value }
     }
@@ -147,12 +147,12 @@ impl Correlation {
 /// the sum, minus half its variance for normal variables.
 ///
 /// The sum has approximately the distribution of g χ²(h) with the same mean and variance.
-fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
+fn probability_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
     let squares = covariance.iter().enumerate().take(terms).map(|(distance, c)| {
         let pairs = if distance == 0 { terms } else { 2 * (terms - distance) };
         pairs as f64 * c * c
     });
-    share_above_of(sum, terms as f64 * covariance[0], squares.sum::<f64>() + shared)
+    probability_above_of(sum, terms as f64 * covariance[0], squares.sum::<f64>() + shared)
 }
 
 /// Returns the probability that a sum of squares of normal variables of mean zero is above `sum`.
@@ -161,7 +161,7 @@ fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
 ///
 /// # Source
 /// Box (1954), Annals of Mathematical Statistics 25, 290–302.
-pub fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
+pub fn probability_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     let unit = square.sqrt();
     let ratio = mean / unit;
     match ChiSquared::new(ratio * ratio) {

@@ -1,6 +1,6 @@
 //! Fit of a model to line data by maximum likelihood.
 
-use mechid_signal::correlation::share_above_of;
+use mechid_signal::correlation::probability_above_of;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -183,7 +183,7 @@ impl Expected {
 
     /// Returns the probability that a correct model has a larger sum of squares than `cost`.
     fn p_value(&self, cost: f64) -> f64 {
-        share_above_of(cost, self.cost, 0.5 * self.variance)
+        probability_above_of(cost, self.cost, 0.5 * self.variance)
     }
 }
 
