@@ -78,10 +78,11 @@ fn delay_of_equations(
 /// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
 /// uncorrelated with the forces. If the residuals `without_delay` are uncorrelated with the forces,
 /// too, either at most a quarter of the power may remain, or the tests of the residual warn without
-/// the delay and pass with it. The fraction of the power that remains must be less than `below`: 1,
-/// or the fraction that remains with another explanation. `dt` is the sampling interval in s;
-/// sinusoidal disturbances have been subtracted from the `records`. `None` if no delay of up to 16
-/// samples (64 if the response hardly follows the force) satisfies this.
+/// the delay and pass with it. If there is another explanation, the lines of all records without it
+/// are `other`; the power that remains with the delay must not be significantly above the power that
+/// remains with these lines. `dt` is the sampling interval in s; sinusoidal disturbances have been
+/// subtracted from the `records`. `None` if no delay of up to 16 samples (64 if the response hardly
+/// follows the force) satisfies this.
 ///
 /// The transients are estimated again for each delay; otherwise they would contain a part of the
 /// effect of the delay.
@@ -95,7 +96,7 @@ pub fn delay_of_open_records(
     unknowns: &Unknowns,
     fit: &OutputErrorFit,
     without_delay: &[SpectralResidual],
-    below: f64,
+    other: Option<&FrequencyData>,
 ) -> Option<Finding> {
     let with_pulses = joined(records)?;
     let corrected = joined(&fit.without_pulse_errors(records).ok()?)?;
@@ -110,18 +111,27 @@ pub fn delay_of_open_records(
     let late_lines = |data: &FrequencyData, samples: f64| data.with_later_force(samples * dt);
     let late = |samples: f64| late_lines(&with_pulses, samples);
     // With many lines, the search begins on a part of them. It ends there if the smallest residual
-    // power on this part is significantly above the limit.
+    // power on this part is significantly above that without the other cause.
     let is_excluded = Cell::new(false);
     let on_fewer = likelihood.on_fewer_lines(&with_pulses).and_then(|(lines, mut fewer)| {
-        let equal_powers = FisherSnedecor::new(fewer.spare() as f64, fewer.spare() as f64).ok()?;
-        let undelayed = fewer.cost(&lines)?;
+        let without_other = other.and_then(|other| {
+            let (other, mut fewer) = likelihood.on_fewer_lines(other)?;
+            fewer.cost(&other)
+        });
+        let without_other = without_other.unwrap_or(f64::INFINITY);
         if near.abs() > DELAY_NEAR {
             fewer.search(&late_lines(&lines, near))?;
         }
+        let freedom = fewer.spare() as f64;
         let cost = |samples: f64| fewer.cost(&late_lines(&lines, samples));
-        let promises = |delayed: f64, is_minimum: bool| {
-            let p_value = equal_powers.sf(delayed / (below * undelayed));
-            is_excluded.set(is_minimum && p_value <= SIGNIFICANCE);
+        let promises = |delayed: f64, decrease: Option<f64>| {
+            // The following steps decrease the power by less than this one.
+            let is_out_of_reach =
+                decrease.is_some_and(|decrease| delayed - decrease > without_other);
+            let equal_powers = FisherSnedecor::new(freedom, freedom);
+            let is_above =
+                equal_powers.is_ok_and(|powers| powers.sf(delayed / without_other) <= SIGNIFICANCE);
+            is_excluded.set(is_out_of_reach && is_above);
             !is_excluded.get()
         };
         let (near, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, promises)?;
@@ -146,7 +156,7 @@ pub fn delay_of_open_records(
     let promises = |delayed: f64, _| follows_force || is_significant(delayed);
     let (samples, delayed) = minimum_near(near, [reach, DELAY_RESOLVED], cost, promises)?;
     let remaining = delayed / undelayed;
-    if !is_significant(delayed) || remaining >= below {
+    if !is_significant(delayed) {
         return None;
     }
     let late = |record: &FrequencyData| record.with_later_force(samples * dt);

@@ -30,12 +30,12 @@ pub(super) fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
 /// Returns the position of the minimum of a `cost` near `start`, and the cost there. The search
 /// uses parabolas with a half width that decreases from the first of `widths` to the last. `None`
 /// if a cost does not exist or if `promises` rejects the cost after a step; its second argument is
-/// `true` if the parabola has its minimum there, so that the step was not limited.
+/// the decrease by this step, `None` for a step that was limited.
 pub(super) fn minimum_near(
     start: f64,
     widths: [f64; 2],
     mut cost: impl FnMut(f64) -> Option<f64>,
-    promises: impl Fn(f64, bool) -> bool,
+    promises: impl Fn(f64, Option<f64>) -> bool,
 ) -> Option<(f64, f64)> {
     let ([mut width, resolved], mut place) = (widths, start);
     let mut least = cost(place)?;
@@ -49,8 +49,10 @@ pub(super) fn minimum_near(
             -LONGEST_STEP * slope.signum()
         };
         place += step * width;
-        least = cost(place)?;
-        if !promises(least, step.abs() < LONGEST_STEP) {
+        let lower = cost(place)?;
+        let decrease = (step.abs() < LONGEST_STEP).then_some(least - lower);
+        least = lower;
+        if !promises(least, decrease) {
             return None;
         }
         width *= f64::clamp(step.abs(), LEAST_WIDTH_RATIO, 1.0);

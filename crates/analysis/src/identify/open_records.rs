@@ -11,7 +11,7 @@ use mechid_checks::{
     linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
-    EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, equivalent_force,
+    EndLoads, OutputErrorFit, PartsOfFit, Refit, SampledRows, Split, equivalent_force,
     output_error_pooling, with_noise_of,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
@@ -275,28 +275,53 @@ impl Tested<'_> {
                 .map(|finding| Explanation { finding, fit: None }),
             Excitation::Lasting => self.fault(dt, compared)?,
         };
-        let below = fault.as_ref().map_or(1.0, |fault| remaining(&fault.finding));
-        let delay = delay_of_open_records(records, dt, unknowns, fit, residuals, below);
-        let explanation = delay.map(|finding| Explanation { finding, fit: None }).or(fault);
-        let Some(Explanation { finding, fit: explained }) = explanation else { return Ok(None) };
-        let quantity = closed[0].measured();
-        let explained = explained.or_else(|| {
-            let change = without_cause(&finding, quantity)?;
-            Some(compared()?.after(change)?.0)
-        });
-        let change = explained.and_then(|explained| {
-            let changed: Option<Vec<FrequencyData>> = match between_samples(&finding) {
-                Some(between) => {
-                    let system = explained.estimate.system().ok()?;
-                    let records = records.iter();
-                    records.map(|record| equivalent_force(record, &system, dt, between)).collect()
-                }
-                None => Some(records.iter().map(without_cause(&finding, quantity)?).collect()),
-            };
-            let changed = fit.without_pulse_errors(&changed?).ok()?;
-            Some(with_noise_of(fit, &joined(&changed).ok()?, unknowns, &explained).ok()?.change)
-        });
-        Ok(Some((finding, change.map(|change| &change * change.transpose()))))
+        let without_fault = fault
+            .as_ref()
+            .and_then(|Explanation { finding, fit }| self.without(finding, fit.as_ref()?, dt));
+        let without_fault = without_fault.as_ref();
+        let delay = delay_of_open_records(records, dt, unknowns, fit, residuals, without_fault);
+        let delay = delay.map(|finding| Explanation { finding, fit: None });
+        // All explanations are fitted to all lines with the same noise.
+        let refitted = |Explanation { finding, fit: explained }: Explanation| {
+            let explained = explained.or_else(|| {
+                let change = without_cause(&finding, closed[0].measured())?;
+                Some(compared()?.after(change)?.0)
+            });
+            let refit = explained.and_then(|explained| {
+                let changed = self.without(&finding, &explained, dt)?;
+                with_noise_of(fit, &changed, unknowns, &explained).ok()
+            });
+            (finding, refit)
+        };
+        let causes = delay.into_iter().chain(fault).map(refitted);
+        let power =
+            |refit: &Option<Refit>| refit.as_ref().map_or(f64::INFINITY, |refit| refit.cost);
+        let best = causes.min_by(|(_, a), (_, b)| power(a).total_cmp(&power(b)));
+        let square = |refit: Refit| &refit.change * refit.change.transpose();
+        Ok(best.map(|(finding, refit)| (finding, refit.map(square))))
+    }
+
+    /// Returns all lines without the cause that a finding names; the estimate of `explained` takes
+    /// this cause into account.
+    fn without(
+        &self,
+        finding: &Finding,
+        explained: &OutputErrorFit,
+        dt: f64,
+    ) -> Option<FrequencyData> {
+        let Self { records, closed, fit, .. } = *self;
+        let changed: Option<Vec<FrequencyData>> = match between_samples(finding) {
+            Some(between) => {
+                let system = explained.estimate.system().ok()?;
+                let records = records.iter();
+                records.map(|record| equivalent_force(record, &system, dt, between)).collect()
+            }
+            None => {
+                let change = without_cause(finding, closed[0].measured())?;
+                Some(records.iter().map(change).collect())
+            }
+        };
+        joined(&fit.without_pulse_errors(&changed?).ok()?).ok()
     }
 
     /// Finds a force between samples or AC coupling that explains the residual.

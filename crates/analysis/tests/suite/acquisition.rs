@@ -86,7 +86,7 @@ fn a_simulated_force_is_named_and_allowed_for() {
         // The fit with the wrong force has an error of many standard errors from the noise; the
         // intervals include this error.
         assert_eq!(held(&usual, truth), 3, "{usual}");
-        let note = "from the parameters of the model that explains the residual";
+        let note = "those of the model that explains the residual";
         assert!(usual.to_string().contains(note), "{usual}");
         let expected = Some(Cause::BetweenSamples { between_samples: between });
         assert_eq!(cause(&usual), expected, "{}", usual.summary().all_checks());
