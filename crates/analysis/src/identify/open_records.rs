@@ -254,6 +254,13 @@ struct Tested<'a> {
     residuals: &'a [SpectralResidual],
 }
 
+/// Cause of a residual, and the square of the change of the parameters by this cause, in the product
+/// of the units of two parameters.
+type CauseWithChange = (Finding, Option<DMatrix<f64>>);
+
+/// Function that returns a record with changed channels.
+type RecordChange = Box<dyn Fn(&FrequencyData) -> FrequencyData>;
+
 impl Tested<'_> {
     /// Finds a delay or a fault of the acquisition that explains the residual. Also returns the
     /// square of the change of the parameters by this cause, `None` if a fit fails.
@@ -263,7 +270,7 @@ impl Tested<'_> {
         unknowns: &Unknowns,
         pooling: Pooling,
         excitation: Excitation<'_>,
-    ) -> Result<Option<(Finding, Option<DMatrix<f64>>)>, AnalysisError> {
+    ) -> Result<Option<CauseWithChange>, AnalysisError> {
         let Self { records, closed, fit, residuals } = *self;
         let band_limited = OnceLock::new();
         let compared = || {
@@ -403,10 +410,7 @@ fn between_samples(finding: &Finding) -> Option<Discretisation> {
 /// Returns a function that removes a delay, or AC coupling, from a record with responses of the
 /// given `quantity`: it delays the force, too, or gives all channels the same coupling. `None` for
 /// another finding.
-fn without_cause(
-    finding: &Finding,
-    quantity: ResponseQuantity,
-) -> Option<Box<dyn Fn(&FrequencyData) -> FrequencyData>> {
+fn without_cause(finding: &Finding, quantity: ResponseQuantity) -> Option<RecordChange> {
     let cause = match finding {
         Finding::Delay(delay) => &Cause::Delay { seconds: delay.seconds },
         Finding::Alternative(alternative) => &alternative.cause,
