@@ -254,8 +254,8 @@ struct Tested<'a> {
     residuals: &'a [SpectralResidual],
 }
 
-/// Cause of a residual, and the square of the change of the parameters by this cause, in the product
-/// of the units of two parameters.
+/// Cause of a residual, and the square of the change of the parameters by this cause, in the
+/// product of the units of two parameters.
 type CauseWithChange = (Finding, Option<DMatrix<f64>>);
 
 /// Function that returns a record with changed channels.
