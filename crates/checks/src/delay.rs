@@ -79,10 +79,10 @@ fn delay_of_equations(
 /// uncorrelated with the forces. If the residuals `without_delay` are uncorrelated with the forces,
 /// too, either at most a quarter of the power may remain, or the tests of the residual warn without
 /// the delay and pass with it. If there is another explanation, the lines of all records without it
-/// are `other`; the power that remains with the delay must not be significantly above the power that
-/// remains with these lines. `dt` is the sampling interval in s; sinusoidal disturbances have been
-/// subtracted from the `records`. `None` if no delay of up to 16 samples (64 if the response hardly
-/// follows the force) satisfies this.
+/// are `other`; the power that remains with the delay must not be significantly above the power
+/// that remains with these lines. `dt` is the sampling interval in s; sinusoidal disturbances have
+/// been subtracted from the `records`. `None` if no delay of up to 16 samples (64 if the response
+/// hardly follows the force) satisfies this.
 ///
 /// The transients are estimated again for each delay; otherwise they would contain a part of the
 /// effect of the delay.
