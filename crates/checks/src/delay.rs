@@ -107,49 +107,21 @@ pub fn delay_of_open_records(
     let is_significant =
         |delayed: f64| distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
     let follows_force = !is_uncorrelated(without_delay);
-    let near = delay_of_either_window(&corrected, dt, unknowns, &fit.estimate).unwrap_or(0.0);
-    let late_lines = |data: &FrequencyData, samples: f64| data.with_later_force(samples * dt);
-    let late = |samples: f64| late_lines(&with_pulses, samples);
-    // With many lines, the search begins on a part of them. It ends there if the smallest residual
-    // power on this part is significantly above that without the other cause.
-    let is_excluded = Cell::new(false);
-    let on_fewer = likelihood.on_fewer_lines(&with_pulses).and_then(|(lines, mut fewer)| {
-        let without_other = other.and_then(|other| {
-            let (other, mut fewer) = likelihood.on_fewer_lines(other)?;
-            fewer.cost(&other)
-        });
-        let without_other = without_other.unwrap_or(f64::INFINITY);
-        if near.abs() > DELAY_NEAR {
-            fewer.search(&late_lines(&lines, near))?;
+    let mut near = delay_of_either_window(&corrected, dt, unknowns, &fit.estimate).unwrap_or(0.0);
+    let late = |samples: f64| with_pulses.with_later_force(samples * dt);
+    // With many lines, the search begins on a part of them.
+    let reach = match on_fewer_lines(&likelihood, &with_pulses, dt, near, other) {
+        OnFewer::Excluded => return None,
+        OnFewer::Found(samples, fewer) => {
+            likelihood.start_at(*fewer);
+            near = samples;
+            DELAY_REFINED
         }
-        let freedom = fewer.spare() as f64;
-        let cost = |samples: f64| fewer.cost(&late_lines(&lines, samples));
-        let promises = |delayed: f64, decrease: Option<f64>| {
-            // The following steps decrease the power by less than this one.
-            let is_out_of_reach =
-                decrease.is_some_and(|decrease| delayed - decrease > without_other);
-            let equal_powers = FisherSnedecor::new(freedom, freedom);
-            let is_above =
-                equal_powers.is_ok_and(|powers| powers.sf(delayed / without_other) <= SIGNIFICANCE);
-            is_excluded.set(is_out_of_reach && is_above);
-            !is_excluded.get()
-        };
-        let (near, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, promises)?;
-        Some((near, fewer))
-    });
-    if is_excluded.get() {
-        return None;
-    }
-    let (near, reach) = match on_fewer {
-        Some((near, fewer)) => {
-            likelihood.start_at(fewer);
-            (near, DELAY_REFINED)
-        }
-        None => {
+        OnFewer::Unknown => {
             if near.abs() > DELAY_NEAR {
                 likelihood.search(&late(near))?;
             }
-            (near, DELAY_REACH)
+            DELAY_REACH
         }
     };
     let cost = |samples: f64| likelihood.cost(&late(samples));
@@ -166,6 +138,59 @@ pub fn delay_of_open_records(
     let is_most = follows_force || remaining <= DELAY_REMAINING || becomes_noise;
     let delay = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
     (is_most && is_uncorrelated(&with_delay)).then(delay)
+}
+
+/// Result of the search for a delay on a part of the lines.
+enum OnFewer<'a> {
+    /// The records have few lines, or the search failed.
+    Unknown,
+    /// Another cause leaves significantly less power.
+    Excluded,
+    /// Delay, in samples, and the estimate with this delay.
+    Found(f64, Box<ChangedRecords<'a>>),
+}
+
+/// Searches for a delay, in samples, on a part of the lines, from a delay `near` it. The search
+/// ends if the smallest residual power is significantly above that of the lines `other` without
+/// another cause.
+fn on_fewer_lines<'a>(
+    likelihood: &ChangedRecords<'a>,
+    lines: &FrequencyData,
+    dt: f64,
+    near: f64,
+    other: Option<&FrequencyData>,
+) -> OnFewer<'a> {
+    let is_excluded = Cell::new(false);
+    let searched = likelihood.on_fewer_lines(lines).and_then(|(lines, mut fewer)| {
+        let without_other = other.and_then(|other| {
+            let (other, mut fewer) = likelihood.on_fewer_lines(other)?;
+            fewer.cost(&other)
+        });
+        let without_other = without_other.unwrap_or(f64::INFINITY);
+        let late = |samples: f64| lines.with_later_force(samples * dt);
+        if near.abs() > DELAY_NEAR {
+            fewer.search(&late(near))?;
+        }
+        let freedom = fewer.spare() as f64;
+        let cost = |samples: f64| fewer.cost(&late(samples));
+        let promises = |delayed: f64, decrease: Option<f64>| {
+            // The following steps decrease the power by less than this one.
+            let is_out_of_reach =
+                decrease.is_some_and(|decrease| delayed - decrease > without_other);
+            let equal_powers = FisherSnedecor::new(freedom, freedom);
+            let is_above =
+                equal_powers.is_ok_and(|powers| powers.sf(delayed / without_other) <= SIGNIFICANCE);
+            is_excluded.set(is_out_of_reach && is_above);
+            !is_excluded.get()
+        };
+        let (samples, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, promises)?;
+        Some(OnFewer::Found(samples, Box::new(fewer)))
+    });
+    match searched {
+        Some(found) => found,
+        None if is_excluded.get() => OnFewer::Excluded,
+        None => OnFewer::Unknown,
+    }
 }
 
 /// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the

@@ -13,6 +13,10 @@ use crate::measurement::Measurement;
 use crate::modes::ModalSystem;
 use crate::text::significant;
 
+/// Note on a record that the settings declare to be at rest.
+const ASSUMED_AT_REST: &str = "the record is assumed to begin and end at rest: motion at the beginning or end is \
+                               attributed to the forces, and the standard errors do not include this effect";
+
 const LINE_BY_LINE: &str =
     "with modes as the model, the force is computed line by line: choose frequency-domain";
 
@@ -62,11 +66,7 @@ pub fn reconstruct_with_modes(
     let force = frequency_domain(system, &motion, &request.forced, &lines, &noise)?;
     let mut remarks: Vec<String> = periods::remark(&recorded, &window).into_iter().collect();
     if is_open && how.at_rest {
-        remarks.push(
-            "the record is assumed to begin and end at rest: motion at the beginning or end is attributed to the \
-             forces, and the standard errors do not include this effect"
-                .into(),
-        );
+        remarks.push(ASSUMED_AT_REST.into());
     }
     let used = force.spectrum().lines().row_iter().filter(|row| row.camax() > 0.0).count();
     let how_found = How {

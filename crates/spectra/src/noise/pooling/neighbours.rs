@@ -159,4 +159,29 @@ mod tests {
             assert!(near(found, cost), "{half_width}: {found} {cost}");
         }
     }
+
+    /// Reference: log det S + tr(S⁻¹Ŝ) of full matrices, by determinants and inverses.
+    #[test]
+    fn uncorrelated_channels_have_the_cost_of_full_matrices() {
+        let vary = |k: usize| (0.618_033_988_75 * k as f64).fract();
+        let variances =
+            |line: usize| DVector::from_fn(3, |k, _| Complex::from(0.1 + vary(3 * line + k)));
+        let covariance: Covariances =
+            (0..23).map(|line| DMatrix::from_diagonal(&variances(line + 1))).collect();
+        let neighbours = Neighbours::new(&covariance);
+        for half_width in 1..=11 {
+            let by_definition = |line: usize| {
+                let window = window(line, half_width, covariance.len());
+                let count = (window.len() - 1) as f64;
+                let others = window.filter(|other| *other != line);
+                let sum = others.fold(DMatrix::zeros(3, 3), |sum, other| sum + &covariance[other]);
+                let predicted = sum.unscale(count);
+                let inverse = predicted.clone().try_inverse().unwrap();
+                predicted.determinant().re.ln() + (inverse * &covariance[line]).trace().re
+            };
+            let expected: f64 = (0..covariance.len()).map(by_definition).sum();
+            let cost = neighbours.cost(half_width).unwrap();
+            assert!((cost - expected).abs() < 1e-12 * expected.abs(), "{half_width}: {cost}");
+        }
+    }
 }
