@@ -5,13 +5,13 @@ use std::f64::consts::PI;
 use std::fmt::{self, Formatter};
 
 use mechid_estimate::frequency_domain::{
-    ChangedRecords, DelayedForce, OutputErrorFit, output_error,
+    ChangedRecords, DelayedForce, OutputErrorFit, output_error, output_error_pooling,
 };
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Response;
 use mechid_signal::{Extent, Record};
-use mechid_spectra::FrequencyData;
+use mechid_spectra::{FrequencyData, Pooling};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -138,6 +138,43 @@ pub fn delay_of_open_records(
     let is_most = follows_force || remaining <= DELAY_REMAINING || becomes_noise;
     let delay = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
     (is_most && is_uncorrelated(&with_delay)).then(delay)
+}
+
+/// Finds a delay of the responses of open records without which the maximum-likelihood search
+/// fails ([`Finding::Delay`]): with the delay the search succeeds, and its residual is uncorrelated
+/// with the forces. The fraction that remains is that of the equations of motion. `dt` is the
+/// sampling interval in s. `None` if no delay of up to 16 samples (64 if the response hardly follows
+/// the force) satisfies this.
+///
+/// # Source
+/// As [`delay_of_open_records`].
+pub fn delay_of_failed_search(
+    records: &[FrequencyData],
+    dt: f64,
+    unknowns: &Unknowns,
+    noise: Pooling,
+) -> Option<Finding> {
+    let data = joined(records)?;
+    let driven = driven(&data.force().map(|f| f.norm()));
+    let near = |data: &FrequencyData| {
+        delay_of_equations(&DelayedForce::new(data, unknowns, &driven)?, dt, &driven)
+    };
+    let mut delays: Vec<(f64, f64)> =
+        [data.under_hann_window(), data.clone()].iter().filter_map(near).collect();
+    delays.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let equations = DelayedForce::new(&data, unknowns, &driven)?;
+    delays.into_iter().find_map(|(near, _)| {
+        let late = |samples: f64| data.with_later_force(samples * dt);
+        let fit = output_error_pooling(&late(near), unknowns, noise).ok()?;
+        let mut likelihood = ChangedRecords::from_fit(&late(near), unknowns, &fit)?;
+        let cost = |samples: f64| likelihood.cost(&late(samples));
+        let (samples, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_, _| true)?;
+        let late = |record: &FrequencyData| record.with_later_force(samples * dt);
+        let delayed: Vec<FrequencyData> = records.iter().map(late).collect();
+        let remaining = equations.residual_power(samples * dt)? / equations.residual_power(0.0)?;
+        let delay = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
+        is_uncorrelated(&residuals_of_fit(&delayed, &likelihood)?).then(delay)
+    })
 }
 
 /// Result of the search for a delay on a part of the lines.

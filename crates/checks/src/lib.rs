@@ -93,8 +93,8 @@ pub use constant_phase::{ConstantPhase, constant_phase};
 pub use cross_correlation::CrossCorrelation;
 pub use delay::Delay;
 pub use delay::{
-    delay_at_samples, delay_between_samples, delay_of_lines, delay_of_open_records,
-    delay_of_responses,
+    delay_at_samples, delay_between_samples, delay_of_failed_search, delay_of_lines,
+    delay_of_open_records, delay_of_responses,
 };
 pub use distortion::Distortion;
 pub use distortion::distortion_of_periods;

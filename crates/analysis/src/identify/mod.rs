@@ -67,7 +67,7 @@ pub mod validation;
 
 use std::fmt;
 
-use mechid_checks::Subject;
+use mechid_checks::{Finding, Subject};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::SecondOrderSystem;
@@ -313,6 +313,7 @@ fn spectral(
     period_given: bool,
 ) -> Result<Fitted, AnalysisError> {
     let is_short = open_records::suit(records, unknowns);
+    let mut delayed = None;
     if !period_given && is_short {
         let noise = OpenNoise { response: likelihood.unwrap_or_default(), force: None };
         let how = open_records::How {
@@ -323,6 +324,7 @@ fn spectral(
         };
         match open_records::fit(records, unknowns, how) {
             Ok(open) if open.ends_show => return Ok(open.fitted),
+            Err(error @ AnalysisError::Unfit { .. }) => delayed = Some(error),
             _ => {}
         }
     }
@@ -334,7 +336,13 @@ fn spectral(
         return Ok(fitted);
     }
     let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
-    spectra::fit(records, unknowns, lines.rule(), estimator)
+    let fitted = spectra::fit(records, unknowns, lines.rule(), estimator)?;
+    // A delay that only the fit as an open record shows is not hidden.
+    let names_delay = |finding: &Finding| finding.subject() == Subject::Delay;
+    match delayed {
+        Some(error) if !fitted.after.iter().flatten().any(names_delay) => Err(error),
+        _ => Ok(fitted),
+    }
 }
 
 impl Identified {

@@ -6,9 +6,9 @@ use std::sync::OnceLock;
 use mechid_checks::limits::DELAY_REMAINING;
 use mechid_checks::{
     AfterSpectralFit, Alternative, Cause, Finding, Quantity, RowParts, SpectralResidual,
-    after_spectral_fit, before_spectral_fit, delay_of_lines, delay_of_open_records,
-    fault_of_acquisition, fault_of_hits, fitted_band, forces_between_samples,
-    linearity_of_open_record,
+    after_spectral_fit, before_spectral_fit, delay_of_failed_search, delay_of_lines,
+    delay_of_open_records, fault_of_acquisition, fault_of_hits, fitted_band,
+    forces_between_samples, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, Refit, SampledRows, Split, equivalent_force,
@@ -149,7 +149,7 @@ pub(super) fn fit(
     let dt = records[0].held.force.sampling().dt();
     let joint = joined(&spectra.data)?;
     let fit = output_error_pooling(&joint, unknowns, noise.response)
-        .map_err(|error| with_delay(error, &joint, dt, unknowns))?;
+        .map_err(|error| with_delay(error, &spectra.data, dt, unknowns, noise.response))?;
     let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
     spectra.data = data;
     spectra.without_sinusoids(&fit);
@@ -437,12 +437,21 @@ fn without_cause(finding: &Finding, quantity: ResponseQuantity) -> Option<Record
 /// Returns the failure of a search. If the responses are delayed, the delay is added as a reason.
 fn with_delay(
     error: EstimateError,
-    data: &FrequencyData,
+    records: &[FrequencyData],
     dt: f64,
     unknowns: &Unknowns,
+    noise: Pooling,
 ) -> AnalysisError {
-    let is_search = matches!(error, EstimateError::NotConverged { .. });
-    match delay_of_lines(data, dt, unknowns).filter(|_| is_search) {
+    if !matches!(error, EstimateError::NotConverged { .. }) {
+        return error.into();
+    }
+    if let Some(delay) = delay_of_failed_search(records, dt, unknowns, noise) {
+        return AnalysisError::Unfit {
+            error,
+            reasons: format!("{delay}; the search without that delay succeeds"),
+        };
+    }
+    match joined(records).ok().and_then(|data| delay_of_lines(&data, dt, unknowns)) {
         Some(delay) => AnalysisError::Unfit { error, reasons: delay.to_string() },
         None => error.into(),
     }

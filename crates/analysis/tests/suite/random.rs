@@ -14,10 +14,10 @@ use mechid_checks::{Finding, Power, Subject};
 use mechid_estimate::Estimate;
 use mechid_io::FrequencyResponses;
 use mechid_model::{Sdof, SecondOrderSystem};
-use mechid_problems::{Fault, RandomTest};
+use mechid_problems::{Fault, RandomTest, exact_harmonic_periodic};
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use mechid_spectra::Pooling;
-use nalgebra::{DMatrix, dmatrix};
+use nalgebra::{DMatrix, DVector, dmatrix};
 use rayon::prelude::*;
 
 const SAMPLES: usize = 2048;
@@ -170,6 +170,45 @@ fn a_late_response_is_told_by_its_delay() {
     assert!(10 * held >= 9 * all, "{held} of {all}: {found}");
     let (_, both) = fitted(&[late(0.5, 4), late(0.5, 5)]);
     assert!(matches!(both[..], [found] if (found - 0.5).abs() < 0.02), "{both:?}");
+}
+
+/// Reference: the generator. Two masses with a force on one of them: without the delay, the search
+/// has no minimum in most of the late records, and the error names the delay.
+#[test]
+fn a_delay_that_stops_the_search_is_named() {
+    let mass = DMatrix::from_diagonal(&DVector::from_vec(vec![1.39, 2.51]));
+    let stiffness = dmatrix![9357.0, -6014.0; -6014.0, 6014.0];
+    let damping = &stiffness * 3.8e-4 + &mass * 0.052;
+    let system = SecondOrderSystem::new(mass, damping, stiffness);
+    let sampling = Sampling::from_rate_hz(141.7, SAMPLES).unwrap();
+    let rig = RandomTest { system: system.unwrap(), sampling, quantity: KIND, force: 100.0 };
+    let told = |samples: f64, seed: u64| {
+        let [mut force, _] = rig.period(seed).unwrap();
+        force = {
+            let mut one = force.data().clone();
+            one.column_mut(0).fill(0.0);
+            Record::new(force.sampling(), one).unwrap()
+        };
+        let steady = exact_harmonic_periodic(&rig.system, &force).unwrap();
+        let late = Fault::Delay { samples }.apply(steady.displacement(), seed).unwrap();
+        let [force, late] = [force, late].map(|all| all.window(SAMPLES / 2, SAMPLES).unwrap());
+        match identify(&[measured([force, late], seed)], &Identify::default()) {
+            Ok(found) => {
+                let delays = found.summary().checks.iter();
+                let mut delays = delays.filter(|check| check.subject == Subject::Delay);
+                (false, delays.next().map(|check| check.finding.to_string()))
+            }
+            Err(error) => (true, Some(error.to_string())),
+        }
+    };
+    let late: Vec<_> = (0..8).into_par_iter().map(|seed| told(2.5, seed)).collect();
+    let is_named = |text: &Option<String>| {
+        text.as_ref().is_some_and(|text| text.contains("the response is 2.5"))
+    };
+    assert!(late.iter().all(|(_, text)| is_named(text)), "{late:?}");
+    assert!(late.iter().filter(|(failed, _)| *failed).count() >= 1, "{late:?}");
+    let right: Vec<_> = (0..8).into_par_iter().map(|seed| told(0.0, seed)).collect();
+    assert!(right.iter().all(|told| *told == (false, None)), "{right:?}");
 }
 
 #[test]
