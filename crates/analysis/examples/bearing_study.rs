@@ -84,7 +84,8 @@ fn settings(rig: &BearingRig, coefficients: Coefficients) -> IdentifyBearing {
     }
 }
 
-/// Returns the standard errors of the Cramér–Rao bound, for k, c and m, each row by row.
+/// Returns the standard errors of the Cramér–Rao bound for the entries of K, C and M, each matrix
+/// row by row.
 fn bound(rig: &BearingRig, periods: &[RigTest], count: usize) -> Vec<f64> {
     // The identification excludes lines at multiples of the rotation frequency, and so does the
     // bound.

@@ -1,5 +1,5 @@
 //! Study of how often the checks of an identification warn, on records that the model fits and on
-//! others.
+//! records that it does not fit.
 //!
 //! `cargo run --release -p mechid-analysis --example checks_study -- RUNS [NAME]` prints, for each
 //! kind of record, the percentage of `RUNS` seeded records with any warning and with a warning of
@@ -155,8 +155,8 @@ impl Case {
             }
             Ok(noise::add_white(&all, NoiseLevel::FractionOfRms(level), 8 * seed + stream)?)
         };
-        // If the force is held between the samples, its noise also acts on the machine, and is not
-        // measured.
+        // If the force is held between the samples, its noise is a part of the force that acts on
+        // the machine, but the measured force does not contain it.
         let clean = force.repeated(self.periods)?;
         let noisy_force = noisy(if held { &clean } else { &force }, self.noise[1], 0)?;
         let (exact, force) = match held {

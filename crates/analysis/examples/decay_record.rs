@@ -26,7 +26,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     ];
     let acceleration = |t: f64, channel: usize| -> f64 {
         let mode = |(at, pole): (usize, &Complex<f64>)| {
-            // The frame is at rest at the release: A in x = Re(A e^{λt}) is such that ẋ = 0 there.
+            // The frame is at rest at the release: ẋ = 0 determines the imaginary part of A in x =
+            // Re(A e^{λt}).
             let amplitude = pulled[(at, channel)] * Complex::new(1.0, pole.re / pole.im);
             (amplitude * pole * pole * (pole * t).exp()).re
         };

@@ -6,7 +6,7 @@
 //! prints, for tests with several periods and for random tests of one machine, the percentage of 95
 //! % intervals that contain the true value, the error of the worst parameter, and the percentages
 //! of records with any warning and with a warning of each subject. A second argument chooses the
-//! rows that contain it.
+//! rows that contain this text.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::collections::BTreeMap;
@@ -24,7 +24,8 @@ type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 /// Time step, in s.
 const DT: f64 = 0.002;
-/// Samples of a period, and of a record of either kind.
+/// Number of samples of a period (`PERIOD`), and of a whole record (`SAMPLES`): eight periods, or a
+/// random test.
 const PERIOD: usize = 1024;
 const SAMPLES: usize = 8 * PERIOD;
 const QUANTITY: ResponseQuantity = ResponseQuantity::Displacement;
@@ -108,7 +109,8 @@ fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
         Test::Random => {
             let sampling = Sampling::new(DT, SAMPLES)?;
             let rig = RandomTest { system, sampling, quantity: QUANTITY, force: 100.0 };
-            // A whole period is cyclic, so that all of it can be delayed.
+            // The delay is applied to a whole period: it is cyclic, so no samples are missing at
+            // its beginning.
             let [force, response] = rig.period(seed)?;
             let response = delay.apply(&response, seed)?;
             let first = SAMPLES / 2 + 1;

@@ -54,7 +54,8 @@ fn main() {
     }
 }
 
-/// Three masses at 18, 41 and 73 Hz; hits every second at 1,024 samples a second.
+/// Returns a hammer test of three masses with natural frequencies of 18, 41 and 73 Hz: one hit per
+/// second, 1,024 samples per second.
 fn rig(quantity: ResponseQuantity, force_noise: f64) -> HammerTest {
     HammerTest {
         frequencies_hz: vec![18.0, 41.0, 73.0],

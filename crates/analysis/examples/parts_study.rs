@@ -51,8 +51,8 @@ enum Test {
 /// Loss factor in place of viscous damping.
 const LOSS_FACTOR: f64 = 0.04;
 
-/// Returns force (N) and displacement (m) over the last of the periods of a force (N), computed
-/// from the receptance.
+/// Returns force (N) and displacement (m) in the steady state that the periodic `force` causes,
+/// computed from the receptance; both have the length of `force`.
 fn steady(machine: &FaultyOscillator, force: &Record, loss_factor: Option<f64>) -> [Record; 2] {
     let mut lines = Spectrum::from_record(force).lines().clone();
     for (line, mut value) in lines.row_iter_mut().enumerate() {

@@ -6,8 +6,9 @@
 //! cargo run --release -p mechid-analysis --example random_study -- 1000
 //! cargo run --release -p mechid-analysis --example random_study -- 300 force
 //! ```
-//! The second argument chooses a table, `segments`, `force` or `colour`, and the third the rows
-//! that contain it; without them, all tables and rows are computed.
+//! The second argument chooses a table (`segments`, `force` or `colour`), and the third argument
+//! chooses the rows that contain this text. Without these arguments, all tables and rows are
+//! computed.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::collections::BTreeSet;

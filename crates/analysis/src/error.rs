@@ -1,4 +1,4 @@
-//! Errors between a record and the result.
+//! Errors of an analysis, from the reading of a record to the result.
 
 use mechid_estimate::EstimateError;
 use mechid_io::{Quantity, escaped};
@@ -60,9 +60,9 @@ pub enum AnalysisError {
     NoTimeAxis {
         /// The record.
         file: String,
-        /// Numbers and names of its columns.
+        /// Numbers and names of the columns of the record.
         available: String,
-        /// A time column whose unit is not understood, and the text for that unit.
+        /// A time column whose unit is not understood, and the text of this unit.
         unclear: Option<(String, String)>,
     },
     /// A file of many records does not contain the requested one, or none was requested.
@@ -74,7 +74,7 @@ pub enum AnalysisError {
         id: Option<String>,
         /// Number of records in the file.
         records: usize,
-        /// Some of its records.
+        /// Some of the records in the file.
         available: String,
     },
     /// An array in memory has no column of this name.
@@ -137,7 +137,7 @@ pub enum AnalysisError {
     NeitherRecordNorTable {
         /// The file.
         file: String,
-        /// Numbers and names of its columns.
+        /// Numbers and names of the columns of the file.
         available: String,
     },
     /// A table does not have the responses of all points to a force.
@@ -198,7 +198,7 @@ pub enum AnalysisError {
     DependentForces {
         /// The force.
         force: String,
-        /// The forces before it.
+        /// Names of the forces before `force` in the list.
         others: String,
         /// Ratio of the RMS of the independent part of this force to the RMS of the force.
         own_share: f64,
@@ -227,11 +227,11 @@ pub enum AnalysisError {
     NoCommonPoint {
         /// The first set.
         first: String,
-        /// Points of the first set.
+        /// Points of the first set of modes.
         points: String,
         /// The second set.
         second: String,
-        /// Points of the second set.
+        /// Points of the second set of modes.
         other_points: String,
     },
     /// An indicator of modes cannot be computed.
@@ -284,9 +284,9 @@ pub enum AnalysisError {
         file: String,
         /// Number and name of the column.
         column: String,
-        /// Unit stated by its name or by the line of units.
+        /// Unit that the name of the column or the line of units states.
         unit: String,
-        /// Quantity of that unit.
+        /// Quantity that the unit measures.
         measures: Quantity,
         /// Setting that names the column.
         setting: &'static str,
@@ -404,7 +404,7 @@ pub enum AnalysisError {
         dof: usize,
     },
     /// The force has no spectral line.
-    #[error("no excited line: over a period of {} the force does not vary", message::count(*period, "sample"))]
+    #[error("no excited line: the force does not vary over a period of {}", message::count(*period, "sample"))]
     StillForce {
         /// Number of samples in the period.
         period: usize,
@@ -516,7 +516,7 @@ pub enum AnalysisError {
     SweepRate {
         /// Requested rate, in Hz.
         rate_hz: f64,
-        /// Rate of the record, in Hz.
+        /// Sampling rate of the record, in Hz.
         own_hz: f64,
     },
     /// NPI (cycles of the natural frequency per period) needs a described experiment, whose
@@ -618,13 +618,13 @@ pub enum AnalysisError {
     TimeLimit {
         /// The limit, in s.
         seconds: f64,
-        /// Failure of the work after the end of the limit, in a sentence.
+        /// Failure with which the work ended after the time limit, in a sentence.
         failure: String,
     },
     /// The process for a record of a fleet has ended.
     #[error("the process that worked on the record has ended: {how}")]
     RecordProcess {
-        /// End of the process, and its message.
+        /// Exit status of the process and its message, in words.
         how: String,
     },
     /// A setting cannot be understood.
@@ -638,7 +638,7 @@ pub enum AnalysisError {
     /// M, C and K have no scale: the data determine only the modes.
     #[error("{unscaled}")]
     Unscaled {
-        /// Equations whose entries are not reported.
+        /// Equations of motion whose entries in M, C and K are not reported.
         unscaled: Unscaled,
     },
     /// The identification failed.
@@ -705,8 +705,8 @@ impl AnalysisError {
     }
 }
 
-/// Returns the part of the library that the code of a failure names. The code stays the same when a
-/// failure moves to another crate.
+/// Returns the part of the library with which the code of a failure begins. A failure that moves to
+/// another crate keeps its code.
 fn part_of_library<'a>(part: &'a str, name: &str) -> &'a str {
     match (part, name) {
         ("Numerics", "EntryNotFinite" | "ExponentialOverflow" | "NotConverged" | "NotSquare") => {

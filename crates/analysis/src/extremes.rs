@@ -3,12 +3,13 @@
 /// Number of sections of a long window in a plot: several for each column of pixels.
 const CELLS: usize = 4096;
 
-/// Smallest and largest sample of each cell of a window, in the unit of its channel.
+/// Smallest and largest sample of each section of a window, in the unit of the channel.
 #[derive(Debug, Clone)]
 pub struct Extremes {
     cell: usize,
     samples: usize,
-    /// Samples of every section, counted from 0, with their values.
+    /// Smallest and largest sample of every section: each has the index, counted from 0, and the
+    /// value.
     extremes: Vec<[(usize, f64); 2]>,
 }
 

@@ -21,7 +21,7 @@ const RARE: f64 = 0.05;
 /// Maximum ratio of pull to push of a hammer; ringing filters cause some pull.
 const ONE_SIDED: f64 = 0.2;
 
-/// Maximum excess of the power of a channel during the hits over its power between them, in
+/// Maximum excess of the power of a channel during the hits over its power between the hits, in
 /// standard deviations of the power of noise; with a larger excess, a force acts.
 const MOVES: f64 = 6.0;
 
@@ -30,25 +30,25 @@ const MOVES: f64 = 6.0;
 pub struct HitRow {
     /// The record.
     pub record: String,
-    /// Number in its record, from 1.
+    /// Number of the hit in its record, counted from 1.
     pub number: usize,
     /// Degree of freedom that is struck, counted from 1.
     pub force: usize,
-    /// First sample of its window, counted from 1.
+    /// First sample of the window of the hit, counted from 1.
     pub first_sample: usize,
-    /// Last sample of its window, counted from 1.
+    /// Last sample of the window of the hit, counted from 1.
     pub last_sample: usize,
-    /// Instant at which its pulse begins, in s after the first sample of the record.
+    /// Instant at which the force pulse begins, in s after the first sample of the record.
     pub time_s: f64,
-    /// Duration of its pulse, in s.
+    /// Duration of the force pulse, in s.
     pub duration_s: f64,
     /// Largest force, in N.
     pub peak: f64,
-    /// `true` if it was used.
+    /// `true` if the hit was used.
     pub used: bool,
-    /// Reasons for its exclusion, a sentence each.
+    /// Reasons for the exclusion of the hit, a sentence each.
     pub reasons: Vec<String>,
-    /// Reasons for its exclusion in machine-readable form, with the measured values.
+    /// Reasons for the exclusion of the hit in machine-readable form, with the measured values.
     pub faults: Vec<HitFault>,
 }
 
@@ -90,8 +90,9 @@ impl fmt::Display for HitRow {
     }
 }
 
-/// Returns a line for every record with its number of hits, and a line for every excluded hit; of
-/// more than [`LISTED`] hits with one kind of fault, a line names the first ones.
+/// Returns a line for every record with its number of hits, and a line for every excluded hit; if
+/// more than [`LISTED`] hits have the same kind of fault, one line names only the first of these
+/// hits.
 pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
     let mut text = String::new();
     for of_record in rows.chunk_by(|a, b| a.record == b.record && a.number < b.number) {
@@ -108,12 +109,12 @@ pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
     text
 }
 
-/// Maximum number of excluded hits with the same kind of fault in a message; of more hits, the
-/// message names the kind, the number, and the first ones.
+/// Maximum number of excluded hits with the same kind of fault that get one message each; for more
+/// hits, one message names the kind, the number, and the first hits.
 const LISTED: usize = 3;
 
-/// Returns a text for every excluded hit, or one for many hits with the same kind of fault, in the
-/// order of the first hit of each text.
+/// Returns a text for every excluded hit, or one text for many hits with the same kind of fault, in
+/// the order of the first hit of each text.
 fn excluded(hits: &[HitRow]) -> Vec<String> {
     let kind = |hit: &HitRow| hit.faults.first().map_or("left out", HitFault::kind);
     let bad: Vec<&HitRow> = hits.iter().filter(|hit| !hit.used).collect();
@@ -155,7 +156,7 @@ pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
         is_hammer.then(|| {
             format!(
                 "the force of {} is zero except for {}, as in a hammer test: `hits` cuts such a record into its hits, excludes \
-                 bad ones, and fits each of the others as a separate record",
+                 bad hits, and fits each good hit as a separate record",
                 buffered.file,
                 message::count(found.all.len(), "short pulse")
             )
@@ -167,7 +168,7 @@ pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
 #[derive(Default)]
 pub(crate) struct Cut {
     pub hits: Vec<Windowed>,
-    /// Noise of the force of each of these records.
+    /// Noise of the force, one entry for each record in `hits`.
     pub noise: Vec<HitNoise>,
     pub rows: Vec<HitRow>,
     /// Number of good hits of each record; records in memory all have the same name.
@@ -235,7 +236,7 @@ fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
 /// the pulse has noise.
 #[derive(Debug, Clone)]
 pub(crate) struct HitNoise {
-    /// Standard deviation between the hits, in N.
+    /// Standard deviation of the force between the hits, in N.
     pub deviation: f64,
     /// Samples of the window with a force, counted from 0, one range for each pulse.
     pub pulses: Vec<Range<usize>>,

@@ -15,8 +15,8 @@ pub const INSPECT_BYTES: usize = 96;
 /// sample by sample, and for frequency responses.
 pub const STRETCH_BYTES: usize = 256;
 
-/// Bytes of memory per number of a window that is analysed as a whole: nonlinear terms, the
-/// separation of hits, derivatives of a whole period.
+/// Bytes of memory per number of a window that is analysed as a whole, as for nonlinear terms, the
+/// separation of hits, and derivatives of a whole period.
 pub const WHOLE_BYTES: usize = 640;
 
 /// Minimum number of bytes of memory per number of a record whose transient is fitted: one force
@@ -45,9 +45,9 @@ pub const PAIR_BYTES: usize = 128;
 /// sensitivities.
 pub const TABLE_BYTES: usize = 3000;
 
-/// Additional bytes of memory per number of a table of frequency responses and degree of freedom:
-/// the receptance of a line and the covariance of its noise; 20 and 40 degrees of freedom took 400
-/// bytes.
+/// Additional bytes of memory for each number of a table of frequency responses, per degree of
+/// freedom: the receptance of a line and the covariance of its noise. 20 and 40 degrees of freedom
+/// took 400 bytes.
 pub const TABLE_DOF_BYTES: usize = 400;
 
 /// Bytes of memory per number of a table of frequency responses and unknown: three copies of the
@@ -70,11 +70,12 @@ pub const MODAL_TABLE_BYTES: usize = 3200;
 /// 24 and 36 bytes.
 pub const MODAL_PAIR_BYTES: usize = 40;
 
-/// Largest number of modes of a first estimate. If their memory is allowed, they are not counted.
+/// Maximum number of initial estimates of modes. The check of the memory first assumes this number
+/// of modes. It determines the actual number only if the assumed number needs too much memory.
 pub(crate) const MANY_MODES: usize = 72;
 
-/// Minimum number of equations per unknown in a table with fewer lines, on which other models are
-/// tried first. A model that does not explain these lines far better than the fitted model is not
+/// Minimum number of equations per unknown in the tables with fewer lines to which other models are
+/// fitted first. A model that does not explain these lines far better than the fitted model is not
 /// fitted to all lines.
 pub(crate) const TRIED_EQUATIONS: usize = 40;
 
@@ -83,15 +84,15 @@ pub(crate) const TRIED_EQUATIONS: usize = 40;
 pub(crate) const TRIED_LINES: usize = 100;
 
 /// Number of lines of a table that decide whether it has more resonances than responses. More lines
-/// would show weaker resonances, in a time that grows with their number.
+/// would show weaker resonances, but the search takes a time that grows with the number of lines.
 pub(crate) const SURPLUS_LINES: usize = 2000;
 
 /// Largest ratio of the number of all lines of a table to the number of lines that are used to try
 /// other models.
 pub(crate) const THINNED_STEP: usize = 10;
 
-/// Largest number of channels whose noise covariances need at most [`STRETCH_BYTES`] per sample and
-/// channel: the number of lines is half the number of samples.
+/// Maximum number of channels for which the noise covariances need at most [`STRETCH_BYTES`] per
+/// sample and channel. A spectrum has half as many lines as the record has samples.
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
 /// Decay of the slowest mode, as a natural logarithm, during the zeros that are appended to the
@@ -99,8 +100,8 @@ pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 /// 0.1 % of the response at the end of the record.
 pub const REST_DECAY: f64 = 7.0;
 
-/// Largest number of zeros that are appended to the forces of a prediction by modes, in lengths of
-/// the record; it limits the memory.
+/// Maximum number of zeros that are appended to the forces of a prediction by modes, as a multiple
+/// of the number of samples of the record. This limits the memory.
 pub const REST_RECORDS: usize = 8;
 
 /// Minimum relative uncertainty of the standard errors for a remark: 12 degrees of freedom give an
@@ -111,14 +112,15 @@ pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
 /// entries of the shapes at this response are unreliable.
 pub const LEAST_EXPLAINED: f64 = 0.5;
 
-/// Minimum share of the samples in the smaller half of a test that is divided between two records.
-/// With a smaller share, the half determines the modes so badly that the comparison of the halves
-/// has little power; the longest record is divided instead.
+/// Minimum share of the samples in the smaller of two parts of a test, if the test is divided into
+/// two parts between two records. With a smaller share, this part determines the modes so badly
+/// that the comparison of the two parts has little power; the longest record is then divided at its
+/// middle instead.
 pub const SMALLER_HALF: f64 = 0.25;
 
-/// Minimum number of modes of an ambient record, within one half-width, that indicates a spectral
-/// peak of the unmeasured forces. Two modes may be a close pair, as in a symmetric tower; a force
-/// with a peak gives one mode for each independent force.
+/// Minimum number of modes of an ambient record with frequencies within one half-width ζf that
+/// indicates a spectral peak of the unmeasured forces. Two modes may be a close pair, as in a
+/// symmetric tower; a force with a peak gives one mode for each independent force.
 pub const CROWDED_MODES: usize = 3;
 
 /// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest
@@ -135,8 +137,8 @@ pub const DRIVEN_LINES: usize = 16;
 /// fit to the small remainder is not representative of the fit to all data.
 pub const MOST_VALIDATED: f64 = 0.8;
 
-/// Minimum share of unmeasured forces in the motion of a mode; a mode with a larger share gets a
-/// note. A smaller share is only in the table.
+/// Minimum share of unmeasured forces in the motion of a mode for a note about this mode. Smaller
+/// shares are listed only in the table.
 pub const NOTED_UNMEASURED: f64 = 0.01;
 
 /// Maximum correlation of the errors of two lines of averaged responses in the same fit: neighbours
@@ -144,13 +146,13 @@ pub const NOTED_UNMEASURED: f64 = 0.01;
 /// a larger limit, smooth noise would appear as modes.
 pub const LINE_CORRELATION: f64 = 0.1;
 
-/// Minimum half-power bandwidth, in lines of a segment, of a mode for a correction of its window
-/// bias: the averaged lines do not determine the response of a narrower mode between them.
+/// Minimum half-power bandwidth of a mode, in lines of a segment, for a correction of its window
+/// bias: the response of a narrower mode between the averaged lines is not determined.
 pub const LEAST_SHARPENED_LINES: f64 = 0.5;
 
 /// Maximum product of the samples of a segment and the number of segments that overlap it, for a
 /// table that states segments. For a larger product the weights of the window would take minutes,
-/// and the statement is ignored.
+/// and the stated segments are ignored.
 pub const MOST_SEGMENT_WORK: usize = 1 << 22;
 
 /// Maximum number of corrections of the window bias of modes from averaged responses. Each removes
@@ -170,7 +172,7 @@ pub const MODAL_SIGNIFICANCE: f64 = 0.01;
 /// Number of bytes in the unit of the setting `memory_gb`.
 const GIGABYTE: f64 = 1e9;
 
-/// Refuses an analysis of `numbers` numbers, of `bytes` bytes each, that needs more than `allowed`
+/// Refuses an analysis of `numbers` numbers, of `bytes` bytes each, if it needs more than `allowed`
 /// bytes.
 pub(crate) fn check_memory(
     file: &str,
@@ -181,7 +183,7 @@ pub(crate) fn check_memory(
     check_bytes(file, numbers, numbers.saturating_mul(bytes), allowed)
 }
 
-/// Refuses an analysis of `numbers` numbers that needs more than `allowed` bytes.
+/// Refuses an analysis of `numbers` numbers if it needs more than `allowed` bytes.
 pub(crate) fn check_bytes(
     file: &str,
     numbers: usize,
@@ -202,8 +204,8 @@ pub(crate) fn memory_bytes(reading: &Reading) -> Option<usize> {
     reading.memory_gb.map(|gb| (gb * GIGABYTE) as usize)
 }
 
-/// Largest number of degrees of freedom of a machine of elements with modes in its result; the
-/// modes of a larger machine come from `modes`.
+/// Maximum number of degrees of freedom of a machine of elements whose modes the result lists. The
+/// modes of a larger machine are computed with `modes`.
 pub(crate) const LISTED_MODES_DOF: usize = 30;
 
 /// Minimum share of the prior in the information about a parameter for a remark.
@@ -234,11 +236,12 @@ pub(crate) const PULSE_EFFECTS: usize = 1 << 25;
 pub(crate) const REST_PERIODS: f64 = 2.0;
 
 /// Maximum number of samples, at each end of a record, that decide whether it begins and ends at
-/// rest. More samples take more time, and the faster modes already show a motion.
+/// rest. A larger number takes more time and shows little more: the faster modes already show a
+/// motion in these samples.
 pub(crate) const REST_SAMPLES: usize = 4096;
 
-/// Ratio of the RMS of a channel at an end of a record to its largest value, at or below which the
-/// channel is at rest: the rest is rounding.
+/// Maximum RMS, about the mean, of a channel that counts as at rest at an end of a record, relative
+/// to the largest magnitude of the channel in the whole record; such small values are rounding.
 pub(crate) const REST_DIGITS: f64 = 1e-9;
 
 /// P-value of the correlations of the prediction errors of a force model; below it, a remark says

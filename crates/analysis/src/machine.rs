@@ -199,7 +199,7 @@ impl Named {
     }
 }
 
-/// Parameters of the channels rather than of the system.
+/// Names of the parameters that belong to the channels; all other parameters belong to the system.
 const CHANNELS: [&str; 3] = ["delay", "p3", "p5"];
 
 /// Returns the covariance of the parameters selected by name.

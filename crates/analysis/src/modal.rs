@@ -31,8 +31,8 @@ pub struct ModalSummary {
     pub response_names: Vec<String>,
     /// Modes of the system, by rising frequency.
     pub modes: Vec<ShapedMode>,
-    /// Natural frequency of each undamped mode as a function of amplitude, within the amplitudes of
-    /// the data of the nonlinear terms; empty for a linear system.
+    /// Natural frequency of each undamped mode as a function of amplitude, up to the largest
+    /// amplitude in the data that determined the nonlinear terms; empty for a linear system.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub backbone: Vec<BackboneRow>,
     /// M, C and K.
@@ -45,7 +45,7 @@ pub struct ShapedMode {
     /// Frequencies, damping, poles.
     #[serde(flatten)]
     pub row: ModeRow,
-    /// Real and imaginary part, in rad/s.
+    /// Real and imaginary part of the eigenvalue, in rad/s.
     pub eigenvalue: [f64; 2],
     /// One entry per degree of freedom; the largest is 1.
     pub shape: Vec<ShapeEntry>,
@@ -112,7 +112,7 @@ impl Machine {
     /// without data.
     ///
     /// # Errors
-    /// [`AnalysisError::Model`] if the covariance includes invalid machines.
+    /// [`AnalysisError::Model`] if parameter values within the covariance give an invalid machine.
     pub fn backbone(&self) -> Result<Vec<BackboneRow>, AnalysisError> {
         let mut rows = Vec::new();
         let Some(part) = &self.nonlinear else { return Ok(rows) };

@@ -35,7 +35,7 @@ pub struct Predicted {
 /// Predicted time histories.
 #[derive(Debug)]
 pub(crate) enum PredictedMotion {
-    /// Every degree of freedom of a machine.
+    /// Response of every degree of freedom of a machine.
     Machine(Response),
     /// Responses of a modal test, samples × columns.
     Modes { names: Vec<String>, record: Record },
@@ -76,7 +76,7 @@ pub struct PredictionError {
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// RMS of measured minus predicted, in this unit.
+    /// RMS of the difference between measured and predicted response, in the unit `unit`.
     pub rmse: f64,
     /// RMSE over the RMS of the measured response about its mean (pure number).
     pub nrmse: f64,
@@ -157,8 +157,8 @@ const PARTS: usize = 8;
 /// Minimum ratio of the error in the first part to the error in the last part that indicates a
 /// wrong initial state.
 const DIES_AWAY: f64 = 3.0;
-/// Minimum number of samples in a part of a record, and number of initial samples that must show
-/// the error.
+/// Minimum number of samples in one of the [`PARTS`] parts of a record. The largest initial error
+/// is searched for in the same number of samples from the beginning.
 const SHORTEST: usize = 16;
 /// Minimum ratio of the largest initial error to the largest error of the record that indicates a
 /// wrong initial state. The ratio is smaller for an inaccurate machine, because its error grows
@@ -252,8 +252,8 @@ fn open(
     shown(&nonlinear::predict(system, &force, Extent::Open, &start)?, phase, 1)
 }
 
-/// Returns the steady state that the search from rest finds, for periods without measured
-/// responses.
+/// Returns the steady state for periods without measured responses, by a search that starts from
+/// rest.
 fn steady_from_rest(
     system: &NonlinearSystem,
     phase: ChannelPhase,

@@ -45,7 +45,8 @@ pub fn within<T, E: From<AnalysisError> + Display>(
     time_limit::within(limit.transpose()?, || work().map_err(with_limit))
 }
 
-/// Returns the failure of an analysis; it names the time limit if this has ended a search.
+/// Returns the failure of an analysis. If the time limit has ended a search, the failure names the
+/// limit.
 fn with_limit<E: From<AnalysisError> + Display>(failure: E) -> E {
     match time_limit::ended() {
         Some(seconds) => AnalysisError::TimeLimit { seconds, failure: failure.to_string() }.into(),
@@ -64,7 +65,8 @@ pub(crate) fn check() -> Option<CheckRow> {
     finding().map(|finding| CheckRow::new(When::After, None, &finding, &Channels::default()))
 }
 
-/// Returns the same check for modes.
+/// Returns the failed check of a modal test if the time limit has ended a search; `None` if all
+/// searches have run to their ends.
 pub(crate) fn check_of_modes() -> Option<ModalCheck> {
     finding().map(|finding| ModalCheck {
         code: "time_limit",
@@ -74,7 +76,8 @@ pub(crate) fn check_of_modes() -> Option<ModalCheck> {
     })
 }
 
-/// Returns the same finding as a remark.
+/// Returns a remark if the time limit has ended a search; `None` if all searches have run to their
+/// ends.
 pub(crate) fn remark() -> Option<String> {
     finding().map(|finding| finding.to_string())
 }

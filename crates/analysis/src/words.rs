@@ -99,7 +99,8 @@ pub(crate) mod written {
         }
     }
 
-    /// Reads also a pair of numbers, equivalent to a text with a colon between them.
+    /// Reads a setting that is given as a text such as `2:50`, or as a pair of numbers such as `[2,
+    /// 50]`.
     pub(crate) fn pair<'de, D: Deserializer<'de>, T>(deserializer: D) -> Result<Option<T>, D::Error>
     where
         T: DeserializeOwned + FromStr<Err: Display>,

@@ -1,5 +1,5 @@
-//! Tests of records that end the process which analyses them. This program is also the process that
-//! analyses the fleets of its own tests, so it has its own `main`.
+//! Tests with records that make the analysing process end. The tests start this same program again
+//! as the analysing process, so it has its own `main`.
 
 use std::fs;
 use std::io::{stdin, stdout};

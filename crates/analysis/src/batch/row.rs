@@ -1,4 +1,4 @@
-//! The result of one record of many.
+//! Result of one of many records.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -76,9 +76,9 @@ pub struct ParameterCell {
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Value, in its unit.
+    /// Value, in the unit of the parameter.
     pub value: f64,
-    /// Standard error, in the same unit; `None` for a known value.
+    /// Standard error, in the unit of the parameter; `None` for a known value.
     pub standard_error: Option<f64>,
 }
 
@@ -107,7 +107,7 @@ pub struct FindingRow {
 }
 
 impl SavedAnalysis {
-    /// Identifies the record that `source` opens. In the row, its name is `record`. Every failure,
+    /// Identifies the record that `source` opens; the row has the name `record`. Every failure,
     /// including a panic, becomes the error of the row. The same record and analysis always give
     /// the same row.
     pub fn row(

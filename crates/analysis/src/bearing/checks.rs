@@ -1,4 +1,4 @@
-//! Checks of the tests of a bearing, before and after its fit.
+//! Checks of the tests of a bearing, before and after the fit.
 
 use mechid_checks::{
     Finding, adjust_p_values, after_spectral_fit, before_spectral_fit, fluid_inertia, instability,
@@ -17,7 +17,7 @@ use crate::AnalysisError;
 use crate::identify::checks::{CheckRow, When};
 use crate::measurement::Channels;
 
-/// A finding, with its test if it concerns only one test.
+/// A finding with its stage, and with a test if the finding concerns only this test.
 type Placed<'a> = (When, Option<(&'a str, &'a Channels)>, Finding);
 
 /// Returns all findings on the tests and on the baseline tests; the p-values are adjusted for the

@@ -43,7 +43,7 @@ pub struct BearingData {
     /// Largest displacement of the housing from its mean position, relative to the shaft, in m;
     /// `None` for frequency responses.
     pub(super) largest_displacement: Option<f64>,
-    /// Excluded frequencies at multiples of the rotation, in Hz.
+    /// Excluded frequencies at multiples of the rotation frequency, in Hz.
     pub(super) left_out_hz: Vec<f64>,
     pub(super) remarks: Vec<String>,
 }
@@ -52,10 +52,10 @@ pub struct BearingData {
 #[derive(Debug, Clone)]
 pub(super) struct TestRecord {
     pub name: String,
-    /// Names of its channels.
+    /// Names of the channels of the record.
     pub channels: Arc<Channels>,
     pub data: FrequencyData,
-    /// Findings on its samples.
+    /// Findings on the samples, before the fit.
     pub before: Vec<Finding>,
 }
 

@@ -45,7 +45,7 @@ pub(super) struct Film {
     /// all variances are multiplied by it.
     pub excess: f64,
     /// Critical value of the statistic of the test of M = 0; `None` if the test did not choose the
-    /// model.
+    /// model with twelve coefficients.
     critical: Option<f64>,
     pub degrees_of_freedom: usize,
 }
@@ -97,7 +97,7 @@ impl Film {
             film.critical = fisher
                 .filter(|_| chosen)
                 // `widen` multiplies the covariance by `before_choice`, which divides the statistic
-                // by the same factor. The critical value is therefore divided by it, too.
+                // by the same factor. The critical value is therefore also divided by this factor.
                 .map(|fisher| EACH as f64 * fisher.inverse_cdf(1.0 - SIGNIFICANCE) / before_choice);
             film.widen(before_choice);
             return Ok(film);
@@ -140,7 +140,8 @@ impl Film {
         Ok(())
     }
 
-    /// Returns the larger [`excess`] of tests and baseline.
+    /// Returns the larger of two ratios: the [`excess`] of the tests and the [`excess`] of the
+    /// baseline tests.
     fn excess_of(
         &self,
         tests: &BearingData,
@@ -277,8 +278,8 @@ fn row_by_row(matrix: &Matrix2<f64>) -> [f64; EACH] {
 }
 
 /// Returns the coefficients of a fit as kxx, kxy, kyx, kyy, then c and m likewise, with their
-/// covariance. If the fit did not estimate the mass, `mass` is returned for it, with a covariance
-/// of zero.
+/// covariance. If the fit did not estimate the mass, the given `mass` takes its place, with a
+/// covariance of zero.
 fn in_order(fit: &OutputErrorFit, mass: &Matrix2<f64>) -> (DVector<f64>, DMatrix<f64>) {
     let estimate = &fit.estimate;
     let free: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();

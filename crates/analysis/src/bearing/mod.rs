@@ -9,9 +9,9 @@
 //! f − M_s a = H d,   H(ω) = K − ω² M + iω C
 //! ```
 //!
-//! is a linear system with noise on both sides. Its twelve entries of K, C and M, or eight without
-//! M, are estimated by maximum likelihood with the noise from the scatter of the periods. M is the
-//! inertia of the fluid: its entries may be negative.
+//! is a linear system with noise on both sides. The twelve entries of K, C and M, or the eight
+//! entries of K and C, are estimated by maximum likelihood with the noise from the scatter of the
+//! periods. M is the inertia of the fluid: its entries may be negative.
 //!
 //! | File | What it does |
 //! |---|---|

@@ -21,9 +21,9 @@ impl BearingTable {
     /// Returns the table as text in the axes of ROSS: `speed` in rad/s, and kxx … myy in SI units
     /// (zero for masses that were not identified), one row per speed and load.
     ///
-    /// The columns kxx … myy are keyword arguments of `BearingElement`. Its releases 1 and 2 call
-    /// the speed `frequency`; release 3 calls it `speed`, and `frequency` the frequency of the
-    /// excitation.
+    /// The columns kxx … myy are keyword arguments of `BearingElement`. Releases 1 and 2 of ROSS
+    /// call the speed `frequency`; release 3 calls it `speed`, and uses `frequency` for the
+    /// frequency of the excitation.
     ///
     /// # Source
     /// Timbó et al., ROSS – Rotordynamic Open Source Software, Journal of Open Source Software
@@ -61,8 +61,9 @@ mod tests {
 
     use super::*;
 
-    /// K and C of `CylindricalBearing` of ROSS 2.3.0: 525 N, 1,500 rev/min, D 0.1 m, L 0.03 m,
-    /// clearance 0.1 mm, 0.1 Pa·s.
+    /// K and C of a short bearing, turned into the axes of ROSS, equal those of
+    /// `CylindricalBearing` of ROSS 2.3.0 for 525 N, 1,500 rev/min, D 0.1 m, L 0.03 m, clearance
+    /// 0.1 mm, 0.1 Pa·s.
     #[test]
     fn a_short_bearing_is_that_of_the_package() {
         let of_ross = [

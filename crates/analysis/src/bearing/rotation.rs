@@ -57,8 +57,8 @@ pub(super) fn speed_of_misfit(tests: &BearingData) -> Option<[f64; 2]> {
                 [used.len(), excluded, rows.len()].map(|count| (4 * count) as f64);
             speeds.push((used * power + excluded * total.ln(), hz));
         }
-        // With this step of the speed, its highest multiple in the band moves by half the line
-        // spacing.
+        // This step of the speed moves the highest multiple of the speed in the band by half the
+        // line spacing.
         hz *= 1.0 + 0.5 * spacing_hz / highest;
     }
     let best = speeds.iter().map(|(criterion, _)| *criterion).reduce(f64::min)?;

@@ -1,9 +1,9 @@
-//! Intervals of coefficients after a choice of the model by a test.
+//! Intervals of coefficients after a test has chosen the model.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Number of bisections for a limit of an interval; they reduce its error to rounding.
+/// Number of bisections for a limit of an interval; they reduce the error of the limit to rounding.
 const HALVINGS: usize = 80;
 
 /// Half the width of the search range for a limit of an interval, in standard errors. A test of
@@ -56,8 +56,8 @@ pub(super) fn gap(
     Some(ends.map(|end| end * variance.sqrt()))
 }
 
-/// Returns the interval at `level` of a coefficient whose estimate, with this standard error,
-/// cannot be inside `gap`.
+/// Returns the confidence interval, at `level`, of a coefficient with the estimate `value` and the
+/// `standard_error`, given that the estimate cannot be inside `gap`.
 ///
 /// # Source
 /// As [`gap`].
@@ -70,7 +70,7 @@ pub(super) fn conditional_interval(
     let student = StudentsT::new(0.0, 1.0, degrees_of_freedom as f64).ok()?;
     let [low, high] = gap.map(|end| end / standard_error);
     let estimate = value / standard_error;
-    // Conditional probability of a larger estimate, which rises with the true value.
+    // Conditional probability of a larger estimate. This probability rises with the true value.
     let above = |truth: f64| {
         let (below_gap, above_gap) = (student.cdf(low - truth), student.sf(high - truth));
         let outside_gap = below_gap + above_gap;
@@ -144,7 +144,8 @@ mod tests {
                 }
             }
             for count in inside {
-                // The tolerance is three standard errors of a fraction of 1,500.
+                // The tolerance is three standard errors of a fraction of 95 % that 1,500 trials
+                // estimate.
                 assert!((0.933..=0.967).contains(&(count as f64 / 1500.0)), "{size}: {inside:?}");
             }
             assert!(size > 0.0 || usual[1..].iter().any(|count| *count < 1275), "{usual:?}");

@@ -24,7 +24,7 @@ pub struct IdentifyBearing {
     pub coefficients: Coefficients,
     /// Spectral lines to use.
     pub lines: LineChoice,
-    /// Lines to exclude in addition to the multiples of the rotation.
+    /// Lines to exclude in addition to the lines at multiples of the rotation frequency.
     pub without: LeftOut,
     /// Number of independent averages of the coherence of tables of frequency responses, a pure
     /// number that need not be an integer.

@@ -46,7 +46,7 @@ pub struct BearingPlan {
 pub struct BearingPoint {
     /// Records of the tests, or their tables of frequency responses.
     pub tests: Vec<PathBuf>,
-    /// Records of the baseline tests, or their tables.
+    /// Records of the baseline tests, or their tables of frequency responses.
     pub baseline: Vec<PathBuf>,
     /// Speed of rotation, in Hz; `None`: as in the settings.
     pub rotation_hz: Option<f64>,

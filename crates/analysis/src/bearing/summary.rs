@@ -76,7 +76,7 @@ pub struct BearingSummary {
     pub condition_number: f64,
     /// Number of spectral lines, summed over the tests.
     pub lines: usize,
-    /// Frequencies of the lines excluded because of the rotation, in Hz.
+    /// Frequencies, in Hz, of the lines that were excluded at multiples of the rotation frequency.
     pub left_out_hz: Vec<f64>,
     /// Dynamic stiffness of the film line by line.
     pub dynamic_stiffness: Vec<StiffnessLine>,
@@ -125,7 +125,7 @@ pub struct StabilityRow {
 pub struct Amplitude {
     /// Largest displacement from the mean position, in m.
     pub largest_displacement: f64,
-    /// Ratio of this displacement to the clearance; `None` if the clearance is unknown.
+    /// Ratio of the largest displacement to the clearance; `None` if the clearance is unknown.
     pub over_clearance: Option<f64>,
 }
 
@@ -295,7 +295,7 @@ impl BearingSummary {
         Ok(Some(Dimensionless { coefficients, sommerfeld_number }))
     }
 
-    /// Returns the threshold of instability; adds a remark if the coefficients do not have one.
+    /// Returns the threshold of instability; adds a remark if the coefficients have no threshold.
     fn whirl(
         &mut self,
         film: &Film,

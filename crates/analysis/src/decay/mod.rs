@@ -44,7 +44,8 @@ pub struct DecaySettings {
 }
 
 impl Default for DecaySettings {
-    /// Returns settings that detect everything in the record, with at most ten modes.
+    /// Returns settings without a given beginning, end and number of modes: these are detected in
+    /// the record, with at most ten modes.
     fn default() -> Self {
         let FreeDecay { modes, max_modes, offset } = FreeDecay::default();
         Self { from_s: None, to_s: None, modes, max_modes, offset }
@@ -67,10 +68,10 @@ pub struct Decayed {
 /// The record needs no force column; if a force column is named, it is not read. All channels have
 /// the same quantity. At each sample, the squares of all channels, each divided by the power of the
 /// channel, are added. Without a given beginning, the decay begins at the last sample whose sum is
-/// at least 80 % of the largest sum; at the first such sample if the amplitude decays from there;
-/// at the beginning of the record if the amplitude grows over most of it. Without a given end, it
-/// ends where the range of a channel has fallen to twelve quantisation steps, if its values are
-/// quantised.
+/// at least 80 % of the largest sum. It begins at the first such sample if the amplitude decays
+/// from there, and at the beginning of the record if the amplitude grows over most of the record.
+/// Without a given end, the decay ends where the range of a channel with quantised values has
+/// fallen to twelve quantisation steps.
 ///
 /// ```
 /// use mechid_analysis::{Channels, DecaySettings, Measurement, ResponseQuantity, decay};
@@ -118,7 +119,7 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     summary.remarks.extend(faults.iter().map(|fault| checks::sentence(fault, &whole.names)));
     summary.remarks.extend(coarse.into_iter().map(|(channel, steps)| {
         format!(
-            "the values of {} span {steps} steps of its converter: rounding to these few steps \
+            "the values of {} span {steps} steps of the converter: rounding to these few steps \
              does not act like noise, and may appear as modes; \
              leave the column out, or measure with a higher gain",
             summary.channels[channel].column
@@ -190,7 +191,8 @@ impl DecaySettings {
         FreeDecay { modes: self.modes, max_modes: self.max_modes, offset: self.offset }
     }
 
-    /// Returns the part of a record between beginning and end.
+    /// Returns the samples of a record from `from_s` to `to_s`; without these settings, all samples
+    /// of the window.
     fn part(&self, measurement: &Measurement) -> Result<Measurement, AnalysisError> {
         if measurement.window_settings().period.is_some() {
             let why = "a free decay has no period: choose `from` and `to`".into();

@@ -13,14 +13,14 @@ use crate::text::{compact, significant, text_table};
 const HIGHEST_HARMONIC: u32 = 7;
 /// Maximum ratio of the tolerance of a harmonic to the frequency of the fundamental mode.
 const HARMONIC_REACH: f64 = 0.1;
-/// Maximum difference of a frequency from a multiple of another, in standard errors, for a
-/// harmonic.
+/// Maximum difference between the frequency of a harmonic and a multiple of the fundamental
+/// frequency, in standard errors.
 const HARMONIC_ERRORS: f64 = 4.0;
 
 /// Mode whose frequency is a multiple of another mode's frequency, within their errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Harmonic {
-    /// The other mode, counted from 1.
+    /// Number, counted from 1, of the mode whose frequency is multiplied.
     pub of_mode: usize,
     /// Order of the harmonic.
     pub order: u32,
@@ -94,8 +94,8 @@ impl DecaySummary {
         });
         let energy = |number: usize| self.modes[number - 1].energy_share;
         let strongest = backbone.modes.iter().max_by(|a, b| energy(**a).total_cmp(&energy(**b)));
-        // The interval of an uncertain frequency is wide and may contain a multiple of the
-        // fundamental frequency by chance.
+        // A frequency with a large standard error is not marked: its wide interval may contain a
+        // multiple of the fundamental frequency by chance.
         let (order, of_mode) = order.zip(strongest).filter(|_| reach < HARMONIC_REACH * low)?;
         Some(Harmonic { of_mode: *of_mode, order })
     }

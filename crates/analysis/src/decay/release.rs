@@ -17,10 +17,11 @@ const FEWEST: usize = 5;
 /// first large sample on; with less evidence, the decay does not begin at this sample.
 const STRONG_EVIDENCE: f64 = 6.0;
 
-/// Returns the beginning of a decay, counted from 0. A sample is large if its sum of squares of all
-/// channels, each divided by its power, is at least [`LEVEL`] of the largest sum. The decay begins
-/// at the last large sample. It begins at the first large sample if the amplitude decays from
-/// there, and at the first sample of the record if the amplitude grows over most of it.
+/// Returns the beginning of a decay, counted from 0. A sample is large if the sum of the squares of
+/// all channels, each divided by the power of the channel, is at least [`LEVEL`] of the largest
+/// sum. The decay begins at the last large sample. It begins at the first large sample if the
+/// amplitude decays from there, and at the first sample of the record if the amplitude grows over
+/// most of it.
 ///
 /// The last large sample follows a static release or the last cycles of a shaker; after an impact
 /// it is at the peak. The mean of the last quarter is subtracted before the squares are taken.
@@ -39,15 +40,16 @@ pub(super) fn release(record: &Record) -> usize {
     if trend(&energies) < 0.0 && falls_throughout(&energies) {
         return first;
     }
-    // The logarithm of a growing amplitude rises linearly.
+    // If an amplitude grows exponentially, its logarithm rises linearly.
     let logarithms: Vec<f64> = crests(&sums[..=last]).iter().map(|crest| crest.ln()).collect();
     let rises = (sums.len() - last) * PARTS < sums.len() && trend(&logarithms) > 0.0;
     if rises { 0 } else { last }
 }
 
-/// Returns the logarithms of the means of the `sums` over intervals of whole periods of the
-/// strongest line. The first sum belongs to the sample `first`. The result is empty for a record
-/// without such a line, or with too few periods.
+/// Divides the `sums` into intervals and returns the logarithm of the mean of each interval. The
+/// length of an interval is a whole number of periods of the strongest spectral line. The first sum
+/// belongs to the sample `first`. The result is empty for a record without such a line, or with too
+/// few periods.
 fn energies(record: &Record, sums: &[f64], first: usize) -> Vec<f64> {
     let Ok(part) = record.window(first, record.len() - first) else { return Vec::new() };
     let spectrum = Spectrum::from_record(&part.without_mean());
@@ -69,7 +71,8 @@ fn energies(record: &Record, sums: &[f64], first: usize) -> Vec<f64> {
     if means.len() < FEWEST { Vec::new() } else { means }
 }
 
-/// Returns the largest sum of each of [`PARTS`] intervals of equal length; none for fewer sums.
+/// Returns the largest sum in each of [`PARTS`] intervals of equal length. The list is empty if
+/// there are fewer sums than intervals.
 fn crests(sums: &[f64]) -> Vec<f64> {
     let part = sums.len() / PARTS;
     let of_part = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
@@ -124,7 +127,8 @@ fn trend(values: &[f64]) -> f64 {
     if is_scatter { 0.0 } else { slope }
 }
 
-/// Returns the sum of the squares of all channels, each divided by its power, at every sample.
+/// Returns, at every sample, the sum of the squares of all channels, each divided by the power of
+/// the channel.
 fn sums(record: &Record) -> Vec<f64> {
     let len = record.len();
     let mut sums = vec![0.0; len];

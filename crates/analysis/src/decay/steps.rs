@@ -1,26 +1,28 @@
-//! Part of a free decay that is large against the quantisation steps of its converter.
+//! Part of a free decay that is large against the quantisation steps of the analogue-digital
+//! converter.
 
 use mechid_signal::{Record, quantisation_step};
 
-/// Number of intervals of a record for the range of its channels.
+/// Number of intervals into which a record is divided; the range of each channel is computed in
+/// every interval.
 const INTERVALS: usize = 64;
 /// Minimum number of samples of an interval.
 const SHORTEST: usize = 32;
-/// Minimum range of a channel in an interval, in quantisation steps; with less, rounding distorts
-/// the motion.
+/// Minimum range of a channel in an interval, in quantisation steps; with a smaller range, rounding
+/// distorts the motion.
 const STEPS: f64 = 12.0;
 /// Minimum range of a channel, in quantisation steps, in the interval where its range is largest;
 /// with a smaller range, quantisation does not end the decay.
 const LARGE: f64 = 8.0 * STEPS;
 
-/// End of the part of a decay that its converter resolves.
+/// End of the part of a decay that the analogue-digital converter resolves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LastShown {
-    /// Number of samples of this part.
+    /// Number of samples of the resolved part of the decay.
     pub samples: usize,
-    /// Channel that falls to a few steps first, counted from 0.
+    /// Index, counted from 0, of the channel that first falls to a few quantisation steps.
     pub channel: usize,
-    /// Quantisation step of this channel, in its unit.
+    /// Quantisation step of the channel, in the unit of the channel.
     pub step: f64,
 }
 

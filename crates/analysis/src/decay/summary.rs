@@ -76,7 +76,7 @@ pub struct DecayModeRow {
     /// Amplitude at the first sample, at the largest entry of the shape, in the unit of the
     /// response.
     pub amplitude: Uncertain,
-    /// Phase of this amplitude, in degrees.
+    /// Phase at the first sample, at the largest entry of the shape, in degrees.
     pub phase_deg: f64,
     /// Ratio of the sum of squares of this mode to the sum of squares of all modes.
     pub energy_share: f64,

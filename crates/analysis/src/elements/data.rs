@@ -22,7 +22,7 @@ use crate::measurement::{Block, Channels};
 /// Spectral lines of all tests of a machine, with their noise if it is known.
 #[derive(Debug, Clone)]
 pub struct ElementData {
-    /// Lines of all tests, one below the other.
+    /// Lines of all tests, one test after the other.
     pub(super) lines: LineData,
     /// Tests, one for each record of the lines.
     pub(super) tests: Vec<TestRow>,
@@ -51,7 +51,7 @@ pub struct TestRow {
     pub file: String,
     /// Kind of the lines.
     pub kind: TestKind,
-    /// Samples used of a record.
+    /// Samples of the record that were used; `None` for a table.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<WindowRow>,
 }

@@ -108,7 +108,7 @@ pub struct IdentifiedElements {
     spectrum: ElementSpectrum,
 }
 
-/// Lines of the data, to draw beside the model.
+/// Spectral lines of the data, for a plot of data and model.
 #[derive(Debug, Clone)]
 struct ElementSpectrum {
     frequency_hz: Vec<f64>,
@@ -127,8 +127,8 @@ impl ElementSpectrum {
     }
 }
 
-/// Amplitude of one sensor over frequency: measured, of the model, and of their difference, in the
-/// unit of the sensor.
+/// Amplitudes of one sensor as functions of frequency, in the unit of the sensor: of the
+/// measurement, of the model, and of the difference between both.
 #[derive(Debug, Clone)]
 pub struct SensorSpectrum {
     /// Name of the sensor.
@@ -141,7 +141,8 @@ pub struct SensorSpectrum {
     pub measured: Vec<f64>,
     /// Amplitudes of the model, one per frequency, in the unit of the sensor.
     pub modelled: Vec<f64>,
-    /// Amplitudes of the difference, one per frequency, in the unit of the sensor.
+    /// Amplitudes of the difference between measurement and model, one per frequency, in the unit
+    /// of the sensor.
     pub residual: Vec<f64>,
 }
 

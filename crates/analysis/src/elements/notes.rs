@@ -42,9 +42,10 @@ pub enum ElementNote {
     Hysteresis,
     /// M, C and K describe the rotor at rest, because the speed differs from line to line.
     AtRest,
-    /// Too many entries of M, C and K are uncertain for their covariance.
+    /// The covariance of M, C and K is not computed, because too many of their entries are
+    /// uncertain.
     NoCovariance {
-        /// Largest number of entries.
+        /// Maximum number of uncertain entries for which the covariance is computed.
         most: usize,
     },
     /// Standard errors and intervals include the change of the parameters by the delay that the
@@ -56,16 +57,16 @@ pub enum ElementNote {
     DoubtfulKnown {
         /// Name of the element and its coefficient.
         parameter: String,
-        /// Stated value, in its unit.
+        /// Stated value, in the unit of the coefficient.
         known: f64,
-        /// Most likely value, in the same unit.
+        /// Most likely value, in the unit of the coefficient.
         value: f64,
-        /// Standard error of this value, in the same unit.
+        /// Standard error of the most likely value, in the unit of the coefficient.
         standard_error: f64,
         /// Probability of a larger rise of the likelihood if all known values are right.
         p_value: f64,
-        /// Misfit in units of its expectation, with the stated value and with the further unknown;
-        /// absent if the noise comes from the residual.
+        /// Ratio of the misfit to its expectation: first with the stated value, then with the
+        /// coefficient as a further unknown. Absent if the noise comes from the residual.
         #[serde(skip_serializing_if = "Option::is_none")]
         misfit: Option<[f64; 2]>,
     },

@@ -34,8 +34,9 @@ impl ElementData {
     }
 
     /// Returns the data with the measured receptances of some parts of the machine. Each table has
-    /// the receptance of one part, measured while it was not connected to the other parts; the
-    /// points of the tables have the names of the degrees of freedom `measured` of the machine.
+    /// the receptance of one part, measured while it was not connected to the other parts. A point
+    /// of a table is the degree of freedom with the same name in the field `measured` of the
+    /// machine.
     ///
     /// # Errors
     /// [`AnalysisError::NoResponse`] if a response between two degrees of freedom of a part is
@@ -128,7 +129,8 @@ fn response<'a>(
     }
 }
 
-/// Returns the noise from standard errors; each holds for the real and for the imaginary part.
+/// Returns the noise from standard errors; each standard error applies to the real part and to the
+/// imaginary part.
 fn noise(errors: &[&Vec<f64>], rows: &[usize], inputs: usize) -> Result<LineNoise, AnalysisError> {
     let covariance = rows.iter().map(|row| {
         let variances = errors.iter().map(|error| Complex::from(2.0 * error[*row] * error[*row]));

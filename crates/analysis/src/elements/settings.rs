@@ -37,9 +37,9 @@ pub struct IdentifyElements {
     /// Noise spectrum that weights the lines.
     #[serde(default)]
     pub noise: Pooling,
-    /// Standard deviation of the noise on the samples of the forces, in N: one value for all of
-    /// them or one for each, for open records and hits; `None`: estimated above the band that the
-    /// forces drive, or between the hits.
+    /// Standard deviation of the noise on the samples of the forces, in N: one value for all forces
+    /// or one value for each. The setting applies to open records and hits. `None`: the noise is
+    /// estimated above the band that the forces drive, or between the hits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_noise: Option<Vec<f64>>,
     /// Maximum number of searches: one from the given initial values, the others from random ones.
@@ -112,7 +112,7 @@ impl IdentifyElements {
         match self.force_noise {
             None => Ok(()),
             Some(_) => {
-                let why = format!("it is for open records and hits, not for {of}");
+                let why = format!("the setting applies to open records and hits, not to {of}");
                 Err(AnalysisError::Setting { setting: "force_noise", why })
             }
         }

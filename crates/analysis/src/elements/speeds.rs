@@ -13,7 +13,8 @@ use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
 use crate::measurement::Channels;
 
-/// Names of the column of speeds, each with its unit in Hz; the column `speed` must state its unit.
+/// Possible names of the column of speeds, each with the factor that converts its values to Hz; the
+/// column `speed` must state its unit.
 const SPEEDS: [(&str, Option<f64>); 6] = [
     ("speed_rpm", Some(1.0 / 60.0)),
     ("rpm", Some(1.0 / 60.0)),
@@ -29,9 +30,9 @@ impl ElementData {
     ///
     /// The speed is in a column `speed_rpm`, `speed_hz`, `speed_rad_s`, or `speed` with a unit.
     /// Each sensor and each input has the columns NAME_real and NAME_imaginary, or NAME_amplitude
-    /// and NAME_phase_deg (or NAME_phase_rad), in SI units or those of their headers; an unbalance
-    /// is in kg·m. Optional columns NAME_standard_error have the standard error of real and
-    /// imaginary part of a sensor.
+    /// and NAME_phase_deg (or NAME_phase_rad), in SI units or in the units that their headers
+    /// state; an unbalance is in kg·m. Optional columns NAME_standard_error have the standard error
+    /// of real and imaginary part of a sensor.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] for a machine whose speed is not `synchronous` and for a missing

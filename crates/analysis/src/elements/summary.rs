@@ -86,7 +86,7 @@ pub struct ElementSummary {
     pub notes: Vec<ElementNote>,
     /// M, C (with Ω G) and K; `None` if they do not form a system.
     pub system: Option<SystemMatrices>,
-    /// Covariance of the entries of these matrices that depend on unknowns.
+    /// Covariance of those entries of M, C and K that depend on unknowns.
     pub covariance: Option<ParameterCovariance>,
     /// Settings of the analysis; with them it can be repeated.
     pub analysis: IdentifyElements,

@@ -159,7 +159,7 @@ impl ElementSummary {
 }
 
 impl TestRow {
-    /// Returns the used part of the file, in words.
+    /// Returns a text that names the samples or lines of the file that are used.
     pub fn words(&self) -> String {
         let samples = self.window.as_ref().map(|window| {
             let rate = compact(window.sample_rate_hz, 6);

@@ -12,8 +12,9 @@ const LEAST: usize = 4;
 /// Maximum number of random permutations for a p-value; its inverse is about the smallest p-value.
 const ORDERS: usize = 9999;
 
-/// Number of permutations with at least the observed change after which the test ends; the p-value
-/// is then about this number divided by the number of permutations made.
+/// Number of permutations that have a change at least as large as the observed change. When the
+/// test has found this number, it ends, and the p-value is about this number divided by the number
+/// of permutations made.
 ///
 /// # Source
 /// J. Besag and P. Clifford, "Sequential Monte Carlo p-values", Biometrika 78 (1991).
@@ -26,7 +27,8 @@ const SHUFFLED: usize = 2000;
 /// Maximum p-value, adjusted for the number of quantities, of a reported change.
 pub const SIGNIFICANT: f64 = 0.01;
 
-/// Maximum number of records that form the pairs for a slope; of more records, every n-th is used.
+/// Maximum number of records that form the pairs for a slope; from a longer list, only every n-th
+/// record is used.
 const SLOPES: usize = 400;
 
 /// Kind of a change.
@@ -40,7 +42,7 @@ pub enum ChangeKind {
 }
 
 impl ChangeKind {
-    /// Returns the word for the kind.
+    /// Returns the name of the kind of change: `step` or `drift`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Step => "step",
@@ -175,8 +177,8 @@ fn means_of_neighbours(ranks: &[f64]) -> Vec<f64> {
     means.into_iter().map(|value| value - middle).collect()
 }
 
-/// Returns the change that explains the largest share of the variance of `values`, whose sum is
-/// zero: its kind, its beginning and its share.
+/// Returns the kind, the beginning and the share of the change that explains the largest share of
+/// the variance of `values`. The sum of the values must be zero.
 fn best(values: &[f64], least: usize) -> Option<(ChangeKind, usize, f64)> {
     let len = values.len();
     let total: f64 = values.iter().map(|value| value * value).sum();

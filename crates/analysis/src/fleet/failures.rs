@@ -13,9 +13,9 @@ pub struct FailureCount {
     pub code: String,
     /// Number of records.
     pub records: usize,
-    /// Name of the first of these records.
+    /// Name of the first record that failed for this reason.
     pub record: String,
-    /// Failure of that record, in a sentence.
+    /// Failure of the first record, in a sentence.
     pub message: String,
 }
 

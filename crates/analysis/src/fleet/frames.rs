@@ -3,7 +3,7 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 
-/// Maximum number of bytes of a message; the row of a record takes some thousand.
+/// Maximum number of bytes of a message; the row of a record takes some thousand bytes.
 const LONGEST: usize = 1 << 28;
 
 /// Writes a message.

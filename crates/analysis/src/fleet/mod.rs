@@ -183,7 +183,8 @@ impl Fleet {
         })
     }
 
-    /// Computes the missing parts in `workers` threads, each with a function from `make`.
+    /// Computes the missing parts in `workers` threads. Each thread calls `make` once, which
+    /// returns the function that computes a part.
     fn run_by<'a>(
         &'a self,
         workers: usize,

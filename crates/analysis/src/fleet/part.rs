@@ -19,7 +19,7 @@ use crate::{AnalysisError, ResultRow, SavedAnalysis};
 /// Key of the [`PartDone`] in the file of a part.
 const DONE: &str = "mechid.part";
 
-/// A record to identify: a file, or some rows of one.
+/// A record to identify: a file, or some rows of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FleetRecord {
     /// The file.
@@ -29,8 +29,8 @@ pub struct FleetRecord {
 }
 
 impl FleetRecord {
-    /// Returns the records of a file: those that the record column separates, or the file itself.
-    /// The row of a file that cannot be read will have the error.
+    /// Returns the records of a file: those that the record column separates, or the file itself. A
+    /// file that cannot be read counts as one record; its row of results will contain the error.
     pub(super) fn from_file(path: PathBuf, analysis: &SavedAnalysis) -> Vec<Self> {
         let column = analysis.reading.record_column.as_ref();
         let column = column.filter(|_| analysis.reading.record_id.is_none());
@@ -59,13 +59,13 @@ type ComputeRows<'a> =
 /// A part that has been computed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartDone {
-    /// Name of its file in the folder of results.
+    /// Name of the file with the results of the part, in the folder of results.
     pub file_name: String,
     /// Number of records; the part has one row for each.
     pub records: usize,
     /// Counts of records without a result, by the reason.
     pub failures: Vec<FailureCount>,
-    /// `true` if it was computed now, `false` if it existed before.
+    /// `true` if the part was computed now, `false` if it existed before.
     pub computed: bool,
 }
 
@@ -98,7 +98,7 @@ impl Part {
         &self.records
     }
 
-    /// Returns the name of its file in the folder of results.
+    /// Returns the name of the file with the results of this part, in the folder of results.
     pub fn file_name(&self) -> &str {
         &self.file_name
     }
@@ -131,7 +131,8 @@ impl Part {
         })
     }
 
-    /// Writes the rows that `compute` adds for the records of each file.
+    /// Computes the rows of the records with `compute`, file by file, and writes them into
+    /// `folder`. If the file of the part exists, only its time of modification is changed.
     fn written(
         &self,
         folder: &Path,
@@ -144,7 +145,8 @@ impl Part {
             let touched = File::options().append(true).open(&path);
             let touched = touched.and_then(|file| file.set_modified(SystemTime::now()));
             match touched {
-                // No later part can be written to a read-only folder, so the time need not change.
+                // The file keeps its old time: no part can be written to its read-only folder, so
+                // no part there is newer.
                 Err(error) if is_read_only(&error) => {}
                 touched => {
                     let file = path_text(&path).into_owned();

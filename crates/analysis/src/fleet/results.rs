@@ -15,8 +15,8 @@ use crate::{AnalysisError, ResultRow};
 pub struct Results {
     /// Rows, in the order of the names of the records.
     pub rows: Vec<ResultRow>,
-    /// Number of older rows of the same records, from parts before a change of a record or the
-    /// analysis.
+    /// Number of ignored older rows of the same records, computed before a record or the analysis
+    /// changed.
     pub superseded: usize,
 }
 

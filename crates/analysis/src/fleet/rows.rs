@@ -11,8 +11,8 @@ use crate::{AnalysisError, ResultRow, SavedAnalysis};
 /// rows is read alone.
 const ROWS_AT_ONCE: usize = 1 << 20;
 
-/// Identifies some records of a file, or the whole file if `records` is empty, and passes their
-/// rows to `take` in their order.
+/// Identifies some records of a file, or the whole file if `records` is empty, and passes the rows
+/// to `take` in the order of the records.
 ///
 /// # Errors
 /// As `take`. The error of a record is in its row.

@@ -27,7 +27,8 @@ pub(super) struct Task {
     pub memory_bytes: Option<u64>,
 }
 
-/// A further message: some records of a file or, if no records are given, the whole file.
+/// Message after the first one: it requests the rows of some records of a file or, if no records
+/// are given, of the whole file.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Order {
     /// Name of the file, in the encoding of the system.

@@ -16,7 +16,7 @@ use crate::text::compact;
 /// Result of a run over many records.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FleetSummary {
-    /// Number of records and of rows.
+    /// Number of records; each record has one row.
     pub records: usize,
     /// Number of records without a result.
     pub failed: usize,

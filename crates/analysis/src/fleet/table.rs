@@ -5,7 +5,7 @@ use mechid_io::{ParquetColumn, ParquetValues, parquet_bytes};
 use crate::batch::{FindingRow, ModeCell, ParameterCell};
 use crate::{AnalysisError, ResultRow};
 
-/// Returns rows of results as the bytes of a Parquet file, with the columns of the parts of a
+/// Returns rows of results as the bytes of a Parquet file, with the same columns as the files of a
 /// fleet.
 ///
 /// # Errors
@@ -14,7 +14,8 @@ pub fn results_as_parquet(rows: &[ResultRow]) -> Result<Vec<u8>, AnalysisError> 
     Ok(parquet_bytes(&columns(rows))?)
 }
 
-/// Returns the columns of the table of results, which do not depend on the rows.
+/// Returns the table of results as columns. The number and names of the columns do not depend on
+/// the rows.
 pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
     let text = |value: &dyn Fn(&ResultRow) -> Option<String>| {
         ParquetValues::Text(rows.iter().map(value).collect())

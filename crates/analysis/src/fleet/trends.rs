@@ -71,12 +71,13 @@ pub struct TrendSeries {
     pub name: String,
     /// SI unit; empty for a ratio.
     pub unit: String,
-    /// Median of the values, in the unit.
+    /// Median of the values, in the unit of the series.
     pub median: f64,
     /// Robust standard deviation of the values (1.4826 × the median absolute deviation), in the
-    /// unit.
+    /// unit of the series.
     pub spread: f64,
-    /// Median of the standard errors, in the unit; `None` if no value has one.
+    /// Median of the standard errors, in the unit of the series; `None` if no value has a standard
+    /// error.
     pub standard_error: Option<f64>,
     /// The values, in the order of the records.
     pub points: Vec<TrendPoint>,
@@ -91,7 +92,7 @@ pub struct TrendChange {
     pub kind: ChangeKind,
     /// Name of the first record with a changed value.
     pub record: String,
-    /// Position of that record on the axis, a pure number.
+    /// Position of the record `record` on the axis, a pure number.
     pub at: f64,
     /// Size of a step, or change from the beginning of a drift to the last record, in the unit of
     /// the series.
@@ -99,7 +100,8 @@ pub struct TrendChange {
     /// Probability of at least this change for a random order of the records, adjusted for the
     /// number of series.
     pub p_value: f64,
-    /// `true` if the p-value is an upper bound: no random order has a change at least as large.
+    /// `true` if the p-value is an upper bound: no random order of the records has a change at
+    /// least as large as this one.
     pub is_bound: bool,
 }
 
@@ -113,9 +115,9 @@ pub struct TrendPoint {
     pub at: f64,
     /// Value, in the unit of the series.
     pub value: f64,
-    /// Standard error, in the same unit.
+    /// Standard error, in the unit of the series.
     pub standard_error: Option<f64>,
-    /// Limits of the 95 % interval, in the same unit.
+    /// Limits of the 95 % interval, in the unit of the series.
     pub interval: Option<[f64; 2]>,
     /// `true` if the distance of the value from its level is more than [`OUTLIER`] times the
     /// combined standard deviation of the series and of the value.
@@ -132,7 +134,7 @@ impl Trends {
         Ok(Self { superseded, ..Self::from_rows(&rows, over) })
     }
 
-    /// Computes the trends of rows, in the order given.
+    /// Computes the trends of rows, in the order that `over` states.
     pub fn from_rows(rows: &[ResultRow], over: TrendAxis) -> Self {
         let failures = FailureCount::from_rows(rows);
         let mut placed: Vec<(f64, &ResultRow)> = Vec::new();
@@ -193,8 +195,8 @@ impl Trends {
 }
 
 impl TrendSeries {
-    /// Detects changes, computes median and spread, and marks the outliers: values far from the
-    /// level at their record.
+    /// Detects changes, computes median and spread, and marks the outliers: values that are far
+    /// from the baseline, which follows the changes.
     fn judge(&mut self, tests: usize) {
         let values: Vec<f64> = self.points.iter().map(|point| point.value).collect();
         self.median = median(values.clone());
@@ -286,7 +288,7 @@ impl Trends {
 
     /// Returns a table with one row per value: quantity, unit, record, position on the axis, value,
     /// standard error, the flag of an outlier, and the kind, size and p-value of a change that
-    /// begins there.
+    /// begins at this record.
     pub fn csv(&self) -> String {
         let header = "quantity,unit,record,at,value,standard_error,outlier,change,change_size,change_p_value";
         let mut text = format!("{header}\n");

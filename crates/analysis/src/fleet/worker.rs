@@ -110,13 +110,13 @@ pub struct Worker {
     running: Option<Running>,
 }
 
-/// A process at work.
+/// A running worker process.
 #[derive(Debug)]
 struct Running {
     child: Child,
     orders: Option<ChildStdin>,
     rows: Receiver<Vec<u8>>,
-    /// Text of the process on its error stream.
+    /// Text that the process wrote to its error stream.
     said: JoinHandle<String>,
 }
 
@@ -192,7 +192,7 @@ impl Worker {
                 }
                 Ok(None) => {
                     drop(running.end());
-                    let how = "its answer was not a row of results".into();
+                    let how = "the output of the process was not a row of results".into();
                     return Ok(Some(AnalysisError::RecordProcess { how }));
                 }
                 Err(RecvTimeoutError::Disconnected) => {

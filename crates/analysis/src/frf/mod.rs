@@ -93,7 +93,8 @@ pub fn frf_of_records(
         return Ok(FrfTable::from_hits(&records, averaged, how));
     }
     if how.exponential_percent.is_some() {
-        let why = "an exponential window is for `hits`".into();
+        let why =
+            "an exponential window needs a hammer test: set `hits`, or leave the window out".into();
         return Err(AnalysisError::Setting { setting: "exponential_percent", why });
     }
     let records = held_of(measurements, hold)?;
@@ -157,12 +158,12 @@ const IDLE: f64 = 0.1;
 
 /// Frequency responses to forces with interleaved lines.
 pub(crate) struct Interleaved {
-    /// Responses to each force, on its lines.
+    /// Responses to each force, on the lines that only this force excites.
     parts: Vec<Responses>,
     crosstalk: Vec<Crosstalk>,
 }
 
-/// Returns the frequency responses to each force on the lines that it alone excites, and the
+/// Returns the frequency responses to each force on the lines that only this force excites, and the
 /// crosstalk of the other forces on these lines; `None` if the forces do not have interleaved lines
 /// of whole periods.
 fn interleaved(
@@ -214,12 +215,12 @@ fn interleaved(
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// Noise on the response.
+    /// H1, for noise on the response only.
     #[default]
     H1,
-    /// Noise on the force.
+    /// H2, for noise on the force only.
     H2,
-    /// Noise on both force and response.
+    /// Hv, for noise on both force and response.
     Hv,
 }
 
@@ -342,8 +343,8 @@ impl Segmentation {
         self.segment.is_none()
     }
 
-    /// Returns the part of a record that must be in memory: segments are averaged one after
-    /// another.
+    /// Returns how much of a record must be in memory at the same time: some whole periods, or at
+    /// least one segment. Segments are averaged one after another.
     pub(crate) fn hold(&self) -> Hold {
         self.segment.map_or(Hold::Periods, Hold::Samples)
     }
@@ -424,8 +425,9 @@ impl Responses {
         let apart: Vec<usize> =
             (0..acting.len()).filter(|at| following.iter().all(|one| one.force != *at)).collect();
         let mut average = average.with_inputs(&apart);
-        // Some lines are already selected: the lines of periods by the scatter of the periods, and
-        // requested lines by the user.
+        // Only the lines that a force drives are used. Two kinds of lines are already selected:
+        // lines of periods, by the scatter of the periods, and lines that the user requests by
+        // number.
         if !matches!((segments, rule.choice), (Segments::Periods(_), _) | (_, LineChoice::Lines(_)))
         {
             average = average.at(&average.driven())?;

@@ -18,7 +18,7 @@ use crate::text::significant;
 pub(super) const PARTS: usize = 20;
 
 /// Maximum RMS of a decayed response in the last part of a window, or before the pulse, relative to
-/// the largest RMS of a part.
+/// the largest RMS in any part of the window.
 const DIED_OUT: f64 = 0.02;
 
 /// Frequency responses from hits, with remarks.
@@ -40,9 +40,11 @@ pub(crate) struct AverageOfHits {
     segments: Segments,
     /// Decay rate of the exponential window, in 1/s.
     added_decay: Option<f64>,
-    /// Largest RMS in the last part of a window, relative to the largest RMS of a part.
+    /// Largest RMS of the response in the last part of a window, relative to the largest RMS in any
+    /// part.
     at_end: f64,
-    /// Largest RMS before the pulse, relative to the largest RMS of a part.
+    /// Largest RMS of the response before the pulse, relative to the largest RMS in any part of a
+    /// window.
     before: f64,
 }
 
@@ -147,8 +149,8 @@ pub(super) fn responses_of_hits(
     Ok(OfHits { responses, cut, added_decay, remarks })
 }
 
-/// Returns the ratio of the RMS of some samples of a response to the largest RMS of its parts; of
-/// several channels, the largest ratio.
+/// Returns the ratio of the RMS of some samples of a response to the largest RMS in any of its
+/// [`PARTS`] parts. With several channels, the largest ratio counts.
 pub(super) fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
     let rms = |samples: &[f64]| {
         (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()

@@ -10,7 +10,7 @@ const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;
 pub(super) struct Peak {
     pub(super) motion: usize,
     pub(super) input: usize,
-    /// Index of its line, counted from 0.
+    /// Index of the line of the peak, counted from 0.
     pub(super) at: usize,
     /// Number of lines within the half-power bandwidth: a sinusoid under a Hann window has one or
     /// two.

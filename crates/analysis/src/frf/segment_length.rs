@@ -24,14 +24,14 @@ const RESOLVED_LINES: usize = 3;
 const ENOUGH: f64 = 0.9;
 
 impl Segmentation {
-    /// Returns these segments with a length, and a remark about its choice; `None` if the length is
-    /// given, or if no length gives enough averages.
+    /// Returns these segments with the chosen length, and a remark about the choice; `None` if the
+    /// length is given, or if no length gives enough averages.
     ///
     /// The length is the shortest power of two with enough averages that keeps 90 % of the
     /// information (coherence, averages and number of lines,
-    /// [`Frf::information`](mechid_spectra::frf::Frf::information)); or the next longer one that
-    /// resolves the narrowest of the largest peaks with three lines, if there is one. The choice
-    /// uses the samples in memory.
+    /// [`Frf::information`](mechid_spectra::frf::Frf::information)). If segments of this length do
+    /// not resolve the narrowest of the largest peaks with three lines, the next longer length that
+    /// does is used, if there is one. The choice uses the samples in memory.
     ///
     /// # Errors
     /// As an average over segments.

@@ -1,4 +1,4 @@
-//! Frequency responses for people and for programs.
+//! Table of frequency responses, as text for people and as data for programs.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -28,9 +28,9 @@ use crate::text::{compact, paragraph, significant, text_table};
 pub struct FrfTable {
     /// The record.
     pub file: String,
-    /// First sample, counted from 1.
+    /// First sample used of the record `file`, counted from 1.
     pub first_sample: usize,
-    /// Last sample, counted from 1.
+    /// Last sample used of the record `file`, counted from 1.
     pub last_sample: usize,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
@@ -75,7 +75,7 @@ pub struct AveragedRecord {
     pub first_sample: usize,
     /// Last sample used, counted from 1.
     pub last_sample: usize,
-    /// Number of its segments, periods or hits.
+    /// Number of segments, periods or hits of the record.
     pub segments: usize,
 }
 
@@ -86,7 +86,7 @@ pub struct SegmentRow {
     pub samples: usize,
     /// Number of samples between the starts of successive segments.
     pub hop: usize,
-    /// `None` for whole periods.
+    /// Window that weights a segment; `None` for whole periods.
     pub window: Option<Window>,
     /// Number of segments, of all records together.
     pub count: usize,
@@ -118,7 +118,7 @@ pub struct Response {
 /// Fraction of the power of a response that is linear in the forces.
 #[derive(Debug, Serialize)]
 pub struct Coherence {
-    /// Degree of freedom, counted from 1.
+    /// Degree of freedom of the response, counted from 1.
     pub motion: usize,
     /// Values, one per frequency, pure numbers from 0 to 1.
     pub values: Vec<f64>,
@@ -184,7 +184,7 @@ impl FrfTable {
         let omega = places.iter().map(|(omega, ..)| *omega).collect();
         let mut table = Self::from_parts(records, &parts[0], how, omega, responses, coherence);
         table.remarks.push(
-            "the forces have separate lines: the responses to each force are estimated on its lines alone"
+            "the forces have separate lines: the responses to each force are estimated only on the lines of this force"
                 .into(),
         );
         table.remarks.extend(crosstalk.iter().map(|one| {
@@ -413,7 +413,8 @@ impl FrfTable {
             .then(|| [self.response_names.clone(), self.force_names.clone()])
     }
 
-    /// Returns whether every force has separate lines.
+    /// Returns whether the forces excite interleaved lines, so that only one force excites each
+    /// line.
     fn is_interleaved(&self) -> bool {
         self.responses.iter().flat_map(|r| &r.real).any(|value| value.is_nan())
     }

@@ -4,7 +4,7 @@ use super::of_hits::{PARTS, over_largest};
 use crate::measurement::Windowed;
 
 /// Maximum RMS in the last part of a record that ends at rest, including noise, relative to the
-/// largest RMS of a part.
+/// largest RMS in any part of the record.
 const AT_REST: f64 = 0.05;
 
 /// Maximum RMS difference, including noise, of two forces that count as equal, relative to the RMS

@@ -61,12 +61,12 @@ impl FromStr for AcCoupling {
 }
 
 impl Acquisition {
-    /// Returns whether these are the defaults: band-limited force, no high-pass.
+    /// Returns whether the settings are the defaults: band-limited force, no high-pass.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Returns the lines of a record, corrected as if all channels had the same coupling.
+    /// Returns the lines of a record, corrected as if all channels had the same AC coupling.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if a channel does not exist, or for Euler's rule.
@@ -102,7 +102,7 @@ impl Acquisition {
     }
 
     /// Returns a fit with the given assumption on the force between samples `dt` (s) apart, and the
-    /// records with the band-limited force that has the same response.
+    /// records with the band-limited force that causes the same response.
     ///
     /// # Source
     /// Successive substitution: the equivalent force depends on the system only through the
@@ -118,7 +118,8 @@ impl Acquisition {
         let mut last = (fit, records.to_vec());
         let Some(between) = self.between_samples else { return Ok(last) };
         let mut settled = pooling == Pooling::AllLines;
-        // Change of the last round, and its ratio to that of the round before.
+        // Largest change of a parameter in the last round, in standard errors, and its ratio to the
+        // change in the previous round.
         let (mut change, mut decrease) = (f64::INFINITY, 1.0);
         for round in 0..ACQUISITION_ROUNDS {
             let system = last.0.estimate.system()?;
@@ -142,9 +143,9 @@ impl Acquisition {
             let before = change;
             change = largest_change(&last.0.estimate, &fit.estimate);
             last = (fit, equivalent);
-            // The first round with another noise model may change the estimate much. The next
-            // change is smaller: it is about this change times `decrease`, the ratio of earlier
-            // successive changes.
+            // The first round with the final noise model may change the estimate much, although the
+            // next change is small. The next change is predicted as this change times `decrease`,
+            // the ratio of the two changes before it.
             if settled && change * f64::min(decrease, 1.0) < ACQUISITION_SETTLED {
                 break;
             }
@@ -162,7 +163,7 @@ pub(super) struct BetweenSamples {
     /// Ratio of the residual power with this force to that of the fit with a band-limited force:
     /// the geometric mean over the channels, as in the likelihood of white noise.
     pub(super) remaining: f64,
-    /// `true` if less power remains and no test of the residual warns any more.
+    /// `true` if this force reduces the residual power and no test of the residual warns.
     pub(super) leaves_noise: bool,
 }
 
@@ -178,13 +179,13 @@ impl BetweenSamples {
 /// Cause of a residual.
 pub(super) struct Explanation {
     pub(super) finding: Finding,
-    /// Fit with this cause taken into account, on the lines of a [`BandLimitedFit`]; `None` if
-    /// there is no such fit.
+    /// Fit whose model includes the cause of the residual, on the lines of a [`BandLimitedFit`];
+    /// `None` if there is no such fit.
     pub(super) fit: Option<OutputErrorFit>,
 }
 
-/// Fit of open records with a band-limited force, with which the fits of other explanations are
-/// compared. Long records are fitted on a part of their lines.
+/// Fit of open records with a band-limited force, as the reference for fits with other explanations
+/// of the residual. Long records are fitted on a part of their lines.
 pub(super) struct BandLimitedFit<'a> {
     records: Vec<FrequencyData>,
     fit: OutputErrorFit,
@@ -195,7 +196,8 @@ pub(super) struct BandLimitedFit<'a> {
 }
 
 impl<'a> BandLimitedFit<'a> {
-    /// Fits the thinned records, from a `fit` to all lines; `None` if that fails.
+    /// Fits a part of the lines if the records are long; the search begins at `fit`, the fit to all
+    /// lines. `None` if the search fails.
     pub(super) fn new(
         records: &[FrequencyData],
         fit: &'a OutputErrorFit,
@@ -216,9 +218,10 @@ impl<'a> BandLimitedFit<'a> {
         Some(Self { records, fit, level, unknowns, pooling })
     }
 
-    /// Returns which of the `kinds` of a force between samples `dt` (s) apart fits best instead of
-    /// the band-limited force. If a kind leaves only noise, another one is fitted only if it leaves
-    /// less power with the noise of this kind. `None` without kinds, or if no fit succeeds.
+    /// Returns the best of the fits with the `kinds` of force between samples, `dt` (s) apart; each
+    /// kind replaces the band-limited force. If the residual of one kind is only noise, another
+    /// kind is fitted only if it reduces the residual power for the same noise. `None` without
+    /// kinds, or if no fit succeeds.
     ///
     /// # Source
     /// Maximum likelihood with the levels of the channels eliminated.
@@ -238,8 +241,8 @@ impl<'a> BandLimitedFit<'a> {
         best
     }
 
-    /// Returns whether one kind of force leaves less power than the best kind so far. The searches
-    /// begin at the fit with this best kind and at the band-limited fit.
+    /// Returns whether one kind of force leaves less residual power than the best kind so far. The
+    /// searches begin at the fit with this best kind and at the band-limited fit.
     fn leaves_less(&self, kind: Discretisation, best: &BetweenSamples, dt: f64) -> bool {
         let log_power = |kind: Discretisation, near: &OutputErrorFit| {
             let data = joined(&self.equivalent(near, kind, dt)?).ok()?;
@@ -250,8 +253,9 @@ impl<'a> BandLimitedFit<'a> {
         near.into_iter().any(|near| log_power(kind, near).is_some_and(|power| power < least))
     }
 
-    /// Returns the records with the band-limited forces that have the same response, by the system
-    /// of a fit, as one kind of force between samples.
+    /// Returns the records with equivalent band-limited forces: in the system of `fit`, each of
+    /// these forces causes the same response as the measured force with the assumption `kind`
+    /// between its samples.
     fn equivalent(
         &self,
         fit: &OutputErrorFit,
@@ -262,7 +266,8 @@ impl<'a> BandLimitedFit<'a> {
         self.records.iter().map(|record| equivalent_force(record, &system, dt, kind)).collect()
     }
 
-    /// Returns the kinds in rising order of the residual power with the band-limited fit.
+    /// Returns the kinds of force in the order of rising residual power; the power is computed with
+    /// the system of the band-limited fit.
     fn likeliest_first(&self, kinds: &[Discretisation], dt: f64) -> Vec<Discretisation> {
         let power = |kind: Discretisation| {
             self.remaining(&self.fit, &self.equivalent(&self.fit, kind, dt)?)

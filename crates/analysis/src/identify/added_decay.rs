@@ -9,7 +9,8 @@ use nalgebra::Complex;
 
 use crate::AnalysisError;
 
-/// Returns the decay that all tables have in common, in 1/s; `None` without a window.
+/// Returns the decay rate that the exponential windows of all tables add, in 1/s; `None` without a
+/// window.
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] if the decays of the tables differ.
@@ -28,8 +29,8 @@ pub(crate) fn common_rate(tables: &[FrequencyResponses]) -> Result<Option<f64>, 
 }
 
 /// Returns a table whose velocities and accelerations are iω and (iω)² times the displacement, as
-/// the estimators assume. With an exponential window, the measured ones are iω + σ and (iω + σ)²
-/// times the displacement.
+/// the estimators assume. With an exponential window, the measured velocities and accelerations are
+/// iω + σ and (iω + σ)² times the displacement.
 pub(crate) fn as_derivatives(
     table: &FrequencyResponses,
     quantity: ResponseQuantity,

@@ -19,7 +19,7 @@ use crate::measurement::{Block, Channels};
 /// A finding and its record.
 #[derive(Debug, Serialize)]
 pub struct CheckRow {
-    /// Time of the check.
+    /// Stage of the analysis to which the check belongs: before or after the fit.
     pub when: When,
     /// Name of the record; `None` with one record.
     pub record: Option<String>,
@@ -36,7 +36,7 @@ pub struct CheckRow {
     pub finding: Finding,
 }
 
-/// Time of a check.
+/// Stage of a check: before or after the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum When {
@@ -200,7 +200,7 @@ impl CheckRow {
         self.verdict == Verdict::Bad
     }
 
-    /// Returns whether another record has the same kind of finding.
+    /// Returns whether `other` is the same kind of finding in another record.
     pub(crate) fn is_of_other_record(&self, other: &Self) -> bool {
         let kind = |row: &Self| (row.subject, std::mem::discriminant(&row.finding));
         self.record != other.record && kind(self) == kind(other)

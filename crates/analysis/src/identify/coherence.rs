@@ -13,7 +13,7 @@ use super::prediction::Prediction;
 use crate::AnalysisError;
 use crate::frf::{Estimator, Responses, Segmentation, average_of_hits};
 
-/// Multiple coherence of the motions with all forces.
+/// Multiple coherence of the responses with all forces.
 #[derive(Debug, Clone)]
 pub struct ResponseCoherence {
     /// Frequencies, in Hz, one per row of `values`.
@@ -30,7 +30,7 @@ impl ResponseCoherence {
         Self { frequency_hz, values: frf.coherence().clone(), averages }
     }
 
-    /// Returns the part between two frequencies, in Hz.
+    /// Returns the coherence on the lines between two frequencies, in Hz.
     fn between(self, [low, high]: [f64; 2]) -> Self {
         let is_inside = |row: &usize| (low..=high).contains(&self.frequency_hz[*row]);
         let rows: Vec<usize> = (0..self.frequency_hz.len()).filter(is_inside).collect();

@@ -12,16 +12,16 @@ use nalgebra::DMatrix;
 /// Comparison of a fit with fits to parts of its data and with larger models.
 #[derive(Default)]
 pub(super) struct Compared {
-    /// Findings of both comparisons.
+    /// Findings of the comparisons with parts of the data and with larger models.
     pub(super) parts: Vec<Finding>,
     /// Mean square error that an omitted term adds to the covariance of the parameters.
     pub(super) omitted: Option<DMatrix<f64>>,
 }
 
 impl Compared {
-    /// Compares a fit with fits to parts of its data. With `records`, which describe the samples of
-    /// the rows (an empty list if these are not known), it also compares the fit with larger
-    /// models.
+    /// Compares a fit with fits to parts of its data. If `records` is given, it also compares the
+    /// fit with larger models; `records` describes the samples of the rows and is empty if the
+    /// samples are not known.
     pub(super) fn new(
         fit: &PartsOfFit<'_>,
         splits: &[(Split, RowParts)],
@@ -36,9 +36,9 @@ impl Compared {
         }
     }
 
-    /// Compares a fit of averaged responses with its bands of lines and, if there are several
-    /// `records`, with these. Each record has the degrees of freedom of its forces, counted from 0;
-    /// `data` has the data of all records.
+    /// Compares a fit of averaged responses with fits to bands of lines and, if there are several
+    /// `records`, with fits to single records. Each entry of `records` has the averages and the
+    /// degrees of freedom of the forces, counted from 0; `data` has the data of all records.
     ///
     /// # Errors
     /// The errors of [`Frf::data`].

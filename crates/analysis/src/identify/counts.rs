@@ -1,4 +1,4 @@
-//! Number of equations and memory that a fit needs, checked before the computation.
+//! Checks before a fit: enough equations for the unknowns, and enough memory.
 
 use std::collections::BTreeSet;
 
@@ -60,7 +60,7 @@ pub(super) fn check(
     records.iter().try_for_each(|record| record.check_spectra(lines(record)))
 }
 
-/// Refuses a fit to tables that needs more memory than a file of their size may use.
+/// Refuses a fit to tables if it needs more memory than the limit for files of their size.
 ///
 /// # Errors
 /// [`AnalysisError::Memory`], and the errors of the settings of the masses.
@@ -80,7 +80,7 @@ pub(super) fn check_tables(
         lines * table.functions.iter().filter(is_chosen).count()
     };
     let numbers: usize = tables.iter().map(of_table).sum();
-    // Reciprocity makes the points of the forces points of responses, too. The direction −Z is the
+    // Because of reciprocity, every force point is also a response point. The direction −Z is the
     // degree of freedom of +Z.
     let functions = tables.iter().flat_map(|table| &table.functions).filter(is_chosen);
     let points = functions.flat_map(|function| [&function.response, &function.reference]);
@@ -96,8 +96,8 @@ pub(super) fn check_tables(
     check_bytes(file, numbers, needed, allowed)
 }
 
-/// Returns the memory, in bytes, that the analysis of tables may use, and the name of the file that
-/// allows it; `None` if a table is not from a file.
+/// Returns the largest of the memory limits of the tables, in bytes, and the name of its file;
+/// `None` if a table is not from a file. The analysis of all tables together may use this memory.
 pub(crate) fn allowed_memory(tables: &[FrequencyResponses]) -> Option<(usize, &str)> {
     let each = tables.iter().map(|table| Some((table.memory?, table.file.as_str())));
     each.collect::<Option<Vec<_>>>()?.into_iter().max_by_key(|(memory, _)| *memory)

@@ -11,7 +11,8 @@ use super::options::Derivatives;
 use crate::AnalysisError;
 use crate::measurement::{Block, joined};
 
-/// Samples of a fit in the time domain, with derived responses for those that were not measured.
+/// Samples of a fit in the time domain, in which responses that were not measured are derived from
+/// the measured responses.
 #[derive(Debug)]
 pub struct Prepared {
     pub displacement: Record,
@@ -19,7 +20,7 @@ pub struct Prepared {
     pub acceleration: Option<Record>,
     pub force: Record,
     /// `true` if all samples, including those of the force, are second derivatives of the
-    /// quantities in the names.
+    /// quantities that the fields name.
     pub twice_differentiated: bool,
 }
 

@@ -17,11 +17,12 @@ const NAMED: usize = 6;
 /// Refuses a fit of a linear system that is singular within rounding errors, that explains no more
 /// of the response than chance does, or in which the interval of every parameter contains zero.
 ///
-/// A fit that is not singular is not refused if a fault of the channels or another model explains
-/// the failure. If all intervals contain zero, the modes of several degrees of freedom may still be
-/// determined; with one degree of freedom, response and mode are indistinguishable from noise. A
-/// biased estimate is not refused for an unexplained response, because it may explain none of a
-/// response that is mostly signal.
+/// If a fault of the channels or another model explains the failure, only a singular fit is
+/// refused. If all intervals contain zero, the modes of a system with several degrees of freedom
+/// may still be determined: the fit is accepted if a natural frequency is determined. With one
+/// degree of freedom, response and mode are then indistinguishable from noise. A biased estimate is
+/// accepted although it explains too little: most of the response may be signal, and the bias the
+/// cause.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -69,8 +70,8 @@ fn explains_failure(check: &CheckRow) -> bool {
     check.is_bad() && check.when == When::Before || check.is_explanation()
 }
 
-/// Refuses a fit with nonlinear terms that explains no more than chance does (of the force or, with
-/// output error, of the response), or in which the interval of every parameter contains zero.
+/// Refuses a fit with nonlinear terms if it explains no more of the force (with output error: of
+/// the response) than chance does, or if the interval of every parameter contains zero.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -116,8 +117,8 @@ pub(super) fn modes_alone(estimate: &Estimate, modes: &[IdentifiedMode]) -> Opti
     })
 }
 
-/// Returns whether the interval of every parameter contains zero; `false` if there are no degrees
-/// of freedom for an interval.
+/// Returns whether the interval of every parameter contains zero; `false` if the fit has no
+/// statistical degrees of freedom for an interval.
 fn is_open(estimate: &Estimate) -> bool {
     estimate.parameters().len() > 0
         && estimate.parameters().all(|p| {

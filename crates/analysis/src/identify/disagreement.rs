@@ -20,8 +20,9 @@ struct ErrorScale {
 }
 
 impl ErrorScale {
-    /// Returns the largest scale of the checks that warn. The scale follows from the scatter of the
-    /// parts of the data, or from the size of the residual, which has `spare` degrees of freedom.
+    /// Returns the largest error scale of the checks that warn; `None` if no scale exceeds 1. A
+    /// check gives a scale if it compares the parts of the data or if it tests the size of the
+    /// residual, which has `spare` degrees of freedom.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle
@@ -69,13 +70,14 @@ pub(super) struct Disagreement {
 }
 
 impl Disagreement {
-    /// Creates additions before the checks decide which of them apply.
+    /// Creates the additions to the standard errors; the checks decide later which of these
+    /// additions apply.
     pub(super) fn new(omitted: Option<DMatrix<f64>>, explained: Option<DMatrix<f64>>) -> Self {
         Self { omitted, explained, scale: None }
     }
 
-    /// Returns the additions to the covariance for which a check warns, with the scale that the
-    /// checks give. The residual has `spare` degrees of freedom.
+    /// Returns only those additions to the covariance for which a check warns, together with the
+    /// scale that the checks determine. The residual has `spare` degrees of freedom.
     pub(super) fn warned_of(self, checks: &[CheckRow], spare: usize) -> Self {
         let warns = |is_of: fn(&CheckRow) -> bool| {
             checks.iter().any(|check| check.is_conspicuous() && is_of(check))
@@ -95,7 +97,8 @@ impl Disagreement {
         Self { scale: None, ..self }
     }
 
-    /// Returns an estimate whose covariance includes the additions.
+    /// Returns the estimate with all additions in its covariance: the scale, the omitted term, and
+    /// the other explanation of the residual.
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] for another number of parameters.
@@ -128,7 +131,7 @@ impl Disagreement {
         self.scale.as_ref().map_or(1.0, |scale| scale.factor)
     }
 
-    /// Returns the remarks on standard errors that include the additions.
+    /// Returns remarks that state what was added to the standard errors, and why.
     pub(super) fn remarks(&self, checks: &[CheckRow]) -> Vec<String> {
         let term = self.omitted.as_ref().map(|_| {
             "standard errors and intervals include the effect of the term that the model omits (check: alternative)"

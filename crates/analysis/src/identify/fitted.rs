@@ -46,8 +46,8 @@ pub struct Fitted {
     pub equations: usize,
     /// The spectra of a fit in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
-    /// Spectra of `frequency` with the noise from the scatter of the periods of every record;
-    /// `None` if a record has one period, and for other fits.
+    /// The spectra in `frequency`, but with the noise that the scatter of the periods shows in
+    /// every record; `None` if a record has one period, and for fits that do not average periods.
     pub scattered: Option<FrequencyData>,
     /// Coherence of the frequency responses of the first record; `None` if no frequency responses
     /// were fitted.
@@ -72,8 +72,9 @@ pub struct Fitted {
     pub force_noise: Vec<ForceNoise>,
     /// Sinusoids that were subtracted from open records.
     pub sinusoids: Vec<SinusoidRow>,
-    /// Measured responses to draw, if others were fitted: for open records the responses to the
-    /// forces alone, for segments the averages without a correction.
+    /// Measured responses to draw; `None` if these are the fitted responses. For open records they
+    /// are the responses to the forces without the transients, for segments the averages without a
+    /// correction.
     pub drawn: Option<FrequencyData>,
     /// Remarks on the fit.
     pub remarks: Vec<String>,
@@ -84,8 +85,8 @@ pub struct Fitted {
 pub struct WithTerms {
     /// The estimate.
     pub estimate: NonlinearEstimate,
-    /// Evidence against a linear system in the first record, before any model; `None` for open
-    /// records.
+    /// Evidence against a linear system in the first record, collected before the fit; `None` for
+    /// open records.
     pub distortion: Option<Distortion>,
     /// Points of the restoring-force surface of the first record; `None` for open records.
     pub restoring: Option<RestoringForce>,
@@ -147,7 +148,7 @@ impl SampleResidual {
 }
 
 impl Fitted {
-    /// Creates a fit with the parts that every fit has; the others are empty.
+    /// Creates a fit with the fields that every fit has; the optional fields are empty.
     pub(super) fn new(
         domain: Domain,
         estimator: &'static str,

@@ -24,7 +24,7 @@ pub struct ForceNoise {
     pub levels_n: Vec<Option<f64>>,
     /// Source of the levels.
     pub source: ForceNoiseSource,
-    /// RMS of each force about its mean, in N; `None` if it does not act.
+    /// RMS of each force about its mean, in N; `None` for a force that does not act.
     #[serde(skip)]
     rms: Vec<Option<f64>>,
     /// Samples of the pulses of hits, counted from 0; only these contain the force noise.

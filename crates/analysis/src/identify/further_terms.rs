@@ -1,5 +1,5 @@
-//! Nonlinear terms that a fit with other nonlinear terms lacks, and their effect on the parameters
-//! of this fit.
+//! Nonlinear terms that are missing in a fit with nonlinear terms, and their effect on the
+//! parameters of this fit.
 
 use mechid_checks::{Finding, NamedChange, NonlinearTermsLeftOut, PValue};
 use mechid_estimate::{EstimateError, Unknowns};
@@ -19,18 +19,18 @@ use crate::AnalysisError;
 
 /// Terms that explain a part of the residual of a fit.
 pub(super) struct FurtherTerms {
-    /// The terms, with the changes that they make.
+    /// Finding that names the terms and the changes of the parameters by these terms.
     pub(super) finding: Finding,
-    /// Square of the change of the parameters, in the products of their units (parameters ×
-    /// parameters).
+    /// Vector of the parameter changes times its transpose (parameters × parameters), in the
+    /// product of the units of two parameters.
     pub(super) squared_change: DMatrix<f64>,
 }
 
 impl FurtherTerms {
     /// Adds terms of the usual kinds to a fit of whole periods, as long as the information
     /// criterion falls and their coefficients differ from zero; `None` if there are no such terms,
-    /// or if the larger fit fails. The larger fit uses the estimator of `fit`. If that fails, both
-    /// fits use least squares on the equation of motion.
+    /// or if the larger fit fails. The larger fit uses the estimator of `fit`. If the larger fit
+    /// fails with this estimator, both fits use least squares on the equation of motion.
     pub(super) fn from_periods(
         data: &SteadyExperiments,
         unknowns: &Unknowns,

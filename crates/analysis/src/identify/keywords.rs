@@ -223,7 +223,8 @@ impl Keywords {
         .filter_map(|(name, given)| given.then_some(name))
     }
 
-    /// Refuses a keyword that the kind of source does not use, and two that exclude each other.
+    /// Returns an error if a keyword is given that this kind of source does not use, or if two
+    /// keywords exclude each other.
     fn check(&self) -> Result<(), AnalysisError> {
         let kind = self.kind();
         if let Some(stray) = self.given().find(|name| !kind.uses(name)) {
@@ -239,12 +240,12 @@ impl Keywords {
             ));
         }
         if self.criterion.is_some() && self.candidates.is_none() {
-            let why = "it applies only to the selection of terms: give `candidates`, or leave `criterion` out";
+            let why = "available only for the selection of terms: give `candidates`, or leave `criterion` out";
             return Err(refused("criterion", why));
         }
         let likelihood = matches!(self.method, None | Some(Method::MaximumLikelihood));
         if self.noise.is_some_and(|noise| noise != Pooling::Automatic) && !likelihood {
-            return Err(refused("noise", "it applies only to `method` maximum-likelihood"));
+            return Err(refused("noise", "available only with `method` maximum-likelihood"));
         }
         Ok(())
     }
@@ -272,7 +273,7 @@ impl Keywords {
             }
             Some(Extent::WholePeriod) if self.force_noise.is_some() => Err(refused(
                 "force_noise",
-                "it is for open records: for whole periods, the scatter of the force shows its noise",
+                "available only for open records: for whole periods, the scatter of the force shows its noise",
             )),
             Some(Extent::WholePeriod) if self.hits.is_some() => {
                 Err(refused("extent", "a hit is not a whole period: leave `extent` or `hits` out"))
@@ -282,7 +283,7 @@ impl Keywords {
                     Some(_) => "between_samples",
                     None => "ac_coupling",
                 };
-                Err(refused(setting, "it is for open records, hits and `domain` time"))
+                Err(refused(setting, "available only for open records, hits and `domain` time"))
             }
             Some(Extent::Open) => {
                 let response = likelihood.unwrap_or_default();
@@ -524,7 +525,8 @@ mod tests {
         }
     }
 
-    /// The refusal names the keyword that does not go with the others.
+    /// The error of a wrong combination of keywords names the keyword that cannot be combined with
+    /// the others.
     #[test]
     fn keywords_that_do_not_go_together_are_refused() {
         let why = |json: &str| read(json).unwrap_err();

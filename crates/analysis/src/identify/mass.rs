@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 use crate::AnalysisError;
 
 /// Known masses, in kg: one per degree of freedom, or all n × n entries row by row, `None` for an
-/// unknown one; empty if all are unknown.
+/// unknown mass; empty if all masses are unknown.
 ///
 /// Written as numbers and `unknown`, separated by commas.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct KnownMass {
-    /// Diagonal, or entries row by row, in kg.
+    /// Masses of the diagonal, or all n × n entries row by row, in kg.
     pub values: Vec<Option<f64>>,
 }
 

@@ -242,7 +242,8 @@ impl Identify {
     }
 
     /// Returns an error if open records or hits have a period, or if the noise of each line is
-    /// requested: they have only one value on each line, which does not show its noise.
+    /// requested: an open record has only one value on each line, and one value does not show the
+    /// noise.
     fn check_open(&self, period_given: bool) -> Result<(), AnalysisError> {
         let (noise, setting, of_period) = match &self.source {
             Source::Hits(how) => {
@@ -251,7 +252,7 @@ impl Identify {
             Source::Open(how) if how.noise.force.is_some() => (
                 &how.noise,
                 "force_noise",
-                "it is for open records: for whole periods, the scatter of the force shows its noise",
+                "available only for open records: for whole periods, the scatter of the force shows its noise",
             ),
             Source::Open(how) => (
                 &how.noise,
@@ -304,8 +305,9 @@ impl Identify {
     }
 }
 
-/// Fits spectra of windows as periods, as open records, or, if they are not periods and too long
-/// for an open fit without a request, averaged over segments.
+/// Fits the spectra of windows as whole periods or as open records. If the windows are not periods
+/// and are too long to be fitted as open records by default, it fits averages over segments
+/// instead.
 fn spectral(
     records: &[Windowed],
     unknowns: &Unknowns,
@@ -337,7 +339,8 @@ fn spectral(
     }
     let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
     let fitted = spectra::fit(records, unknowns, lines.rule(), estimator)?;
-    // A delay that only the fit as an open record shows is not hidden.
+    // The failed fit as open records may have shown a delay. If the fit of whole periods does not
+    // report a delay, the failure is returned.
     let names_delay = |finding: &Finding| finding.subject() == Subject::Delay;
     match delayed {
         Some(error) if !fitted.after.iter().flatten().any(names_delay) => Err(error),
@@ -346,7 +349,7 @@ fn spectral(
 }
 
 impl Identified {
-    /// Returns the numbers, checks and remarks.
+    /// Returns the summary of the result: numbers, checks and remarks.
     pub fn summary(&self) -> &IdentificationSummary {
         &self.summary
     }
@@ -376,7 +379,7 @@ impl Identified {
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] if the data do not determine a parameter,
-    /// [`AnalysisError::Unscaled`] if they determine the modes alone.
+    /// [`AnalysisError::Unscaled`] if the data determine only the modes.
     pub fn system(&self) -> Result<SecondOrderSystem, AnalysisError> {
         self.check_scale()?;
         Ok(self.fitted.estimate.system()?)
@@ -411,7 +414,8 @@ impl Identified {
         &self.summary.checks
     }
 
-    /// Returns doubts that follow from the numbers themselves, a sentence each.
+    /// Returns warnings that follow from the identified parameters and the residual, one sentence
+    /// each.
     pub fn doubts(&self) -> Vec<String> {
         self.summary.doubts()
     }
@@ -423,8 +427,8 @@ impl Identified {
 
     /// Predicts a record that was not fitted, and adds the result to [`Identified::summary`].
     ///
-    /// Predicts the window of `other`: a steady state over whole periods, any other response from
-    /// the initial state that fits it best.
+    /// The prediction covers the window of `other`. A steady state is predicted over whole periods;
+    /// any other response is predicted from the initial state that fits this response best.
     ///
     /// # Errors
     /// [`AnalysisError::DegreesOfFreedom`] if the record has another number of degrees of
@@ -541,9 +545,9 @@ impl Identified {
         self.fitted.frequency.as_ref().map(|(_, data)| data)
     }
 
-    /// Returns the spectra to draw: for open records the responses to the forces alone, for
-    /// segments their averages as measured, otherwise the fitted spectra; `None` for a fit in the
-    /// time domain.
+    /// Returns the spectra to draw: for open records the responses to the forces without the
+    /// transients, for segments the averages as measured, otherwise the fitted spectra; `None` for
+    /// a fit in the time domain.
     pub fn drawn_spectra(&self) -> Option<&mechid_spectra::FrequencyData> {
         self.fitted.drawn.as_ref().or_else(|| self.spectra())
     }

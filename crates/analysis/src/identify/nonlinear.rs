@@ -29,8 +29,8 @@ use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Minimum number of records or windows for cross-validation of a candidate, in which each is
-/// excluded once.
+/// Minimum number of records or windows for cross-validation of a candidate; each record or window
+/// is excluded once.
 const HELD_OUT_RECORDS: usize = 3;
 
 /// Nonlinear terms of an identified system, which [`Machine::read`](crate::Machine::read) can read.
@@ -49,10 +49,11 @@ pub struct NonlinearSummary {
     /// Number of blocks of time whose scatter gives the standard errors; `None` if the scatter of
     /// the periods gives them, or if the residual was assumed white.
     pub blocks: Option<usize>,
-    /// Number of periods whose scatter gives the standard errors; `None` otherwise.
+    /// Number of periods whose scatter gives the standard errors; `None` if the standard errors
+    /// have another source.
     pub periods: Option<usize>,
-    /// Evidence against a linear system in the first record, before any model; `None` for open
-    /// records.
+    /// Evidence against a linear system in the first record, collected before the fit; `None` for
+    /// open records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distortion: Option<DistortionRow>,
     /// Growth of each term beyond the amplitudes of the data; constant forces are omitted.
@@ -68,12 +69,14 @@ pub struct NonlinearSummary {
 pub struct ExtrapolationRow {
     /// Name of the term.
     pub term: String,
-    /// Exponent of the growth of its force at the largest amplitude, a pure number.
+    /// Exponent with which the force of the term grows from the largest amplitude of the data to
+    /// 1.5 times this amplitude, a pure number; 3 for a cubic spring.
     pub order: f64,
-    /// Part of the restoring force that the term contributes, at the two amplitudes; ratios.
+    /// Ratio of the force of the term to the restoring force, at the largest amplitude of the data
+    /// and at 1.5 times this amplitude.
     pub share: [f64; 2],
-    /// Standard error of the restoring force over the restoring force, at the two amplitudes;
-    /// ratios.
+    /// Ratio of the standard error of the restoring force to the restoring force, at the largest
+    /// amplitude of the data and at 1.5 times this amplitude.
     pub relative_error: [f64; 2],
     /// `true` if predictions beyond the data are unreliable.
     pub poor: bool,
@@ -286,7 +289,8 @@ fn select(
     Ok(Some(select_terms(data, unknowns, terms, candidates, *criterion, *weighting)?))
 }
 
-/// Returns the residuals of output error, made white for the most likely noise, with their records.
+/// Returns the residuals of an output-error fit, whitened for the most likely noise, each with the
+/// response and the force of its record.
 pub(super) fn white_residuals(records: &[Windowed], residuals: &[Record]) -> Vec<Residual> {
     let residual = |(Windowed { held, .. }, samples): (&Windowed, &Record)| {
         Residual::Samples(SampleResidual {
@@ -308,7 +312,8 @@ fn whole_periods(held: &Block) -> Result<SteppedRecord, AnalysisError> {
 
 /// Estimates the terms, by output error if `stepped` has records. Removes uncertain candidates,
 /// because noise on the response biases the least squares that selected them. Also returns the
-/// residuals of output error; empty for least squares, whose residual is a force.
+/// residuals of output error; this list is empty for least squares, because its residual is a force
+/// and not a response.
 pub(super) fn estimated(
     data: &SteadyExperiments,
     unknowns: &Unknowns,

@@ -45,8 +45,9 @@ const LEVEL: f64 = 1e-3;
 /// transient.
 const ROUNDING: f64 = 1e-20;
 
-/// Maximum number of lines for which a record without settings is tried as an open record. A fit
-/// with two forces and an eighth of [`SENSITIVITIES`] takes ten seconds on one processor.
+/// Maximum number of lines for which a record without settings is tried as an open record. As an
+/// example of the time: a fit with two forces takes ten seconds on one processor if its product of
+/// lines and parameters is an eighth of [`SENSITIVITIES`].
 const LINES: usize = 1 << 19;
 /// Maximum product of lines and unknown parameters for which a record without settings is tried as
 /// an open record.
@@ -195,8 +196,8 @@ pub(super) fn fit(
     Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
 }
 
-/// Returns the data without the transients of forces and responses, and the data with the measured
-/// forces and only the responses to them.
+/// Returns two sets of data. The first set is without the transients of forces and responses. The
+/// second set has the measured forces, and only the responses to these forces.
 fn without_transients(
     fit: &OutputErrorFit,
     data: &[FrequencyData],
@@ -212,8 +213,9 @@ fn sinusoid_rows(records: &[Windowed], fit: &OutputErrorFit) -> Vec<SinusoidRow>
     pairs.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect()
 }
 
-/// Compares the records and the bands of lines, and tests terms that the model omits, unless a
-/// residual is only rounding. A single record is divided into stretches of time.
+/// Compares the records and the bands of lines with each other, and the fit with larger models.
+/// Makes no comparison if a residual is only rounding. A single record under a lasting force is
+/// divided into sections of time.
 fn agreement(
     data: &[FrequencyData],
     fit: &OutputErrorFit,
@@ -248,14 +250,15 @@ fn agreement(
 /// Open records with their fit.
 struct Tested<'a> {
     records: &'a [FrequencyData],
-    /// The records without their transients and without the errors of pulses.
+    /// The records after subtraction of their transients and of the estimated errors of their force
+    /// pulses.
     closed: &'a [FrequencyData],
     fit: &'a OutputErrorFit,
     residuals: &'a [SpectralResidual],
 }
 
-/// Cause of a residual, and the square of the change of the parameters by this cause, in the
-/// product of the units of two parameters.
+/// Cause of a residual, and the vector of the parameter changes by this cause times its transpose
+/// (parameters × parameters), in the product of the units of two parameters.
 type CauseWithChange = (Finding, Option<DMatrix<f64>>);
 
 /// Function that returns a record with changed channels.
@@ -263,7 +266,8 @@ type RecordChange = Box<dyn Fn(&FrequencyData) -> FrequencyData>;
 
 impl Tested<'_> {
     /// Finds a delay or a fault of the acquisition that explains the residual. Also returns the
-    /// square of the change of the parameters by this cause, `None` if a fit fails.
+    /// vector of the parameter changes by this cause times its transpose; `None` in its place if a
+    /// fit fails.
     fn cause(
         &self,
         dt: f64,
@@ -308,8 +312,9 @@ impl Tested<'_> {
         Ok(best.map(|(finding, refit)| (finding, refit.map(square))))
     }
 
-    /// Returns all lines without the cause that a finding names; the estimate of `explained` takes
-    /// this cause into account.
+    /// Returns all lines of the records after the effect of a finding (delay, AC coupling or force
+    /// between samples) is removed. `explained` is the fit whose estimate already includes this
+    /// effect.
     fn without(
         &self,
         finding: &Finding,
@@ -331,7 +336,8 @@ impl Tested<'_> {
         joined(&fit.without_pulse_errors(&changed?).ok()?).ok()
     }
 
-    /// Finds a force between samples or AC coupling that explains the residual.
+    /// Finds the cause that explains the residual: an assumption on the force between samples, or
+    /// AC coupling.
     fn fault<'a>(
         &self,
         dt: f64,
@@ -408,8 +414,8 @@ fn between_samples(finding: &Finding) -> Option<Discretisation> {
 }
 
 /// Returns a function that removes a delay, or AC coupling, from a record with responses of the
-/// given `quantity`: it delays the force, too, or gives all channels the same coupling. `None` for
-/// another finding.
+/// given `quantity`. For a delay, the function also delays the force; for AC coupling, it gives all
+/// channels the same AC coupling. `None` if the finding is neither of these two.
 fn without_cause(finding: &Finding, quantity: ResponseQuantity) -> Option<RecordChange> {
     let cause = match finding {
         Finding::Delay(delay) => &Cause::Delay { seconds: delay.seconds },
@@ -515,8 +521,8 @@ fn show(ends: &EndLoads) -> bool {
     ends.p_value() < LEVEL && ends.share > ROUNDING
 }
 
-/// Returns all lines between the first and the last one chosen by the rule, because transients show
-/// in the differences between neighbouring lines.
+/// Returns all lines between the first and the last one chosen by the rule, because transients
+/// appear as differences between neighbouring lines.
 fn band(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let chosen = rule.lines(&held.force, held.force.len())?;
     let (Some(&first), Some(&last)) = (chosen.first(), chosen.last()) else { return Ok(chosen) };

@@ -35,7 +35,7 @@ pub(super) fn fit(
         );
     }
     if search.delay || search.phase {
-        return refuse("search", "delay and phase of the channels are found from whole periods");
+        return refuse("search", "delay and phase of the channels need whole periods");
     }
     terms.check_dof(unknowns.dof()).map_err(EstimateError::from)?;
     let how = open_records::How {

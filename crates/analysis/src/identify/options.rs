@@ -48,8 +48,8 @@ pub struct Identify {
 /// Data that are fitted, and the estimator.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source {
-    /// Spectral lines of windows; the record decides whether they are periods or their transients
-    /// are estimated.
+    /// Spectral lines of windows. The data decide whether the windows count as whole periods, or as
+    /// open records whose transients are estimated.
     Spectra(SpectralFit),
     /// Spectral lines of whole periods.
     Periods(PeriodFit),
@@ -72,11 +72,13 @@ impl Default for Source {
     }
 }
 
-/// Fit of spectral lines for which the record decides whether the windows are periods.
+/// Fit of spectral lines; the data decide whether the windows count as whole periods or as open
+/// records.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SpectralFit {
-    /// Noise spectrum of maximum likelihood; `None`: maximum likelihood if at least two periods
-    /// determine the noise or if noise biases least squares, otherwise least squares.
+    /// Noise spectrum of maximum likelihood. `None`: the data decide on the estimator, which is
+    /// maximum likelihood if at least two periods determine the noise or if noise biases least
+    /// squares, otherwise least squares.
     pub likelihood: Option<Pooling>,
     /// Spectral lines.
     pub lines: SpectralLines,
@@ -241,7 +243,7 @@ pub struct SegmentFit {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SampleFit {
     /// Assumption on the force between samples; `None`: the equation of motion at the samples if
-    /// there is an acceleration, otherwise linear.
+    /// there is an acceleration, otherwise a force that is linear between samples.
     pub between_samples: Option<Discretisation>,
     /// Extent of the window; `None`: open, or whole periods with spectral derivatives.
     pub extent: Option<Extent>,
@@ -308,7 +310,7 @@ pub enum Derivatives {
     SavitzkyGolay {
         /// Number of samples in the window, odd.
         window: usize,
-        /// Order of the polynomial, at least 2 and less than the window.
+        /// Order of the polynomial: at least 2, and less than the number of samples in the window.
         order: usize,
     },
 }
@@ -398,8 +400,9 @@ impl Identify {
         Self::from(Source::Segments(SegmentFit { estimator, segments, ..SegmentFit::default() }))
     }
 
-    /// Fits samples in time: the equation of motion at the samples if there is an acceleration,
-    /// otherwise exactly for a force that is linear between them.
+    /// Fits samples in time. If there is an acceleration, the equation of motion at the samples is
+    /// fitted; otherwise the transition from sample to sample, which is exact for a force that is
+    /// linear between samples.
     pub fn samples() -> Self {
         Self::from(Source::Samples(SampleFit::default()))
     }
@@ -421,7 +424,7 @@ impl Identify {
         matches!(&self.source, Source::Periods(fit) if fit.estimator == estimator)
     }
 
-    /// Uses these spectral lines; samples in time have none.
+    /// Uses these spectral lines; has no effect on a fit of samples in time.
     #[must_use]
     pub fn lines(mut self, choice: LineChoice) -> Self {
         if let Some(lines) = self.source.lines_mut() {
@@ -430,8 +433,8 @@ impl Identify {
         self
     }
 
-    /// Excludes lines with contributions other than the response to the force; samples in time have
-    /// none.
+    /// Excludes lines with contributions other than the response to the force; has no effect on a
+    /// fit of samples in time.
     #[must_use]
     pub fn without(mut self, without: LeftOut) -> Self {
         if let Some(lines) = self.source.lines_mut() {

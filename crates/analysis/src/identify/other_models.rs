@@ -21,7 +21,7 @@ use super::tabulated::{Tabulated, joined};
 use super::thinned;
 use crate::AnalysisError;
 
-/// Maximum number of alternations between a delay and a fit with it.
+/// Number of rounds, each with an estimate of the delay and a fit with this delay.
 const DELAY_ROUNDS: usize = 2;
 
 /// Decibels per unit of the natural logarithm of a magnitude.
@@ -115,8 +115,9 @@ pub(super) struct BetterModel {
     pub(super) finding: Finding,
     /// Fraction of the residual power that remains with this model.
     pub(super) remaining: f64,
-    /// Square of the change of the parameters by this model, in the product of the units of two
-    /// parameters; `None` if its parameters have another meaning.
+    /// Vector of the parameter changes by this model times its transpose (parameters × parameters),
+    /// in the product of the units of two parameters. `None` if the parameters of this model have
+    /// another meaning.
     pub(super) change: Option<DMatrix<f64>>,
 }
 
@@ -131,7 +132,8 @@ fn in_measured_quantity(
     })
 }
 
-/// Returns the measured responses, and the responses of an estimate to the forces of other data.
+/// Returns the measured responses of `data`, and the responses of `estimate` to the forces of
+/// `forces`.
 fn modelled(
     data: &FrequencyData,
     forces: &FrequencyData,
@@ -173,7 +175,8 @@ fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, Estimate)>
     Some((seconds, fit))
 }
 
-/// Returns a fit to tables whose numbers have another quantity, and its responses.
+/// Returns a fit to the tables with their values taken as responses of `quantity`, and the measured
+/// and fitted responses.
 fn refitted(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -193,8 +196,8 @@ fn refitted(
     Some((fit.estimate, model))
 }
 
-/// Returns a fit to tables whose magnitudes are levels in dB, and its responses. The first level
-/// has the given sign.
+/// Returns a fit to the tables with their magnitudes taken as levels in dB, and the measured and
+/// fitted responses. The mean level of the first function has the given `sign`.
 fn level_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -213,7 +216,8 @@ fn level_responses(
             function.standard_error = None;
             let levels = levels(&function.values);
             let mean = levels.iter().sum::<f64>() / levels.len() as f64;
-            // The levels of several functions of one machine are similar.
+            // The functions of one machine have similar levels, so the mean level of each function
+            // gets the sign that brings it nearer to the mean level of the first function.
             let first = *first.get_or_insert(sign * mean);
             let sign = if (mean - first).abs() <= (mean + first).abs() { 1.0 } else { -1.0 };
             let pairs = function.values.iter_mut().zip(levels);
@@ -231,16 +235,17 @@ fn level_responses(
     Some((fit, ModelledResponses { log_area, ..model }))
 }
 
-/// Returns the response with a level (dB) that was read as the magnitude of `z`. If a negative
-/// level was read as a magnitude, its phase is shifted by π.
+/// Converts a value `z`, whose magnitude is the absolute value of `level` (dB), to a response. If
+/// the level is negative, the phase of `z` contains a shift of π, and this shift is removed.
 fn magnitude(z: Complex<f64>, level: f64) -> Complex<f64> {
     let turn = if level < 0.0 { PI } else { 0.0 };
     Complex::from_polar((level / DECIBELS).exp(), z.arg() + turn)
 }
 
-/// Returns the levels (dB) that were read as magnitudes, up to a common sign: from line to line,
-/// the level keeps or reverses its sign, whichever gives the smaller change of the logarithm of the
-/// response. A reversal of the sign appears in the data as a phase jump of π.
+/// Returns the levels in dB of values whose magnitudes are absolute levels; the sign of the first
+/// level is unknown and taken as positive. On each further line, the level keeps or reverses the
+/// sign of the previous level: the result is the sign with the smaller change of the logarithm of
+/// the response. A negative level appears in the data as a phase shift of π.
 fn levels(values: &[Complex<f64>]) -> Vec<f64> {
     let mut sign = 1.0;
     let mut levels: Vec<f64> = values.iter().map(|z| z.norm()).collect();

@@ -17,7 +17,7 @@ use crate::measurement::Block;
 pub enum Prediction {
     /// Steady state under whole periods of a band-limited force, means subtracted.
     Steady,
-    /// Step from sample to sample.
+    /// Simulation that computes each sample from the previous sample.
     Sampled {
         /// Assumption on the force between samples.
         discretisation: Discretisation,
@@ -80,7 +80,8 @@ impl Prediction {
             let (measured, predicted) = (record.clone(), channels(&response, kind).clone());
             let names = names(kind, measured.channels());
             match self {
-                // Transducers have offsets, and the fit of a spectrum excludes its mean.
+                // The means are subtracted, because transducers have offsets, and the fit of a
+                // spectrum excludes the mean.
                 Prediction::Steady => Compared {
                     kind,
                     names,
@@ -120,9 +121,9 @@ impl Prediction {
     }
 }
 
-/// Returns the steady state of a nonlinear system under the mean period of the measured force, as
-/// the channels record it, repeated for every buffered period. Of several steady states, it returns
-/// the state nearest to the measured response.
+/// Returns the steady state of a nonlinear system under the mean period of the measured force. The
+/// response is given as the channels record it, repeated for every buffered period. Of several
+/// steady states, it returns the state nearest to the measured response.
 pub(crate) fn steady_state(
     system: &NonlinearSystem,
     channels: ChannelPhase,

@@ -30,11 +30,12 @@ use crate::hits;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Minimum change of a parameter by the correction of the window, in standard errors, for a remark.
+/// Minimum change of a parameter, in standard errors, for a remark on the correction of the window
+/// bias that caused the change.
 const BLUNTED: f64 = 0.5;
 
-/// Remark on records that are neither whole periods nor short enough to be fitted as open records
-/// without a request.
+/// Remark on records that are not whole periods, and that are too long to be fitted as open records
+/// by default.
 pub(super) const UNTRIED: &str = "the windows are not whole periods, and have too many lines and unknowns to estimate \
                                   the transients by default: frequency responses were averaged over segments. \
                                   `extent` open estimates the transients";
@@ -83,8 +84,8 @@ pub fn fit(
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
-    // If a parameter is undetermined, the fit ends here with an error that names it; otherwise a
-    // later step would fail.
+    // If a parameter is undetermined, the fit ends here with an error that names this parameter.
+    // Without this check, a later step would fail with a less useful error.
     estimate.system()?;
     let periodic = segments.are_periods();
     let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));
@@ -265,7 +266,7 @@ fn after_fit(
 }
 
 /// Tests the linearity on the lines between the first and the last one fitted; `None` for a free
-/// system, which has no displacement to take powers of.
+/// system: the test needs powers of the displacement, which cannot be computed for a free system.
 fn linearity_finding(
     measured: &Block,
     lines: &Lines,

@@ -63,13 +63,13 @@ pub struct ParameterRow {
     pub name: String,
     /// Matrix of the parameter: mass, damping or stiffness.
     pub matrix: String,
-    /// Row, counted from 1.
+    /// Row of the entry in its matrix, counted from 1.
     pub row: usize,
-    /// Column, counted from 1.
+    /// Column of the entry in its matrix, counted from 1.
     pub column: usize,
     /// SI unit.
     pub unit: &'static str,
-    /// `true` if it was given rather than estimated.
+    /// `true` if the entry was given and not estimated.
     pub known: bool,
     #[serde(flatten)]
     /// Estimate with its uncertainty.
@@ -251,8 +251,8 @@ impl Uncertain {
     }
 }
 
-/// Returns the number of significant digits of `value` down to the second of its standard error, 3
-/// to 12.
+/// Returns the number of significant digits of `value`, from 3 to 12: the last digit shown is the
+/// second significant digit of the standard error.
 fn digits(value: f64, error: f64) -> usize {
     let ratio = (value.abs() / error).log10();
     if ratio.is_finite() { (ratio.floor() as i32 + 3).clamp(3, 12) as usize } else { 6 }

@@ -20,7 +20,8 @@ use crate::AnalysisError;
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Windowed};
 
 impl SampleFit {
-    /// Returns the part of a record to buffer: all of it if every sample depends on all others.
+    /// Returns the part of a record that must be in memory: the whole record if every sample
+    /// depends on all others.
     pub(crate) fn hold(&self) -> Hold {
         match (self.derivatives, self.refine.map(|refine| refine.interpolation)) {
             (Some(Derivatives::Spectral), _) => Hold::Whole,
@@ -348,10 +349,10 @@ fn estimator(discretisation: Discretisation) -> &'static str {
     match discretisation {
         Discretisation::Euler => "least squares from sample to sample, Euler's rule",
         Discretisation::ZeroOrderHold => {
-            "least squares from sample to sample, the force held between them"
+            "least squares from sample to sample, force held between samples"
         }
         Discretisation::FirstOrderHold => {
-            "least squares from sample to sample, the force linear between them"
+            "least squares from sample to sample, force linear between samples"
         }
     }
 }

@@ -25,7 +25,7 @@ pub struct SinusoidRow {
     pub amplitudes: Vec<f64>,
     /// Largest ratio of an amplitude to √2 times the standard deviation of its response.
     pub share: f64,
-    /// Index of the record, because names may be equal.
+    /// Index of the record; several records may have the same name.
     #[serde(skip)]
     place: usize,
 }

@@ -38,18 +38,19 @@ pub(super) const LIKELIHOOD_PARAMETERS: usize = 1200;
 /// 1.
 const IDLE: f64 = 2.0;
 
-/// Maximum number of unknown parameters for a search for nonlinear terms; with more there is none.
+/// Maximum number of unknown parameters for a search for nonlinear terms; a fit with more
+/// parameters omits this search.
 const TERM_PARAMETERS: usize = 100;
 
 /// Maximum unexplained part of the response that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Minimum excess of the residual power of least squares over that of maximum likelihood, per
-/// parameter and in units of the noise, for least squares to count as biased.
+/// Largest excess of the residual power of least squares over that of maximum likelihood, per
+/// parameter and in units of the noise power, at which least squares still counts as unbiased.
 const EXCESS: f64 = 10.0;
 
-/// Minimum ratio of the residuals of least squares and maximum likelihood for least squares to
-/// count as biased although the residual is not noise.
+/// Ratio of the residual of least squares to the residual of maximum likelihood. At or above it,
+/// least squares counts as biased even if the residual of maximum likelihood is more than noise.
 const MUCH: f64 = 2.0;
 
 /// Returns the pooling of the noise for an estimator.
@@ -60,7 +61,7 @@ fn pooling_of(estimator: Option<PeriodEstimator>) -> Pooling {
     }
 }
 
-/// The periods of a record on the lines found in its force.
+/// The periods of a record, and the lines that were chosen from its force.
 type Spectra = (RepeatedPeriods, Lines);
 
 /// Fits the spectra of the windows of one or several records, each on the lines that `lines`
@@ -83,8 +84,8 @@ pub(super) fn fit(
         noise_through,
         remark,
     } = estimated(&spectra, &data, unknowns, estimator)?;
-    // If a parameter is undetermined, the fit ends here with an error that names it; otherwise a
-    // later step would fail.
+    // If a parameter is undetermined, the fit ends here with an error that names this parameter.
+    // Without this check, a later step would fail with a less useful error.
     estimate.system()?;
     let RecordFindings { before, after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
@@ -170,9 +171,9 @@ impl RecordFindings {
     }
 }
 
-/// Compares the records, the halves of their periods and the bands of lines, and tests terms that
-/// the model omits. If the noise of a record is not known, the halves are not compared, and the
-/// noise has the form of `spectrum`.
+/// Compares the records, the halves of their periods and the bands of lines, and compares the fit
+/// with larger models. If the noise of a record is not known, the halves are not compared, and the
+/// noise is assumed to have the form of `spectrum`.
 fn agreement(
     spectra: &[Spectra],
     weighted: &[FrequencyData],
@@ -261,7 +262,7 @@ fn idle_forces(held: &Block, records: &[FrequencyData]) -> Option<String> {
 }
 
 /// Returns the nonlinear term that explains most of the residual of the linear model in all
-/// records; `None` if their periods differ.
+/// records; `None` if the records differ in sampling rate or in the number of samples of a period.
 fn nonlinear_term(
     records: &[Windowed],
     unknowns: &Unknowns,
@@ -312,14 +313,15 @@ struct SpectralEstimate {
     noise: Vec<NoiseModel>,
     /// Noise spectrum that weighted the fit; `None` without weights.
     spectrum: Option<NoiseSpectrum>,
-    /// System that gives the form of the noise, a response to unmeasured forces.
+    /// System whose response to unmeasured forces gives the form of the noise spectrum; `None` if
+    /// no such form was used.
     noise_through: Option<SecondOrderSystem>,
     remark: Option<String>,
 }
 
-/// Returns the estimate of a method from the spectra with means `data`. Without a method, it uses
-/// maximum likelihood if the periods show the noise and the search converges, otherwise least
-/// squares.
+/// Returns the estimate of a method from the `spectra` of the periods and from their means, `data`.
+/// Without a method, it uses maximum likelihood if the periods show the noise and the search
+/// converges, otherwise least squares.
 fn estimated(
     spectra: &[Spectra],
     data: &FrequencyData,
@@ -471,7 +473,8 @@ fn preferred(
     if of_plain <= ROUNDING || excess.is_nan() || excess <= EXCESS {
         return Ok(plain);
     }
-    // If the model is wrong, the estimates of both methods are wrong.
+    // If the residual of maximum likelihood is more than noise, the model is wrong, and so are the
+    // estimates of both methods. Least squares is then kept unless its residual is much larger.
     let fit_findings =
         after_spectral_fit(std::slice::from_ref(data), &likely.estimate, Extent::WholePeriod)?;
     let is_noise = |finding: &Finding| finding.verdict() == Verdict::Good;
@@ -514,8 +517,8 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     Ok(repeated.with_quantisation(steps(&recorded.held))?)
 }
 
-/// Maximum ratio of quantisation step to RMS of a channel that is ignored: its rounding changes no
-/// parameter.
+/// Maximum ratio of a quantisation step to the RMS of its channel if the step is ignored: such fine
+/// rounding changes no parameter.
 const FINE: f64 = 3e-5;
 
 /// Returns the quantisation steps of responses and forces, in their units; 0 for a channel without

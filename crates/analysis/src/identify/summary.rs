@@ -69,7 +69,7 @@ pub struct IdentificationSummary {
     pub fit: FitRow,
     /// Names of the channels, without units, one per degree of freedom; `"0"` where there is none.
     pub channels: Channels,
-    /// Every record, the first included; of a hammer test every hit that was used.
+    /// All fitted records, including the first; for a hammer test, all hits that were used.
     pub records: Vec<RecordRow>,
     /// Every hit of a hammer test, used or left out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -226,7 +226,7 @@ impl IdentificationSummary {
             .collect()
     }
 
-    /// Returns doubts that follow from the numbers themselves.
+    /// Returns warnings that follow from the identified parameters and the residual.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         let is_misfit = |check: &&CheckRow| matches!(check.finding, Finding::Misfit(_));
@@ -364,7 +364,7 @@ impl IdentificationSummary {
     }
 }
 
-/// Returns how many checks passed, and each warning with its sentence.
+/// Returns the number of checks that passed or warn, and the text of each warning.
 pub(crate) fn verdict(checks: &[CheckRow]) -> String {
     let total = checks.len();
     let warnings: Vec<&CheckRow> = checks.iter().filter(|check| check.is_conspicuous()).collect();
@@ -406,7 +406,7 @@ impl FitRow {
         }
     }
 
-    /// Returns the quality of the fit as a table; `model` is the name of the model in it.
+    /// Returns the quality of the fit as a table; the text of the table calls the model `model`.
     pub(super) fn lines(&self, model: &str) -> String {
         text_table(&self.rows(model))
     }

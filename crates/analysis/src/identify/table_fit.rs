@@ -27,7 +27,8 @@ use crate::text::significant;
 /// A fit to the data of tables.
 pub(super) struct TableFit {
     pub(super) name: &'static str,
-    /// Estimate from the data, in which an exponential window adds to every decay rate.
+    /// Estimate from the data as measured: its decay rates include the decay of an exponential
+    /// window.
     pub(super) estimate: Estimate,
     /// Estimate of the machine, without the decay of an exponential window.
     pub(super) of_machine: Estimate,
@@ -166,7 +167,8 @@ impl TableFit {
     }
 }
 
-/// A fit, its checks, and the standard errors that include what the checks show.
+/// A checked fit. The standard errors of its estimate include the disagreement of model and data
+/// that the checks show.
 pub(super) struct CheckedFit {
     pub(super) checks: Vec<CheckRow>,
     disagreement: Disagreement,
@@ -258,11 +260,13 @@ struct Scope<'a> {
     is_unscaled: bool,
 }
 
-/// A finding with its time and the name of its table.
+/// A finding, whether it was made before or after the fit, and the name of its table if there are
+/// several.
 type Row = (When, Option<String>, Finding);
 
 impl Scope<'_> {
-    /// Returns the checks before and after the fit, and what they may add to the standard errors.
+    /// Returns the checks before and after the fit, and the additions to the standard errors if
+    /// model and data disagree.
     fn checks(&self) -> Result<(Vec<CheckRow>, Disagreement), AnalysisError> {
         let mut findings = self.before();
         let (fit, rows) = (self.fit, self.data.len());
@@ -299,8 +303,9 @@ impl Scope<'_> {
         adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
         let row =
             |(when, name, finding): Row| CheckRow::new(when, name, &finding, &Channels::default());
-        // With an exponential window, or without a scale, the fitted parameters are not those of
-        // the machine. If another model changes them, this is not a change of the machine.
+        // With an exponential window, or without a scale, the fitted parameters are not the
+        // parameters of the machine. A change of the fitted parameters by another model is then not
+        // a change of the machine.
         let is_same =
             !self.is_unscaled && self.tables.iter().all(|table| table.added_decay.is_none());
         let [omitted, explained] =

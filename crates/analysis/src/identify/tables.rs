@@ -233,7 +233,7 @@ impl IdentifiedResponses {
         &self.data
     }
 
-    /// Returns the numbers, checks and remarks.
+    /// Returns the summary of the result: numbers, checks and remarks.
     pub fn summary(&self) -> &ResponseSummary {
         &self.summary
     }

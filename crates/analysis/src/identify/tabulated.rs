@@ -280,7 +280,8 @@ fn uncorrected(table: &FrequencyResponses, why: &str) -> String {
 }
 
 /// Returns remarks on the noise that a table states. `is_averaged` states whether the segments of
-/// the table are used, `is_certain` whether its coherence is 1, which states no noise.
+/// the table are used. `is_certain` states whether the coherence of the table is 1, so that it
+/// contains no information about the noise.
 fn noise_remarks(
     table: &FrequencyResponses,
     how: &IdentifyResponses,
@@ -439,7 +440,7 @@ fn rows(table: &FrequencyResponses, band: Option<Band>) -> Result<Vec<usize>, An
 /// Frequency responses with their coherence, and the degrees of freedom of their forces.
 pub(super) type Coherent = Vec<(Frf, Vec<usize>)>;
 
-/// Concatenates responses to the data of one fit.
+/// Concatenates responses into the data of one fit.
 fn averages_of(coherent: &Coherent) -> Result<FrequencyData, AnalysisError> {
     together(coherent.iter().map(|(frf, dofs)| Ok(frf.data(dofs)?)))
 }
@@ -457,7 +458,7 @@ fn together(
     each.try_fold(first, |data, next| Ok(data.and(&next?)?))
 }
 
-/// Returns whether the coherences of a table are 1 up to rounding (their median on some rows).
+/// Returns whether the median coherence of a table on the given rows is 1, except for rounding.
 fn is_without_noise(table: &FrequencyResponses, rows: &[usize]) -> bool {
     let values = table.coherence.iter().flat_map(|c| rows.iter().map(|row| c.values[*row]));
     let mut values: Vec<f64> = values.collect();
@@ -541,8 +542,8 @@ impl Columns<'_> {
         Ok(Frf::new(omega, response, coherence, averages, self.measured)?)
     }
 
-    /// Returns the responses with the coherence of the table: one item for all forces if the
-    /// coherence is multiple, otherwise one item for each force; `None` if the table has no
+    /// Returns the responses with the coherence of the table. A multiple coherence gives one item
+    /// for all forces, an ordinary coherence one item for each force. `None` if the table has no
     /// coherence.
     fn coherent(
         &self,

@@ -39,8 +39,9 @@ impl Unscaled {
         let (mut normalised, mut unscaled) = (unknowns.clone(), None);
         loop {
             match fit(&normalised) {
-                // Sometimes only the fit shows that a force channel contains noise alone.
-                // Related equations have a common scale, so this does not apply to them.
+                // Sometimes only the fit shows that a force channel contains only noise, so that an
+                // equation has no scale. A symmetric matrix or proportional damping relates the
+                // equations. They then have a common scale, and the error is final.
                 Err(AnalysisError::Estimate(EstimateError::OnlyRatios { dof, .. }))
                     if !unknowns.is_related()
                         && (unscaled.is_none() || !free.contains(&(dof - 1))) =>
@@ -58,9 +59,9 @@ impl Unscaled {
         }
     }
 
-    /// Returns the equations without scale, and the unknowns of one of the systems with the same
-    /// modes. This system has unit masses on the degrees of freedom `free`, counted from 0, and no
-    /// mass that couples other equations to these degrees of freedom.
+    /// Returns the equations without scale, and the unknowns of a system that has the same modes as
+    /// the machine. In this system the degrees of freedom `free`, counted from 0, have unit masses,
+    /// and no mass couples another equation to them.
     fn normalised(unknowns: &Unknowns, free: &[usize]) -> Result<(Self, Unknowns), AnalysisError> {
         let (mut normalised, mut equations) = (unknowns.clone(), Vec::new());
         for row in 0..unknowns.dof() {

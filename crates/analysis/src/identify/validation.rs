@@ -72,8 +72,8 @@ impl ValidationWindow {
     }
 }
 
-/// Returns the part of a predicted window to buffer. An open record is predicted in chunks, so it
-/// needs no more memory than a fitted record.
+/// Returns the part of a predicted window that must be in memory. An open record is predicted in
+/// chunks, so it needs no more memory than a fitted record.
 pub(super) fn hold(fitted: Hold, prediction: Prediction) -> Hold {
     match (fitted, prediction) {
         (Hold::Whole, _) => Hold::Whole,

@@ -12,7 +12,8 @@ use crate::extremes::Extremes;
 /// Maximum number of reported spectral lines of a channel.
 const STRONGEST: usize = 3;
 
-/// Minimum ratio of a reported line to the strongest one.
+/// Ratio of amplitudes: a spectral line is reported only if its amplitude is more than this ratio
+/// times the amplitude of the strongest line.
 const FAINTEST: f64 = 0.01;
 
 /// Measures of a channel.
@@ -82,7 +83,8 @@ pub struct Period {
 #[derive(Debug, Default)]
 pub struct Gathered {
     levels: RunningStatistics,
-    /// The first samples, for lines and period; empty without such a search.
+    /// The first samples, in which spectral lines and the period are detected; empty if the channel
+    /// is not searched for them.
     held: Vec<f64>,
     /// Extreme values over time; `None` if no picture is drawn.
     extremes: Option<Extremes>,
@@ -95,7 +97,7 @@ pub struct Measured {
     pub channel: Channel,
     /// Amplitude spectrum.
     pub lines: AmplitudeSpectrum,
-    /// Extreme values over time; `None` if it is not drawn.
+    /// Extreme values over time; `None` if the channel is not drawn.
     pub extremes: Option<Extremes>,
 }
 
@@ -224,8 +226,8 @@ impl AmplitudeSpectrum {
         self.period
     }
 
-    /// Returns cycles per sample and amplitudes, without the mean, for a periodic channel from the
-    /// mean period.
+    /// Returns the frequency (cycles per sample) and the amplitude of every line except the mean. A
+    /// periodic channel has only the lines of its mean period.
     pub fn points(&self) -> impl Iterator<Item = (f64, f64)> {
         let every = self.period.map_or(1, |period| self.samples / period);
         let lines = self.amplitude.iter().copied().enumerate().step_by(every).skip(1);

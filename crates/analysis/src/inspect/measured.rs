@@ -19,7 +19,7 @@ pub struct Shown {
     pub offset: f64,
     /// `true` if lines and a period are to be detected; a column of instants has none.
     pub spectral: bool,
-    /// `true` if it is also plotted.
+    /// `true` if the column is also plotted.
     pub drawn: bool,
 }
 
@@ -60,7 +60,8 @@ impl Span {
         (self.hold < self.len).then_some((self.start + 1, self.start + self.hold))
     }
 
-    /// Returns the samples used for period and lines in words; `None` if all are used.
+    /// Returns a sentence that states which samples were used for period and lines; `None` if all
+    /// samples were used.
     pub fn looked_at(self, file: &str) -> Option<String> {
         let end = self.start + self.len;
         self.held().map(|(first, last)| {

@@ -60,7 +60,7 @@ pub fn inspect(
 }
 
 impl Inspected {
-    /// Returns the numbers and remarks.
+    /// Returns the summary of the record: numbers and remarks.
     pub fn summary(&self) -> &RecordSummary {
         &self.summary
     }
@@ -94,7 +94,8 @@ impl Serialize for Inspected {
     }
 }
 
-/// Returns the number in the file that states the time axis; `None` if the axis has another source.
+/// Returns the name and value of the number in the file that states the time axis, such as `Fs =
+/// 25600`; `None` if the time axis has another source.
 fn stated_by(table: &Table, time: &TimeAxis<'_>) -> Option<String> {
     let (name, value) = table.stated_rate().filter(|_| *time == TimeAxis::OfFile)?;
     Some(format!("{} = {}", escaped(name), message::number(*value)))
@@ -204,8 +205,8 @@ impl Inspection<'_> {
         })
     }
 
-    /// Returns the indices of the requested columns; by default, all except an empty one after a
-    /// trailing delimiter.
+    /// Returns the indices of the requested columns; by default, of all columns except an empty
+    /// column after a trailing delimiter.
     fn asked(&self, table: &Table) -> Result<Vec<usize>, AnalysisError> {
         match self.columns {
             [] => Ok(table.filled_columns().collect()),
@@ -213,8 +214,9 @@ impl Inspection<'_> {
         }
     }
 
-    /// Returns the requested columns, or the numeric ones of the usual length; their number of
-    /// samples; and the reasons why the other columns are omitted.
+    /// Returns three results: the requested columns or, by default, the numeric columns that have
+    /// the most common length; the number of samples of these columns; and the reasons why the
+    /// other columns are omitted.
     fn shown(
         &self,
         table: &Table,

@@ -1,4 +1,4 @@
-//! The inventory of a record.
+//! Summary of an inspected record: format, columns, time axis and channels.
 
 use std::fmt;
 

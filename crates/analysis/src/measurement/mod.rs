@@ -65,7 +65,7 @@ pub(crate) struct RecordSource {
     /// Path that the record was read from; `None` for arrays.
     pub path: Option<PathBuf>,
     pub channels: Channels,
-    /// The same channels with the names for results, without units.
+    /// Channels with the names that results use, without units.
     pub names: Arc<Channels>,
     pub reading: Reading,
     /// Time axis of the whole record.
@@ -83,7 +83,7 @@ pub(crate) struct RecordSource {
 #[derive(Debug)]
 enum Samples {
     File(Box<RecordFile>),
-    /// Samples × used columns.
+    /// Samples in memory, samples × used columns.
     Memory(DMatrix<f64>),
 }
 
@@ -92,14 +92,14 @@ enum Samples {
 pub struct Block {
     /// Name of the record for messages.
     pub file: String,
-    /// Forces, samples × degrees of freedom, in N. Of a long window, forces and responses have only
-    /// the first samples.
+    /// Forces, samples × degrees of freedom, in N. For a long window, forces and responses contain
+    /// only the first samples.
     pub force: Record,
-    /// Samples × degrees of freedom, in m.
+    /// Displacement, samples × degrees of freedom, in m.
     pub displacement: Option<Record>,
-    /// Samples × degrees of freedom, in m/s.
+    /// Velocity, samples × degrees of freedom, in m/s.
     pub velocity: Option<Record>,
-    /// Samples × degrees of freedom, in m/s².
+    /// Acceleration, samples × degrees of freedom, in m/s².
     pub acceleration: Option<Record>,
     /// First sample of the window, counted from 1.
     pub first_sample: usize,
@@ -418,13 +418,13 @@ fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
 
 impl RecordSource {
     /// Refuses a computation on `samples` samples of the used columns, with `bytes` bytes per
-    /// number, that needs too much memory.
+    /// number, if it needs too much memory.
     pub fn check_memory(&self, samples: usize, bytes: usize) -> Result<(), AnalysisError> {
         let numbers = samples.saturating_mul(self.channels.roles().len());
         check_memory(&self.name, numbers, bytes, self.memory)
     }
 
-    /// Refuses a computation on the noise of `lines` spectral lines of all used columns that needs
+    /// Refuses a computation on the noise of `lines` spectral lines of all used columns if it needs
     /// too much memory.
     pub fn check_spectra(&self, lines: usize) -> Result<(), AnalysisError> {
         let channels = self.channels.roles().len();

@@ -16,8 +16,9 @@ fn stated_quantity(table: &Table, column: usize) -> Option<Quantity> {
     unit.as_ref().and_then(StatedUnit::used).map(|unit| unit.quantity)
 }
 
-/// Returns a text with which [`Table::find`] finds a column: its name, or its number if other
-/// columns have the same name. It is the name if neither of these texts is unique.
+/// Returns a text with which [`Table::find`] finds a column: the name of the column, or its number
+/// if other columns have the same name. If the number does not find the column either, the name is
+/// returned.
 fn text_of(table: &Table, column: usize) -> String {
     let texts = [table.short_name(column), (column + 1).to_string()];
     let finds = |text: &&String| table.find(text).is_ok_and(|found| found == column);

@@ -24,7 +24,7 @@ pub struct Role<'a> {
 pub struct ToSi {
     /// Factor of each column, in SI units per unit of the column.
     pub factors: Vec<f64>,
-    /// Remarks about columns in other units, and about a time axis in a doubtful unit.
+    /// Remarks about columns that were not in SI units, and about a time axis in a doubtful unit.
     pub remarks: Vec<String>,
     /// Findings on texts in headers that may be units.
     pub findings: Vec<Finding>,
@@ -68,7 +68,7 @@ impl ToSi {
     /// Returns the factors from the units in the headers of `table`.
     ///
     /// # Errors
-    /// As [`ToSi::new`], and if there is no such column.
+    /// As [`ToSi::new`]; also an error if the table has no column of a role.
     pub fn from_table(table: &Table, roles: &[Role<'_>]) -> Result<Self, AnalysisError> {
         let places = roles.iter().map(|role| Ok((table.find(role.column)?, role.quantity)));
         let places: Vec<_> = places.collect::<Result<_, AnalysisError>>()?;
@@ -78,13 +78,13 @@ impl ToSi {
         Self::new(table.file(), columns, roles)
     }
 
-    /// Returns the factor of a column; 1 if there is no such column.
+    /// Returns the factor that converts a column to SI units; 1 if the column does not exist.
     pub fn factor(&self, column: usize) -> f64 {
         self.factors.get(column).copied().unwrap_or(1.0)
     }
 }
 
-/// Returns the finding about a text that may be a unit, if it is doubtful.
+/// Returns a finding if it is doubtful whether a text in a header is a unit.
 pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Option<Finding> {
     let unit = stated.unit.as_ref().filter(|unit| unit.quantity == wanted);
     (stated.evidence != Evidence::Stated).then(|| {
@@ -106,7 +106,7 @@ pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     }
     let what = match &stated.unit {
         Some(unit) => format!(
-            "may be a unit; its factor {} to {} {}",
+            "may be a unit; its factor {} for the conversion to {} {}",
             message::number(unit.in_si),
             unit.quantity.si(),
             match stated.evidence {
@@ -180,12 +180,12 @@ const RATHER_SLOW_HZ: f64 = 20.0;
 /// Minimum duration, in s, for the limit [`RATHER_SLOW_HZ`].
 const LONG_S: f64 = 1000.0;
 
-/// Minimum doubtful sampling rate, in Hz, of a time column without a unit: no force or response
-/// needs it, but day numbers read as seconds give it.
+/// Minimum sampling rate, in Hz, that is doubtful for a time column without a unit. No force or
+/// response needs such a high rate, but day numbers that are read as seconds give such a rate.
 const FAST_HZ: f64 = 1e7;
 
-/// Minimum doubtful sampling rate, in Hz, of instants above [`DAY_NUMBERS`]: day numbers of samples
-/// at 1 Hz give this rate if they are read as seconds.
+/// Minimum sampling rate, in Hz, that is doubtful if the instants are at least [`DAY_NUMBERS`]:
+/// samples at 1 Hz have this rate if their day numbers are read as seconds.
 const RATHER_FAST_HZ: f64 = 86_400.0;
 
 /// Smallest instant that may be a day number: 20,000 is a day of 1954 in a spreadsheet.
@@ -223,11 +223,11 @@ pub(crate) fn doubtful_time(
 }
 
 /// Minimum relative error of a sampling rate, due to the digits of its time column, for a remark; a
-/// smaller error is negligible against the noise of frequencies.
+/// smaller error is negligible against the errors that noise causes in identified frequencies.
 const RATE_ERROR: f64 = 1e-5;
 
 /// Maximum ratio of the rounding step of instants to their time step. Equally spaced instants have
-/// the ratio 1, so a larger ratio shows no rounding.
+/// the ratio 1, so a ratio above this maximum shows no rounding.
 const EVEN: f64 = 0.99;
 
 /// Returns a remark if the digits of a time column make the sampling rate so uncertain that the
@@ -271,6 +271,7 @@ mod tests {
         coarse_time(&table, &time, sampling)
     }
 
+    /// A remark reports the uncertainty of the sampling rate if the instants have too few digits.
     /// The expected uncertainty is half a unit of the last digit at each end, divided by the
     /// duration of the record.
     #[test]

@@ -63,9 +63,9 @@ impl Window {
 pub enum Hold {
     /// The whole window.
     Whole,
-    /// Whole periods within [`IN_MEMORY_SAMPLES`] samples, at least one.
+    /// Whole periods, at most [`IN_MEMORY_SAMPLES`] samples in total, but at least one period.
     Periods,
-    /// [`IN_MEMORY_SAMPLES`] samples, or this number if it is larger.
+    /// The given number of samples, but at least [`IN_MEMORY_SAMPLES`].
     Samples(usize),
 }
 
@@ -89,13 +89,14 @@ impl Hold {
     }
 }
 
-/// The window of a measurement, which can be processed from beginning to end at any length.
+/// The window of a measurement. A window of any length can be processed in chunks from beginning to
+/// end.
 #[derive(Debug, Clone)]
 pub struct Windowed {
     /// Buffered samples, beginning with the first.
     pub held: Block,
     source: Arc<RecordSource>,
-    /// Samples, counted from 0.
+    /// Range of the samples of the window in the record, counted from 0.
     window: Range<usize>,
 }
 
@@ -138,7 +139,7 @@ impl Windowed {
         self.window.len()
     }
 
-    /// Refuses a computation on the noise of `lines` spectral lines that needs too much memory.
+    /// Refuses a computation on the noise of `lines` spectral lines if it needs too much memory.
     ///
     /// # Errors
     /// [`AnalysisError::Memory`].
@@ -146,8 +147,8 @@ impl Windowed {
         self.source.check_spectra(lines)
     }
 
-    /// Refuses the fit of the transients of all `records` of the same file that needs too much
-    /// memory.
+    /// Returns an error if the fit of the transients needs too much memory, for all `records` from
+    /// the same file together.
     ///
     /// # Errors
     /// [`AnalysisError::Memory`].
@@ -163,8 +164,8 @@ impl Windowed {
         self.held
     }
 
-    /// Returns a range of samples, counted from the first, of a fully buffered window, with another
-    /// force.
+    /// Returns a range of samples, counted from the first, of a fully buffered window, with `force`
+    /// in place of the measured force.
     ///
     /// # Errors
     /// [`AnalysisError::Signal`] if the range exceeds the window.

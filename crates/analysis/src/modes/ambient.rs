@@ -113,7 +113,8 @@ fn engine_settings(
     }
 }
 
-/// Returns the checks of the modes themselves.
+/// Returns the checks of the identified modes: forces with a spectral peak, and responses that no
+/// mode moves.
 fn ambient_checks(modes: &[ModalModeRow], outputs: &[Output]) -> Vec<ModalCheck> {
     let names: Vec<String> = outputs.iter().map(|output| output.name.clone()).collect();
     let idle = checks::response_checks(modes, &names);

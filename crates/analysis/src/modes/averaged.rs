@@ -25,9 +25,10 @@ pub(super) struct Averaged {
     lines: Vec<usize>,
     /// Line spacing of a segment, in Hz.
     pub spacing_hz: f64,
-    /// Minimum distance, in lines, of independent errors.
+    /// Minimum distance, in lines, between two lines whose errors count as independent.
     step: usize,
-    /// Ratio of the standard errors of lines `step` apart to those of independent lines.
+    /// Factor on the standard errors computed for independent lines: lines `step` apart still have
+    /// a small correlation. 1 without correlation.
     pub inflation: f64,
     /// Weights of the smoothing by the window; empty without smoothing.
     smoothing: Vec<f64>,
@@ -79,10 +80,12 @@ impl Averaged {
         .collect()
     }
 
-    /// Returns the bias of the averages in the responses of modes on some rows.
+    /// Returns the bias that averaging over the segments causes in the responses of `modes`, on the
+    /// given rows.
     ///
-    /// The responses of modes outside the band are smooth within the band, so their bias is
-    /// negligible; the residual terms are not valid outside the band.
+    /// The residual terms are ignored, because they are not valid outside the band. They represent
+    /// the modes outside the band; the responses of these modes are smooth within the band, so
+    /// their bias is negligible.
     pub fn bias(
         &self,
         rows: &[usize],

@@ -20,7 +20,7 @@ use crate::text::{paged_table, significant, text_table};
 pub struct ModeComparison {
     /// Names of the two sets.
     pub sets: [String; 2],
-    /// Common points of both sets, by their names in the first.
+    /// Common points of both sets, by their names in the first set.
     pub points: Vec<String>,
     /// Pairs of corresponding modes of both sets, by rising frequency of the first set.
     pub pairs: Vec<PairRow>,
@@ -46,7 +46,7 @@ pub struct PairRow {
     pub damping_ratio: Option<DifferenceRow>,
     /// Modal assurance criterion, a pure number.
     pub mac: f64,
-    /// Standard error of the criterion, a pure number.
+    /// Standard error of the modal assurance criterion, a pure number.
     pub mac_standard_error: f64,
     /// Probability of a larger difference of the shapes due to their errors alone, adjusted for the
     /// number of tests; `None` without errors, or at a single point.
@@ -131,7 +131,8 @@ pub fn compare_modes(first: &ModeSet, second: &ModeSet) -> Result<ModeComparison
     })
 }
 
-/// Returns the corresponding entries of both sets, with the sign of the second.
+/// Returns the indices of the corresponding entries of both sets, and the sign that multiplies the
+/// entry of the second set.
 fn common_points(
     first: &ModeSet,
     second: &ModeSet,
@@ -170,7 +171,8 @@ fn common_points(
 /// Maximum number of points in a message.
 const LISTED: usize = 6;
 
-/// Returns the relative sign of two names if they can be the same point and direction.
+/// Returns 1 if two names can be the same point and direction, and −1 if the directions are
+/// opposite; otherwise `None`.
 fn same_direction(one: &str, other: &str) -> Option<f64> {
     let undirected = |directed: &str, point: &str| {
         let direction = Direction::parse(directed).filter(|one| one.point == point)?;

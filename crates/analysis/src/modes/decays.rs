@@ -46,8 +46,8 @@ pub(super) fn modes(
     Ok(modes)
 }
 
-/// Returns a note if the modes of a single decay show that it is not a sum of decaying
-/// oscillations; none for a decay that cannot be analysed alone, such as a short one.
+/// Returns a note if the analysis of a single decay shows that this decay is not a sum of decaying
+/// oscillations; `None` if the decay cannot be analysed alone, for example because it is too short.
 fn deviations(measurement: &Measurement, how: &DecaySettings) -> Option<String> {
     let remarks = match decay(measurement, how) {
         Ok(modes) => modes.summary().model_remarks(),

@@ -32,7 +32,7 @@ pub struct StabilisationRows {
     /// Damping ratios, pure numbers, one for each pole.
     pub damping_ratio: Vec<f64>,
     /// Flags, one for each pole: true if frequency and damping (for ambient records also the shape)
-    /// agree with a pole of the order below.
+    /// agree with a pole of the model whose order is lower by one step.
     pub is_stable: Vec<bool>,
 }
 

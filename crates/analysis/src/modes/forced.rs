@@ -36,7 +36,7 @@ pub(super) struct Test {
     pub band_hz: [f64; 2],
 }
 
-/// Parts of the result that do not come from the fit.
+/// Data for the result in addition to the fit: records, channels, band, checks and notes.
 struct Context {
     records: Vec<RecordRow>,
     hits: Vec<HitRow>,
@@ -62,7 +62,8 @@ struct Fit {
 }
 
 impl Test {
-    /// Fits the modes, and for a validation also the beginning of the records.
+    /// Fits the modes to the whole records; for a validation, also fits modes to the beginning of
+    /// the records only.
     pub fn modes(
         self,
         records: Vec<RecordRow>,
@@ -308,8 +309,8 @@ impl Context {
         Ok(Modes { summary, spectrum, source })
     }
 
-    /// Returns the rows of the modes. The masses are those of the fitted modes, with the decay of
-    /// an exponential window.
+    /// Returns the rows of the modes. The modal masses come from the fitted modes, whose damping
+    /// includes the decay of an exponential window.
     fn mode_rows(
         &self,
         estimate: &ModalEstimate,

@@ -12,7 +12,7 @@ use crate::text::significant;
 
 /// Result of the comparison of the two halves of a test.
 pub(super) struct Halves {
-    /// Check of their agreement; `None` if they have no common mode.
+    /// Check of the agreement of the two halves; `None` if they have no common mode.
     pub check: Option<ModalCheck>,
     /// Note on modes that a half alone does not determine.
     pub note: Option<String>,
@@ -104,7 +104,7 @@ fn check(compared: &PartsComparison, what: &str) -> Option<ModalCheck> {
     Some(ModalCheck { code: "halves", passed, value: p_value, text })
 }
 
-/// Returns the largest difference of a mode in words.
+/// Returns a sentence about the mode that differs most between the two halves.
 fn difference(
     [one, two]: [&ComparedMode; 2],
     pair: &ModePair,

@@ -102,7 +102,8 @@ impl FreeMotion {
     }
 }
 
-/// Returns Re and −Im of φ exp λt at an output, of one mode after the other.
+/// Returns the real part and the negative imaginary part of φ exp λt at an output: two values for
+/// each mode, mode by mode.
 pub(crate) fn basis(system: &ModalSystem, output: usize, time: f64) -> Vec<f64> {
     let delay = system.model.delays.get(output).copied().unwrap_or(0.0);
     let part = |term: &mechid_modal::ModalTerm| {

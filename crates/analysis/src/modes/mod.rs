@@ -136,9 +136,10 @@ fn modes_of_records(
 /// Identifies the modes of a structure from tables of its frequency responses, all together, with
 /// any number of points and references.
 ///
-/// If a table states that it has averages over segments, lines with errors correlated by the window
-/// are excluded, and the bias of the window is computed from the identified modes and subtracted,
-/// round by round; the decay of an exponential window is subtracted, too.
+/// If a table states that its responses are averages over segments, the window correlates the
+/// errors of neighbouring lines, and lines with such errors are excluded. The bias of the window is
+/// computed from the identified modes and subtracted, in several iterations. The decay of an
+/// exponential window is subtracted, too.
 ///
 /// # Errors
 /// As [`modes`], and [`AnalysisError::MissingResponse`] if a response is missing.
@@ -163,7 +164,7 @@ impl Modes {
         &self.summary
     }
 
-    /// Computes the stabilisation diagram and the mode indicator, in a part of the time of the
+    /// Computes the stabilisation diagram and the mode indicator. This takes less time than the
     /// identification.
     ///
     /// # Errors

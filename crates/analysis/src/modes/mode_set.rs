@@ -25,8 +25,8 @@ pub struct ModeSet {
     pub modes: Vec<ComparedMode>,
 }
 
-/// Frequencies and shapes alone, such as those of a finite-element model. Unknown fields are
-/// refused, because they may be misspelt.
+/// Modes given by frequencies and shapes, such as the modes of a finite-element model. Unknown
+/// fields are refused, because they may be misspelt.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlainModes {
@@ -84,7 +84,7 @@ impl ModeSet {
         }
     }
 
-    /// Takes modes from the JSON of a result, or of frequencies and shapes alone.
+    /// Takes modes from the JSON of a result, or from a JSON that has only frequencies and shapes.
     ///
     /// # Errors
     /// [`AnalysisError::SavedModes`] if the JSON has no modes, or an unknown field in addition to
@@ -103,7 +103,8 @@ impl ModeSet {
         Self::new(name, plain.response_names, modes)
     }
 
-    /// Takes the modes of a test; its points are the stated ones, or the columns.
+    /// Takes the modes of a test. The points are the stated points of the responses or, if none are
+    /// stated, the names of the columns.
     ///
     /// # Errors
     /// [`AnalysisError::NothingToCompare`].
@@ -199,7 +200,8 @@ impl ModeSet {
         Ok(Self { name: name.into(), points, modes: compared })
     }
 
-    /// Returns the modes at some of the points, by index, with the sign of each.
+    /// Returns the modes at some of the points. Each entry is the index of a point, and a sign; the
+    /// value at the point is multiplied by this sign.
     pub(super) fn at(&self, entries: &[(usize, f64)]) -> Result<Vec<ComparedMode>, AnalysisError> {
         let restrict = |mode: &ComparedMode| {
             let (shape, covariance) = (mode.shape.shape(), mode.shape.covariance());

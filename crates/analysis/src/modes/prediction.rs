@@ -53,7 +53,7 @@ pub fn predict_with_modes(
     let [low, high] = system.band_hz.map(|hz| significant(hz, 4));
     let mut remarks = block.unit_notes();
     remarks.push(format!(
-        "the modes predict the response only from {low} to {high} Hz; the errors are those of this band"
+        "the modes predict the response only from {low} to {high} Hz; the errors are computed in this band"
     ));
     if !steady && settle == 0 {
         remarks.push(

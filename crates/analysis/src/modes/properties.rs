@@ -48,7 +48,8 @@ impl Properties {
             constraints.push(ModalConstraint::RealShapes { derivative });
         }
         if self.reciprocal {
-            // Forces in both directions of a point have the same sensor, which counts once.
+            // The two forces in the opposite directions of a point have the same sensor; this
+            // sensor counts once.
             let mut points: Vec<DrivingPoint> = Vec::new();
             for point in driving_points {
                 if points.iter().all(|other| other.output != point.output) {
@@ -68,9 +69,9 @@ impl Properties {
         Ok(constraints)
     }
 
-    /// Fits modes that have the properties. A property is not imposed if the modes of the fit
-    /// without this property contradict it. Also returns the settings of the fit, and the check of
-    /// each property.
+    /// Fits the modes with the given properties as constraints. If the test of a property fails,
+    /// the modes are fitted again without this property. Returns the fit, its settings, and the
+    /// check of each property.
     pub(super) fn imposed<T>(
         self,
         settings: &ModesSettings,

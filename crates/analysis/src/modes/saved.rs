@@ -75,7 +75,7 @@ pub struct SavedMode {
     pub modal_mass: Option<f64>,
     /// Standard error of the modal mass, in kg.
     pub modal_mass_standard_error: Option<f64>,
-    /// Share of the sum of squares of all modes of a free decay, a ratio.
+    /// Ratio of the sum of squares of this mode to that of all modes of a free decay.
     pub energy_share: Option<f64>,
 }
 
@@ -179,8 +179,8 @@ pub(super) fn from_json_with_modes<T: DeserializeOwned>(
 ) -> Result<T, AnalysisError> {
     let refused = |why: String| AnalysisError::SavedModes { file: name.into(), why };
     if !json["modes"].is_array() {
-        let why = "its modes are not a list; if it has the settings of an analysis, name the result, \
-                   which `mechid modes --json` prints";
+        let why = "its modes are not a list; if it has the settings of an analysis, give the \
+                   result instead: the output of `mechid modes --json`";
         return Err(refused(why.into()));
     }
     // A field between backticks would look like a setting.
@@ -209,7 +209,7 @@ impl SavedModes {
     /// Takes the modes from the JSON of a result.
     ///
     /// # Errors
-    /// [`AnalysisError::SavedModes`] if it has none.
+    /// [`AnalysisError::SavedModes`] if the JSON has no modes.
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
         let mut saved: Self = from_json_with_modes(name, json)?;
         if saved.records.is_empty() {
@@ -223,7 +223,7 @@ impl SavedModes {
     /// Takes the modes of a result that `--json` prints.
     ///
     /// # Errors
-    /// [`AnalysisError::SavedModes`] if it has none.
+    /// [`AnalysisError::SavedModes`] if the result has no modes.
     pub fn from_result(result: &impl Serialize) -> Result<Self, AnalysisError> {
         let json = serde_json::to_value(result).map_err(|error| AnalysisError::SavedModes {
             file: "the result".into(),
@@ -332,7 +332,8 @@ impl From<SavedValue> for Uncertain {
         let interval = saved
             .interval
             .map(|[low, high]| [low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)]);
-        // A known value has no interval; an estimate with an infinite error has one.
+        // A known value has no interval. An interval without a standard error therefore means an
+        // infinite standard error.
         let infinite = interval.map(|_| f64::INFINITY);
         let standard_error = saved.standard_error.or(infinite);
         Self { value: saved.value.unwrap_or(f64::NAN), standard_error, interval }

@@ -101,7 +101,7 @@ impl ModesSettings {
         }
     }
 
-    /// Checks the band and the share for validation.
+    /// Checks the frequency band, and the share of each record that is excluded for the validation.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] for an invalid band or share.
@@ -121,7 +121,8 @@ impl ModesSettings {
         Ok(())
     }
 
-    /// Refuses the first given setting among some that do not apply to `what`.
+    /// Returns an error if one of the settings `names`, which do not apply to `what`, is given. The
+    /// error names the first of them.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`].
@@ -140,7 +141,7 @@ impl ModesSettings {
         }
     }
 
-    /// Returns the error of a setting.
+    /// Returns the error that refuses a setting, with the reason.
     pub(super) fn refused(&self, setting: &'static str, why: String) -> AnalysisError {
         AnalysisError::Setting { setting, why }
     }

@@ -18,8 +18,8 @@ use crate::measurement::{Block, Channels, Hold, Measurement, check_distinct};
 /// Records of one test: inputs and outputs with their names.
 #[derive(Debug)]
 pub(super) struct Recorded {
-    /// Forces (N, samples × inputs) and responses (samples × outputs) of each record, or of each
-    /// group of its hits whose windows have no gap.
+    /// Forces (N, samples × inputs) and responses (samples × outputs) of each record. A record that
+    /// is cut into hits has one part for each group of hits without gaps between their windows.
     pub parts: Vec<Part>,
     /// Names of the forces.
     pub inputs: Vec<String>,
@@ -31,7 +31,7 @@ pub(super) struct Recorded {
     pub hits: Vec<HitRow>,
 }
 
-/// One record, or hits of a record whose windows have no gap.
+/// One record, or consecutive hits of a record without gaps between their windows.
 #[derive(Debug)]
 pub(super) struct Part {
     /// Forces, samples × inputs, in N; `None` without forces.
@@ -100,8 +100,8 @@ impl Recorded {
         Ok(Self { parts, inputs, outputs, driving_points, hits })
     }
 
-    /// Reads records like [`Recorded::from_forced`], with one force in the first record and another
-    /// force in all other records.
+    /// Reads records like [`Recorded::from_forced`], but treats the force of the first record and
+    /// the force of all other records as two inputs.
     pub fn struck_apart(
         measurements: &[Measurement],
         rule: Option<&HitRule>,
@@ -136,11 +136,11 @@ impl Recorded {
         Ok(self.with_parts(parts))
     }
 
-    /// Returns the first and the second half of the records. They are divided between two records
-    /// if the smaller half then has at least the share [`SMALLER_HALF`] of the samples; otherwise
-    /// the longest record is divided at its middle.
+    /// Returns the first and the second half of the test. The boundary is the end of a record if
+    /// each half then has at least the share [`SMALLER_HALF`] of the samples; otherwise the longest
+    /// record is divided at its middle.
     ///
-    /// Forces that are zero in a half are not among its inputs.
+    /// A force that is zero in one half is not an input of this half.
     pub fn halves(&self) -> Result<[Self; 2], AnalysisError> {
         let lens: Vec<usize> = self.parts.iter().map(|part| part.responses.len()).collect();
         let total: usize = lens.iter().sum();
@@ -294,7 +294,8 @@ impl Columns {
         Ok(Record::new(block.force.sampling(), data)?)
     }
 
-    /// Returns a hit of a record with the number of its input.
+    /// Returns a hit of a record in which the number of the force column is replaced by the number
+    /// of the input of the test.
     fn placed(&self, record: usize, hit: HitRow) -> HitRow {
         let force = self.input[record].get(hit.force - 1).map_or(hit.force, |input| input + 1);
         HitRow { force, ..hit }
@@ -320,9 +321,9 @@ pub(super) fn driving_points(
 }
 
 impl Places {
-    /// Returns the points of the forces. If none are stated, they are the names of the force
-    /// columns, if all these names are points. The columns are those of the first record or, if
-    /// every record has one force column, those of all records.
+    /// Returns the points of the forces. If no points are stated and all names of the force columns
+    /// are points, returns these names. They are the names in the first record or, if every record
+    /// has one force column, the names in all records.
     fn forces_of(&self, measurements: &[Measurement]) -> Cow<'_, [String]> {
         let of_record = |measurement: &Measurement| measurement.source().names.force.clone();
         let names: Vec<Vec<String>> = measurements.iter().map(of_record).collect();

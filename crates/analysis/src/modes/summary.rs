@@ -93,7 +93,8 @@ pub struct RecordRow {
 pub struct TableRow {
     /// Number of frequencies.
     pub frequencies: usize,
-    /// Segments of averaged responses; `None` if the table does not state them.
+    /// Segments over which the frequency responses were averaged; `None` if the table does not
+    /// state them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub segments: Option<SegmentsRow>,
     /// Decay rate, in 1/s, that an exponential window adds to every mode, if there is one.
@@ -101,7 +102,7 @@ pub struct TableRow {
     pub added_decay: Option<f64>,
 }
 
-/// Segments of averaged responses.
+/// Segments over which the frequency responses of a table were averaged.
 #[derive(Debug, Serialize)]
 pub struct SegmentsRow {
     /// Number of segments.
@@ -199,9 +200,9 @@ pub struct ModalModeRow {
     /// empty without a positive modal mass.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mass_normalised_shape: Vec<ShapeEntry>,
-    /// The same shape with one entry per force, at its point and in its direction, in kg^(−1/2): by
-    /// reciprocity, the shape at the points of a roving hammer. Empty without a positive modal
-    /// mass.
+    /// Mass-normalised shape with one entry per force, at the point and in the direction of this
+    /// force, in kg^(−1/2): by reciprocity, the shape at the points of a roving hammer. Empty
+    /// without a positive modal mass.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mass_normalised_shape_at_forces: Vec<ShapeEntry>,
     /// Length of an ambient record in decay times of the mode, ζωT, a pure number.
@@ -214,7 +215,7 @@ pub struct ModalModeRow {
 pub struct HarmonicRow {
     /// Frequency, in Hz.
     pub frequency_hz: f64,
-    /// Probability of such a line without a sinusoid.
+    /// Probability that a record without a sinusoid has a line at least as strong as this one.
     pub p_value: f64,
 }
 
@@ -234,9 +235,9 @@ pub struct DroppedRow {
 pub struct ModalCheck {
     /// Name of the check, in snake case.
     pub code: &'static str,
-    /// `true` if it passed.
+    /// `true` if the check passed.
     pub passed: bool,
-    /// Number that decides, a ratio or a probability.
+    /// Number that decides the verdict, a ratio or a probability.
     pub value: f64,
     /// The finding, in a sentence.
     pub text: String,

@@ -36,7 +36,7 @@ pub struct ModalSystem {
 /// index of its output in the modal model.
 pub(crate) type MeasuredChannel = (ResponseQuantity, usize, usize);
 
-/// A saved result of modes, as far as a system needs it.
+/// The fields of a saved result with modes that a system needs.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct Saved {
@@ -69,7 +69,7 @@ impl ModalSystem {
     /// Takes the modes from the JSON of a result.
     ///
     /// # Errors
-    /// [`AnalysisError::SavedModes`] if they have no frequency responses.
+    /// [`AnalysisError::SavedModes`] if the modes have no frequency responses.
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
         let refused = |why: String| AnalysisError::SavedModes { file: name.into(), why };
         let saved: Saved = from_json_with_modes(name, json)?;

@@ -68,8 +68,8 @@ impl Tables {
         self.tables.iter().zip(self.averaged.iter().map(Option::as_ref))
     }
 
-    /// Refuses a fit of modes to `data` of the tables that needs more memory than a file of their
-    /// size may use. The number of modes is that of the initial estimates.
+    /// Returns an error if a fit of modes to the lines `data` needs more memory than the analysis
+    /// of tables of this size may use. The number of modes is that of the initial estimates.
     ///
     /// # Errors
     /// [`AnalysisError::Memory`].
@@ -84,7 +84,8 @@ impl Tables {
             let pairs = unknowns.saturating_mul(unknowns).saturating_mul(MODAL_PAIR_BYTES);
             numbers.saturating_mul(MODAL_TABLE_BYTES).saturating_add(pairs)
         };
-        // The modes are only counted if the largest possible number needs too much memory.
+        // The modes are counted only if the largest possible number of modes would need too much
+        // memory.
         let modes = if needed(MANY_MODES) <= allowed {
             0
         } else {
@@ -246,9 +247,9 @@ pub(super) fn rows(
     }
 }
 
-/// Returns a table with points in positive directions and the stated quantity. Under an exponential
-/// window it also corrects velocities and accelerations, so that they are derivatives of the
-/// displacement.
+/// Returns a table with points in positive directions and the stated quantity. If the table has an
+/// exponential window, also corrects velocities and accelerations such that they are derivatives of
+/// the displacement.
 fn prepare(
     table: &FrequencyResponses,
     quantity: Option<ResponseQuantity>,

@@ -22,7 +22,8 @@ pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> b
     !phase && !whole && matches!(method, Method::Continuous | Method::Discretised)
 }
 
-/// Callback for a chunk, the force on it, and the range of its samples that count.
+/// Callback for a chunk of the record, the force that was reconstructed from this chunk, and the
+/// range of samples of the chunk that are added to the result.
 pub type Take<'a> =
     dyn FnMut(&Measurement, &IdentifiedForce, Range<usize>) -> Result<(), AnalysisError> + 'a;
 

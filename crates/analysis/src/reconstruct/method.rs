@@ -200,8 +200,8 @@ fn with_terms(
     })?)
 }
 
-/// Returns the stated noise of each channel as the noise of a complete response; `None` if it is
-/// not stated.
+/// Returns the stated noise levels of the channels, sorted by displacement, velocity and
+/// acceleration; `None` if no noise is stated.
 fn motion_noise(
     request: &Request,
     motion: &Measurement,
@@ -237,7 +237,7 @@ impl How {
         } else if method == Method::Continuous {
             "equation of motion, sample by sample"
         } else {
-            "equation of motion from sample to sample, the force linear between them"
+            "equation of motion from sample to sample, with a force linear between samples"
         };
         Self {
             method,
@@ -279,9 +279,9 @@ fn lines(
     })
 }
 
-/// Returns the source of the noise if it is not stated: the lines without force, if there are
-/// enough. Lines outside a band do not count as lines without force: forces that are not
-/// reconstructed may act on them.
+/// Returns the source of a noise level that is not stated: the lines without force if there are
+/// enough of them, otherwise an unknown source. Lines outside a band do not count as lines without
+/// force, because forces that are not reconstructed may act there.
 fn outside(request: &Request, motion: &Measurement) -> Noise {
     let given = request.lines.as_ref().filter(|_| request.periodic);
     let needed = mechid_force::MIN_OUTSIDE_LINES;
@@ -350,8 +350,8 @@ fn in_band_of(motion: &Measurement, force: &IdentifiedForce) -> Result<Measureme
     })
 }
 
-/// Minimum share of the power of a response on the given lines; with less, the response has another
-/// cause.
+/// Minimum share of the power of a response that must be on the given lines; below it, a remark is
+/// made.
 const FEW: f64 = 0.5;
 
 /// Returns a remark about the channel with the smallest share of its power on the given lines, if
@@ -456,7 +456,7 @@ fn correlated_errors(p_value: f64) -> Option<String> {
         format!(
             "the prediction errors of the force model are correlated (p = {p_value:.1e}): one band does \
              not describe the spectrum of the force, for example because a weaker force acts in addition \
-             to a sinusoid, or the machine differs from the one given. The standard error of the force is \
+             to a sinusoid, or the machine differs from the given model. The standard error of the force is \
              not reliable: reconstruct the forces in separate bands (`band_hz`), or state the noise \
              (`noise`)"
         )

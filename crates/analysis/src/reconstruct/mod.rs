@@ -63,11 +63,11 @@ pub struct Reconstructed {
 pub struct ForceChunk<'a> {
     /// Time axis of the whole force.
     pub sampling: Sampling,
-    /// The force; `samples` are its new samples.
+    /// Reconstructed force; only the samples in the range `samples` are new.
     pub force: &'a IdentifiedForce,
     /// Samples of `force` after those of the previous chunk.
     pub samples: Range<usize>,
-    /// `true` if its standard error includes the noise of the record.
+    /// `true` if the standard error of the force includes the noise of the record.
     pub counts_noise: bool,
 }
 
@@ -187,7 +187,7 @@ struct System<'a> {
     name: &'a str,
     /// Names of the forces, one for each place where they may act.
     forces: Vec<String>,
-    /// `true` if its uncertainty is known.
+    /// `true` if the uncertainty of the system is known.
     uncertain: bool,
 }
 

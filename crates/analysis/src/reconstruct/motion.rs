@@ -181,8 +181,9 @@ pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> b
     needed.into_iter().all(|quantity| columns_of(channels, quantity, dofs).is_some())
 }
 
-/// Returns displacement, velocity and acceleration of every degree of freedom; `None` unless all
-/// were measured. Without accelerations these are zero.
+/// Returns displacement, velocity and acceleration of every degree of freedom; `None` if one of
+/// them was not measured. If `with_acceleration` is false, the accelerations are not needed, and
+/// are zero.
 pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) -> Option<Response> {
     let record = measured.record();
     let record_of = |quantity: ResponseQuantity| -> Option<Record> {

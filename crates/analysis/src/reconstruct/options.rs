@@ -16,8 +16,8 @@ pub struct Reconstruct {
     pub forced: Vec<usize>,
     /// Spectral lines with force; `None` if unknown.
     pub lines: Option<LineSpec>,
-    /// Frequency band of the reconstructed force, ends included; `None`: all frequencies; without a
-    /// displacement, only the frequencies at which the responses show a force.
+    /// Frequency band of the reconstructed force, limits included. `None`: all frequencies, or, if
+    /// no displacement is measured, the frequencies at which the responses show a force.
     pub band_hz: Option<Band>,
     /// `true` if an open record begins at rest.
     pub at_rest: bool,
@@ -35,22 +35,22 @@ pub enum Method {
     /// Chosen automatically for the record.
     #[default]
     Auto,
-    /// Equation of motion, sample by sample: displacement, velocity and acceleration of every
+    /// Equation of motion, sample by sample; needs displacement, velocity and acceleration of every
     /// degree of freedom.
     Continuous,
-    /// Exact step from each sample to the next, the force linear between them: displacement and
-    /// velocity.
+    /// Exact step from each sample to the next, with a force that is linear between samples; needs
+    /// displacement and velocity of every degree of freedom.
     Discretised,
-    /// Dynamic stiffness, line by line: whole periods.
+    /// Dynamic stiffness, line by line; needs whole periods.
     FrequencyDomain,
-    /// Empirical-Bayes shrinkage, the posterior mean of the force: whole periods, or a short
+    /// Empirical-Bayes shrinkage (posterior mean of the force), for whole periods or a short
     /// record.
     Shrinkage,
-    /// Tikhonov regularisation: whole periods, or a short record.
+    /// Tikhonov regularisation, for whole periods or a short record.
     Tikhonov,
-    /// Truncated singular values: whole periods, or a short record.
+    /// Truncated singular value decomposition, for whole periods or a short record.
     TruncatedSvd,
-    /// Augmented Kalman filter and smoother: an open record of any length.
+    /// Augmented Kalman filter and smoother, for an open record of any length.
     Kalman,
 }
 

@@ -1,4 +1,4 @@
-//! The strongest line of a force of any length.
+//! Strongest spectral line of a force; the force may have any number of samples.
 
 use std::ops::Range;
 

@@ -10,8 +10,9 @@ use nalgebra::DMatrix;
 use crate::limits::{REST_DIGITS, REST_PERIODS, REST_SAMPLES};
 use crate::modes::{ModalSystem, free_motion_basis};
 
-/// Returns whether a record begins and ends at rest: at neither end does free motion of the modes
-/// explain the responses better than noise. `false` also for a record that is too short to decide.
+/// Returns whether a record begins and ends at rest: noise explains the responses at both ends at
+/// least as well as free motion of the modes does. `false` also for a record that is too short to
+/// decide.
 ///
 /// The Bayesian information criterion decides, with one variance for all channels, each divided by
 /// its RMS about its mean.

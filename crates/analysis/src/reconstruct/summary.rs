@@ -61,8 +61,8 @@ pub struct Chosen {
 pub struct ForceRow {
     /// Degree of freedom, counted from 1.
     pub dof: usize,
-    /// Name of the force in the test that identified the system, or `force 1` of the first degree
-    /// of freedom.
+    /// Name of the force in the test that identified the system; without such a name, a number such
+    /// as `force 1` for the first degree of freedom.
     pub name: String,
     /// `true` if the reconstruction of this force was requested.
     pub sought: bool,

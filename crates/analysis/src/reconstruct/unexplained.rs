@@ -15,7 +15,7 @@ pub struct Measured {
     /// Name of the column.
     pub column: String,
     /// Ratio of the RMS of the unexplained part to the RMS of the response; `None` if there are as
-    /// many forces as measured channels, or without a comparison.
+    /// many forces as measured channels, or if the method gives no residual.
     pub unexplained: Option<f64>,
     /// Expected unexplained ratio due to noise and the uncertainty of the machine; `None` if the
     /// noise is known only from the fit.
@@ -76,7 +76,8 @@ fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share, 2))
 }
 
-/// Returns a remark if the unexplained part exceeds what noise and machine explain.
+/// Returns a remark if the unexplained part of a channel exceeds the part that is expected from the
+/// noise and the uncertainty of the machine.
 pub fn remark(
     measured: &[Measured],
     unexplained: Option<&[Unexplained]>,
@@ -124,7 +125,7 @@ fn causes(request: &Request, dofs: usize) -> Vec<String> {
     causes.push(
         "a sensor is dead, two sensors are interchanged, or a column has the wrong unit".into(),
     );
-    causes.push("the machine differs from the one given".into());
+    causes.push("the machine differs from the given model".into());
     causes
 }
 

@@ -7,7 +7,7 @@ use crate::identify::checks::CheckRow;
 use crate::identify::summary::least_squares_remark;
 use crate::text::significant;
 
-/// Minimum ratio of the residual power to its expectation; with less, the standard errors are too
+/// Minimum ratio of the residual power to its expectation; below it, the standard errors are too
 /// large by more than a factor of √2.
 const OVERSTATED: f64 = 0.5;
 
@@ -90,7 +90,8 @@ fn is_predicted(fit_percent: f64) -> bool {
     fit_percent >= POOR_FIT
 }
 
-/// Returns whether predicted samples were also fitted; the prediction then proves little.
+/// Returns whether the fit used samples that are also predicted; such a prediction is weak evidence
+/// for the values.
 pub fn was_fitted(contents: &Review<'_>) -> bool {
     let report = &contents.identified.summary();
     report.validation.iter().any(|predicted| {

@@ -24,7 +24,7 @@ use crate::measurement::{Block, Windowed};
 pub struct Review<'a> {
     /// The identification.
     pub identified: &'a Identified,
-    /// The records fitted, one by one.
+    /// Content for each of the fitted records.
     pub records: Vec<RecordReview<'a>>,
     /// Measured receptance of the records, or the reason why there is none.
     pub receptance: Result<Receptance, String>,
@@ -42,7 +42,8 @@ pub struct RecordReview<'a> {
     pub name: Option<&'a str>,
     /// Index of the record, counted from 0.
     pub index: usize,
-    /// Lines of a period; `None` if no lines of a period were fitted.
+    /// Spectral lines of the period that were fitted; `None` if the fit did not use the lines of a
+    /// period.
     pub lines: Option<Vec<usize>>,
     /// Levels of the columns used.
     pub channels: Vec<Channel>,

@@ -23,14 +23,16 @@ const SEGMENTS: usize = 8;
 /// Minimum coherence of every motion with the force on a line that is shown.
 const EXPLAINED: f64 = 0.5;
 
-/// Maximum ratio of the other forces to a force that acts alone on a line.
+/// Maximum ratio of every other force to the largest force on a spectral line; up to this ratio,
+/// the largest force counts as acting alone.
 const ALONE: f64 = 1e-3;
 
-/// Maximum ratio of the other forces to a force that acts alone, if the channels of the other
-/// forces contain only noise of their load cells.
+/// Maximum ratio of every other force to the force that counts as acting alone, if the channels of
+/// the other forces contain only the noise of their load cells.
 const ALONE_WITH_NOISE: f64 = 0.1;
 
-/// Minimum coherence from line to line of a force channel that contains a part of another force.
+/// Minimum coherence, from line to line, of the ratio of two force channels that counts as
+/// crosstalk; below this coherence, the smaller force is noise.
 const CROSSTALK_COHERENCE: f64 = 0.5;
 /// Minimum number of lines for a coherence from line to line.
 const FEWEST_LINES: usize = 8;
@@ -48,7 +50,7 @@ pub struct Receptance {
 /// Rows of data with a single force, so that the ratio of motion to force is the receptance.
 pub struct ActingAlone<'a> {
     data: &'a FrequencyData,
-    /// Maximum ratio of force k (row) to force j (column) on lines with force j alone.
+    /// Maximum ratio of force k (row) to force j (column) on the lines on which only force j acts.
     limits: DMatrix<f64>,
 }
 

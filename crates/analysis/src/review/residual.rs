@@ -10,14 +10,14 @@ use crate::identify::fitted;
 use crate::identify::prediction::Compared;
 use crate::measurement::Block;
 
-/// Maximum ratio of a residual to the response that counts as rounding.
+/// Maximum ratio of residual to response that counts as a rounding error.
 const ROUNDING: f64 = 1e-12;
 
 /// Measured and predicted motion of one record, and correlations of the residual of the fit.
 pub struct Residual {
     /// Every measured quantity with its prediction.
     pub compared: Vec<Compared>,
-    /// Correlations of each residual channel; empty if it is not tested separately.
+    /// Correlations of each residual channel; empty if the channels are not tested separately.
     pub correlations: Vec<Correlations>,
     /// First measured quantity over the mean period, with its prediction; `None` without a mean
     /// period.
@@ -40,7 +40,7 @@ pub enum OwnCorrelation {
     Samples {
         /// Autocorrelation.
         correlation: Correlation,
-        /// Number of lags at which noise on the response correlates the residual.
+        /// Number of lags at which the residual is correlated because of noise on the response.
         span: usize,
     },
     /// Correlation from line to line: real and imaginary part at the distances 1, 2 …
@@ -82,7 +82,7 @@ pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
     (size, if residual > ROUNDING * size { residual } else { 0.0 })
 }
 
-/// Correlates at the lags of the checks of the residual.
+/// Computes the correlations of the residual at the lags that the checks of the residual use.
 fn sample_correlations(
     residual: &fitted::SampleResidual,
 ) -> Result<Vec<Correlations>, AnalysisError> {

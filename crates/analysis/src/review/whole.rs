@@ -133,12 +133,12 @@ impl Gathered {
     }
 }
 
-/// Sums over periods, sample by sample of a period and channel by channel.
+/// Sums over all periods: one sum for each sample of the period and each channel.
 #[derive(Debug)]
 struct Periods {
     sums: DMatrix<f64>,
-    /// Sum of squares about the mean so far, scaled; squares about zero would lose the scatter by
-    /// cancellation.
+    /// Scaled sum of squares about the mean of the samples so far. With squares about zero,
+    /// cancellation would remove the scatter.
     squares: DMatrix<f64>,
     /// Scale of each channel, because squares of large or small values overflow or underflow.
     scales: Vec<f64>,

@@ -18,9 +18,9 @@ use crate::measurement::{Block, CHUNK_SAMPLES, Hold};
 pub enum Estimator {
     /// Steps from sample to sample by Euler's rule; the bias is proportional to the step.
     Euler,
-    /// Steps from sample to sample, the force held between them.
+    /// Steps from sample to sample, with a force that is held between samples.
     Held,
-    /// Steps from sample to sample, the force linear between them.
+    /// Steps from sample to sample, with a force that is linear between samples.
     #[default]
     Linear,
     /// The equation of motion at the samples, with the acceleration.
@@ -63,11 +63,11 @@ impl Estimator {
 /// Sums of an estimator over the processed samples.
 #[derive(Debug)]
 pub(crate) enum Gathered {
-    /// Steps from sample to sample.
+    /// Sums over the steps from sample to sample, for the estimators in the time domain.
     Steps(Discretisation, Transitions),
-    /// Samples of the equation of motion.
+    /// Sums over the samples, for the equation of motion.
     Instants(EquationOfMotion),
-    /// Spectra of whole periods.
+    /// Sums of the spectra of whole periods.
     Periods(Estimator, Box<RepeatedPeriods>),
 }
 
@@ -97,7 +97,8 @@ impl Gathered {
         Ok(Self::Steps(discretisation, Transitions::new(dof, force.sampling().dt())?))
     }
 
-    /// Adds samples; for whole periods one or more periods.
+    /// Adds samples; if the estimator uses whole periods, the samples must be one or more complete
+    /// periods.
     pub(crate) fn push(&mut self, samples: &Samples<'_>) -> Result<(), AnalysisError> {
         let force = &samples.force;
         match self {

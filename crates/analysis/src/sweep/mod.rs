@@ -36,7 +36,8 @@ pub struct SweepSettings {
     pub settings: Settings,
     /// Estimator.
     pub estimator: Estimator,
-    /// Known masses; `None`: the masses of a described experiment; for a record, no mass is known.
+    /// Known masses. `None`: for a described experiment, its masses are known; for a record, no
+    /// mass is known.
     pub mass: Option<KnownMass>,
     /// Natural frequency whose cycles NPI counts, in Hz; `None`: the lowest of the machine.
     pub natural_frequency_hz: Option<f64>,
@@ -175,7 +176,7 @@ fn spectra_note(measured: &Block) -> Option<String> {
     })
 }
 
-/// Reads a record once, for all of these decimations.
+/// Reads a record once, and accumulates the sums for every decimation factor in `factors`.
 fn gather(
     recorded: &Windowed,
     estimator: Estimator,

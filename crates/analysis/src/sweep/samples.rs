@@ -1,4 +1,4 @@
-//! Samples to identify from, simulated or measured.
+//! Samples for an identification, simulated or measured.
 
 use std::borrow::Cow;
 

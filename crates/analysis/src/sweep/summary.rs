@@ -68,7 +68,7 @@ pub struct SweptParameter {
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// Estimate, in that unit.
+    /// Estimate of the parameter, in the unit `unit`.
     pub value: f64,
     /// Standard error, in the same unit.
     pub standard_error: f64,
@@ -157,7 +157,7 @@ impl SweepSummary {
             }
         }
         text += if self.has_reference() {
-            "\nThe error is that of the worst entry, relative to the largest entry of its matrix"
+            "\nThe error is the largest error of an entry, relative to the largest entry of its matrix"
         } else {
             "\nThe error is the largest standard error, relative to the largest entry of its \
              matrix: it does not include bias"

@@ -21,8 +21,8 @@ fn light() -> Sdof {
     Sdof::new(3.0, 2.0 * 0.05 * omega * 3.0, 3.0 * omega * omega).unwrap()
 }
 
-/// White force of 30 s at 100 Hz, constant or linear between its samples, and the response from
-/// rest with 0.3 % noise.
+/// White force of 30 s, sampled at 100 Hz, constant or linear between its samples, and the response
+/// from rest with 0.3 % noise.
 fn simulated(between: Discretisation, kind: ResponseQuantity, seed: u64) -> Measurement {
     let sampling = Sampling::from_rate_hz(100.0, 3000).unwrap();
     let force = noise::white(sampling, 1, 100.0, seed).unwrap();
@@ -83,8 +83,8 @@ fn a_simulated_force_is_named_and_allowed_for() {
         let holding: usize = holding.sum();
         assert!(holding >= 20, "{between}, {kind}: {holding}");
         let usual = identify(&[simulated(between, kind, 0)], &Identify::default()).unwrap();
-        // The fit with the wrong force has an error of many standard errors from the noise; the
-        // intervals include this error.
+        // With the wrong force between the samples, the errors of the estimates are many times the
+        // standard errors from the noise. The intervals include these errors.
         assert_eq!(held(&usual, truth), 3, "{usual}");
         let note = "those of the model that explains the residual";
         assert!(usual.to_string().contains(note), "{usual}");
@@ -93,9 +93,9 @@ fn a_simulated_force_is_named_and_allowed_for() {
     }
 }
 
-/// Accelerations of a tower of five storeys under a white force on the last one, held between its
-/// samples, with 2 % noise: the sum of its modes, each with the closed-form response of an
-/// oscillator.
+/// Accelerations of a tower of five storeys, with 2 % noise. A white force, held between its
+/// samples, acts on the top storey. The response is the sum of the closed-form responses of the
+/// modes.
 fn tower(samples: usize) -> (Measurement, [f64; 5]) {
     let masses = [1000.0, 1000.0, 900.0, 900.0, 700.0];
     let springs = [1.2e6, 1e6, 9e5, 8e5, 6e5];
@@ -168,7 +168,8 @@ fn random_test(response_hz: Option<f64>, force_hz: Option<f64>, seed: u64) -> Me
     coupled_test(&heavy(), sampling, [response_hz, force_hz], seed)
 }
 
-/// Random test whose response and force are behind high-passes with these corners in Hz.
+/// Random test whose response and force pass high-pass filters with these corner frequencies in Hz;
+/// `None`: no filter.
 fn coupled_test(
     oscillator: &Sdof,
     sampling: Sampling,
@@ -218,8 +219,8 @@ fn an_ac_coupled_response_is_allowed_for() {
     assert!(wrong.to_string().contains("no fitted channel a9"), "{wrong}");
 }
 
-/// The response is behind a high-pass of 3 Hz. The check of every record names the AC coupling and
-/// its corner frequency.
+/// The response channel has a high-pass filter with a corner frequency of 3 Hz. The check of every
+/// record names the AC coupling and its corner frequency.
 #[test]
 fn an_ac_coupled_response_is_named() {
     (0..4_u64).into_par_iter().for_each(|seed| {
@@ -234,9 +235,9 @@ fn an_ac_coupled_response_is_named() {
     });
 }
 
-/// The force channel is behind a high-pass of 0.5 Hz. In some records a force that is held between
-/// its samples also explains the residual up to noise, but correcting the high-pass leaves less
-/// residual power.
+/// The force channel has a high-pass filter with a corner frequency of 0.5 Hz, which a check must
+/// name. In some records a force that is held between its samples also explains the residual up to
+/// the noise, but the correction of the high-pass gives a smaller residual power.
 #[test]
 fn an_ac_coupled_force_is_named() {
     let omega = TAU * 12.0;
@@ -253,9 +254,9 @@ fn an_ac_coupled_force_is_named() {
     });
 }
 
-/// In some of these records, the fit with a force that is linear between its samples passes the
-/// tests of the residual, although it leaves 90 % of the residual power. The fit with the held
-/// force leaves less than 1 %.
+/// The force is held between its samples, and the check must say so. In some of these records, a
+/// fit that assumes a linear force between the samples also passes the tests of the residual,
+/// although 90 % of the residual power remains. With a held force, less than 1 % remains.
 #[test]
 fn a_held_force_is_not_taken_for_a_linear_one() {
     let omega = TAU * 5.0;

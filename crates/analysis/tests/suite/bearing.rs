@@ -222,8 +222,9 @@ fn records_and_tables(
 /// Results from records of `count` periods in x and as many in y, and results from their tables.
 fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [IdentifiedBearing; 2] {
     let (tests, tables) = records_and_tables(rig, count, seed);
-    // Without a rotation frequency both use the same lines; a record and its table differ in the
-    // neighbours of excluded lines.
+    // Without a rotation frequency, the records and the tables are fitted on the same lines. With a
+    // rotation frequency, a record and its table would exclude different lines near the multiples
+    // of this frequency.
     let twelve = Coefficients::Twelve;
     let how = IdentifyBearing { rotation_hz: None, coefficients: twelve, ..settings(rig) };
     [BearingData::from_records(&tests, &how), BearingData::from_responses(&tables, &how)]
@@ -310,7 +311,8 @@ fn intervals_hold_with_the_baseline_subtracted_and_not_without() {
         assert!(without < 0.7, "{coefficients:?}: {without}");
         let false_alarms = rejected as f64 / runs as f64;
         match coefficients {
-            // At a rate of 5 %, four standard errors of 80 tests are 10 %.
+            // At an expected rate of false alarms of 5 %, four standard errors of the rate in 80
+            // tests are 10 %.
             Coefficients::Eight => assert!(false_alarms < 0.15, "{false_alarms}"),
             _ => assert!(false_alarms > 0.95, "{false_alarms}"),
         }

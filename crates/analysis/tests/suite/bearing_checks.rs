@@ -6,7 +6,8 @@ use mechid_problems::rig::{BearingRig, RigTest};
 
 use super::bearing::{data, measurement, periods, rig, settings, with_baseline};
 
-/// Result of eight periods of each test; the settings may differ from those of the rig.
+/// Result for tests of eight periods each, with the settings `how`, which may differ from the
+/// settings of the rig.
 fn analysed(
     rig: &BearingRig,
     tests: &[RigTest],

@@ -35,9 +35,9 @@ fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -
     if periodic { measured.period(PERIOD).unwrap() } else { measured }
 }
 
-/// Reference: (K − ω²M + iωC)⁻¹. If a force channel shows only a part of another force and noise,
-/// the responses to it cannot be determined: an estimate would be the response to the noise, a
-/// hundred times too large.
+/// Reference: (K − ω²M + iωC)⁻¹. If a force channel contains only noise and a part of another
+/// force, the responses to this force cannot be determined. An estimate would relate the response
+/// to the noise, and would be a hundred times too large.
 #[test]
 fn a_force_that_follows_another_has_no_responses_and_is_told() {
     let system = chain(2, Support::Held, 0.02, 3);
@@ -194,9 +194,10 @@ fn crosstalk_between_interleaved_forces_is_told_and_taken_off() {
     }
 }
 
-/// Reference: the machine and the factor. A sensor in mm next to one in m, or one with a gain 20 %
-/// too large, changes neither the residual nor the diagonal of M, only the symmetry of C and K. A
-/// bearing, whose C and K are not symmetric either, is not reported, nor is a correct record.
+/// Reference: the machine and the factor. A sensor in mm in a record in m, or a sensor with a gain
+/// 20 % too large, changes only the symmetry of C and K; the residual and the diagonal of M do not
+/// change. A correct record must not be reported. A bearing must not be reported either, although
+/// its C and K are not symmetric.
 #[test]
 fn a_sensor_with_another_gain_is_told_by_damping_and_stiffness() {
     let period = Sampling::new(0.002, 1024).unwrap();

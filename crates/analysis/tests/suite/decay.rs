@@ -69,8 +69,8 @@ fn modes_and_their_release_are_found() {
 }
 
 /// Two decays after different releases: each release hardly excites one of the two modes, and both
-/// decays together give both modes. Of 20 pairs, 80 intervals of 95 % of frequency and damping
-/// ratio contain the true value 76 times on average, with a standard deviation of 2.
+/// decays together give both modes. In 20 pairs of decays, 76 of the 80 intervals (95 %) of
+/// frequency and damping ratio contain the true value on average, with a standard deviation of 2.
 #[test]
 fn several_decays_have_common_modes() {
     let truth = [(6.0_f64, 0.01_f64), (30.0, 0.02)];
@@ -193,8 +193,8 @@ fn what_cannot_be_analysed_is_refused() {
     assert!(matches!(decay(&none, &default), Err(AnalysisError::NoMotion)));
 }
 
-/// The record has no noise and is quantised, so that the last cycles of the decay are a square
-/// wave.
+/// The record has no noise and is quantised, so the last cycles of the decay are a square wave. The
+/// result must have only the two true modes, and a remark must report the few steps.
 #[test]
 fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
     for bits in [8, 10, 12] {

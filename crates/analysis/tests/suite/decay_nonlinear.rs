@@ -61,7 +61,7 @@ fn quadratic_drag_is_damping_over_amplitude() {
         let zeta = 0.005 + 4.0 * point.amplitude / PI;
         let off = point.damping_ratio.value - zeta;
         let error = point.damping_ratio.standard_error.unwrap();
-        // The formula itself has an error of the order of the squared damping ratio.
+        // The formula for ζ(a) itself has an error of the order of ζ².
         assert!(off.abs() < 4.0 * error + 1.5 * zeta * zeta, "{found}");
         assert!(error < 0.1 * zeta, "{found}");
         let frequency = point.frequency_hz.value;
@@ -183,8 +183,9 @@ fn a_second_hit_and_the_largest_number_of_modes_are_said() {
     assert!(told(&found, "as many modes were found as `max_modes` allows"), "{found}");
 }
 
-/// With little noise, an autoregression describes two decays of the same phase better than one
-/// decay does. The response is the sum of the closed-form responses to the hits.
+/// A second hit during the decay must be reported, even if both decays have the same phase. If
+/// there is little noise, an autoregression then describes the record better than a decay does. The
+/// response is the sum of the closed-form responses to the hits.
 #[test]
 fn hits_in_phase_are_said() {
     let sampling = Sampling::from_rate_hz(200.0, 3000).unwrap();

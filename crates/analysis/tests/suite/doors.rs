@@ -213,7 +213,7 @@ fn what_does_not_fit_together_is_refused_by_name() {
     assert!(matches!(mixed, Err(AnalysisError::DegreesOfFreedom { got: 2, dofs: 1, .. })));
     assert!(matches!(identify(&[], &Identify::default()), Err(AnalysisError::NoRecord)));
 
-    // The reference has another number of degrees of freedom.
+    // A sweep is refused if the reference has another number of degrees of freedom than the record.
     let sweep = SweepSettings {
         kind: mechid_analysis::sweep::Kind::Decimation,
         settings: "1".parse().unwrap(),
@@ -249,7 +249,8 @@ fn a_record_given_twice_is_refused() {
     refused(frf_of_records(&pair, &FrfSettings::default()).unwrap_err());
     refused(modes(&repeated, &ModesSettings::default()).unwrap_err());
 
-    // Records with other samples, and another part of the same record, count as other tests.
+    // Records with different samples, and different parts of one record, count as different tests
+    // and are not refused.
     let noisy = noise::add_white(&x, NoiseLevel::FractionOfRms(1e-9), 1).unwrap();
     identify(&[test(&x, "a"), test(&noisy, "b")].map(periods), &Identify::default()).unwrap();
     let part = |start: usize| {
@@ -285,7 +286,7 @@ fn a_response_equal_to_the_force_is_no_panic() {
         for kind in [ResponseQuantity::Displacement, ResponseQuantity::Acceleration] {
             let test = Measurement::from_records(&force, &[(kind, &force)]).unwrap();
             for how in [Identify::default(), Identify::spectra(Method::LeastSquares)] {
-                // The result is a machine, or an error.
+                // The identification may return a machine or an error.
                 if let Ok(found) = identify(&[test.clone().period(24).unwrap()], &how) {
                     assert!(found.checks().iter().all(|check| !check.text.contains("NaN")));
                 }
@@ -294,8 +295,8 @@ fn a_response_equal_to_the_force_is_no_panic() {
     }
 }
 
-/// A grounded chain of 26 masses with a force on each has 2,028 parameters, whose covariance has
-/// four million entries.
+/// A grounded chain of 26 masses with a force on each has 2,028 parameters, and their covariance
+/// has four million entries. The summary must omit this covariance, but a call must return it.
 #[test]
 fn the_covariance_of_very_many_parameters_is_there_for_those_who_ask() {
     let n = 26;

@@ -40,14 +40,14 @@ fn record(fault: Option<&Fault>, on: [bool; 2], seed: u64) -> Measurement {
     Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap()
 }
 
-/// Subjects of the warnings on such a record.
+/// Subjects of the warnings on a record with a fault on the forces, on the responses, or on both.
 fn warnings(fault: Option<&Fault>, on: [bool; 2], seed: u64) -> Vec<String> {
     let found = identify(&[record(fault, on, seed)], &Identify::default()).unwrap();
     let warned = found.checks().iter().filter(|check| check.is_conspicuous());
     warned.map(|check| check.subject.to_string()).collect()
 }
 
-/// Reference: the generator, which knows the fault.
+/// Reference: the generator, which knows the fault. The check for this kind of fault must warn.
 #[test]
 fn every_fault_is_told_by_a_check_that_is_meant_for_it() {
     let (force, response, both) = ([true, false], [false, true], [true, true]);
@@ -75,8 +75,8 @@ fn every_fault_is_told_by_a_check_that_is_meant_for_it() {
 }
 
 /// Forces quantised by a converter of 8 bits, with the same error in all periods. The mean square
-/// of 480 errors over their standard errors is known to about 0.12, because the errors of one
-/// record are correlated.
+/// of 480 ratios of error to standard error has an expected value of about 1; it scatters by about
+/// 0.12, because the errors of one record are correlated.
 #[test]
 fn intervals_hold_beside_forces_in_steps() {
     let machine = machine();

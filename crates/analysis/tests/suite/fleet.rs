@@ -1,5 +1,5 @@
-//! Analysis of many records with the same settings: each row equals that of a single
-//! identification, and no part is lost or computed twice.
+//! Analysis of many records with the same settings: each row of the result equals the row of a
+//! single identification, and no part of the result is lost or computed twice.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -133,19 +133,20 @@ fn parts_are_the_same_for_any_number_of_workers_and_made_once() {
     assert_eq!(table.len(), 4);
     assert!(table == contents(&two));
 
-    // A second run computes no part again, and its summary is the same.
+    // A second run computes no part of the result again, and has the same summary.
     let again = run(&records, &one, 2);
     assert_eq!(again.computed_records, 0);
     assert_eq!((again.failed, &again.failures), (first.failed, &first.failures));
 
-    // A part that is lost or damaged is computed again with the same content.
+    // A part of the result that is lost or damaged is computed again, with the same content.
     let names: Vec<&String> = table.keys().collect();
     fs::remove_file(one.join(names[0])).unwrap();
     fs::write(one.join(names[1]), &table[names[1]][..100]).unwrap();
     assert_eq!(run(&records, &one, 2).computed_parts, 2);
     assert!(table == contents(&one));
 
-    // A changed record gives a new part; the old part is reported.
+    // After a record has changed, its part of the result is computed again, and the summary reports
+    // the old part.
     fs::write(&records[0], fs::read_to_string(RIG).unwrap()).unwrap();
     let changed = run(&records, &one, 2);
     assert_eq!((changed.computed_parts, changed.other_parts), (1, 1));
@@ -218,7 +219,8 @@ fn a_file_of_many_records_makes_a_row_for_each() {
     assert!(failure("io.not-finite").message.contains("(record broken), sample 8"));
     assert!(failure("analysis.window").message.contains("(record cut) has 100"));
 
-    // A single record gives the same numbers as in its part and as in its own file.
+    // A record of the file, analysed alone, gives the same numbers as its source file, the example
+    // record.
     let alone = |id: &str| {
         let reading = Reading { record_id: Some(id.into()), ..analysis.reading.clone() };
         SavedAnalysis { reading, ..analysis.clone() }
@@ -325,7 +327,7 @@ fn trends_find_what_stands_out_and_nothing_else() {
     assert!(outliers.contains(&"speed-3766.csv"));
     // One of two thousand normal values lies beyond 3.5 standard deviations.
     assert!(outliers.len() <= 4, "{outliers:?}");
-    // The interval is that of the row of the record.
+    // The interval equals the interval in the row of this record.
     let interval = mass.points[0].interval.unwrap();
     let error = mass.points[0].standard_error.unwrap();
     assert!(interval[1] - interval[0] > 3.9 * error);

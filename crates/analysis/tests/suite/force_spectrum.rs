@@ -40,7 +40,7 @@ fn measured(sinusoids: &[[f64; 3]], seed: u64) -> (Record, Measurement) {
     (force, run.unwrap())
 }
 
-/// 200 sinusoids with random phases up to `highest_hz`, with an RMS value of `rms` in all.
+/// 200 sinusoids with random phases up to `highest_hz`, with a total RMS value of `rms`.
 fn band(highest_hz: f64, rms: f64, seed: u64) -> Vec<[f64; 3]> {
     let sampling = Sampling::from_rate_hz(1.0, 200).unwrap();
     let draw = noise::white(sampling, 2, 1.0, seed).unwrap();
@@ -66,8 +66,9 @@ fn judged(sinusoids: &[[f64; 3]], seed: u64) -> (bool, f64) {
     (result.summary().remarks.iter().any(is_named), share)
 }
 
-/// A force of 7 N RMS up to 100 Hz beside a sinusoid of 100 N: the fitted band ends near the
-/// sinusoid, and less than half of the intervals contain the force.
+/// A force of 7 N RMS up to 100 Hz acts in addition to a sinusoid of 100 N. The fitted band ends
+/// near the sinusoid, so fewer than 60 % of the intervals contain the force; a remark must report
+/// this.
 #[test]
 fn a_weaker_force_beside_a_sinusoid_is_named() {
     let wrong = |seed: u64| {

@@ -113,7 +113,8 @@ fn a_column_that_shows_noise_alone_is_no_second_hammer() {
     }
 }
 
-/// Responses that come late or early by whole samples, as from a converter that scans its channels.
+/// The responses are late or early by whole samples, as with a converter that scans its channels.
+/// The check of the delay must find this number of samples.
 #[test]
 fn a_late_response_to_hits_is_told_by_its_delay() {
     for (late, seed) in [(0_isize, 2), (3, 0), (1, 1), (-2, 0)] {
@@ -185,9 +186,10 @@ fn ac_coupled_responses_to_hits_are_named() {
     });
 }
 
-/// Noise of 0.5 % of the peak on the samples of a pulse is common to all lines of the hit: it makes
-/// the standard errors hardly larger, and no check of the residual warns of it. The probability
-/// that fewer than 20 of 24 intervals of modes contain the true value is 0.006.
+/// Noise of 0.5 % of the peak on the samples of a pulse is common to all lines of the hit: this
+/// noise increases the standard errors only slightly, and no check of the residual warns of the
+/// noise. The probability that fewer than 20 of 24 intervals of modes contain the true value is
+/// 0.006.
 #[test]
 fn noise_of_the_force_is_common_to_all_lines_of_a_hit() {
     let fits = |noise_n: f64| -> Vec<Identified> {
@@ -234,8 +236,8 @@ fn noise_of_the_force_is_common_to_all_lines_of_a_hit() {
     assert!((0.9..1.3).contains(&larger), "standard errors are {larger} times as large");
 }
 
-/// At least 85 % of 72 or of 36 intervals of 95 % must contain the true value; groups of twelve are
-/// correlated. The damping ratios scatter by some thousandths.
+/// There are 72 or 36 intervals of 95 %; at least 85 % of them must contain the true value, because
+/// groups of twelve are correlated. The damping ratios scatter by some thousandths of their values.
 #[test]
 fn a_roving_hammer_finds_the_machine() {
     for (quantity, runs) in [(ACCELERATION, 6), (ResponseQuantity::Displacement, 3)] {
@@ -265,9 +267,9 @@ fn a_roving_hammer_finds_the_machine() {
     }
 }
 
-/// The spectra of hits in the figures are the response to the only force that acts. On every line
-/// the acceleration agrees with the machine to six times the noise (0.05 m/s² on a sample, 2/√N of
-/// it on a line of N samples).
+/// The spectra of the hits in the figures are responses to the one force that acts. On every line
+/// the acceleration agrees with the machine to six times the noise. The noise is 0.05 m/s² on a
+/// sample, and 2/√N times this value on a line of a window of N samples.
 #[test]
 fn the_receptance_of_hits_is_that_of_the_machine() {
     let truth = rig(ACCELERATION).system().unwrap();
@@ -314,7 +316,7 @@ fn hits_that_are_left_out_are_told_with_their_reasons() {
     assert_eq!(json["file"], "point 1");
     assert_eq!(json["hits"].as_array().unwrap().len(), 10);
     assert_eq!(json["analysis"]["hits"]["trigger_percent"], 0.5);
-    // Settings without hits do not mention them.
+    // Saved settings without a rule for hits do not have the field `hits`.
     let one = serde_json::to_value(Identify::default()).unwrap();
     assert!(one.get("hits").is_none());
 }
@@ -434,8 +436,9 @@ fn lines_without_force_are_left_out_of_segments() {
     }
 }
 
-/// Under an exponential window e^(−σt) the response at iω is that of the machine at iω + σ. Without
-/// a window a remark reports the response that has not decayed at the end.
+/// Reference: a response measured under an exponential window e^(−σt) at the frequency ω equals the
+/// response of the machine at s = iω + σ. Without a window a remark reports the response that has
+/// not decayed at the end.
 #[test]
 fn frequency_responses_are_those_of_the_machine_with_the_decay_of_the_window() {
     let sampling = Sampling::from_rate_hz(1024.0, 5 * 4096).unwrap();
@@ -510,7 +513,7 @@ fn what_hits_cannot_be_found_in_is_refused() {
         other => panic!("{other}"),
     };
     refused(&hits(HitRule { trigger_percent: -1.0, ..HitRule::default() }));
-    // With windows of 2,000 samples no hit has enough room.
+    // With windows of 2,000 samples, no hit has a complete window in the record.
     let how = hits(HitRule { samples: Some(2000), ..HitRule::default() });
     let error = identify(std::slice::from_ref(&test), &how).unwrap_err();
     assert!(matches!(error, AnalysisError::NoHit { .. }), "{error}");

@@ -81,7 +81,8 @@ fn a_wrong_period_has_no_misfit_to_show() {
 }
 
 /// Eight strokes of different strengths, one second apart, so that each response decays before the
-/// next stroke. The response to a half-sine is a sum over 16 parts of each sample.
+/// next stroke. The response to each half-sine is computed as a sum over 16 parts of each sampling
+/// interval.
 fn strokes(strengths: [f64; 8]) -> Measurement {
     const RATE: f64 = 1024.0;
     const PERIOD: usize = 1024;
@@ -179,7 +180,8 @@ fn the_highest_mode_is_that_of_the_fit() {
     }
 }
 
-/// Reference: the receptance in closed form.
+/// Reference: the receptance in closed form. The result lists the lines of the fit, with their
+/// standard errors, only on request.
 #[test]
 fn the_lines_of_a_fit_are_given_on_request() {
     let test = displacements(10).period(256).unwrap();
@@ -203,8 +205,8 @@ fn the_lines_of_a_fit_are_given_on_request() {
             // Three parameters from 198 numbers: the fit is more accurate than the measurement.
             assert!(line.fitted_standard_error[0] < error, "{line:?}");
         }
-        // The mean of 198 squared errors, each over a squared standard error with nine degrees of
-        // freedom, is about 1 ± 0.6 (four standard deviations).
+        // The mean of 198 squared errors, each divided by a squared standard error with nine
+        // degrees of freedom, is about 1 ± 0.6 (four standard deviations).
         assert!((0.5..1.7).contains(&of_noise), "{of_noise}");
         assert!(of_fit < 5.0, "{of_fit}");
         assert!(

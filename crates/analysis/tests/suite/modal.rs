@@ -1,4 +1,5 @@
-//! Modes of a machine: instability is reported, and rounding errors are not taken for instability.
+//! Modes of a machine: instability is reported, and rounding errors are not reported as
+//! instability.
 
 use mechid_analysis::{Machine, ModalSummary};
 use mechid_model::SecondOrderSystem;

@@ -126,7 +126,8 @@ fn a_table_gives_modes_masses_and_good_checks() {
     assert!(MODES.iter().any(|(hz, _)| (peak - hz).abs() < 0.2), "{peak}");
 }
 
-/// Reference: under the window e^(−σt) the response is that at s = jω + σ.
+/// Reference: a response measured under the window e^(−σt) at the frequency ω equals the response
+/// without a window at s = jω + σ.
 #[test]
 fn the_decay_of_an_exponential_window_is_subtracted() {
     const RATE: f64 = 2.5;
@@ -202,7 +203,7 @@ fn a_wrong_gain_and_a_wrong_sign_are_named() {
 }
 
 /// A sensor that measures only noise, a thousandth of its former level, is named once. On correct
-/// data every sensor passes, and the text of no check has the words of a failure.
+/// data every sensor passes, and no check that passes has words of a failure in its text.
 #[test]
 fn a_sensor_that_moves_in_no_mode_is_named() {
     let right = plain([1.0; 3], 5);
@@ -269,7 +270,8 @@ fn a_delay_of_accelerations_is_part_of_the_model() {
     }
 }
 
-/// Reference: H = ψψᵀ/(ω_r²(1 + jη) − ω²), whose residues have phases of −η/2 in every mode.
+/// Reference: H = ψψᵀ/(ω_r²(1 + jη) − ω²), whose residues have phases of −η/2 in every mode. The
+/// checks must not report this phase as a delay.
 #[test]
 fn structural_damping_is_no_delay() {
     for seed in 0..2 {
@@ -383,8 +385,8 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
         |ratios: &[f64]| (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
     // The limits are three standard deviations of the RMS of 420 and of 60 ratios.
     assert!(of_shapes.len() == 420 && (0.9..1.1).contains(&rms(&of_shapes)), "{of_shapes:?}");
-    // The limits are three standard deviations of the RMS of 100 independent ratios: those of the two
-    // points of a mode are correlated.
+    // The limits are three standard deviations of the RMS of 100 independent ratios, because the
+    // ratios at the two points of a mode are correlated.
     assert!(at_forces.len() >= 180 && (0.79..1.21).contains(&rms(&at_forces)), "{at_forces:?}");
     assert!(of_mac.len() == 60 && (0.73..1.27).contains(&rms(&of_mac)), "{of_mac:?}");
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
@@ -511,7 +513,8 @@ fn a_finite_element_model_is_compared_at_the_common_points() {
     }
 }
 
-/// Reference: the fitted responses, read back from the file.
+/// Reference: the measured table. The fitted responses, written to a universal file and read back,
+/// must agree with this table except for its noise.
 #[test]
 fn the_synthesis_is_read_back_from_a_universal_file() {
     let measured = plain([1.0; 3], 11);
@@ -537,7 +540,7 @@ fn hammer(file: &str) -> std::path::PathBuf {
 }
 
 /// Reference: the structure of the examples with modes at 12 Hz and 31 Hz; one of the two
-/// accelerometers shows both.
+/// accelerometers shows both modes.
 #[test]
 fn a_modal_test_is_an_analysis_of_many_records() {
     let analysis = SavedAnalysis {
@@ -576,7 +579,8 @@ fn modes_predict_a_record_that_was_not_fitted() {
     let open = |file: &str| Measurement::open(hammer(file), &channels).unwrap();
     let mut found = mechid_analysis::modes(&[open("hammer-1.csv")], &settings).unwrap();
     let same = found.predict(&[open("hammer-1.csv")]).unwrap()[0];
-    // The second record was struck at another point, so the fit to the first does not predict it.
+    // In the second record the hammer struck another point, so the fit to the first record does not
+    // predict the second record.
     let other = found.predict(&[open("hammer-2.csv")]).unwrap()[0];
     assert!(same > 0.999 && other < 0.9, "{same} {other}");
     found.add_validation(&[open("hammer-1.csv")]).unwrap();
@@ -584,7 +588,8 @@ fn modes_predict_a_record_that_was_not_fitted() {
     assert!(check(&found, "predicted").passed);
 }
 
-/// Two records, each struck at its own point: the halves of the test have one force each.
+/// A test of two records with hits at different points, so each half of the test has one force. The
+/// modes of the halves must agree.
 #[test]
 fn the_halves_of_a_roving_hammer_test_agree() {
     let mut settings = ModesSettings {

@@ -32,8 +32,8 @@ fn pulses() -> Record {
     Record::new(Sampling::from_rate_hz(RATE_HZ, SAMPLES).unwrap(), data).unwrap()
 }
 
-/// Exact response to pulses whose decay ends within the record, so that it equals the periodic
-/// response.
+/// Exact response to pulses. The response decays before the end of the record, so it equals the
+/// periodic response.
 fn response(forces: &Record) -> Record {
     let spectrum = Spectrum::from_record(forces);
     let mut lines = DMatrix::<C>::zeros(spectrum.len(), 4);
@@ -54,8 +54,8 @@ fn measurement(forces: &Record, motion: &Record) -> Measurement {
     Measurement::from_columns(forces.sampling(), &columns, &channels).unwrap()
 }
 
-/// Root mean square of the ratios of error and stated standard error; both are the RMS over a
-/// record.
+/// Root mean square of the ratios of error to stated standard error. In each ratio, the error and
+/// the standard error are RMS values over a record.
 fn ratio(pairs: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     let squares: Vec<f64> =
         pairs.into_iter().map(|(error, stated)| (error / stated).powi(2)).collect();
@@ -190,7 +190,7 @@ fn rest_at_both_ends_is_detected() {
 }
 
 /// The hammer strikes downwards, and the positive direction of the sensors is upwards. Modal masses
-/// and reciprocity are those of the same test with both in one direction.
+/// and reciprocity equal those of the same test with the hammer and the sensors in one direction.
 #[test]
 fn forces_against_the_direction_of_their_sensors_give_masses_and_reciprocity() {
     let forces = pulses();

@@ -26,8 +26,8 @@ fn machine() -> NonlinearSystem {
     NonlinearSystem::new(linear, "k2: x1^2, k3: x1^3".parse().unwrap(), vec![8e4, 4e6]).unwrap()
 }
 
-/// Two periods of a displacement of some centimetres on odd lines up to 21, and the force that it
-/// needs, whose lines end at 63.
+/// Two periods of the force and of a displacement of some centimetres. The displacement is
+/// prescribed on the odd lines up to line 21; the force that causes it has lines up to 63.
 fn steady_state() -> (Record, Record) {
     let sampling = Sampling::new(0.02, PERIOD).unwrap();
     let record = |order: i32| {
@@ -40,7 +40,8 @@ fn steady_state() -> (Record, Record) {
         Spectrum::from_lines(sampling, lines).unwrap().to_record().unwrap()
     };
     let response = Response::new(record(0), record(1), record(2)).unwrap();
-    // The mean of the force is kept, because the force of x² has one direction.
+    // The mean of the force is kept, because the force of the term x² has the same sign at all
+    // times.
     let force = machine().force(&response).unwrap();
     (force.repeated(2).unwrap(), response.displacement().repeated(2).unwrap())
 }
@@ -182,8 +183,8 @@ fn the_force_of_a_spring_that_hardens_is_found_with_its_error() {
     assert!(larger.channel(0).iter().zip(error.channel(0)).all(|(with, without)| with > without));
 }
 
-/// Reference: the backbone of the true model, which the tests of the model compare with ω² ≈ k + ¾
-/// k₃ A². The interval of the program's backbone must contain it.
+/// Reference: the backbone of the true model. The intervals of the identified backbone must contain
+/// it. Other tests compare the backbone of a model with ω² ≈ k + ¾ k₃ A².
 #[test]
 fn a_backbone_holds_that_of_the_truth() {
     let (force, x) = steady_state();
@@ -276,7 +277,8 @@ fn a_fifth_power_is_told_to_extrapolate_badly() {
     let test = test_of(&force, &x).period(PERIOD).unwrap();
     let how = Identify::nonlinear("k2: x1^2, k3: x1^3, k5: x1^5".parse().unwrap());
     let found = identify(&[test], &how).unwrap();
-    // The machine has no fifth power, so the term has no share of the force and no warning appears.
+    // The machine has no term of the fifth power. The fitted term k5 therefore has no share of the
+    // force, and no warning appears.
     assert!(!found.to_string().contains("extrapolates badly"), "{found}");
     let linear = machine().linear().clone();
     let terms = "k3: x1^3, k5: x1^5".parse().unwrap();
@@ -377,8 +379,8 @@ fn one_shaker_at_a_time(cubic: f64, seed: u64) -> Vec<Measurement> {
     vec![shaken(0), shaken(1)]
 }
 
-/// Reference: the machine in closed form. One record does not determine the machine; both together
-/// determine it, with the nonlinear term and without it.
+/// Reference: the machine in closed form. Each of the two records alone does not determine the
+/// machine; the two records together determine it, with and without the nonlinear term.
 #[test]
 fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
     let term = "cubic stiffness of x1 (hardening)";
@@ -398,9 +400,9 @@ fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
     }
 }
 
-/// A window of 2,048 samples from a random motion eight times as long, from 1 to 8 Hz, and the
-/// force that it needs in an oscillator of 10 kg at 3.6 Hz with a cubic spring. The displacement
-/// has 0.5 % noise.
+/// A window of 2,048 samples of a random displacement from 1 to 8 Hz; the period of the
+/// displacement is eight times as long as the window. The force gives this displacement to an
+/// oscillator of 10 kg at 3.6 Hz with a cubic spring. The displacement has 0.5 % noise.
 fn random_motion(cubic: f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.01, 8 * 2048).unwrap();
     let draw = noise::white(Sampling::new(1.0, sampling.lines()).unwrap(), 2, 1.0, seed).unwrap();
@@ -518,9 +520,9 @@ fn noise_on_the_force_is_no_fault_of_a_right_model() {
     assert_eq!(wrong, 6);
 }
 
-/// A motion whose frequency rises from 1 to 7 Hz in 20 s, and the force that it needs in an
-/// oscillator of 10 kg at 3.6 Hz with the additional force `law` of displacement and velocity. The
-/// displacement has 0.5 % noise.
+/// A displacement whose frequency rises from 1 to 7 Hz in 20 s, with 0.5 % noise. The force gives
+/// this displacement to an oscillator of 10 kg at 3.6 Hz; `law` is an additional force of the
+/// oscillator, a function of displacement and velocity.
 fn sweep(law: impl Fn(f64, f64) -> f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.01, 2000).unwrap();
     let motion = |t: f64| {
@@ -571,9 +573,10 @@ fn terms_are_found_in_open_records() {
     assert!(refused(how).contains("`candidates`"));
 }
 
-/// References: the machine of the periods, whose quadratic spring is missing in the model, and the
-/// machine of the sweep, whose friction is missing. The intervals include the change of the
-/// parameters by the missing terms. A model with all terms has no finding of missing terms.
+/// References: a machine under periodic excitation, whose quadratic spring is missing in the model,
+/// and machines under a sweep, whose friction or drag is missing. The intervals of mass, damping
+/// and stiffness must contain the true values, although the missing term changes the estimates.
+/// Models with all terms may warn in at most 2 of 60 records.
 #[test]
 fn intervals_of_a_model_that_lacks_a_term_hold() {
     let (force, x) = steady_state();

@@ -26,7 +26,7 @@ fn table(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> FrequencyRe
     table_of_lines(LINES, receptance, seed, is_stated)
 }
 
-/// A table as above with another number of lines in the same band.
+/// A table like that of `table`, with the number of lines given, in the same band.
 fn table_of_lines(
     lines: usize,
     receptance: &Receptance<'_>,
@@ -123,8 +123,9 @@ fn modes_beyond_the_degrees_of_freedom_are_told() {
     }
 }
 
-/// A driving point with two modes far apart, fitted with one degree of freedom: it takes the lower
-/// mode, and only a second mode explains the rest.
+/// A driving point with two modes far apart, fitted with one degree of freedom. The fit finds the
+/// lower mode; the check of whiteness must warn, but must not name a damping law or a delay as the
+/// cause.
 #[test]
 fn a_second_mode_is_not_taken_for_damping_or_a_delay() {
     for (hz, size) in [(26.0, 0.2), (33.0, 0.5), (60.0, 0.3)] {
@@ -182,7 +183,8 @@ fn another_quantity_is_told() {
     }
 }
 
-/// Levels in decibels whose magnitudes are all below one, all above one, or below and above one.
+/// Tables whose magnitudes are given in decibels: the check must name decibels as the cause,
+/// whether the magnitudes are all below one, all above one, or below and above one.
 #[test]
 fn decibels_read_as_magnitudes_are_told() {
     for gain in [1e-3, 1e6, 1.0, 5.0, 50.0] {
@@ -196,8 +198,8 @@ fn decibels_read_as_magnitudes_are_told() {
     }
 }
 
-/// Other models are tried on fewer lines of a long table first; they are found on these lines as
-/// they are on all lines.
+/// For a long table, other models are first tried on only some of the lines. The same model must be
+/// found on these lines as on all lines.
 #[test]
 fn long_tables_are_told_apart_too() {
     let structural = |omega: f64| {

@@ -1,4 +1,5 @@
-//! Parts of the data that disagree, and fits that do not determine the machine.
+//! Tests of the reports on parts of the data that disagree, and on fits that do not determine the
+//! machine.
 
 use mechid_analysis::identify::{OpenFit, Source};
 use mechid_analysis::{
@@ -120,7 +121,7 @@ fn a_residual_beyond_the_noise_widens_the_intervals() {
     assert!(scale >= misfit.unwrap().sqrt() && scale > 3.0, "{found}");
 }
 
-/// The response is noise and has no relation to the force.
+/// The response is noise and has no relation to the force; the identification must refuse it.
 #[test]
 fn a_response_that_is_noise_is_no_result() {
     let [force, _] =

@@ -102,8 +102,9 @@ fn several_records_have_ends_of_their_own() {
     assert!((1.2..2.4).contains(&gain), "{gain}");
 }
 
-/// Reference: the generator. The amplitude is a tenth of the RMS value, so the share of the RMS is
-/// 0.1/√2.
+/// Reference: the generator. The amplitude of the run-out is a tenth of the RMS value of the
+/// response, so the RMS of the run-out is 0.1/√2 of that value. The result must list the run-out of
+/// each record, but only one remark must report it.
 #[test]
 fn run_out_is_taken_off_and_told_once() {
     let tests: Vec<Measurement> = (0..2)
@@ -130,8 +131,8 @@ fn run_out_is_taken_off_and_told_once() {
     assert!(right.summary().fit.sinusoids.is_empty());
 }
 
-/// Reference: the generator, which delays the response over its whole period; the record is a
-/// window of it.
+/// Reference: the generator, which delays a whole period of the response. The record is a window of
+/// this period.
 #[test]
 fn a_late_response_is_told_by_its_delay() {
     let late = |samples: f64, seed: u64| {
@@ -263,8 +264,8 @@ fn an_open_record_has_no_period() {
     assert!(matches!(error, AnalysisError::Setting { setting: "noise", .. }), "{error}");
 }
 
-/// For `runs` records with noise on force and response: the share of the 95 % intervals that
-/// contain the true value, the number of records with a warning, and the results.
+/// Identifies `runs` records with noise on force and response. Returns the share of the 95 %
+/// intervals that contain the true value, the number of records with a warning, and the results.
 fn judged(
     rig: &RandomTest,
     force_noise: f64,
@@ -306,14 +307,14 @@ fn with_force_noise(force: Option<Vec<f64>>) -> Identify {
 
 /// If the intervals are right, the probability that fewer than 88 % of 180 intervals of 95 % (in
 /// correlated groups of three) contain the true value is below 0.01. If the noise of 1 % is
-/// ignored, a third of the intervals do not contain it.
+/// ignored, a third of the intervals do not contain the true value.
 #[test]
 fn noise_on_the_force_is_read_above_its_band() {
     let (share, warned, all) = judged(&rig(), 0.01, &with_force_noise(None), 30);
     assert!(share >= 0.88, "{share}");
     assert!(warned <= 3, "{warned} of 30 warn");
-    // The noise is 1 % of 84 N, the RMS within the band of a force of 100 N. 256 lines determine
-    // its power to about 1/16.
+    // The RMS of the force is 100 N before band limitation, and 84 N after it. The noise is 1 % of
+    // 84 N; 256 lines determine the noise power to about 1/16.
     let levels = all.iter().map(|found| found.summary().fit.force_noise[0].levels_n[0].unwrap());
     let mean = levels.sum::<f64>() / 30.0;
     assert!((mean / 0.837 - 1.0).abs() < 0.03, "{mean}");
@@ -380,8 +381,9 @@ fn resonances_narrower_than_a_line_warn() {
     assert!(!wide.iter().any(leaks));
 }
 
-/// Reference: the half-power width 2ζf. It is less than one line for 1 % damping in segments of 256
-/// samples, and five lines for 5 % in segments of 1,024.
+/// Reference: the half-power width 2ζf. A remark must warn for 1 % damping in segments of 256
+/// samples (less than one line wide), but not for 5 % in segments of 1,024 samples (five lines
+/// wide).
 #[test]
 fn frequency_responses_tell_of_a_peak_that_the_window_blunts() {
     let told = |rig: RandomTest, samples: usize| {
@@ -415,7 +417,8 @@ fn the_length_of_segments_is_chosen() {
 fn intervals_of_modes_of_averaged_responses_hold() {
     let mode = |hz: f64| (std::f64::consts::TAU * hz).powi(2) * 10.0;
     let [low, high] = [mode(25.0), mode(40.0)];
-    // Proportional damping of two equal masses: in phase with each other, and opposed.
+    // Two equal masses with proportional damping: they move in phase in the first mode, and in
+    // opposite phase in the second mode.
     let stiffness = dmatrix![low + high, low - high; low - high, low + high] * 0.5;
     let [slow, fast] = [0.02, 0.03].map(|ratio| 2.0 * ratio * 10.0);
     let [slow, fast] = [slow * (low / 10.0).sqrt(), fast * (high / 10.0).sqrt()];
@@ -449,7 +452,8 @@ fn intervals_of_modes_of_averaged_responses_hold() {
     assert!(held >= 70, "{held}");
 }
 
-/// A file of averaged responses states enough of its segments to correct the bias of their window.
+/// A file of averaged responses states its segments and their window, so the bias of the window can
+/// be corrected as for the record.
 #[test]
 fn a_table_of_segments_is_fitted_as_its_record() {
     let test = random_test(3);
@@ -514,9 +518,9 @@ fn with_friction(force: &Record, friction: f64) -> Record {
     Record::from_channel(force.sampling(), out).unwrap()
 }
 
-/// The linear fit takes friction of 3 % of the RMS force for damping, and leaves a residual of a
-/// few per cent of the motion that has the sign of the velocity. The same records without friction
-/// must not warn.
+/// The dry friction is 3 % of the RMS force. The linear fit describes a part of it as damping; the
+/// residual, a few per cent of the response, has the sign of the velocity. A check must name the
+/// friction. The same records without friction must not warn.
 #[test]
 fn dry_friction_under_a_random_force_is_named() {
     let long = RandomTest { sampling: Sampling::new(0.002, 2 * SAMPLES).unwrap(), ..rig() };
@@ -598,9 +602,9 @@ fn chain(rate_hz: f64, samples: usize) -> RandomTest {
     RandomTest { system, sampling, quantity: KIND, force: 100.0 }
 }
 
-/// The 108 unknowns of six sensors and forces exceeded a limit, above which every record was fitted
-/// as a whole period: checks warned, and about one of eight intervals did not contain the true
-/// value.
+/// Six sensors and forces have 108 unknowns. An earlier version fitted records with this number of
+/// unknowns as whole periods: checks warned, and about one of eight intervals did not contain the
+/// true value. The records must be fitted as open records, without a warning.
 #[test]
 fn six_random_forces_need_no_settings() {
     let chain = chain(500.0, 2048);

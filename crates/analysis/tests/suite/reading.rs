@@ -197,8 +197,8 @@ fn frequency_responses_take_one_force_and_several_responses() {
     }
 }
 
-/// Reference: the rows of H1 do not depend on each other, so a response has the same values beside
-/// other responses and alone.
+/// Reference: the rows of H1 do not depend on each other, so the frequency responses of one output
+/// are the same with and without other outputs.
 #[test]
 fn frequency_responses_take_fewer_responses_than_forces() {
     use mechid_analysis::frf::Estimator;

@@ -1,4 +1,5 @@
-//! Records as on real test rigs: one shaker at a time, and disturbances at lines of their own.
+//! Records like those of real test rigs: one shaker acts at a time, and disturbances are on single
+//! spectral lines.
 
 use mechid_analysis::identify::{Disturbance, KnownMass, LeftOut, Method};
 use mechid_analysis::{
@@ -39,8 +40,9 @@ fn test(driven: usize, seed: u64) -> (Record, Response) {
     (force, motion)
 }
 
-/// Displacement records, one for each shaker. The noise on the response is a part of its RMS, that
-/// on every force channel a part of the RMS of the shaker's force.
+/// Displacement records, one for each shaker. `on_response` is the ratio of the noise on the
+/// response to its RMS; `on_force` is the ratio of the noise on every force channel to the RMS of
+/// the shaker's force.
 fn records(seed: u64, [on_response, on_force]: [f64; 2]) -> Vec<Measurement> {
     let record = |driven: usize| {
         let (force, motion) = test(driven, 10 * seed + driven as u64);

@@ -148,10 +148,10 @@ fn intervals_of_late_responses_include_the_delay() {
 }
 
 /// Mobilities that are read as accelerances, and a mass that changes by 2 % within the band: in
-/// both cases the standard errors from the noise alone are far too small. The result has larger
-/// standard errors, which include the change of the parameters for the correct quantity. Its
-/// intervals reach the values of the machine, or the range between the values of the two machines;
-/// some intervals from the noise alone do not.
+/// both cases the standard errors from the noise alone are far too small. The standard errors of
+/// the result must be larger, and include the error due to the wrong model. Each interval must
+/// contain the value of the machine or, if the mass changes, overlap the range between the values
+/// of the two machines. Some intervals from the noise alone are too narrow for this.
 #[test]
 fn intervals_of_a_wrong_model_are_as_wide_as_its_error() {
     let system = oscillator();
@@ -191,8 +191,8 @@ fn intervals_of_a_wrong_model_are_as_wide_as_its_error() {
     }
 }
 
-/// Under a window exp(−σt) the response at iω is that of the machine at iω + σ, for every measured
-/// quantity.
+/// Reference: a response measured under a window exp(−σt) at the frequency ω equals the response of
+/// the machine at s = iω + σ. This is tested for every measured quantity.
 #[test]
 fn the_decay_that_a_window_adds_is_taken_off() {
     let sigma = 4.3;
@@ -226,7 +226,8 @@ fn the_decay_that_a_window_adds_is_taken_off() {
             assert!(worst(&table) < 1e-8, "{quantity}: {}", worst(&table));
         }
     }
-    // Known entries of the structure are those of the machine; a known damping needs a known mass.
+    // Known entries of the structure are the values of the machine, without the decay of the
+    // window. A known damping therefore needs a known mass.
     let mut table = exact(&oscillator(), ResponseQuantity::Displacement);
     table.added_decay = Some(sigma);
     let known = |form: &str| {
@@ -253,7 +254,8 @@ fn a_record_and_its_table_agree() {
     let x = noise::add_white(&x, NoiseLevel::FractionOfRms(0.05), 7).unwrap();
     let responses = [(ResponseQuantity::Displacement, &x)];
     let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
-    // The noise is estimated for each line, as the coherence does.
+    // The noise is estimated line by line; the coherence of the table is also computed line by
+    // line.
     let estimator = Some(PeriodEstimator::MaximumLikelihood(Pooling::PerLine));
     let how = Identify::from(Source::Periods(PeriodFit { estimator, ..PeriodFit::default() }));
     let of_record = identify(std::slice::from_ref(&test), &how).unwrap();
@@ -326,8 +328,8 @@ fn points_in_names_of_channels_are_kept() {
 }
 
 /// Three periods give two deviations per line, so neighbouring lines share their noise levels. The
-/// mean square of 180 errors over their standard errors is known to about 0.15, because the errors
-/// of one record are correlated.
+/// mean square of 180 ratios of error to standard error has an expected value of about 1; it
+/// scatters by about 0.15, because the errors of one record are correlated.
 #[test]
 fn tables_of_three_periods_know_their_noise() {
     let period = Sampling::from_rate_hz(128.0, 128).unwrap();
@@ -405,7 +407,8 @@ fn intervals_from_standard_errors_hold() {
     assert!((0.935..=0.965).contains(&share), "{share}");
 }
 
-/// An average over 64 responses with noise only on the response, and its coherence.
+/// The table has averages over 64 responses, with noise only on the response, and their coherence.
+/// From 93.5 to 96.5 % of the 95 % intervals must contain the true value.
 #[test]
 fn intervals_from_coherence_hold() {
     let measure = |mut table: FrequencyResponses, seed: u64| {

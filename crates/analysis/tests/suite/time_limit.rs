@@ -21,8 +21,9 @@ fn example(file: &str) -> String {
     format!("{}/../../examples/{file}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Ends the `work` after each of several numbers of polls. A result must say so if, and only if, a
-/// search ended early; a failure must be due to the limit, because the whole work succeeds.
+/// Ends the `work` after each of several numbers of polls. A result must report the time limit if,
+/// and only if, a search ended early. A failure must be due to the limit, because `work` without a
+/// limit succeeds.
 fn says_so<T: Serialize>(work: impl Fn() -> Result<T, AnalysisError>) {
     let json = |result: &T| serde_json::to_string(result).unwrap();
     let whole = json(&work().unwrap());
@@ -61,7 +62,7 @@ fn a_machine_is_identified_as_far_as_the_time_allows() {
 
 #[test]
 fn a_table_of_responses_has_a_limit() {
-    // Every twentieth line is enough.
+    // Every twentieth line is sufficient for this test, and makes it faster.
     let mut table = plain([1.0; 3], 1);
     let thin = |values: &[Complex<f64>]| values.iter().step_by(20).copied().collect();
     table.functions.iter_mut().for_each(|function| function.values = thin(&function.values));

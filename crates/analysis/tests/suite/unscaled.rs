@@ -23,8 +23,8 @@ fn machine() -> SecondOrderSystem {
     chain(DOFS, Support::Held, 0.02, 3)
 }
 
-/// Exact steady displacements under a multisine at the first mass, with noise as a part of their
-/// RMS.
+/// Exact steady displacements under a multisine force on the first mass; `on_response` is the ratio
+/// of the noise to the RMS of each displacement.
 fn record(seed: u64, on_response: f64) -> Measurement {
     let period = Sampling::new(0.008, PERIOD).unwrap();
     let lines = Multisine::flat(1..=70, 10.0, Phases::Random { seed }).unwrap();
@@ -96,8 +96,9 @@ fn modes_are_those_of_the_machine_and_nothing_else_is_given() {
     }
 }
 
-/// With a diagonal mass matrix the equation of the driven mass has its scale. A stated mass of
-/// another degree of freedom, right or wrong, changes only its own equation.
+/// If the mass matrix is diagonal, the measured force determines the scale of the equation of the
+/// driven mass. A stated mass of another degree of freedom, right or wrong, changes only the
+/// equation of that degree of freedom.
 #[test]
 fn a_stated_mass_scales_its_own_equation_and_no_mode() {
     let test = record(2, 0.01);
@@ -162,8 +163,8 @@ fn held(all: &[Identified], system: &SecondOrderSystem) -> (usize, usize) {
     (held, total)
 }
 
-/// The share of 100 runs with six nearly independent numbers lies between 91.5 and 98 %, within
-/// four standard deviations.
+/// In 100 runs with six nearly independent intervals each, the share of intervals that contain the
+/// true value must be between 91.5 and 98 %. These limits are four standard deviations.
 #[test]
 fn intervals_of_the_modes_hold() {
     for how in [from_frf(), Identify::spectra(Method::MaximumLikelihood)] {

@@ -23,8 +23,9 @@ struct Phase {
     variance: f64,
 }
 
-/// Returns, for each driving point with at least two modes, the test of a delay: phases of the
-/// residues in proportion to the frequency. Delays above half a period of a mode are not found.
+/// Returns, for each driving point with at least two modes, the test of a delay. A delay makes the
+/// phases of the residues proportional to the frequency. Delays above half a period of a mode are
+/// not found.
 ///
 /// Modes can also be complex, with phases that differ from mode to mode. The scatter about the
 /// proportional phases estimates the effects of the errors and of complex modes together.
@@ -37,7 +38,7 @@ pub(super) fn tests(
     let test = |&DrivingPoint { output, input, .. }: &DrivingPoint| {
         let power = derivative(outputs[output].quantity?) as i32;
         let residue = |mode: &IdentifiedMode| turned_residue(mode, output, input, power);
-        // This test corrects a wrong sign, because another check reports it.
+        // Another check reports a wrong sign of a channel, so the sign is corrected here.
         let negative = modes.iter().filter(|mode| residue(mode).re < 0.0).count();
         let sign = if 2 * negative > modes.len() { -1.0 } else { 1.0 };
         let phase = |mode: &IdentifiedMode| Phase {
@@ -76,11 +77,11 @@ struct Delay {
     p_value: f64,
 }
 
-/// Returns the delay that explains the phases; `None` with fewer than two.
+/// Returns the delay that explains the phases best; `None` with fewer than two phases.
 ///
 /// Without a delay the phases scatter about zero (viscous damping), about −ζ (structural damping),
-/// or between the two. The p-value is the larger one of these two cases, and 1 if they give delays
-/// of opposite signs.
+/// or between the two. The p-value is the larger of the p-values for viscous and for structural
+/// damping. It is 1 if these two cases give delays of opposite signs.
 fn delay(phases: &[Phase]) -> Option<Delay> {
     let viscous = delay_about(phases, |_| 0.0)?;
     let structural = delay_about(phases, |phase| -phase.damping_ratio)?;
@@ -93,7 +94,7 @@ fn delay(phases: &[Phase]) -> Option<Delay> {
 ///
 /// The scatter between the modes is estimated by the method of moments and added to the variances
 /// of the phases. The variance of the delay is computed from the residuals; if the variance that
-/// follows from the weights is larger, it is used instead.
+/// follows from the weights is larger, the larger variance is used.
 ///
 /// # Source
 /// Knapp & Hartung (2003), Statistics in Medicine 22, 2693–2710.
@@ -114,16 +115,18 @@ fn delay_about(phases: &[Phase], expected: impl Fn(&Phase) -> f64) -> Option<Del
 struct Proportional {
     /// Delay, in s.
     delay: f64,
-    /// Variance of the delay that follows from the weights, in s².
+    /// Variance of the delay, in s², if the variances that weight the phases are correct.
     variance: f64,
     /// Weighted sum of the squared residuals.
     square: f64,
-    /// Expected value of `square` per variance between the modes, in 1/rad².
+    /// Increase of the expected value of `square` per unit of additional variance between the
+    /// modes, in 1/rad².
     expected_square: f64,
 }
 
 impl Proportional {
-    /// Fits the phases with the variance `between` the modes added to each, in rad².
+    /// Fits the phases; the variance `between` the modes, in rad², is added to the variance of each
+    /// phase.
     fn new(phases: &[Phase], expected: impl Fn(&Phase) -> f64, between: f64) -> Self {
         let weight = |p: &Phase| 1.0 / (p.variance + between);
         let sum = |term: &dyn Fn(&Phase) -> f64| -> f64 { phases.iter().map(term).sum() };
@@ -151,7 +154,8 @@ mod tests {
 
     use super::*;
 
-    /// Natural frequency (Hz), damping ratio, and error of the phase (rad).
+    /// Natural frequency (Hz), damping ratio, and standard deviation of the phase error (rad) of
+    /// each simulated mode.
     const MODES: [(f64, f64, f64); 6] = [
         (10.0, 0.02, 1e-4),
         (23.0, 0.02, 1e-3),
@@ -174,8 +178,9 @@ mod tests {
         MODES.map(&mut phase).into()
     }
 
-    /// Without a delay, the p-value is below 5 % in at most 5 % of the cases: for real and complex
-    /// modes, with viscous damping, structural damping, and half of each.
+    /// The test must not report a delay too often: without a delay, at most about 5 % of the
+    /// p-values are below 5 %. This is tested for real and complex modes, with viscous damping,
+    /// structural damping, and half of each.
     #[test]
     fn p_values_are_right_with_complex_modes() {
         let mut rng = ChaCha20Rng::seed_from_u64(1);
@@ -189,7 +194,8 @@ mod tests {
         }
     }
 
-    /// Equal phases at neighbouring frequencies look like a delay, but also like structural damping.
+    /// Equal phases at neighbouring frequencies may be due to a delay or to structural damping. The
+    /// test with viscous damping alone reports a delay; the complete test does not.
     #[test]
     fn structural_damping_in_a_narrow_band_is_no_delay() {
         let mut rng = ChaCha20Rng::seed_from_u64(3);

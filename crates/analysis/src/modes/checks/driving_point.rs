@@ -50,8 +50,8 @@ pub(super) fn tests(
     driving_points.iter().filter_map(test).collect()
 }
 
-/// Returns the residue of the displacement times 2jω_d: positive for proportional damping and a
-/// driving point.
+/// Returns the residue of the displacement times 2jω_d, which is positive at a driving point if the
+/// damping is proportional.
 pub(super) fn turned_residue(
     mode: &IdentifiedMode,
     output: usize,

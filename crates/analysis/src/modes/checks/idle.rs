@@ -9,8 +9,8 @@ use super::super::summary::{ModalCheck, ModalModeRow};
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Returns, for each of several forces, the check that it excites at least one mode. The test is
-/// that its participations in all modes are zero.
+/// Returns, for each of several forces, the check that this force excites at least one mode. The
+/// null hypothesis is that the participations of the force in all modes are zero.
 ///
 /// # Source
 /// Wald's test of the participations, with two degrees of freedom for each mode.
@@ -35,8 +35,8 @@ pub(super) fn force_checks(modes: &[IdentifiedMode], inputs: &[String]) -> Vec<M
     several(inputs).filter_map(check).collect()
 }
 
-/// Returns, for each of several responses, the check that it moves in at least one mode. The test
-/// is that its entries in the shapes of all modes with standard errors are zero.
+/// Returns, for each of several responses, the check that this response moves in at least one mode.
+/// The null hypothesis is that its entries in all mode shapes with standard errors are zero.
 ///
 /// # Source
 /// Wald's test of the shapes, with two degrees of freedom for each mode.
@@ -64,7 +64,8 @@ pub(in crate::modes) fn response_checks(
     several(outputs).filter_map(check).collect()
 }
 
-/// Returns the numbers and names of several channels; a single one is tested by the fit itself.
+/// Returns the indices and names of the channels if there are several; empty for a single channel,
+/// because a fit already tests it.
 fn several(names: &[String]) -> impl Iterator<Item = (usize, &String)> {
     names.iter().enumerate().filter(|_| names.len() > 1)
 }

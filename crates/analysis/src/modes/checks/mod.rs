@@ -46,8 +46,8 @@ pub(super) fn channel_checks(
 }
 
 /// Returns, for each response, the check of the share of its variance that the modes explain. If
-/// both this check and the check that some mode moves the response fail, returns the second check
-/// instead.
+/// this check fails and no mode moves the response significantly, the failed check of the motion
+/// replaces it.
 pub(super) fn output_checks(
     explained: &[f64],
     modes: &[ModalModeRow],
@@ -56,7 +56,8 @@ pub(super) fn output_checks(
     let idle = response_checks(modes, names);
     let shares = explained_checks(explained, names).into_iter().enumerate();
     let row = |(at, share): (usize, ModalCheck)| match idle.get(at) {
-        // Residual terms may explain a sensor that no mode moves.
+        // If residual terms explain the response of a sensor that no mode moves, the check of the
+        // explained share passes, and only this check is returned.
         Some(idle) if !share.passed && !idle.passed => idle.clone(),
         _ => share,
     };
@@ -72,8 +73,8 @@ fn explained_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
     share_checks("explained", explained, names, words)
 }
 
-/// Returns, for each response, the check of the share of its variance that is predicted in data
-/// that were not fitted.
+/// Returns, for each response, the check of the share of its variance that the modes predict, in
+/// data that were not fitted.
 pub(super) fn prediction_checks(predicted: &[f64], names: &[String]) -> Vec<ModalCheck> {
     let words = [
         "the modes predict",

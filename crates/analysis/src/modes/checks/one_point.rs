@@ -7,8 +7,8 @@ use crate::modes::summary::ModalCheck;
 use crate::text::significant;
 
 /// Returns the check that the force acts at one point in all records. It fails if a separate force
-/// in the first record explains the records far better. `apart` has the lines with the separate
-/// force; `None` if the fit to these lines fails.
+/// in the first record explains the records far better. `apart` contains the lines of all records
+/// with the force of the first record as a separate force. `None` if the fit to these lines fails.
 ///
 /// # Source
 /// Schwarz (1978), Annals of Statistics 6, 461–464 (Bayesian information criterion).

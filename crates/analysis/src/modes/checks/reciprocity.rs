@@ -9,11 +9,12 @@ use super::super::sources::Output;
 use super::driving_point::{receptance_residue, relative_error};
 use super::tested::Tested;
 
-/// Returns, for each pair of driving points, the test of equal residues of all modes in both
-/// directions.
+/// Returns, for each pair of driving points, the test of reciprocity. In every mode, the residue of
+/// the response at the first point to the force at the second point must be equal to the residue in
+/// the opposite direction.
 ///
-/// Errors of shapes and participations are assumed to be independent; errors of their common scale
-/// are not, which makes the test conservative.
+/// The test assumes that all errors of shapes and participations are independent. The errors of a
+/// common scale are not independent; this makes the test conservative.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.7 (Maxwell's reciprocity of receptances).

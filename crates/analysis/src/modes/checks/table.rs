@@ -29,7 +29,7 @@ pub(in super::super) fn table_checks(
     checks
 }
 
-/// Checks texts of a header that may be units.
+/// Checks the texts in the headers of a table that may be units.
 fn units(table: &FrequencyResponses) -> Vec<ModalCheck> {
     let doubts = table.doubts.iter();
     let findings = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));

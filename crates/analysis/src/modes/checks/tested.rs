@@ -4,8 +4,8 @@ use super::super::summary::ModalCheck;
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Test of a property that all modes of a structure with constant M, C and K have, or of an imposed
-/// property.
+/// Test of a property of the modes: one that every structure with constant M, C and K has, or one
+/// that the settings impose.
 pub struct Tested {
     /// Name of the check, in snake case.
     pub code: &'static str,
@@ -42,7 +42,8 @@ pub fn adjusted(mut tests: Vec<Tested>) -> Vec<ModalCheck> {
 mod tests {
     use super::*;
 
-    /// The example of R's `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")`: 0.03, 0.06, 0.06, 0.02.
+    /// The adjusted p-values are equal to those of R: `p.adjust(c(0.01, 0.04, 0.03, 0.005),
+    /// "holm")` returns 0.03, 0.06, 0.06, 0.02.
     #[test]
     fn p_values_are_those_of_holm() {
         let test = |p_value| Tested { code: "a", p_value, passes: "b".into(), fails: "c".into() };
