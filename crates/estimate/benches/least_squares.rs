@@ -50,8 +50,8 @@ fn triangles(criterion: &mut Criterion) {
 }
 
 fn row_blocks(matrix: &DMatrix<f64>) -> LeastSquares {
-    // The last column is the right-hand side: the triangular factor is then that of the QR of the
-    // whole matrix.
+    // The last column is passed as right-hand side, so that the triangular factor is that of the QR
+    // of the whole matrix.
     let unknowns = matrix.ncols() - 1;
     let mut rows = LeastSquares::new(unknowns, 1);
     rows.push_rows(matrix.columns(0, unknowns), matrix.columns(unknowns, 1))

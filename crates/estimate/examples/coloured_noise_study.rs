@@ -31,7 +31,8 @@ const LEVEL: f64 = 0.05;
 const NARROW: f64 = 3.0;
 /// Number of experiments from which the covariance of a noise is estimated.
 const MANY: u64 = 4000;
-/// Number of discarded samples before the first one; after them a recursion is stationary.
+/// Number of initial samples of a recursion that are discarded; after these samples the recursion
+/// is stationary.
 const BEFORE: usize = 2000;
 
 /// Colour of a noise.
@@ -42,7 +43,8 @@ enum Colour {
     Autoregressive,
     /// Power that falls like 1/f over three decades: a sum of autoregressive noises.
     OneOverF,
-    /// White noise, and [`NARROW`] times its RMS in a resonance of the width of four lines.
+    /// White noise plus a narrow disturbance: a resonance four lines wide, whose RMS is [`NARROW`]
+    /// times that of the white noise.
     Narrow,
     /// Response of the machine to an autoregressive force of the first order (0.9) on its last
     /// mass, plus white noise with a tenth of the RMS of the response.
@@ -150,7 +152,7 @@ impl Machine {
     }
 }
 
-/// A machine, its steady test, and the noise on its response.
+/// A machine, its test in steady state, and the noise on its response.
 struct Study {
     machine: &'static str,
     test: Test,
@@ -203,7 +205,7 @@ impl Study {
         let (len, dof) = (self.exact.len(), self.scale.len());
         let mut motion = self.exact.data().clone();
         if let Colour::UnmeasuredForce = self.colour {
-            // One force moves all channels, so that all have the same factor.
+            // One force moves all channels, so the same factor scales the noise of all channels.
             let by = self.scale[dof - 1];
             let all = self.exact.sampling().with_len(4 * len)?;
             motion += by * response(&self.test.system, all, seed)?.rows(len, len);

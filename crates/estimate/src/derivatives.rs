@@ -83,7 +83,8 @@ impl SavitzkyGolay {
     /// Largest half-width, in samples; a polynomial over more samples cannot follow a vibration.
     pub const MOST_HALF_WIDTH: usize = 10_000;
 
-    /// Highest order; the columns of higher powers of time differ by rounding only.
+    /// Maximum order of the polynomial; at higher orders the columns (powers of time) are linearly
+    /// dependent up to rounding.
     pub const MOST_ORDER: usize = 20;
 
     /// Number of samples of a window, 2·half_width + 1.

@@ -126,8 +126,8 @@ impl EquationOfMotion {
     }
 
     /// Returns the parts of the estimate and the factors of its covariance. The factors are the
-    /// residual covariance and one row for each parameter, which gives the parameter from the
-    /// right-hand side of its equation.
+    /// residual covariance and one row for each parameter; the product of this row and the
+    /// right-hand side of the equation is the parameter.
     pub(crate) fn findings(
         &self,
         unknowns: &Unknowns,
@@ -258,7 +258,7 @@ pub(crate) fn equations_by_columns(
     shared
 }
 
-/// Index of a free parameter in the solutions of the groups.
+/// Position of a free parameter in the solutions of the groups of equations.
 struct Place<'a> {
     group: &'a Group,
     /// Number of unknowns in the preceding groups.

@@ -22,7 +22,7 @@ pub enum EstimateError {
         rows: usize,
         /// Columns of the matrix.
         columns: usize,
-        /// Degrees of freedom expected.
+        /// Expected number of degrees of freedom.
         dof: usize,
     },
     /// A known value is NaN or infinite.
@@ -53,7 +53,7 @@ pub enum EstimateError {
     OnlyRatios {
         /// Degree of freedom, counted from 1.
         dof: usize,
-        /// Names of the parameters of that equation.
+        /// Names of the parameters in the equation of motion of `dof`.
         parameters: String,
     },
     /// The two entries of a symmetric pair are known, but they differ.
@@ -64,11 +64,11 @@ pub enum EstimateError {
     Asymmetric {
         /// Name of the entry below the diagonal.
         lower: String,
-        /// Value of that entry, in its SI unit.
+        /// Value of the entry below the diagonal, in its SI unit.
         lower_value: f64,
         /// Name of the entry above the diagonal.
         upper: String,
-        /// Value of that entry, in its SI unit.
+        /// Value of the entry above the diagonal, in its SI unit.
         upper_value: f64,
     },
     /// An entry of the damping matrix is given although proportional damping determines it.
@@ -162,7 +162,7 @@ pub enum EstimateError {
         message::count(*len, "sample")
     )]
     Diverged {
-        /// Samples of the record.
+        /// Number of samples of the record.
         len: usize,
     },
     /// The noise covariance of a line cannot be inverted.
@@ -174,7 +174,8 @@ pub enum EstimateError {
         /// Frequency, in Hz.
         frequency_hz: f64,
     },
-    /// No search for the best fit (maximum likelihood, output error or a constant) converged.
+    /// No search for the best fit (by maximum likelihood, by output error, or for proportional
+    /// damping) converged.
     #[error(
         "the search for the best fit failed: {} reached no minimum within {steps} \
          steps. This does not show that the model is wrong; more lines, more periods, a known mass or fewer \
@@ -182,7 +183,7 @@ pub enum EstimateError {
         if *searches == 1 { "one search".to_owned() } else { format!("{searches} searches") }
     )]
     NotConverged {
-        /// Number of searches, each from another start.
+        /// Number of searches, each with another initial estimate.
         searches: usize,
         /// Maximum number of steps of the first search.
         steps: usize,

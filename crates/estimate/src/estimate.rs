@@ -32,7 +32,7 @@ pub struct Estimate {
 pub struct EstimateParts {
     /// Unknown entries of M, C and K.
     pub unknowns: Unknowns,
-    /// Values, in the SI unit of each.
+    /// Estimated values, each in the SI unit of its entry.
     pub values: Vec<f64>,
     /// Covariance of the values.
     pub covariance: Covariance,

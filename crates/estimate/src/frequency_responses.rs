@@ -166,7 +166,7 @@ fn joined(
     Ok(joined.ok_or(SpectraError::NoExcitedLine)?)
 }
 
-/// Weighted residuals at some parameters, with their sensitivities J = Q R.
+/// Weighted residuals at given parameter values, with the sensitivities J = Q R of the residuals.
 struct Errors {
     white: Whitened,
     dof: usize,
@@ -207,9 +207,9 @@ impl Errors {
     }
 }
 
-/// Returns the covariance of sums Σ b e over the weighted errors e of averaged responses of `dof`
-/// outputs, and the smallest number of degrees of freedom of their variances. There is one sum for
-/// each column b of `influence`.
+/// Returns the covariance of the sums Σ b e, one for each column b of `influence`, and the smallest
+/// number of degrees of freedom of the variances of these sums. The errors e are the weighted
+/// errors of averaged responses with `dof` outputs.
 pub(crate) fn covariance_of_errors(
     records: &[(Frf, Vec<usize>)],
     dof: usize,

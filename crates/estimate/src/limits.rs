@@ -1,7 +1,7 @@
 //! Limits of this crate, each with what happens on either side.
 
-/// Maximum ratio of the noise power of the motion to the power of the motion on a line of the
-/// weighted linear estimate; a line with more noise has zero weight.
+/// Maximum ratio of the noise power of the motion to the power of the motion on a line that the
+/// weighted linear estimate uses; a line with a larger ratio has zero weight.
 pub(crate) const WEIGHTING_CLEAR: f64 = 0.1;
 
 /// Maximum number of Gauss–Newton steps after each change of the delay in a search for the delay of
@@ -68,8 +68,8 @@ pub(crate) const RESTART_RESTARTED: usize = 3;
 /// regressors count as linearly dependent.
 pub(crate) const GRAM_DEPENDENT: f64 = 1e-14;
 
-/// Ridge added to every regressor of related entries, relative to its length, so that dependent
-/// regressors still have a triangular factor.
+/// Ridge added to every regressor of related entries, relative to the length of the regressor, so
+/// that linearly dependent regressors still have a triangular factor.
 pub(crate) const GRAM_RIDGE: f64 = 1e-7;
 
 /// Number of lines whose products are in memory at a time, on each thread.
@@ -86,20 +86,19 @@ pub(crate) const GRAM_LANCZOS: usize = 80;
 /// Maximum deviation of the misfit ratio of a correct model from 1, in standard deviations.
 pub(crate) const FIT_PLAUSIBLE: f64 = 6.0;
 
-/// Maximum number of sensitivities (residuals times parameters times parts) of a fit whose parts
-/// are compared and whose omitted terms are tested: 128 MiB of numbers. Larger fits have no such
-/// comparison.
+/// Maximum number of sensitivities (residuals times parameters times parts) for a comparison of the
+/// parts of the data and for a test of omitted terms: 128 MiB of numbers. Larger fits have neither
+/// the comparison nor the test.
 pub(crate) const MAX_PARTS: usize = 1 << 24;
 
-/// Maximum number of sensitivities (residuals times parameters) for the correction of the window of
-/// averaged responses, and for a covariance with correlated lines: 128 MiB of numbers. Larger fits
-/// are not corrected and assume independent errors of the lines; they count as not settled if the
-/// window smooths the responses.
+/// Maximum number of sensitivities (residuals times parameters) for the correction of the window
+/// bias of averaged responses, and for a covariance with correlated lines: 128 MiB of numbers.
+/// Larger fits are not corrected and assume independent errors of the lines; they count as not
+/// settled if the window smooths the responses.
 pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
 
 /// Number of partial sums of the products of the effects of pulses. It limits the memory of the
-/// sums. It does not depend on the number of threads, so that the result does not depend on it,
-/// either.
+/// sums. The number is fixed, so that the result does not depend on the number of threads.
 pub(crate) const PULSE_SUMS: usize = 8;
 
 /// Maximum number of effects of the errors of pulses on the residuals, and maximum number of
@@ -190,8 +189,8 @@ pub(crate) const TRANSITION_BLOCK: usize = 256;
 /// too few lines.
 pub(crate) const PARTS: usize = 4;
 
-/// Information of a part about a combination of parameters, relative to the information of all
-/// data, below which the part does not determine the combination.
+/// Minimum information of a part of the data about a combination of parameters, relative to the
+/// information of all data; with less information the part does not determine the combination.
 pub(crate) const PART_INFORMS: f64 = 1e-9;
 
 /// Largest distance, in lines, between lines whose errors are correlated by Hann's window, the

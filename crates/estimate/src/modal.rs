@@ -158,7 +158,7 @@ fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
 /// Uncertainty of the parameters.
 struct Spread<'a> {
     covariance: &'a Covariance,
-    /// Equation of motion of each parameter.
+    /// Index of the equation of motion that contains each parameter.
     equations: &'a [usize],
     degrees_of_freedom: usize,
 }
@@ -264,7 +264,7 @@ impl Spread<'_> {
     }
 }
 
-/// A quantity with its gradient over the free parameters.
+/// A quantity with its gradient with respect to the free parameters.
 struct Value {
     value: f64,
     gradient: DVector<f64>,

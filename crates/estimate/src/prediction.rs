@@ -147,8 +147,8 @@ impl Step {
         DVector::from_column_slice(at.state())
     }
 
-    /// Advances the state by one step from a sample of the force; after the last sample, the force
-    /// continues with the first one.
+    /// Advances the state by one step from a sample of the force; after its last sample, the force
+    /// continues with its first sample.
     fn advance(&self, force: &Record, sample: usize, at: &mut At) {
         let (loads, next) = (force.data(), (sample + 1) % force.len());
         let size = at.next.len();

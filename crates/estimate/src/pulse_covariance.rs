@@ -20,7 +20,8 @@ pub(crate) struct PulseCovariance {
 }
 
 impl PulseCovariance {
-    /// Factors I + PᵀP; `None` if an effect is not finite or there is no block.
+    /// Computes the Cholesky factor of I + PᵀP; `None` if an effect is not finite or there is no
+    /// block.
     pub(crate) fn new(effects: Vec<DMatrix<f64>>) -> Option<Self> {
         let count = effects.first()?.ncols();
         let products: Vec<_> = effects

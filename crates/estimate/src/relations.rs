@@ -12,7 +12,8 @@ use crate::Unknowns;
 pub struct Relations {
     /// Source of each free entry, in the order of [`Unknowns::free`].
     entries: Vec<Source>,
-    /// Number of unknowns that are entries themselves; α and β of proportional damping follow them.
+    /// Number of unknowns that are entries of M, C or K themselves; α and β of proportional damping
+    /// follow these unknowns.
     shared: usize,
     proportional: bool,
 }
@@ -26,7 +27,7 @@ enum Source {
     Damping { mass: Part, stiffness: Part },
 }
 
-/// An entry of the mass or the stiffness.
+/// An entry of the mass matrix or of the stiffness matrix.
 #[derive(Debug, Clone, Copy)]
 enum Part {
     Known(f64),
@@ -261,7 +262,7 @@ mod tests {
     fn entries_follow_from_independent_unknowns_and_lead_back_to_them() {
         let unknowns = chain();
         let relations = Relations::from_unknowns(&unknowns).unwrap();
-        // m1, m2, m3, then k11 k12 k22 k23 k33, then α and β.
+        // The unknowns are m1, m2, m3, then k11, k12, k22, k23, k33, then α and β.
         assert_eq!(relations.count(), 10);
         let p = [2.0, 3.0, 4.0, 50.0, -20.0, 60.0, -30.0, 70.0, 0.5, 0.01];
         let [m, c, k] = unknowns.assemble(relations.entries(&p).as_slice());

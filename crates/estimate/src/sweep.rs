@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::Estimate;
 
-/// Outcome at one setting.
+/// Outcome of the estimator at one setting of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepPoint<S, E> {
     /// Setting, such as a time step or a number of natural periods per record (NPI).

@@ -122,7 +122,7 @@ impl Unknowns {
     }
 
     /// Returns the same unknowns with a symmetric matrix: its entries (i, j) and (j, i) are one
-    /// unknown; if one of the two is known, the other one is known, too.
+    /// unknown; if one of these two entries is known, both are known.
     ///
     /// # Errors
     /// [`EstimateError::Asymmetric`] if two such entries are known and differ.

@@ -1,7 +1,7 @@
 //! Prints the tables of `docs/book/src/studies/force.md`: `cargo run --release -p mechid-force
-//! --example noise_study`. With `-- known` it prints only the first of them, with `-- coverage 200`
-//! the table of the intervals over 200 records each, and with `-- accelerations 100` the table of
-//! accelerations alone.
+//! --example noise_study`. With `-- known` the program prints only the first table, with `--
+//! coverage 200` the table of the intervals over 200 records each, and with `-- accelerations 100`
+//! the table for tests that measure only accelerations.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 #[allow(dead_code, reason = "the test uses the rest")]

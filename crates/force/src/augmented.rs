@@ -17,9 +17,9 @@ use crate::posterior_points::posterior_points;
 use crate::smoother::StateSpace;
 use crate::state_space::Machine;
 
-/// The system with forces of any model, as one state space. The state of a force is its
-/// contribution to x + ½ẍΔt² within a step, so that no entry is large in any units of the
-/// system.
+/// State space of the system together with its forces, for any force model. The state of a force is
+/// scaled to the contribution of the force to x + ½ẍΔt² over a step. No entry is then large, in any
+/// units of the system.
 pub(crate) struct Augmented {
     machine: Machine,
     rate: DMatrix<f64>,
@@ -247,7 +247,7 @@ impl Augmented {
         Ok(Tuned { model: model.clone(), noise: 1.0, log_likelihood, free: Vec::new() })
     }
 
-    /// Returns the lowest corner frequency, in radians per sample: half a period in twenty times
+    /// Returns the lowest corner frequency, in radians per sample: half its period is twenty times
     /// the length of the record.
     fn lowest(&self) -> f64 {
         0.05 * PI / self.sampling.len() as f64
@@ -273,8 +273,8 @@ impl Augmented {
                     None => continue,
                 },
             };
-            // A difference of a hundredth in the log-likelihood moves no parameter by more than a
-            // seventh of its uncertainty.
+            // The search ends at a difference of 0.01 in the log-likelihood, which moves no
+            // parameter by more than a seventh of its uncertainty.
             let step = if order > 2 { 0.3 } else { 1.0 };
             let point = minimise(cost, &start, step, 0.01, 60 * (forces + 1));
             let Some(tuned) = self.trial(&process, noise, &point) else { continue };
@@ -367,8 +367,9 @@ fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
     best.1
 }
 
-/// Upper bounds of the motion, from the measurement: velocities from differences of the samples
-/// (including noise), displacements as if all motion had the period of the record.
+/// Upper bounds of the motion, from the measurement. A displacement channel gives velocities from
+/// the differences of its samples (including noise). Channels of velocity and acceleration give
+/// displacements as if all motion had the period of the record.
 #[derive(Default)]
 struct Sizes {
     displacement: f64,

@@ -9,8 +9,9 @@ use crate::limits;
 /// Returns the part of a record between two frequencies in Hz, including the ends: samples ×
 /// channels, in the unit of the record.
 ///
-/// A whole period keeps its lines in the band. An open record is extended by its mirror image, so
-/// that its ends match; the lines of the extended record are half as far apart.
+/// For a whole period, the lines in the band are kept and all others are zero. An open record is
+/// extended by its mirror image, so that its ends match; the lines of the extended record are half
+/// as far apart.
 ///
 /// Methods that estimate a force in a band ([`Measurement::in_band`]) return this part; compare
 /// their result with this part of the reference force.
@@ -45,7 +46,7 @@ pub fn within_band(
     Ok(Record::new(record.sampling(), data)?)
 }
 
-/// Returns an error unless these frequencies are the ends of a band.
+/// Returns an error unless the frequencies are finite, at least 0 Hz and in ascending order.
 pub(crate) fn check_band([low_hz, high_hz]: [f64; 2]) -> Result<(), ForceError> {
     if low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite() {
         return Ok(());

@@ -22,7 +22,7 @@ pub(crate) struct Components {
     pub lowest_hz: Vec<f64>,
     /// Energy of the part of the measurement that no force can cause.
     pub outside_energy: f64,
-    /// Number of real data in this part.
+    /// Number of real data in the part of the measurement that no force can cause.
     pub outside_weight: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The equation of motion, sample by sample.
+//! Force from the equation of motion, sample by sample.
 
 use mechid_model::{Response, SecondOrderSystem};
 use mechid_signal::Record;

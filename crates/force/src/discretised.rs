@@ -28,8 +28,9 @@ use crate::state_space::exact_transition;
 ///
 /// # Errors
 /// [`ForceError::Dof`], [`ForceError::TooShort`] for a response shorter than one step,
-/// [`ForceError::StepTooLong`] if the step is so long that its end does not depend on the force
-/// during it, and [`ForceError::Unstable`] if the free response overflows within a step.
+/// [`ForceError::StepTooLong`] if the step is so long that the state at the end of the step does
+/// not depend on the force during the step, and [`ForceError::Unstable`] if the free response
+/// overflows within a step.
 ///
 /// # Source
 /// Dissertation eqs. (4.7.1)–(4.7.3), read as their velocity rows with the minus sign between the
@@ -83,7 +84,7 @@ fn force_of_steps(
     Ok(IdentifiedForce::from_record(Record::new(sampling, force)?))
 }
 
-/// Solver for the input q of a step, in step units, from the change z(k+1) − Φ z(k) of the state.
+/// Solver for the input q of a step, from the change z(k+1) − Φ z(k) of the state z = (x, Δt·ẋ).
 pub(crate) struct Solution {
     /// Transition matrix Φ, 2n×2n.
     pub state: DMatrix<f64>,
@@ -123,8 +124,8 @@ impl Solution {
         Ok(Self { state, input: invertible(input, dt)? })
     }
 
-    /// Returns the inputs for `change`, 2n × any number of steps: the input at the start of each
-    /// step, n × the same number, and for a linear input also the input at the end of the step.
+    /// Returns the input at the start of each step, n × steps, and for a linear input also the
+    /// input at the end of each step, n × steps. The matrix `change` is 2n × steps.
     pub fn inputs(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let n = self.state.nrows() / 2;
         if self.input.lu_internal().nrows() == n {
@@ -155,7 +156,7 @@ impl Solution {
     }
 }
 
-/// Returns z(k+1) − Φ z(k) in step units, 2n × steps.
+/// Returns z(k+1) − Φ z(k), 2n × steps, for the state z = (x, Δt·ẋ).
 fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix<f64> {
     let (n, len, dt) = (response.dof(), response.sampling().len(), response.sampling().dt());
     let (x, v) = (response.displacement().data(), response.velocity().data());
@@ -171,9 +172,9 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
-    // In step units, the input matrix of a short step is about I. The smallest singular value is
-    // therefore divided by the largest one, but by at least 1: for a single force, smallest and
-    // largest are equal.
+    // For the state (x, Δt·ẋ), the input matrix of a short step is about I. The smallest singular
+    // value is therefore divided by the largest one, but by at least 1: for a single force,
+    // smallest and largest are equal.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });

@@ -10,7 +10,7 @@ pub enum ForceError {
     /// System and response differ in size.
     #[error(
         "the system has {}, the response has {}: \
-         give one channel per degree of freedom, or name the measured ones in a `Measurement`", message::count(*system, "degree of freedom"), message::count(*response, "channel")
+         give one channel per degree of freedom, or name the measured degrees of freedom in a `Measurement`", message::count(*system, "degree of freedom"), message::count(*response, "channel")
     )]
     Dof {
         /// Degrees of freedom of the system.
@@ -78,7 +78,8 @@ pub enum ForceError {
         /// Order given.
         order: usize,
     },
-    /// The time step is so long that the end of a step does not depend on the force during it.
+    /// The time step is so long that the motion at the end of a step does not depend on the force
+    /// during the step.
     #[error(
         "the time step {dt} s is too long for the machine: the motion at the end of a step does not depend on the \
          force during the step (reciprocal condition {reciprocal_condition:.1e}); sample faster"
@@ -101,7 +102,7 @@ pub enum ForceError {
     Unstable {
         /// Largest real part of an eigenvalue, in 1/s.
         rate: f64,
-        /// Duration considered, in s: the record, or one time step.
+        /// Duration in which the free response grows, in s: that of the record, or one time step.
         duration: f64,
     },
     /// No line was chosen.
@@ -166,7 +167,7 @@ pub enum ForceError {
         /// The channel, counted from 1.
         channel: usize,
     },
-    /// A number is not positive and finite.
+    /// A number must be positive and finite, but is zero, negative, infinite or NaN.
     #[error("{what} must be positive and finite, got {value}")]
     NotPositive {
         /// Name of the number.
@@ -188,7 +189,7 @@ pub enum ForceError {
     /// The measured channels cannot show a force, at any frequency.
     #[error(
         "the measured channels cannot separate the force on degree of freedom {} (counted from 1) from the \
-         others at any frequency: measure elsewhere, or name fewer forces",
+         other forces at any frequency: measure elsewhere, or name fewer forces",
         dof + 1
     )]
     Unseen {

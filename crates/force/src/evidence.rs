@@ -135,8 +135,8 @@ impl Evidence {
         if other.likelihood > self.likelihood { other } else { self }
     }
 
-    /// Adds this reach and the neighbouring reaches that are likely enough. The weight of each is
-    /// the number of reaches that it represents.
+    /// Adds this reach and the neighbouring reaches whose likelihood is not negligible. The weight
+    /// of a reach is the number of reaches that it represents.
     fn beside(
         self,
         components: &Components,
@@ -206,7 +206,7 @@ impl Evidence {
         Ok(points.into_iter().map(|(weight, point)| (weight, at(&point))).collect())
     }
 
-    /// Returns the variance τ² g_i of the force of a driven component.
+    /// Returns the variance τ² g_i of the force in component i, if this component carries a force.
     fn driven(&self, components: &Components, i: usize) -> f64 {
         if i >= self.reach {
             return 0.0;
@@ -268,8 +268,9 @@ impl Evidence {
             .expect("there are starts")
     }
 
-    /// Returns initial noise variances: the mean square of the data beyond the reach or, if few
-    /// data remain there, low quantiles of the mean squares of all components.
+    /// Returns initial noise variances. They are the mean square of the data outside the `reach`
+    /// strongest components or, if few such data remain, low quantiles of the mean squares of all
+    /// components.
     fn first_noises(components: &Components, reach: usize) -> Vec<f64> {
         let tail_weight: f64 =
             components.weight[reach..].iter().sum::<f64>() + components.outside_weight;
@@ -371,7 +372,7 @@ impl Evidence {
         }
     }
 
-    /// Returns the log-likelihood of y_i, and the probability that component i is driven.
+    /// Returns the log-likelihood of y_i, and the probability that component i carries a force.
     fn component(&self, components: &Components, i: usize) -> (f64, f64) {
         let (weight, energy) = (components.weight[i], components.energy[i]);
         let log = |share: f64, variance: f64| {

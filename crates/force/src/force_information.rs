@@ -25,7 +25,8 @@ pub(crate) struct ForceInformation {
 struct Term {
     omega: f64,
     width: f64,
-    /// HᴴH of the scaled channels; `None` at an undamped resonance, which would show any force.
+    /// HᴴH of the scaled channels; `None` at an undamped resonance, where the response is infinite
+    /// and would show any force.
     information: Option<DMatrix<Complex<f64>>>,
 }
 
@@ -35,7 +36,8 @@ pub(crate) struct ErrorSpectrum {
     edges: Vec<[f64; 2]>,
     /// Error variance of each force in each interval, forces × intervals, in N².
     pub variance: DMatrix<f64>,
-    /// True if the interval determines every force better than its model does.
+    /// True if the measurement determines every force in this interval better than the force model
+    /// does.
     is_determined: Vec<bool>,
     least_hz: f64,
 }

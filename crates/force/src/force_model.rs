@@ -16,9 +16,10 @@ use crate::limits;
 ///         1 + (ω/ω_c)^(2 order)
 /// ```
 ///
-/// Order 1 reverts to zero as an Ornstein–Uhlenbeck process does, and is a random walk over times
-/// that are short compared with 1/ω_c; higher orders are bands with a sharper end at the corner.
-/// None of them drifts: without information in the measurement, the force is 0 ± τ.
+/// A force of order 1 returns to zero like an Ornstein–Uhlenbeck process; over times that are short
+/// compared with 1/ω_c it is a random walk. With a higher order, the spectrum falls more steeply
+/// above the corner. No force model drifts: without information in the measurement, the force is 0
+/// ± τ.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceModel {
@@ -31,7 +32,7 @@ pub struct ForceModel {
 }
 
 impl ForceModel {
-    /// Highest order: its band has the sharpest end that 256 samples can resolve.
+    /// Highest order: the upper edge of its band is the sharpest that 256 samples can resolve.
     pub const MOST: usize = 16;
 
     pub(crate) fn check(&self, forces: usize) -> Result<(), ForceError> {
@@ -64,7 +65,7 @@ impl ForceModel {
 pub(crate) struct LowPass {
     /// Rate matrix of u̇ = rate·u + (white noise on the last state); the force is u₀.
     pub rate: DMatrix<f64>,
-    /// Intensity of the white noise.
+    /// Intensity of the white noise that drives the last state.
     pub intensity: f64,
     /// Stationary covariance of u; the variance of u₀ is 1.
     pub covariance: DMatrix<f64>,
@@ -106,8 +107,8 @@ impl LowPass {
 }
 
 /// Returns the covariance, due to white noise, of the state of u̇ = A u + noise after a unit of
-/// time: a series over a short step, which is doubled until it covers the unit. Only sums of
-/// squares are added.
+/// time: a series gives the covariance after a short step, and the step is doubled until it covers
+/// the unit. Only sums of squares are added.
 ///
 /// # Source
 /// Van Loan (1978) for the integral; doubling as in Higham (2008), *Functions of Matrices*, 10.3.
@@ -163,7 +164,8 @@ mod tests {
 
     #[test]
     fn noise_over_a_step_is_that_of_a_random_walk_and_of_its_integral() {
-        // u̇₀ = u₁, u̇₁ = noise: after one unit [1/3, 1/2; 1/2, 1].
+        // With u̇₀ = u₁ and u̇₁ = noise, the covariance after one unit of time is [1/3, 1/2; 1/2,
+        // 1].
         let rate = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]);
         let noise = DMatrix::from_row_slice(2, 2, &[0.0, 0.0, 0.0, 1.0]);
         let found = step_noise(&rate, &[noise]).unwrap().remove(0);

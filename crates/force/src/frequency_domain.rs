@@ -1,4 +1,4 @@
-//! The dynamic stiffness, line by line.
+//! Force from the dynamic stiffness, line by line.
 
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
@@ -27,8 +27,8 @@ use crate::unexplained::Residual;
 ///
 /// # Errors
 /// [`ForceError::NoLines`], [`ForceError::NoSuchLine`], [`ForceError::RepeatedLine`];
-/// [`ForceError::NotTransmitted`] at a line where the channels do not show the forces, as
-/// velocities at DC; [`ForceError::MoreForcesThanMeasurements`], [`ForceError::NoForcedDof`],
+/// [`ForceError::NotTransmitted`] at a line where the channels do not show the forces (for example
+/// velocities at DC); [`ForceError::MoreForcesThanMeasurements`], [`ForceError::NoForcedDof`],
 /// [`ForceError::NoSuchDof`], [`ForceError::Resonance`], [`ForceError::TooFewOutsideLines`],
 /// [`ForceError::NoNoise`], [`ForceError::NotPositive`]; [`ForceError::EmptyBand`] if no line is in
 /// the band of the measurement.

@@ -66,8 +66,8 @@ impl IdentifiedForce {
         self
     }
 
-    /// Returns the part of the force between two frequencies in Hz, including the ends, with a
-    /// white error.
+    /// Returns the part of the force between two frequencies in Hz, including the ends, for a force
+    /// with a white error.
     ///
     /// The standard error, in N, then covers the lines in the band. Use this function for the
     /// equation of motion ([`continuous`](crate::continuous()) and its variants), which turns white

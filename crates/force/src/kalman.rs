@@ -29,7 +29,7 @@ pub enum Tuning {
     /// The noise of the channels is proportional to their size; each force has its own size.
     Likelihood,
     /// The noise of each channel is known (one standard deviation, in the channel's unit); the
-    /// model of the forces has maximum likelihood.
+    /// model of the forces is estimated by maximum likelihood.
     NoiseKnown(Vec<f64>),
     /// Noise and model given.
     Given {
@@ -69,8 +69,8 @@ pub struct KalmanForce {
 /// Each force is a stationary process with a band from 0 up to a corner frequency ([`ForceModel`]),
 /// continuous in time, without an assumption between samples. Order and corner of the band, the
 /// sizes of the forces and the noise are those of maximum likelihood. If the force acts only during
-/// a part of the record, the noise is that of the other part. The smoother uses the whole record
-/// for every instant. The standard error comes from the model.
+/// a part of the record, the noise is estimated from the other part. The smoother uses the whole
+/// record for every instant. The standard error comes from the model.
 ///
 /// For a structure on springs, accelerations and velocities do not show a constant force, and their
 /// noise exceeds the response to a slow force. Without a displacement, the force and its standard
@@ -93,9 +93,9 @@ pub struct KalmanForce {
 /// cannot separate the forces; [`ForceError::Silent`] if all channels are zero;
 /// [`ForceError::NotPositive`], [`ForceError::ChannelCount`], [`ForceError::ModelCount`] and
 /// [`ForceError::ModelOrder`] for a given tuning; [`ForceError::NoLikelihood`],
-/// [`ForceError::StepTooLong`] and [`ForceError::Unstable`] if the filter or a step of it overflows
-/// (an unstable system is possible, but not a free response that grows by more than about e⁵ within
-/// a step).
+/// [`ForceError::StepTooLong`] and [`ForceError::Unstable`] if the filter or the transition over
+/// one step overflows (the system may be unstable, but its free response must not grow by more than
+/// about e⁵ within a step).
 ///
 /// # Source
 /// Lourens, Reynders, De Roeck, Degrande & Lombaert (2012), An augmented Kalman filter for force
@@ -204,8 +204,8 @@ fn in_band(
 ) -> Result<IdentifiedForce, ForceError> {
     let record = within_band(force.record(), band_hz, Extent::Open)?;
     let (sampling, len) = (record.sampling(), record.len());
-    // This function has the slope 1 at the first sample and the slope 0 at the last one: only at
-    // the first sample does it form a corner with its mirror image.
+    // This function has the slope 1 at the first sample and the slope 0 at the last one. It
+    // therefore forms a corner with its mirror image at the first sample only.
     let corner: Vec<f64> =
         (0..len).map(|k| sampling.time(k) * (1.0 - 0.5 * k as f64 / len as f64)).collect();
     let corner = BandFilter { sampling, band_hz, extent: Extent::Open }.apply(&corner)?;
@@ -248,8 +248,8 @@ pub(crate) fn check_seen(
     }
 }
 
-/// Returns mean and variance of every state at every sample under a tuning, sample after sample,
-/// and the number of states.
+/// Returns mean and variance of every state at every sample under a tuning, ordered by sample, and
+/// the number of states.
 fn states(augmented: &Augmented, tuned: &Tuned) -> Result<(Vec<f64>, Vec<f64>, usize), ForceError> {
     let process = LowPass::new(tuned.model.order)?;
     let space = augmented.started(augmented.space(&tuned.model, &process, tuned.noise, 10.0)?);
@@ -290,7 +290,8 @@ fn mixed(
     Ok(force.with_standard_error(Some(Record::new(reference.sampling(), error)?)))
 }
 
-/// Returns motion and forces of the whole record under a tuning, over all frequencies.
+/// Returns the motion and the forces of the whole record for a given tuning. The forces are not
+/// restricted to a band.
 fn smoothed(
     augmented: &Augmented,
     system: &SecondOrderSystem,

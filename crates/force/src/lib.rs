@@ -9,9 +9,9 @@
 //! | [`regularised`] | any channels, a period or few samples | the lines are unknown |
 //! | [`kalman`] | any channels, any length | the record is not a period |
 //!
-//! [`with_uncertain_system`] adds the covariance of an identified system to the standard error of
-//! any of them. The chapter on forces of the book has the reasons, and compares the errors of all
-//! methods.
+//! [`with_uncertain_system`] adds the uncertainty of an identified system to the standard error of
+//! a force from any of these functions. The chapter on forces in the book explains the methods and
+//! compares their errors.
 //!
 //! ```
 //! use mechid_force::{Measurement, Noise, frequency_domain, relative_error};

@@ -1,5 +1,5 @@
-//! Limits of this crate: the numbers that decide how long to search, when to stop and what counts
-//! as shown.
+//! Limits of this crate: the numbers that decide how long to search, when to stop, and whether a
+//! measurement shows a force.
 
 // Posterior points
 
@@ -9,11 +9,11 @@ pub(crate) const CURVATURE_STEP: f64 = 0.15;
 /// Standard deviation of a logarithm that the measurement does not determine.
 pub(crate) const UNDETERMINED_LOGARITHM: f64 = 1.5;
 
-/// Standard deviation of the logarithm of a parameter below which the best point alone is enough:
-/// the effect of such a deviation on a standard error is at most a hundredth.
+/// Standard deviation of the logarithm of a parameter; if all deviations are smaller, only the best
+/// point is used. The effect of such a deviation on a standard error is at most a hundredth.
 pub(crate) const NARROW_POSTERIOR: f64 = 0.02;
 
-/// Largest logarithm of a ratio: the likelihood of a posterior point divided by its approximation.
+/// Maximum logarithm of the ratio of the likelihood of a posterior point to its approximation.
 pub(crate) const POINT_WEIGHT: f64 = 1.0;
 
 // Kalman filter
@@ -29,7 +29,8 @@ pub(crate) const ORDER_GAIN: f64 = 1.0;
 /// Maximum number of states of all forces; with more, long records take too long.
 pub(crate) const FORCE_STATES: usize = 16;
 
-/// Ratio of successive corner frequencies of the grid, from half a period in the record up.
+/// Ratio of successive corner frequencies of the grid. At the lowest corner frequency of the grid,
+/// the record has the length of half a period.
 pub(crate) const CORNER_RATIO: f64 = 4.0;
 
 /// Highest corner frequency, in radians per sample: the Nyquist frequency.
@@ -42,41 +43,42 @@ pub(crate) const GRID_RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
 /// is only noise.
 pub(crate) const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
 
-/// Relative change of every variance over a step at which the covariance has converged. Variances
-/// that converge by a factor of 1 − 10⁻⁴ per step are then within 10⁻⁸ of their limit.
+/// Maximum relative change of any variance in one step for the covariance to count as converged.
+/// Variances that converge by a factor of 1 − 10⁻⁴ per step are then within 10⁻⁸ of their limit.
 pub(crate) const CONVERGED_COVARIANCE: f64 = 1e-12;
 
-/// Relative change of every variance over a step at which the covariance has converged, if only the
-/// likelihood is needed.
+/// Maximum relative change of any variance in one step for the covariance to count as converged, if
+/// only the likelihood is needed.
 pub(crate) const CONVERGED_LIKELIHOOD: f64 = 1e-7;
 
 /// Number of time constants 1/ω_c after which the initial state of a force model has decayed; for
 /// order 16 by the factor e^(−0.1·512).
 pub(crate) const DECAY_TIME: f64 = 512.0;
 
-/// Largest norm of a rate matrix times a sub-step; the terms of the series then fall by half or
-/// more.
+/// Largest norm of a rate matrix times a sub-step. Below this limit, each term of the series for
+/// the noise of a sub-step is at most half the previous term.
 pub(crate) const SUBSTEP: f64 = 0.25;
 
-/// Number of terms of the series for the noise of a step; the next would be below rounding.
+/// Number of terms of the series for the noise of a step; the next term would be smaller than
+/// rounding.
 pub(crate) const SERIES_TERMS: usize = 18;
 
-/// Maximum number of frequencies at which the system is evaluated. Only resonances are narrower
-/// than the spacing of these frequencies, and there the force is known best.
+/// Maximum number of frequencies at which the system is evaluated. Between these frequencies the
+/// response changes little, except at a narrow resonance, where the force is known best.
 pub(crate) const INFORMATION_FREQUENCIES: usize = 1024;
 
-/// Number of periods of the slowest force in the record, if the channels do not show a constant
-/// force; the unknown mean affects slower forces.
+/// Minimum number of periods that the slowest force has in the record, if the channels do not show
+/// a constant force. The unknown mean affects slower forces.
 pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
 
-// Likelihood of the components
+// Limits for the likelihood of the components.
 
 /// Colours tried: white, random walk, integrated random walk.
 pub(crate) const COLOURS: [i32; 3] = [0, 1, 2];
 
-/// Minimum number of components that can carry a force; with fewer, only white is tried. If a white
-/// force drives fewer than this number, a colour needs the gain [`COLOUR_GAIN`]: the amplitudes of
-/// few components may follow a slope by chance.
+/// Minimum number of components that can carry a force; with fewer, only a white force is tried. If
+/// a white force drives fewer components than this number, a coloured force needs the gain
+/// [`COLOUR_GAIN`], because the amplitudes of few components may follow a slope by chance.
 pub(crate) const COLOUR_COMPONENTS: f64 = 16.0;
 
 /// Minimum gain in the log-likelihood by a colour if fewer than [`COLOUR_COMPONENTS`] components
@@ -92,21 +94,24 @@ pub(crate) const EM_ROUNDS: usize = 300;
 /// Change of the log-likelihood in a round at which the iteration ends.
 pub(crate) const EM_CHANGE: f64 = 1e-3;
 
-/// Difference to the largest log-likelihood above which a reach or colour has a negligible weight.
+/// Maximum difference to the largest log-likelihood; a reach or colour with a larger difference has
+/// a negligible weight.
 pub(crate) const NEGLIGIBLE_LIKELIHOOD: f64 = 6.0;
 
-/// Prior probability that the reach of a white force is all components, relative to all reaches.
+/// Prior weight of a white force that reaches all components, relative to the sum of the prior
+/// weights of all possible reaches.
 pub(crate) const ENDLESS_PRIOR: f64 = 0.25;
 
 /// Number of reaches on either side of the best reach that are averaged.
 pub(crate) const NEIGHBOURING_REACHES: usize = 16;
 
-/// Minimum share of driven components of a band; below it the force consists of single lines. The
-/// silent components then determine where the lines are, and the reach adds no information.
+/// Minimum share of components with a force for the force to count as a band; below it the force
+/// consists of single lines. The components without a force then determine where the lines are, and
+/// the reach adds no information.
 pub(crate) const BAND_SHARE: f64 = 0.5;
 
-/// Minimum number of driven components of a band; below it the force consists of single lines, even
-/// if [`BAND_SHARE`] is exceeded.
+/// Minimum number of components with a force for the force to count as a band; below it the force
+/// consists of single lines, even if [`BAND_SHARE`] is exceeded.
 pub(crate) const BAND_COMPONENTS: f64 = 6.0;
 
 // Regularisation
@@ -168,7 +173,7 @@ pub(crate) const INNOVATION_LAGS: usize = 25;
 /// unknown initial state.
 pub(crate) const INNOVATIONS_SETTLED: usize = 50;
 
-// Forces that act for a part of a record
+// Limits for forces that act for a part of a record.
 
 /// Number of parts into which a record is divided in the search for quiet parts.
 pub(crate) const INTERMITTENT_BLOCKS: usize = 16;
@@ -176,8 +181,8 @@ pub(crate) const INTERMITTENT_BLOCKS: usize = 16;
 /// Minimum number of consecutive quiet parts that determine the noise: a quarter of the record.
 pub(crate) const QUIET_BLOCKS: usize = 4;
 
-/// Probability that parts with a stationary force differ at least as much by chance; below it the
-/// force counts as not stationary.
+/// Minimum probability that the parts of a record with a stationary force differ this much by
+/// chance; below it the force counts as not stationary.
 pub(crate) const INTERMITTENT_LEVEL: f64 = 0.01;
 
 /// Number of samples, from the first on, that decide whether a record begins at rest. More samples

@@ -14,7 +14,7 @@ use crate::error::ForceError;
 pub struct Channel {
     /// Degree of freedom, counted from 0.
     pub dof: usize,
-    /// Response quantity measured there.
+    /// Response quantity that the channel measures.
     pub quantity: ResponseQuantity,
 }
 
@@ -31,7 +31,8 @@ pub enum Start {
 
 /// A measured record and the quantity of each of its channels.
 ///
-/// Any mixture is possible: displacement of one degree of freedom only, accelerations of all, both.
+/// Any mixture is possible, for example the displacement of one degree of freedom, the
+/// accelerations of all degrees of freedom, or both.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
     record: Record,
@@ -89,8 +90,8 @@ impl Measurement {
     /// Restricts the force to the band between two frequencies in Hz, including the ends.
     ///
     /// Force and standard error then belong to this band ([`within_band`](crate::within_band) of
-    /// the force). The response outside of it contributes to the noise and the spectrum of the
-    /// force, but is not returned.
+    /// the force). The response outside the band is used to estimate the noise and the spectrum of
+    /// the force, but the force outside the band is not returned.
     ///
     /// # Errors
     /// [`ForceError::NoBand`] if the lower end is not below the upper end, or an end is not finite.
@@ -105,7 +106,7 @@ impl Measurement {
         Ok(Self { record, ..self.clone() })
     }
 
-    /// Lowest and highest frequency of the force to identify, in Hz; `None`: all.
+    /// Lowest and highest frequency of the force to identify, in Hz; `None`: all frequencies.
     pub fn band_hz(&self) -> Option<[f64; 2]> {
         self.band_hz
     }

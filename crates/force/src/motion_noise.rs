@@ -1,4 +1,4 @@
-//! Propagation of noise in a complete response to the force of the equation of motion.
+//! Effect of noise in a complete response on the force from the equation of motion.
 
 use std::collections::BTreeMap;
 
@@ -56,7 +56,8 @@ impl MotionNoise {
 /// var F̂ᵢ = Σⱼ (Mᵢⱼ² σ²_ẍⱼ + Cᵢⱼ² σ²_ẋⱼ + Kᵢⱼ² σ²_xⱼ)
 /// ```
 ///
-/// in N², at every sample; exact, since the force is linear in the response.
+/// The variance is in N², for every sample. It is exact, because the force is linear in the
+/// response.
 ///
 /// # Errors
 /// The errors of [`continuous`]; [`ForceError::ChannelCount`] if a noise level is missing.

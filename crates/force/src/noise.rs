@@ -15,9 +15,9 @@ pub enum Noise {
     Unknown,
     /// One standard deviation per channel, in the channel's unit.
     PerChannel(Vec<f64>),
-    /// Noise measured on the lines that were not chosen (without DC and Nyquist), on which the
-    /// force is assumed zero and the response is noise. Needs at least [`MIN_OUTSIDE_LINES`] of
-    /// them.
+    /// Noise measured on the lines that the caller did not choose (without DC and Nyquist). The
+    /// force is assumed zero on these lines, so the response is noise. At least
+    /// [`MIN_OUTSIDE_LINES`] such lines are needed.
     OutsideLines,
 }
 
@@ -52,7 +52,7 @@ impl Noise {
     }
 }
 
-/// Returns σ of each channel, from σ² = N/4 · mean |X_n|² over the lines that were not chosen.
+/// Returns σ of each channel, from σ² = N/4 · mean |X_n|² over the lines that are not in `lines`.
 fn outside_level(
     measured: &Measurement,
     spectrum: &Spectrum,

@@ -1,4 +1,4 @@
-//! The equation of motion with nonlinear terms, sample by sample.
+//! Force from the equation of motion with nonlinear terms, sample by sample.
 
 use mechid_model::{NonlinearSystem, Response};
 use mechid_signal::Record;
@@ -58,8 +58,8 @@ pub fn continuous_nonlinear(
 /// [`continuous_with_noise`](crate::continuous_with_noise) with the
 /// [tangents](NonlinearSystem::tangents) of each sample instead of C and K.
 ///
-/// The standard error is of first order in the noise: if the force is curved within one standard
-/// deviation of the noise, the noise also changes the mean of the force.
+/// The standard error is of first order in the noise: if the force is not linear in the response
+/// within one standard deviation of the noise, the noise also changes the mean of the force.
 ///
 /// # Errors
 /// The errors of [`continuous_nonlinear`]; [`ForceError::ChannelCount`] if a noise level is

@@ -1,4 +1,4 @@
-//! An open record: the impulse responses as one dense matrix.
+//! Operator of an open record: the impulse responses as one dense matrix.
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::linear_algebra::svd;

@@ -1,4 +1,4 @@
-//! A whole period: one small problem per line.
+//! Operator of a whole period: one small problem per line.
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::linear_algebra::svd;

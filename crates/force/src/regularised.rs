@@ -1,4 +1,5 @@
-//! Force from few or noisy channels: the weakly transmitted part of the force is damped.
+//! Force from few or noisy channels: the part of the force that the system transmits weakly is
+//! reduced.
 
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
@@ -27,7 +28,7 @@ pub enum ForceUnknowns {
     EveryLine,
     /// Spectral lines of the force only; the record is one whole period in steady state.
     Lines(Vec<usize>),
-    /// Every sample, the force linear between them; the record is open.
+    /// Every sample of an open record; the force is linear between the samples.
     Samples(Start),
 }
 
@@ -74,7 +75,7 @@ pub struct RegularisedForce {
 /// The errors of [`frequency_domain`](crate::frequency_domain()); [`ForceError::TooLarge`] for an
 /// open record beyond the limit; [`ForceError::Unstable`] if the free response of an unstable
 /// system grows by more than 10⁶ over the record (a period needs no stability);
-/// [`ForceError::Silent`] if no force reaches any channel, or all are zero;
+/// [`ForceError::Silent`] if no force reaches any channel, or if all channels are zero;
 /// [`ForceError::EmptyBand`].
 ///
 /// # Source
@@ -287,7 +288,7 @@ mod tests {
             let offset = 0.02 * f64::from(step);
             let width = half_width(offset, 1.0);
             let held = below(width - offset) - below(-width - offset);
-            // The complementary error function has no more digits.
+            // The accuracy of the complementary error function limits the tolerance.
             assert!((held - 0.95).abs() < 1e-11, "{offset}: {held}");
         }
     }

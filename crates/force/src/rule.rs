@@ -24,8 +24,8 @@ pub enum Rule {
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
     ///
-    /// This rule minimises the error of the response, not of the force: with few driven lines it
-    /// damps too little.
+    /// This rule minimises the error of the response, not of the force: if the force has few lines,
+    /// λ is too small.
     ///
     /// # Source
     /// Golub, Heath & Wahba (1979).
@@ -34,9 +34,9 @@ pub enum Rule {
     /// − unknowns). The corner is searched for only where this residual variance is at most twice
     /// that of the noise.
     ///
-    /// The curve of the textbooks has ‖residual‖, which vanishes when there are as many unknowns as
-    /// data; the corner of this curve is then at zero damping. If the residual is far above the
-    /// noise, the curve has other corners, at which only the resonance is fitted.
+    /// Textbooks use ‖residual‖ instead, which is zero if there are as many unknowns as data; the
+    /// corner of that curve is then at λ = 0. Where the residual is far above the noise, the curve
+    /// has other corners, at which only the resonance is fitted.
     ///
     /// # Source
     /// Hansen & O'Leary (1993) for the curve and its curvature; both changes are ours.
@@ -131,9 +131,9 @@ fn grid(largest: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Returns one threshold per distinct singular value above rounding, halfway (in its logarithm) to
-/// the next one. If the singular value itself were the threshold, the least change of the system
-/// would exclude it.
+/// Returns one threshold per distinct singular value above rounding: the middle between this
+/// singular value and the next one, in the logarithm. If the singular value itself were the
+/// threshold, the smallest change of the system could exclude its component.
 fn thresholds(components: &Components) -> Vec<f64> {
     let transmitted = components.transmitted();
     let mut values = components.singular[..transmitted].to_vec();
@@ -143,7 +143,8 @@ fn thresholds(components: &Components) -> Vec<f64> {
     values.iter().zip(next).map(|(s, next)| (s * next.max(1e-3 * s)).sqrt()).collect()
 }
 
-/// Returns the candidate with the least residual²/(data − unknowns)², if enough data remain.
+/// Returns the candidate with the least residual²/(data − unknowns)²; candidates with too few
+/// remaining data (data − unknowns) do not count.
 fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     let share = if matches!(filter, Filter::TruncatedSvd(_)) {
         limits::TRUNCATION_RESIDUAL
@@ -160,7 +161,8 @@ fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     }))
 }
 
-/// Returns the first candidate, the most regularised one, whose cost is minimal up to rounding.
+/// Returns the index of the most regularised candidate whose cost equals the minimum up to
+/// rounding; this is the first such candidate.
 ///
 /// If the cost is flat towards λ = 0, only rounding would decide between the candidates.
 fn least(costs: impl Iterator<Item = f64>) -> usize {

@@ -25,8 +25,8 @@ pub(crate) struct StateSpace {
     pub start: Vec<f64>,
 }
 
-/// Data for the backward pass: one block per sample, allocated once; covariance and gains only up
-/// to the sample at which they converge.
+/// Data for the backward pass: one block per sample, allocated once. Covariances and gains are
+/// stored only for the samples before they converge.
 pub(crate) struct Passage {
     mean: Vec<f64>,
     covariance: Vec<f64>,
@@ -76,7 +76,7 @@ struct Filter {
     /// `true` once covariance, gains and variances no longer change from sample to sample.
     settled: bool,
     tolerance: f64,
-    /// Variances before the measurements of the last sample.
+    /// Variances of the states before the measurements of the last sample.
     before: Vec<f64>,
     moved: Vec<f64>,
     product: Vec<f64>,
@@ -296,7 +296,7 @@ mod tests {
 
     const M: usize = 3;
     const CHANNELS: usize = 2;
-    /// The record is long enough for the variances to converge.
+    /// Number of samples, enough for the variances to converge.
     const LEN: usize = 90;
 
     fn space() -> StateSpace {
@@ -316,7 +316,8 @@ mod tests {
         (0..LEN * CHANNELS).map(|i| (1.3 * i as f64).sin() + 0.1 * i as f64).collect()
     }
 
-    /// Solves all samples at once: the joint covariance of all states, conditioned on all samples.
+    /// Returns the reference for the smoother: the joint covariance of all states is conditioned on
+    /// all samples at once.
     fn conditioned() -> (DVector<f64>, DVector<f64>, f64) {
         let s = space();
         let t = DMatrix::from_row_slice(M, M, &s.transition);

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::ForceError;
 use crate::measurement::Measurement;
 
-/// Returns the exact transition over a step, for the input q.
+/// Returns the exact transition over one step; the input is q = Δt² M⁻¹ F.
 pub(crate) fn exact_transition(
     system: &SecondOrderSystem,
     dt: f64,
@@ -24,7 +24,8 @@ pub(crate) fn growth_rate(system: &SecondOrderSystem) -> Result<f64, ForceError>
     Ok(system.eigenvalues()?.iter().map(|l| l.re).fold(f64::NEG_INFINITY, f64::max))
 }
 
-/// System in step units with the outputs y = out·z + through·q, for a force linear over a step.
+/// System with the state z = (x, Δt·ẋ) and the outputs y = out·z + through·q, for a force that is
+/// linear over a step.
 pub(crate) struct Machine {
     pub transition: StateTransition,
     /// Output matrix, channels × 2n; each row is divided by the scale of its channel.

@@ -21,7 +21,8 @@ pub trait FrequencyResponse {
         self.inputs()
     }
 
-    /// Returns measured channels × forces at ω (rad/s); `None` where it is not finite.
+    /// Returns the matrix of frequency responses (measured channels × forces) at ω (rad/s); `None`
+    /// where it is not finite.
     fn response(
         &self,
         channels: &[Channel],

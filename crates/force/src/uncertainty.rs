@@ -1,4 +1,4 @@
-//! Propagation of the uncertainty of an identified system to the force.
+//! Effect of the uncertainty of an identified system on the force.
 
 use mechid_model::{NonlinearSystem, SecondOrderSystem, UncertainNonlinearSystem, UncertainSystem};
 use mechid_signal::Record;
@@ -8,10 +8,10 @@ use crate::error::ForceError;
 use crate::identified::IdentifiedForce;
 use crate::limits;
 
-/// Returns the force that `find` gives for the identified system, with the uncertainty of the
-/// system added to its standard error: variance + gᵀ Σ g at every sample, with g the derivatives of
-/// the force with respect to the uncertain entries (delta method). The residual of the measured
-/// channels is treated likewise ([`Unexplained::machine`](crate::Unexplained)).
+/// Returns the force that `find` computes for the identified system. The uncertainty of the system
+/// is added to the variance of the force: variance + gᵀ Σ g at every sample, where g has the
+/// derivatives of the force with respect to the uncertain entries (delta method). The residual of
+/// the measured channels is treated likewise ([`Unexplained::system`](crate::Unexplained)).
 ///
 /// The derivatives are central differences over a tenth of a standard error: exact for
 /// [`continuous`](crate::continuous()), for which the force is linear in the entries. If `find`
@@ -57,9 +57,9 @@ pub fn with_uncertain_system(
     })
 }
 
-/// Returns the force that `find` gives for a system with nonlinear terms, with the uncertainty of
-/// all its parameters added to its standard error, as [`with_uncertain_system`] does for a linear
-/// one.
+/// Returns the force that `find` computes for a system with nonlinear terms. The uncertainty of all
+/// parameters of the system is added to the standard error of the force. [`with_uncertain_system`]
+/// does the same for a linear system.
 ///
 /// # Errors
 /// The errors of `find`; [`ForceError::Model`] if a changed system is impossible.
@@ -97,7 +97,7 @@ pub fn with_uncertain_nonlinear_system(
 }
 
 /// Returns a force whose standard error includes the uncertainty of parameters with this
-/// covariance; `changed` returns the force for a change of one of the parameters.
+/// covariance; `changed(i, step)` returns the force if parameter i changes by `step`.
 fn propagate(
     force: IdentifiedForce,
     covariance: &DMatrix<f64>,

@@ -36,8 +36,8 @@ impl Unexplained {
     /// Ratio of residual to response, a pure number: 0 if the force explains the whole response, 1
     /// if it explains no part of it (2 if the predicted response has the opposite sign).
     ///
-    /// The larger of the two responses is the reference, since the response of a dead sensor is
-    /// zero.
+    /// The reference is the larger of the measured and the predicted response, because the measured
+    /// response of a dead sensor is zero.
     pub fn share(&self) -> f64 {
         if self.motion > 0.0 { self.residual / self.motion } else { 0.0 }
     }
@@ -138,8 +138,8 @@ impl Residual {
         Ok(Self::new(measured.record().data(), residual, level.map(<[f64]>::to_vec)))
     }
 
-    /// Computes the residual if displacement, velocity and force of every degree of freedom were
-    /// identified together.
+    /// Computes the residual of a method that identifies displacement, velocity and force of every
+    /// degree of freedom together.
     pub fn from_motion(
         system: &SecondOrderSystem,
         measured: &Measurement,

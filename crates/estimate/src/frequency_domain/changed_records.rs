@@ -1,4 +1,4 @@
-//! Open records whose channels are changed: a delayed force, a high-pass.
+//! Open records whose channels are changed, such as by a delay of the force or a high-pass filter.
 
 use std::borrow::Cow;
 
@@ -25,7 +25,7 @@ pub struct ChangedRecords<'a> {
     noise: NoiseSpectrum,
     /// Number of real equations minus the number of unknowns.
     spare: usize,
-    /// Estimate for the last change, the initial estimate for the next one.
+    /// Estimate for the last change of the data; it is the initial estimate for the next change.
     theta: DVector<f64>,
     /// Amplitudes of the errors of pulses for the last change; empty if there are none.
     amplitudes: Vec<f64>,
@@ -47,15 +47,15 @@ impl<'a> ChangedRecords<'a> {
         Some(Self { unknowns, noise, spare: spare(data, unknowns), theta, amplitudes })
     }
 
-    /// Returns some of the lines of `data`, and the same estimate for these lines; `None` if the
-    /// data have few lines.
+    /// Returns a selection of the lines of `data`, and a copy of this estimate for the selected
+    /// lines. `None` if the data have few lines.
     pub fn on_fewer_lines(&self, data: &FrequencyData) -> Option<(FrequencyData, Self)> {
         let (data, noise) = thinned(data, self.unknowns, &self.noise)?;
         let spare = spare(&data, self.unknowns);
         Some((data, Self { noise, spare, ..self.clone() }))
     }
 
-    /// Makes the last estimate on fewer lines the initial estimate on all lines.
+    /// Uses the last estimate of `fewer`, the same problem on fewer lines, as the initial estimate.
     pub fn start_at(&mut self, fewer: Self) {
         self.theta = fewer.theta;
     }
@@ -145,7 +145,7 @@ impl<'a> ChangedRecords<'a> {
     }
 }
 
-/// Returns the data without the errors of pulses.
+/// Returns the data minus the pulse errors that have these amplitudes.
 fn corrected<'a>(data: &'a FrequencyData, amplitudes: &[f64]) -> Option<Cow<'a, FrequencyData>> {
     if amplitudes.is_empty() {
         return Some(Cow::Borrowed(data));

@@ -11,8 +11,8 @@ use crate::relations::Relations;
 
 /// Fit of the equation of motion to spectral lines as a function of the delay of the force.
 ///
-/// A delay changes only the forces, so the regressors (motions of unknown entries) are factored
-/// once.
+/// A delay changes only the forces, so the regressors (the motions that the unknown entries
+/// multiply) are factored only once.
 pub struct DelayedForce<'a> {
     data: &'a FrequencyData,
     /// Weight of each line.
@@ -28,7 +28,8 @@ struct Group {
     /// Orthonormal basis of the regressors; equations that are fitted together are stacked.
     q: DMatrix<f64>,
     q_transposed: DMatrix<f64>,
-    /// Forces of the known entries, rows × equations.
+    /// Forces (N) that the known entries of M, C and K need for the measured motion, rows ×
+    /// equations.
     known: DMatrix<f64>,
 }
 
@@ -71,10 +72,10 @@ impl<'a> DelayedForce<'a> {
         Some(Self { data, weight, driven: driven.len(), groups })
     }
 
-    /// Returns the ratio of residual power to the power of the right-hand side, added over the
-    /// driven equations, for a force that is `delay` (s) later. For related equations, the ratio of
-    /// all equations together is multiplied by the number of forces. `None` if the result is not
-    /// finite.
+    /// Returns the normalised residual power (residual power divided by the power of the right-hand
+    /// side), summed over the driven equations, for a force that is delayed by `delay` (s). For
+    /// related equations, the ratio of all equations together is multiplied by the number of
+    /// forces. `None` if the result is not finite.
     ///
     /// # Source
     /// Ours.
@@ -86,7 +87,8 @@ impl<'a> DelayedForce<'a> {
     }
 }
 
-/// Returns the indices of columns of the motions from their matrix and degree of freedom.
+/// Returns the indices of columns of the motions; each column is given by its matrix (M, C or K)
+/// and its degree of freedom.
 fn column_indices(dof: usize, columns: &Columns) -> Vec<usize> {
     columns.iter().map(|(matrix, column)| *matrix as usize * dof + column).collect()
 }
@@ -146,8 +148,8 @@ mod tests {
 
     use super::*;
 
-    /// For all sets of known entries and all delays, the power is that of the solution of the
-    /// equations.
+    /// The residual power agrees with that of a least-squares solution of the delayed equations,
+    /// for all sets of known entries and all delays.
     #[test]
     fn the_power_is_that_of_a_fit_with_the_delay() {
         let lines = 12;

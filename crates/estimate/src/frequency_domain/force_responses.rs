@@ -55,7 +55,8 @@ impl ForceResponses {
     }
 }
 
-/// Columns over the residuals of one record, with the range of these residuals among all residuals.
+/// Indices of the residuals of one record among all residuals, and data of this record, such as a
+/// matrix with one row for each of these residuals.
 pub(super) type RecordColumns<T> = (Range<usize>, T);
 
 /// Returns orthonormal bases of the responses to the transient loads of every open record.
@@ -86,7 +87,7 @@ fn transient_basis(
     Some((2 * n * rows.start..2 * n * rows.end, q))
 }
 
-/// Removes the components that the transients explain from columns over all residuals.
+/// Subtracts from `columns` (one row per residual) the components that the transients explain.
 pub(super) fn remove(transients: &[RecordColumns<DMatrix<f64>>], columns: &mut DMatrix<f64>) {
     for (rows, transient) in transients {
         let mut part = columns.rows_mut(rows.start, rows.len());

@@ -23,7 +23,8 @@ use crate::{Estimate, Unknowns};
 const EXPONENTS: [i32; 3] = [0, -2, -3];
 /// Linear estimates from spectra, one equation of motion after another.
 pub(super) struct InitialEstimates<'a> {
-    /// Data as measured. Open records are under a Hann window, which reduces their transients.
+    /// Measured data. A Hann window is applied to open records, because it reduces their
+    /// transients.
     data: Cow<'a, FrequencyData>,
     /// Number of unknown transient loads; their initial estimates are zero.
     transient_loads: usize,
@@ -46,7 +47,8 @@ struct Equation {
 enum Kind {
     /// Ordinary least squares: the noise of the regressors is neglected.
     Ordinary,
-    /// Total least squares in the metric of the noise of regressors and force: consistent.
+    /// Total least squares in the metric of the noise of regressors and force; the estimate is
+    /// consistent.
     Total,
 }
 
@@ -260,8 +262,9 @@ impl<'a> InitialEstimates<'a> {
     /// [`InitialEstimates::triangle`].
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
-        // For each displacement, then for each force: the columns that contain its noise. A column
-        // has an index, the index of its power of the frequency (3: no power), and a real factor.
+        // Columns that contain the noise of each displacement, then of each force. A column is
+        // given by its index, the index of its power of the frequency (3: no power) and a real
+        // factor.
         let mut enters: Vec<Vec<(usize, usize, f64)>> = vec![Vec::new(); 2 * n];
         for (at, (_, p)) in equation.parameters.iter().enumerate() {
             enters[p.column()].push((at, p.matrix() as usize, 1.0));

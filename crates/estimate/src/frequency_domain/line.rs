@@ -198,7 +198,8 @@ pub(super) fn solve_lower<C: Dim, S: StorageMut<Complex<f64>, Dyn, C>>(
     true
 }
 
-/// Returns the forces that have noise in a covariance of n displacements and n forces.
+/// Returns the indices of the forces that have noise, from the covariance of n displacements and n
+/// forces.
 pub(super) fn noisy_forces(covariance: &ComplexMatrix) -> impl Iterator<Item = usize> {
     let n = covariance.ncols() / 2;
     (0..n).filter(move |force| covariance.column(n + force).iter().any(|z| *z != Complex::ZERO))

@@ -1,5 +1,5 @@
-//! Blocks of lines, each with the columns that are nonzero on it, for an orthogonal decomposition
-//! of many columns that are zero on most lines.
+//! Blocks of lines for an orthogonal decomposition of many columns that are zero on most lines; a
+//! block has only the columns that are nonzero on its lines.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::limits::GRAM_LINES;
 #[derive(Clone)]
 pub(super) struct LineBlock {
     pub(super) lines: Range<usize>,
-    /// Columns of the layout, in rising order.
+    /// Indices of the nonzero columns, in ascending order.
     pub(super) columns: Vec<usize>,
 }
 
@@ -30,7 +30,8 @@ pub(super) struct BlockFactors {
 }
 
 impl LineBlock {
-    /// Returns the blocks of all lines, given which lines use which of the columns.
+    /// Returns the blocks of all lines; `is_used` states whether a line (first argument) uses a
+    /// column.
     pub(super) fn all(
         lines: usize,
         columns: usize,

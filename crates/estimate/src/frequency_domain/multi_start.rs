@@ -118,7 +118,7 @@ fn end_on_fewer(
     end.map_or(start, |end| end.parameters)
 }
 
-/// Searches on fewer lines.
+/// Searches for a minimum on fewer lines than the data have; `None` if the search fails.
 fn search_thin(
     thin: &mut impl Restartable,
     start: DVector<f64>,
@@ -147,8 +147,8 @@ pub(super) fn thinned(
     (step > 1).then(|| data.thinned(step).zip(noise.thinned(step))).flatten()
 }
 
-/// Returns the ratio of the number of all lines to the number of lines on which searches begin and
-/// explanations of a residual are compared.
+/// Returns the ratio of the number of all lines to the number of lines on which searches begin. A
+/// comparison of explanations of a residual uses the same ratio.
 ///
 /// # Source
 /// Ours.
@@ -275,7 +275,8 @@ impl Ends {
         (!best.converged).then(|| best.parameters.clone())
     }
 
-    /// Returns one of the best points, in turn.
+    /// Returns the point at which restart number `at` begins: the best points in turn if the best
+    /// minimum is ambiguous, otherwise the best point.
     fn turn(&self, at: usize) -> Option<DVector<f64>> {
         let count =
             if self.is_ambiguous() { RESTART_RESTARTED.min(self.distinct.len()) } else { 1 };
@@ -285,8 +286,8 @@ impl Ends {
 }
 
 impl GlobalMinimum {
-    /// Returns the minimum of a search that starts at this minimum, with other weights of the same
-    /// residuals.
+    /// Returns the minimum of a search that starts at this minimum; the residuals are the same, but
+    /// their weights differ.
     ///
     /// # Errors
     /// [`EstimateError::NotConverged`].
@@ -301,9 +302,9 @@ impl GlobalMinimum {
     }
 }
 
-/// Returns the best member of each family. The first family comes first, then the others by rising
-/// sum of squares. A member comes last if its sum of squares is about the same as that of a better
-/// member.
+/// Returns the best initial estimate of each family of initial estimates. That of the first family
+/// comes first, the others follow by rising sum of squares. An estimate comes last if its sum of
+/// squares is about the same as that of a better estimate.
 fn in_order(problem: &mut impl Restartable, families: Vec<Vec<DVector<f64>>>) -> Vec<DVector<f64>> {
     let mut best: Vec<(usize, f64, DVector<f64>)> = Vec::new();
     for (family, members) in families.into_iter().enumerate() {

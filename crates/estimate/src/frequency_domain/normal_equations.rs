@@ -1,4 +1,4 @@
-//! Normal equations of a Jacobian with Kronecker products as rows, in coordinates with a small
+//! Normal equations of a Jacobian whose rows are Kronecker products, in coordinates with a small
 //! condition number.
 
 use std::rc::Rc;
@@ -31,9 +31,9 @@ pub(super) struct Layout {
 #[derive(Debug)]
 struct Equation {
     row: usize,
-    /// Indices of its unknowns among all unknowns.
+    /// Indices of the unknowns of this equation among all unknowns.
     places: Vec<usize>,
-    /// Indices of their columns in [`Layout::columns`].
+    /// Indices, in [`Layout::columns`], of the columns for the unknowns of this equation.
     columns: Vec<usize>,
 }
 
@@ -57,15 +57,16 @@ struct Related {
 struct Block {
     row: usize,
     places: Vec<usize>,
-    /// Orthonormal basis of the unknown columns, for an equation without some of the columns.
+    /// Orthonormal basis of the columns for the unknowns of this equation; `None` if the equation
+    /// has all columns.
     basis: Option<Rc<DMatrix<f64>>>,
-    /// Upper triangular matrix T.
+    /// Upper triangular matrix T of the coordinates T θ of this equation.
     triangle: Rc<DMatrix<f64>>,
 }
 
 /// Normal equations JᵀJ v = −Jᵀr for a step v.
 pub(super) struct NormalEquations {
-    /// JᵀJ, of unit diagonal.
+    /// Gram matrix JᵀJ, scaled to a unit diagonal.
     pub gram: DMatrix<f64>,
     /// Jᵀr.
     pub gradient: DVector<f64>,
@@ -93,8 +94,8 @@ impl Layout {
                 (free.len() + at, index(column))
             });
             let mut both: Vec<(usize, usize)> = of_row.chain(of_ends).collect();
-            // The unknowns get the order of `columns`, so that an equation with all columns can use
-            // them directly.
+            // The unknowns are sorted in the order of `columns`, so that an equation with all
+            // columns needs no selection of columns.
             both.sort_unstable_by_key(|(_, column)| *column);
             let (places, columns) = both.into_iter().unzip();
             Equation { row, places, columns }
@@ -108,17 +109,17 @@ impl Layout {
         &self.columns
     }
 
-    /// Returns the normal equations and makes the regressors orthonormal. `None` if these are
-    /// linearly dependent, or if values overflow.
+    /// Returns the normal equations and makes the regressors orthonormal. `None` if the regressors
+    /// are linearly dependent, or if values overflow.
     ///
     /// With H = WᴴW, the entry for the unknown in column a of equation i and the unknown in column
     /// b of equation j is 2 Re Σ φ̄_a φ_b H_ij. This sum is the product of a matrix of pairs (a, b)
-    /// and a matrix of pairs (i, j); it takes 1/dof of the operations that the rows of J would
-    /// take. The condition number of the Gram matrix is the square of that of J. This square is
+    /// and a matrix of pairs (i, j); it needs 1/dof of the operations that the rows of J would
+    /// need. The condition number of the Gram matrix is the square of that of J. This square is
     /// harmless for regressors that are orthonormal over the lines weighted by ‖W_l‖; rounding of
-    /// the Gram matrix slows the search but does not change the minimum, where Jᵀr = 0.
-    /// With a `tangent` S (entries and transient loads × unknowns), the unknowns are the
-    /// independent ones.
+    /// the Gram matrix slows the search but does not change the minimum, where Jᵀr = 0. With a
+    /// `tangent` S (entries and transient loads × unknowns), the equations are those of the
+    /// independent unknowns.
     ///
     /// # Source
     /// Van Loan (2000), J. Computational and Applied Mathematics 123, 85–100 (least squares with
@@ -203,12 +204,13 @@ impl Layout {
         blocks
     }
 
-    /// Returns 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
+    /// Returns the sums 2 Re Σ φ̄_a φ_b H_ij, one row for each pair a ≤ b and one column for each
+    /// of the dof² pairs (i, j).
     fn products(&self, factors: &[BlockFactors]) -> DMatrix<f64> {
         let product = |of: &BlockFactors| {
             kronecker::gram(of.regressors.as_view(), of.weights.as_view(), self.dof)
         };
-        // The sum has the same order for any number of threads.
+        // The terms of the sum are added in the same order for any number of threads.
         let parts: Vec<DMatrix<f64>> = factors.par_iter().map(product).collect();
         let pair = |a: usize, b: usize| b * (b + 1) / 2 + a;
         let count = self.columns.len();
@@ -265,8 +267,8 @@ impl NormalEquations {
     /// `None` if JᵀJ is singular to rounding.
     pub(super) fn covariance(&self) -> Option<(DMatrix<f64>, f64)> {
         let inverse = Cholesky::new(&self.gram, 0.0)?.inverse_of_lower();
-        // The covariance is R Rᵀ with the rows R = T⁻¹D⁻¹L⁻ᵀ of the unknowns: L is the Cholesky
-        // factor of the Gram matrix, D and T lead from the unknowns to the coordinates.
+        // The covariance is R Rᵀ with R = T⁻¹D⁻¹L⁻ᵀ. L is the Cholesky factor of the Gram matrix,
+        // and D T θ are the coordinates of the unknowns θ.
         let roots = self.coordinates.unknowns_of_columns(&inverse.transpose());
         let covariance = &roots * roots.transpose();
         let lengths = self.coordinates.lengths(&self.gram);
@@ -356,8 +358,8 @@ impl Coordinates {
         Some(gram)
     }
 
-    /// Returns 2 Re Σ φ̄ y for every unknown. This is Jᵀ applied to values whose product with W_lᴴ
-    /// is y. `weighted` has y for each block, 2 lines × dof, real parts first.
+    /// Returns 2 Re Σ φ̄ y for every unknown. This is Jᵀr for values r with W_lᴴ r = y on each
+    /// line. `weighted` has y for each block, 2 lines × dof, real parts first.
     pub(super) fn project<'b>(
         &self,
         weighted: impl Iterator<Item = (&'b BlockFactors, &'b DMatrix<f64>)>,

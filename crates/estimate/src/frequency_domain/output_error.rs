@@ -58,7 +58,7 @@ pub fn output_error(
 ///
 /// # Errors
 /// As [`output_error`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the
-/// nominal system has another number of degrees of freedom than `data`.
+/// numbers of degrees of freedom of the nominal system and of `data` differ.
 ///
 /// # Source
 /// As [`output_error`].
@@ -118,8 +118,8 @@ pub fn output_error_of_table(
     Ok(fit)
 }
 
-/// Estimates as [`output_error_pooling`] where the data state no noise, from the result of a `fit`
-/// to nearly the same data as the only initial estimate.
+/// Estimates from data that state no noise, as [`output_error_pooling`] does, but with one initial
+/// estimate only: the result of a `fit` to nearly the same data.
 ///
 /// # Errors
 /// As [`output_error_pooling`].
@@ -147,7 +147,7 @@ pub struct Refit {
 }
 
 /// Repeats a `fit` with changed `data` and the same noise spectrum. The search begins at `near`, a
-/// fit to such data or to a part of their lines.
+/// fit to the changed data or to a part of their lines.
 ///
 /// # Errors
 /// As [`output_error`].

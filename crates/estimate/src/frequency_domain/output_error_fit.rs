@@ -1,4 +1,4 @@
-//! Result of maximum likelihood, from the minimum of its search.
+//! Result of a maximum-likelihood fit, computed at the minimum that the search found.
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::gauss_newton::{Minimum, SumOfSquares};
@@ -38,7 +38,7 @@ pub struct OutputErrorFit {
     pub deviance: Option<f64>,
     /// Number of Gauss–Newton steps from the best initial estimate to the minimum.
     pub steps: usize,
-    /// Number of searches, each from another initial estimate.
+    /// Number of searches, each from a different initial estimate.
     pub searches: usize,
     /// Number of searches that ended at this minimum; if two or more agree, it is probably the
     /// global minimum.
@@ -147,7 +147,8 @@ impl EndLoads {
     /// the force (N).
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if there are more or fewer open records or degrees of freedom.
+    /// [`NumericsError::Size`] if the number of open records or of degrees of freedom differs from
+    /// that of the fit.
     pub fn without_transients(
         &self,
         records: &[FrequencyData],
@@ -214,7 +215,8 @@ pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausi
 pub(super) struct Scale {
     /// Ratio of the noise power to the power assumed by the weights.
     pub(super) level: f64,
-    /// Factor of the covariance for sampled weights, used without a [`WeightUncertainty`].
+    /// Ratio of the covariance to the inverse of the Fisher information for sampled weights;
+    /// ignored if there is a [`WeightUncertainty`].
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
     /// Inverse of the Fisher information with errors of pulses in the forces; `None` if the lines
@@ -259,10 +261,10 @@ fn entries_with_covariance(
     }
 }
 
-/// Returns the ratio of the power of the modelled response to the forces to the power of the
-/// measured response. If the ratio is above 1, the modelled transients cancel the excess. If it is
-/// above 1/ε, the sum of both is only rounding error, as in a solution of normal equations with
-/// this condition number.
+/// Returns the power of the modelled response to the forces, divided by the power of the measured
+/// response. If the ratio is above 1, the modelled transients cancel the excess. If the ratio is
+/// above 1/ε, the sum of modelled response and transients is only rounding error, as in a solution
+/// of normal equations with this condition number.
 fn cancelled_power(data: &FrequencyData, unknowns: &Unknowns, independent: &[f64]) -> f64 {
     let [m, c, k] = unknowns.assemble(entries(unknowns, independent).as_slice());
     let Ok(system) = SecondOrderSystem::new(m, c, k) else { return 0.0 };
@@ -364,8 +366,8 @@ pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
 ///
 /// For weights W = Ŝ⁻¹ with a sample covariance Ŝ of n channels and ν degrees of freedom, and the
 /// true covariance S, E[W] = ν/(ν−n)·S⁻¹ and E[W S W] = ν³/((ν−n)((ν−n)²−1))·S⁻¹. The covariance of
-/// the estimate is therefore E[WSW]/E[W]² times the best one, and ν²/((ν−n)²−1) times the computed
-/// one.
+/// the estimate is therefore E[WSW]/E[W]² times the best covariance, and ν²/((ν−n)²−1) times the
+/// computed covariance.
 ///
 /// # Errors
 /// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) if this

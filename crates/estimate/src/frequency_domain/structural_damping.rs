@@ -11,7 +11,8 @@ use crate::{EquationOfMotion, Estimate, Unknowns};
 /// Fit of −ω²M X + iD X + K X = F, with a damping D that does not depend on the frequency.
 #[derive(Debug, Clone)]
 pub struct StructuralDamping {
-    /// Loss factor: projection of D on K, a ratio.
+    /// Loss factor, a ratio: projection of the structural damping matrix D on the stiffness matrix
+    /// K.
     pub loss_factor: f64,
     /// Modelled displacement, rows × n, in m.
     pub displacement: DMatrix<Complex<f64>>,
@@ -50,7 +51,7 @@ pub fn structural_damping(data: &FrequencyData, unknowns: &Unknowns) -> Option<S
     is_finite.then_some(StructuralDamping { loss_factor, displacement })
 }
 
-/// Solves the least squares with a weight on each line.
+/// Solves the least-squares problem; `weight` has one weight for each line.
 fn solve(data: &FrequencyData, weight: &[f64], unknowns: &Unknowns) -> Option<Estimate> {
     if weight.iter().any(|weight| !weight.is_finite()) {
         return None;

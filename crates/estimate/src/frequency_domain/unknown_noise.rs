@@ -98,7 +98,7 @@ struct Subtracted {
 
 /// Data without the errors of their force pulses, and a fit to them with white noise.
 struct WithoutPulses {
-    /// Most likely amplitudes of the errors.
+    /// Most likely amplitudes of the pulse errors.
     amplitudes: Vec<f64>,
     data: FrequencyData,
     white: Weighted,
@@ -163,8 +163,8 @@ fn with_pulse_fit(
 }
 
 /// Estimates the parameters from responses whose noise is white, proportional to the response, or
-/// the sum of both. Such noise occurs in tables of frequency responses, whose averages are often
-/// equally coherent on all lines.
+/// the sum of both. Such noise occurs in tables of frequency responses, because averaged responses
+/// often have the same coherence on all lines.
 pub(super) fn with_response_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -176,7 +176,8 @@ pub(super) fn with_response_noise(
     finished(data, unknowns, weighted, Subtracted { of_sinusoids: 0, pulses: None })
 }
 
-/// Chooses the noise of each channel from the residual of a fit; `None` if all are white.
+/// Chooses the noise of each channel from the residual of a fit; `None` if the noise of all
+/// channels is white.
 fn response_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -217,8 +218,8 @@ fn response_noise(
     Ok(Some(noise.with_model(NoiseModel::Proportional { with_white })))
 }
 
-/// Returns the result of a fit to data without the errors in `subtracted`. The flag is `true` if
-/// the noise of the fit is white.
+/// Returns the result of a fit to `data`; the errors in the last argument have already been
+/// subtracted from these data. The flag is `true` if the noise of the fit is white.
 fn finished(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -250,8 +251,8 @@ fn finished(
     finish(data, unknowns, &mut misfit, &fit, scale)
 }
 
-/// A fit, with white noise, to open records without the sinusoids that the residual of this fit
-/// shows.
+/// Fit with white noise to open records. The sinusoids that the residual of this fit shows are
+/// subtracted from the records.
 struct FitWithSinusoids<'a> {
     /// Data without the sinusoids.
     data: Cow<'a, FrequencyData>,
@@ -326,8 +327,8 @@ fn with_white_noise(
             Some(before) => before.followed(&mut misfit)?,
         };
         let sizes = levels_of(data, &misfit);
-        // With an exact force only the ratios between the channels matter: the residual gives the
-        // common level.
+        // With an exact force only the ratios between the noise levels of the channels matter: the
+        // residual gives the common level.
         let common = if known_force { sizes[0] / levels[0] } else { 1.0 };
         let settled =
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
@@ -366,17 +367,18 @@ fn reweighted(
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         match before.fit.clone().followed(&mut misfit) {
             Ok(fit) => last = Some(Weighted { fit, noise }),
-            // The result is the previous fit, with its weights.
+            // If this round fails, the result is the fit of the previous round, with the noise of
+            // that round.
             Err(_) => break,
         }
     }
     Ok(last)
 }
 
-/// Estimates the noise spectrum from the residual, separately for each channel or for unmeasured
-/// forces. At each line the noise of the previous round is multiplied by the ratio of the residual
-/// power to its expected value, which includes the stated noise of the force. `None` if the
-/// spectrum is white.
+/// Estimates the noise spectrum from the residual. The noise is separate for each channel, or it is
+/// the response to unmeasured forces. At each line the noise of the previous round is multiplied by
+/// the ratio of the residual power to its expected value, which includes the stated noise of the
+/// force. `None` if the spectrum is white.
 fn spectrum_of_residual(
     data: &FrequencyData,
     unknowns: &Unknowns,

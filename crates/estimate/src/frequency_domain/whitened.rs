@@ -49,8 +49,8 @@ impl Whitened {
         Some(whitened)
     }
 
-    /// Computes only the residual; the sensitivity would need memory for residuals × parameters
-    /// numbers.
+    /// Computes the residual without the sensitivity, which would need a matrix of residuals ×
+    /// parameters in memory.
     pub fn residual_of(
         data: &FrequencyData,
         unknowns: &Unknowns,

@@ -15,7 +15,7 @@ use super::search::Minimum;
 pub(super) struct Information {
     /// Indices of the parameters that are not at a bound.
     pub(super) free: Vec<usize>,
-    /// Lengths of the columns of these parameters in the Jacobian.
+    /// Lengths of the Jacobian columns of the parameters that are not at a bound.
     pub(super) scale: DVector<f64>,
     /// Right singular vectors, free × free, by falling singular values.
     pub(super) directions: DMatrix<f64>,
@@ -91,7 +91,7 @@ impl Information {
         self.is_determined[at].then(|| self.covariance[(at, at)].max(0.0).sqrt())
     }
 
-    /// Ratio of the largest to the smallest singular value.
+    /// Ratio of the largest to the smallest singular value of the scaled Jacobian.
     pub(super) fn condition(&self) -> f64 {
         match (self.singular_values.iter().next(), self.singular_values.iter().next_back()) {
             (Some(largest), Some(smallest)) => largest / smallest,

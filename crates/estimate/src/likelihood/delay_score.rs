@@ -16,7 +16,7 @@ use super::search::Linearisation;
 /// Delay, of one output or of all outputs, that explains most of a residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayScore {
-    /// Output that is late; `None` if all outputs are late by the same time.
+    /// Index of the delayed output; `None` if all outputs have the same delay.
     pub output: Option<usize>,
     /// Delay of the output, in s, to first order.
     pub delay: f64,
@@ -30,7 +30,7 @@ pub struct DelayScore {
     pub changes: Vec<f64>,
 }
 
-/// Factors QR of the derivatives of residual and priors with respect to the parameters that are not
+/// QR factors of the derivatives of residual and priors with respect to the parameters that are not
 /// at a bound.
 struct Factors {
     /// Indices of the parameters that are not at a bound.
@@ -85,8 +85,8 @@ pub(super) fn delay_score<M: ResponseModel>(
     Some(DelayScore { output, delay, standard_error, p_value, changes })
 }
 
-/// Returns the direction of a delay of one output, or of all outputs, in the space of the delays of
-/// p outputs.
+/// Returns the unit delay of one output, or of all outputs, as a vector with one entry (1 or 0) for
+/// each of the p outputs.
 fn direction_of(output: Option<usize>, p: usize) -> DVector<f64> {
     DVector::from_fn(p, |at, _| f64::from(output.is_none_or(|one| one == at)))
 }

@@ -28,11 +28,12 @@ pub struct Channels {
 /// Identifies the free entries of M, C and K (the independent unknowns of related entries) from
 /// sensors and forces at some of the degrees of freedom. The search starts at the system `near`.
 ///
-/// The parameters have the names of their entries (`m11`, `k12`; the upper one of symmetric
-/// entries); those of proportional damping are `alpha` and `beta`.
+/// The parameters have the names of their entries, such as `m11` and `k12`. A parameter of two
+/// symmetric entries has the name of the upper entry. The parameters of proportional damping are
+/// `alpha` and `beta`.
 ///
 /// # Errors
-/// [`LikelihoodError::Size`] if `near` has another number of degrees of freedom than `unknowns`,
+/// [`LikelihoodError::Size`] if the numbers of degrees of freedom of `near` and `unknowns` differ,
 /// [`LikelihoodError::Machine`] for a channel at a degree of freedom that does not exist, and the
 /// other errors of a fit.
 ///

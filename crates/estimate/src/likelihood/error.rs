@@ -25,7 +25,7 @@ pub enum LikelihoodError {
     Setting {
         /// Name of the setting.
         name: &'static str,
-        /// Requirement that it does not meet.
+        /// Requirement that the setting does not meet.
         requirement: &'static str,
         /// Value given, in the unit of the setting.
         value: f64,
@@ -52,7 +52,7 @@ pub enum LikelihoodError {
          or two outputs have the same noise"
     )]
     SingularNoise {
-        /// Frequency of the line.
+        /// Frequency of the line with the singular covariance, in Hz.
         frequency_hz: f64,
     },
     /// A sample covariance has too few degrees of freedom for a weight.
@@ -70,7 +70,7 @@ pub enum LikelihoodError {
     /// The receptance does not exist.
     #[error("the response of the machine is not finite with these parameters: {at}")]
     NoResponse {
-        /// Parameters for which the response is not finite.
+        /// Name of the parameter values at which the response is not finite.
         at: &'static str,
     },
     /// The initial and final states of open records need too many unknowns.

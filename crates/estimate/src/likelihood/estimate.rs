@@ -68,12 +68,13 @@ pub struct ParameterEstimate {
 pub struct Combination {
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// One possible set of values, one for each parameter in its unit. The data determine only the
-    /// combinations; other values with the same combinations fit equally well.
+    /// One possible set of values: one value for each parameter, in the unit of the parameter. The
+    /// data determine only the combinations; other values with the same combinations fit equally
+    /// well.
     pub values: Vec<f64>,
     /// Coefficients of the parameters in the differential of each determined combination; the
     /// largest coefficient is 1. The unit of a coefficient is the unit of the parameter with the
-    /// largest coefficient, divided by the unit of its parameter.
+    /// largest coefficient, divided by the unit of the parameter that the coefficient multiplies.
     pub determined: Vec<Vec<f64>>,
 }
 
@@ -146,7 +147,7 @@ pub struct FoundMinimum {
     /// Sum of squares including the priors, a pure number: −2 times the log-likelihood, up to a
     /// constant.
     pub sum_of_squares: f64,
-    /// Number of searches that ended here.
+    /// Number of searches that ended at this minimum.
     pub searches: usize,
     /// Number of steps of the best search.
     pub steps: usize,

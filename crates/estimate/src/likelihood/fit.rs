@@ -282,8 +282,8 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Returns a quantile of the error of an estimate in units of its standard error without
-    /// [`Fit::error_scale`].
+    /// Returns a quantile of the error of an estimate, in units of the standard error before its
+    /// multiplication by [`Fit::error_scale`].
     pub(super) fn quantile(&self, probability: f64) -> f64 {
         let freedom = self.degrees_of_freedom.clamp(1.0, 1e6);
         StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| law.inverse_cdf(probability))

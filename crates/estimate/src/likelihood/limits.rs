@@ -35,9 +35,10 @@ pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 /// likely by a factor e²⁵; most measurements have less noise.
 pub(super) const HOPELESS_RISE: f64 = 50.0;
 
-/// Numbers (real and imaginary parts of the lines) per unknown in the first steps of every search:
-/// with this number the minimum is near the minimum for all lines, on which the search continues.
-/// With a fifth of this number the resonances of a long record can be between the lines.
+/// Number of measured values (real and imaginary parts) per unknown in the first steps of every
+/// search. With this number the minimum is near the minimum for all lines; the search then
+/// continues on all lines. With a fifth of this number the resonances of a long record can be
+/// between the selected lines.
 pub(super) const SEARCH_NUMBERS: usize = 100;
 
 /// Damping of a step, relative to the unit diagonal of the Gram matrix, above which the curvature
@@ -53,8 +54,8 @@ pub(super) const KEPT_RESPONSES: usize = 1 << 22;
 /// Maximum number of steps of a search.
 pub(super) const STEPS: usize = 200;
 
-/// Maximum number of steps away from the estimate until the profile of the likelihood has fallen
-/// enough for the limit of an interval.
+/// Maximum number of steps away from the estimate in the search for a value beyond the limit of a
+/// profile interval; if no step reaches such a value, the limit is infinite.
 pub(super) const PROFILE_STEPS: usize = 24;
 
 /// Smallest and largest factor from one distance to the next in the search for the limit of a
@@ -65,7 +66,8 @@ pub(super) const PROFILE_FACTORS: [f64; 2] = [1.5, 8.0];
 /// is slightly above 1, so that the next value is probably beyond the limit.
 pub(super) const PROFILE_MARGIN: f64 = 1.1;
 
-/// Maximum number of steps between values on either side of the limit of a profile interval.
+/// Maximum number of steps that narrow the range around the limit of a profile interval, after a
+/// value on each side of the limit is known.
 pub(super) const PROFILE_SECANTS: usize = 20;
 
 /// Deviation from the required rise of the sum of squares, relative to this rise, that ends the
@@ -124,16 +126,16 @@ pub(super) const STATE_RESPONSE: f64 = 1e-6;
 pub(super) const FREED_COEFFICIENTS: usize = 24;
 
 /// Maximum product of the number of lines and the cube of the number of degrees of freedom with
-/// unknown terms, if a known coefficient is tried as an unknown. At the limit a step takes about a
-/// second.
+/// unknown terms, in a fit that tries a known coefficient as an unknown; a larger fit is not made.
+/// At the limit a step takes about a second.
 pub(super) const FREED_WORK: f64 = 1e9;
 
 /// Number of searches that must end at the lowest minimum if the known noise explains the residual
 /// of this minimum; otherwise the search uses all initial estimates.
 pub(super) const CONFIRMED: usize = 2;
 
-/// Number of searches that must end at the lowest minimum if the noise is unknown: without known
-/// noise, no misfit shows whether the minimum is the correct one.
+/// Number of searches that must end at the lowest minimum if the noise is unknown. In this case the
+/// misfit cannot show whether the minimum is the correct one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 
 /// Number of degrees of freedom that represents an exactly known noise level: with a larger number,

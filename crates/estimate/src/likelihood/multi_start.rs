@@ -13,7 +13,8 @@ use super::search::{Bounds, Effort, LeastSquaresProblem, Minimum, minimise};
 pub(super) struct SearchEnd {
     pub(super) minimum: Minimum,
     pub(super) searches: usize,
-    /// Points that these searches reached after their first steps, if the first steps converged.
+    /// Points after the first steps of the searches that ended at this minimum; a search whose
+    /// first steps did not converge has no point.
     near: Vec<Minimum>,
 }
 
@@ -122,8 +123,8 @@ impl Minima {
 
     /// Returns whether, after the first steps, the sum of squares of a search is far above that of
     /// the search with the lowest minimum. Such a search is very unlikely to end lower. The limit
-    /// [`HOPELESS_RISE`] is multiplied by the mean square of the residual of the latter search, in
-    /// units of the noise, if this mean square is above 1.
+    /// [`HOPELESS_RISE`] is multiplied by the mean square of the residual of the search with the
+    /// lowest minimum, in units of the noise, if this mean square is above 1.
     fn is_hopeless(&self, near: &Minimum) -> bool {
         let best = self.ends.first().and_then(|end| end.near.first());
         best.is_some_and(|best| {

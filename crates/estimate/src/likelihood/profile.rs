@@ -88,7 +88,7 @@ impl<M: ResponseModel> Profile<'_, '_, M> {
         (point.root.powi(2) - self.rise).abs() <= PROFILE_TOLERANCE * self.rise
     }
 
-    /// Returns the limit between a value inside the interval and a value outside it.
+    /// Returns the limit of the interval, from a value inside the interval and a value outside it.
     fn between(&mut self, mut inside: Point, mut outside: Point) -> f64 {
         let needed = self.rise.sqrt();
         for step in 0..PROFILE_SECANTS {

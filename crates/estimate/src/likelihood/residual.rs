@@ -217,7 +217,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(Block { first_row: 2 * p * first, first, lines, residual, columns, effects })
     }
 
-    /// Returns the response at a line, its weights, and L⁻¹e without a transient.
+    /// Returns the response at a line, the weights of the line, and L⁻¹e before the transient is
+    /// subtracted from e.
     fn whitened(
         &self,
         parameters: &[f64],
@@ -297,8 +298,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(jacobian)
     }
 
-    /// Calls `visit` with the residual of each record. This residual has the lines with their
-    /// responses and the factors L of their covariance, and the linear unknowns of the record.
+    /// Calls `visit` with the residual of each record. This residual contains the responses of the
+    /// lines, the factors L of the covariance of each line, and the linear unknowns of the record.
     /// `None` if a response does not exist or a visit fails.
     pub(super) fn for_each_record(
         &self,
@@ -330,7 +331,7 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(columns)
     }
 
-    /// Rows of the priors.
+    /// Returns the residual of each prior.
     fn prior_rows(&self, parameters: &[f64]) -> Vec<f64> {
         let row = |prior: &PriorRow| (parameters[prior.parameter] - prior.mean) / prior.deviation;
         self.priors.iter().map(row).collect()

@@ -70,22 +70,24 @@ pub(super) struct Minimum {
 /// lengths are scaled by the columns of the Jacobian. For data without noise, this ratio ends the
 /// search.
 const STEP_TOLERANCE: f64 = 1e-12;
-/// First damping, relative to the unit diagonal of the Gram matrix.
+/// First nonzero damping λ of a Levenberg–Marquardt step, relative to the unit diagonal of the Gram
+/// matrix.
 const FIRST_DAMPING: f64 = 1e-8;
-/// Minimum damping; a smaller value is set to zero.
+/// Minimum damping λ of a Levenberg–Marquardt step; a smaller λ is set to zero.
 const LEAST_DAMPING: f64 = 1e-13;
-/// Maximum damping; with a larger value the step would be only rounding.
+/// Maximum damping λ of a Levenberg–Marquardt step; with a larger λ the step is so short that its
+/// effect is only rounding.
 const MAX_DAMPING: f64 = 1e12;
 /// Maximum ratio of the curvature correction to its step; a larger correction is not used.
 const MAX_CORRECTION: f64 = 0.75;
-/// Fraction of a step for the finite difference of the curvature.
+/// Fraction of a step over which the finite difference for the curvature is taken.
 const CURVATURE_STEP: f64 = 0.1;
 
 /// Normal equations for the parameters that no bound blocks, with columns of unit length.
 struct Local<'a> {
     linearisation: &'a Linearisation,
     free: Vec<usize>,
-    /// Lengths of the free columns.
+    /// Lengths of the Jacobian columns of the free parameters.
     scale: DVector<f64>,
     gram: DMatrix<f64>,
     gradient: DVector<f64>,
@@ -140,7 +142,7 @@ impl<'a> Local<'a> {
 pub(super) struct Effort {
     /// Maximum number of steps.
     pub(super) steps: usize,
-    /// Predicted decrease, relative to the sum of squares, that ends the search.
+    /// Predicted decrease of the sum of squares, relative to this sum, below which the search ends.
     pub(super) tolerance: f64,
 }
 
@@ -213,8 +215,8 @@ fn ended(local: &Local<'_>, parameters: &[f64], cost: f64) -> Minimum {
     Minimum { parameters: parameters.to_vec(), cost, numbers, steps: 0, converged: false, at_bound }
 }
 
-/// Takes the last step if it does not increase the sum of squares; its effect on the sum is
-/// negligible.
+/// Returns the minimum after the last Gauss–Newton step; if this step increases the sum of squares,
+/// returns `end` without the step. The effect of the step on the sum is negligible.
 fn polished(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,
@@ -237,8 +239,8 @@ fn cost_at(problem: &impl LeastSquaresProblem, parameters: &[f64]) -> Option<f64
     problem.evaluate(parameters).map(|evaluation| problem.residual(&evaluation).norm_squared())
 }
 
-/// Returns the next parameters, which have a lower sum of squares, and their residual; `None` if no
-/// damping gives a lower sum, or the time limit is over.
+/// Returns the next parameters, which have a lower sum of squares, and their residual; `None` if
+/// the sum is lower for no damping λ of the step, or after the end of the time limit.
 fn descend<P: LeastSquaresProblem>(
     problem: &P,
     bounds: &Bounds,
@@ -343,7 +345,8 @@ mod tests {
         assert_eq!(minimum.at_bound, [false, false]);
     }
 
-    /// With x ≤ ½ the minimum is at y = ¼.
+    /// With the bound x ≤ ½, the search ends at x = ½ and y = ¼, and reports that x is at its
+    /// bound.
     #[test]
     fn a_bound_holds_and_is_reported() {
         let half = bounds([f64::NEG_INFINITY; 2], [0.5, f64::INFINITY]);

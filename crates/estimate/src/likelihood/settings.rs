@@ -7,12 +7,13 @@ use super::LikelihoodError;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum NoiseSource {
-    /// Covariance that the data state; the residual if they state none.
+    /// Covariance that the data state; if the data state none, it is estimated from the residual.
     #[default]
     Automatic,
-    /// Residual, as white noise of unknown level in every output.
+    /// Covariance estimated from the residual: white noise of unknown level in every output.
     WhiteResidual,
-    /// Residual, as noise with a smooth unknown spectrum in every output.
+    /// Covariance estimated from the residual: noise with a smooth unknown spectrum in every
+    /// output.
     SmoothResidual,
 }
 

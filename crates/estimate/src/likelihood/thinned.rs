@@ -1,4 +1,4 @@
-//! One of every n lines of the data, for the first steps of a search.
+//! Selection of one line out of every n lines of the data, for the first steps of a search.
 
 use mechid_spectra::LineData;
 use mechid_spectra::thinning::thinned_rows;
@@ -9,7 +9,7 @@ use super::residual::Residual;
 use super::response_model::{Dimensions, ResponseModel};
 use super::transient;
 
-/// A model at some of its lines.
+/// A model on selected lines.
 pub(super) struct Thinned<'a, M> {
     model: &'a M,
     pub(super) rows: Vec<usize>,

@@ -37,7 +37,8 @@ pub(super) struct RecordUnknowns<'a> {
 }
 
 impl<'a> RecordUnknowns<'a> {
-    /// Returns the unknowns of the record with these rows.
+    /// Creates the linear unknowns of the record with these rows; `transient` is the number of
+    /// unknowns of its transient.
     pub(super) fn new(data: &'a LineData, rows: &Range<usize>, transient: usize) -> Self {
         let omega = &data.omega()[rows.clone()];
         let reference = omega.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
@@ -86,7 +87,7 @@ impl<'a> RecordUnknowns<'a> {
     }
 }
 
-/// Weighted responses of a line to the linear unknowns of its record.
+/// Weighted responses, at one line, to the linear unknowns of its record.
 pub(super) struct LineColumns {
     /// L⁻¹ times the response to the state loads, p × states.
     pub(super) states: Option<DMatrix<Complex<f64>>>,
@@ -138,7 +139,7 @@ impl LineColumns {
 pub(super) struct TransientBasis {
     /// Rows of Q.
     pub(super) blocks: Vec<DMatrix<f64>>,
-    /// Factor R of the independent columns.
+    /// Triangular factor R of the linearly independent columns.
     triangle: DMatrix<f64>,
     permutation: PermutationSequence<Dyn>,
     /// Lengths of the columns of A.

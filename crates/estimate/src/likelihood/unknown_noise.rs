@@ -26,7 +26,7 @@ pub(super) struct WeightedMinimum {
     pub(super) bases: Vec<DMatrix<f64>>,
 }
 
-/// Data and model of all rounds.
+/// Data, model, priors and bounds, which are the same in all rounds.
 pub(super) struct UnknownNoise<'a, M> {
     pub(super) model: &'a M,
     pub(super) data: &'a LineData,

@@ -11,8 +11,8 @@ pub(super) struct Weights {
     covariance: Vec<DMatrix<Complex<f64>>>,
     outputs: usize,
     inputs_are_exact: bool,
-    /// Lower triangular factors of the covariance of the outputs, for exact inputs; empty if one of
-    /// them does not exist.
+    /// Lower triangular factors of the covariance of the outputs, for exact inputs; empty if one
+    /// factor does not exist.
     lower: Vec<DMatrix<Complex<f64>>>,
 }
 
@@ -95,8 +95,8 @@ impl Weights {
         (gain * of_inputs * gain.adjoint())[(0, 0)].re
     }
 
-    /// Factors S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ plus the covariance of an uncertain model;
-    /// `None` if the sum is singular.
+    /// Computes the Cholesky factor of S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ plus the covariance of
+    /// an uncertain model; `None` if the sum is singular.
     pub(super) fn line(
         &self,
         row: usize,

@@ -28,13 +28,14 @@ use crate::{Estimate, EstimateError};
 ///
 /// `between` is the factor and the interpolation of a refined fit: the prediction takes `factor`
 /// steps per interval, under the interpolated force. Motions between the samples are not used, so
-/// an interval has one error for any number of points. The discretisation defines the force between
-/// points; for Euler's rule the force is held.
+/// each interval has one missing force for any `factor`. The discretisation defines the force
+/// between points; for Euler's rule the force is held.
 ///
 /// # Errors
-/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not fit the machine or
-/// each other, or cannot be refined; [`EstimateError::Undetermined`] if the data do not determine
-/// the machine; [`NumericsError::TooFewRows`].
+/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the sizes or time axes of the records do
+/// not agree with the machine or with each other, or if the records cannot be refined;
+/// [`EstimateError::Undetermined`] if the data do not determine the machine;
+/// [`NumericsError::TooFewRows`].
 ///
 /// # Source
 /// Dissertation Appendix B for the refinement.
@@ -53,7 +54,8 @@ pub fn missing_force(
     let (factor, way) = between.unwrap_or((1, Interpolation::Linear));
     let finer = refine(force, factor, way)?;
     let step = Step::new(&system, finer.sampling().dt(), discretisation)?;
-    // Only a Fourier series is defined after the last sample.
+    // Band-limited interpolation is a Fourier series, which is defined after the last sample; the
+    // other interpolations are not.
     let goes_on = between.is_none_or(|(_, way)| way == Interpolation::BandLimited);
     let (samples, dt) = (force.len(), force.sampling().dt());
     let closes = extent == Extent::WholePeriod && goes_on;

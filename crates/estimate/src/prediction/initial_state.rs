@@ -57,7 +57,7 @@ pub struct StartFit {
 }
 
 impl StartFit {
-    /// Creates a fit without a sample.
+    /// Creates a fit that contains no sample yet.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if the machine has no degree of freedom.
@@ -98,7 +98,8 @@ impl StartFit {
             *run = last(&response)?;
             responses.push(response);
         }
-        // The first sample of a later segment is already in the sums.
+        // A later segment begins with the last sample of the preceding one, which is already in the
+        // sums.
         let first = usize::from(!self.channels.is_empty());
         if first == 0 {
             let channels = n * measured.len();
@@ -136,7 +137,7 @@ impl StartFit {
         let width = 2 * n + 1;
         let mut rows = DMatrix::zeros(self.channels.len() * width, width);
         for (at, (factor, size)) in self.channels.iter().zip(&self.sizes).enumerate() {
-            // A segment that was refused can leave channels without rows.
+            // A segment that was rejected can leave channels without rows.
             if factor.rows() > 0 {
                 let scale = if *size > 0.0 { size.sqrt() } else { 1.0 };
                 rows.rows_mut(at * width, width).copy_from(&factor.r().unscale(scale));
@@ -164,7 +165,8 @@ impl StartFit {
     }
 }
 
-/// Returns the state at the last sample; it is rest if the squares of the state underflow.
+/// Returns the state at the last sample; if the squares of all its values underflow, the returned
+/// state is zero.
 fn last(response: &Response) -> Result<InitialState, EstimateError> {
     let last_sample = |record: &Record| record.data().row(record.len() - 1).transpose();
     let (x, v) = (last_sample(response.displacement()), last_sample(response.velocity()));

@@ -13,7 +13,7 @@ use crate::EstimateError;
 pub(super) struct Continuous {
     dt: f64,
     dof: usize,
-    /// `None` for Euler, where AΔt = Φ − I.
+    /// Matrix logarithm and its derivative; `None` for Euler's rule, where AΔt = Φ − I.
     generator: Option<Generator>,
     /// \[A B\]: 2n × (2n + forces).
     pub(super) value: DMatrix<f64>,

@@ -19,7 +19,8 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
 pub struct TimeDomainFit {
     estimate: Estimate,
     discretisation: Discretisation,
-    /// \[Φ − I, Γ(, Γ⁺)\], with zeros for omitted forces.
+    /// \[Φ − I, Γ\] or, with coefficients for the force at the next sample, \[Φ − I, Γ, Γ⁺\]; zeros
+    /// for omitted forces.
     change: DMatrix<f64>,
     state_matrix: DMatrix<f64>,
     dt: f64,
@@ -32,7 +33,8 @@ struct Fitted<'a> {
     continuous: Continuous,
 }
 
-/// Sensitivity of a parameter to \[A₂₁ A₂₂ B₂\]: dp = −Σ_j M_ij weight · d(row j).
+/// Sensitivity of a parameter to \[A₂₁ A₂₂ B₂\]: dp = −Σ_j M_ij weight · d(row j), where i is
+/// `equation` and row j belongs to this matrix.
 struct Sensitivity {
     equation: usize,
     weight: RowDVector<f64>,
@@ -110,7 +112,8 @@ impl TimeDomainFit {
     ///
     /// # Errors
     /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size), [`EstimateError::Signal`],
-    /// [`EstimateError::Step`] if the record does not fit.
+    /// [`EstimateError::Step`] if the channels, the sampling or the time step of the record do not
+    /// agree with those of the fit.
     ///
     /// # Source
     /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 3 (prediction).
@@ -146,11 +149,12 @@ impl TimeDomainFit {
     }
 }
 
-/// Regression of the increments on states and forces.
+/// Regression of the state increments z⁺ − z on states and forces.
 pub(super) struct Regression {
     /// Indices of the forces that are not identically zero.
     forces: Vec<usize>,
-    /// True if the force at the next sample has coefficients, too.
+    /// True if the regression has coefficients for the force at the next sample in addition to
+    /// those for the force at the present sample.
     two_forces: bool,
     pub(super) solution: Solution,
     /// Coefficients, regressors × 2n; if several sets fit equally well, the set with the smallest
@@ -192,7 +196,8 @@ impl Regression {
         change
     }
 
-    /// Returns \[Φ − I, Γ(, Γ⁺)\] with zeros for omitted forces.
+    /// Returns \[Φ − I, Γ\] or, with coefficients for the force at the next sample, \[Φ − I, Γ,
+    /// Γ⁺\], with zeros for omitted forces.
     fn all_forces(&self, n: usize) -> DMatrix<f64> {
         let groups = if self.two_forces { 2 } else { 1 };
         let mut change = DMatrix::zeros(2 * n, (2 + groups) * n);

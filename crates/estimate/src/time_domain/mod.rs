@@ -81,7 +81,7 @@ impl TimeDomain {
     ///
     /// # Errors
     /// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size)
-    /// if the records do not belong together, and as [`Transitions::fit`].
+    /// if the records do not belong together, and the errors of [`Transitions::fit`].
     pub fn fit(
         &self,
         displacement: &Record,

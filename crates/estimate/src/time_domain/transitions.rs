@@ -51,7 +51,7 @@ impl Transitions {
         self.dt
     }
 
-    /// Number of pairs so far.
+    /// Number of pairs of neighbouring measured samples that have been added.
     pub fn rows(&self) -> usize {
         self.factor.rows()
     }

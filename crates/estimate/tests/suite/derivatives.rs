@@ -88,8 +88,9 @@ fn the_published_coefficients_come_out() {
     }
 }
 
-/// The error of the centred window of order p is of order Δt^(p+1−d) or better: half the step must
-/// reduce the error of the identified matrices by a factor of at least 2³ for order 4, d = 2.
+/// The error of the d-th derivative by the centred window of order p is of order Δt^(p+1−d) or
+/// better. Half the step must therefore reduce the error of the identified matrices by a factor of
+/// at least 2³ for order 4 and d = 2.
 #[test]
 fn an_open_record_is_identified_as_well_as_its_step_allows() {
     let unknowns = Unknowns::unknown_mass(2).unwrap();

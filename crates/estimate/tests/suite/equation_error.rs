@@ -13,7 +13,8 @@ use crate::common::{
     bearing, displacements, forces, oscillator, relative_error, sampling, synthesise,
 };
 
-/// Five masses in a chain with a follower force: no symmetric matrix, all modes stable.
+/// Returns a chain of five masses with a follower force: no matrix is symmetric, and all modes are
+/// stable.
 fn chain() -> SecondOrderSystem {
     let k = DMatrix::from_fn(5, 5, |i: usize, j: usize| match i.abs_diff(j) {
         0 => 900.0 + 100.0 * i as f64,
@@ -128,7 +129,7 @@ fn an_unforced_direction_needs_a_known_mass() {
 
 #[test]
 fn parameters_that_are_not_excited_are_named_and_the_others_stay_right() {
-    // The second direction is held: the data do not determine its parameters.
+    // The second direction does not move, so the data do not determine its parameters.
     let (w, n) = (vec![10.0, 20.0, 30.0, 40.0], 4);
     let force = forces(&[1, 2, 3, 4], 2, 1.0);
     let motion = DMatrix::from_fn(n, 2, |l, c| {

@@ -18,8 +18,8 @@ struct Data {
 }
 
 impl Data {
-    /// Random motions, which need not be motions of the system, and the forces that give these
-    /// motions, with noise.
+    /// Draws random motions, which need not be motions of the system, and computes the forces that
+    /// cause these motions. Noise is added to the forces.
     fn new(mck: [&DMatrix<f64>; 3], rows: usize, noise: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let n = mck[0].nrows();
@@ -59,7 +59,7 @@ fn every_pattern_of_unknowns_gives_the_system_back() {
         .unwrap();
     for unknowns in [Unknowns::known_mass(m).unwrap(), Unknowns::unknown_mass(2).unwrap(), partly] {
         let found = data.rows().solve(&unknowns).unwrap();
-        // Columns are well conditioned: only rounding of forces of 4e6 N remains.
+        // The columns are well conditioned: only rounding errors of forces of 4e6 N remain.
         for (got, true_) in [(found.mass(), m), (found.damping(), c), (found.stiffness(), k)] {
             assert!((got - true_).abs().max() < 1e-7, "{found}");
         }
@@ -90,7 +90,8 @@ fn covariance_is_that_of_the_normal_equations() {
             let ((i, a), (j, b)) = (at(p), at(q));
             let expected = s[(i, j)] * inverse[(a, b)];
             let scale = (s[(i, i)] * s[(j, j)]).sqrt() * inverse.max();
-            // Residuals of 30 N are differences of forces of 4e6 N: ε·4e6/30 = 3e-11, summed.
+            // Residuals of 30 N are differences of forces of 4e6 N. Their relative rounding error
+            // is ε·4e6/30 = 3e-11 and adds up over the rows.
             assert!((found.covariance()[(p, q)] - expected).abs() < 1e-9 * scale, "{p} {q}");
         }
     }
@@ -165,7 +166,8 @@ fn intervals_follow_students_t() {
     assert_eq!(found.parameter("k").unwrap().interval(0.9).unwrap()[1], f64::INFINITY);
 }
 
-/// A Vandermonde block of condition 1e10 (scaled): normal equations cannot resolve it.
+/// The regressors are a Vandermonde block with a (scaled) condition number of 1e10. The solution is
+/// accurate, although normal equations cannot resolve this block.
 #[test]
 fn ill_conditioned_rows_keep_the_accuracy_normal_equations_lose() {
     let t = |row: usize| 1.0 + 1e-3 * row as f64 / 2000.0;
@@ -175,7 +177,7 @@ fn ill_conditioned_rows_keep_the_accuracy_normal_equations_lose() {
     rows.push_rows(regressors.as_view(), targets.as_view()).unwrap();
     let solution = rows.solve().unwrap();
     assert!(solution.condition > 1e10 && solution.undetermined.is_empty());
-    // Condition × ε × √rows, and the right-hand side is itself rounded.
+    // The error is about the condition number × ε × √rows; the right-hand side is also rounded.
     let bound = solution.condition * f64::EPSILON * 50.0;
     assert!(solution.coefficients.iter().all(|c| (c - 1.0).abs() < bound), "{solution:?}");
 }

@@ -35,7 +35,8 @@ fn correlations_do_not_depend_on_the_unit() {
     assert!(matches!(whiteness(&broken, 20), Err(SignalError::NotFinite { sample: 7, .. })));
 }
 
-/// m ẍ + c ẋ + k x = F at random instants, each quantity in a unit of its own.
+/// Returns k from m ẍ + c ẋ + k x = F at random instants, with these units of the response and of
+/// the force.
 fn equations(response_unit: f64, force_unit: f64) -> Result<f64, EstimateError> {
     let motion = [3, 5, 8].map(|seed| DMatrix::from_iterator(200, 1, noise(seed)));
     let force = (&motion[0] * 2.0 + &motion[1] * 0.3 + &motion[2] * 50.0) * force_unit;

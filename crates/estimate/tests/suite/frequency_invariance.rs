@@ -12,7 +12,8 @@ use crate::common::{bearing, displacements, forces};
 
 const LINES: usize = 40;
 
-/// A measurement of the bearing with noise on the displacement, and the covariance of this noise.
+/// Returns the angular frequencies, forces and displacements of a measurement of the bearing, with
+/// noise on the displacements.
 fn measurement(seed: u64) -> (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f64>>) {
     let lines: Vec<usize> = (1..=LINES).collect();
     let omega: Vec<f64> = lines.iter().map(|n| *n as f64 * 0.1).collect();
@@ -26,7 +27,7 @@ fn measurement(seed: u64) -> (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f
     (omega, force, motion)
 }
 
-/// The same measurement with forces P F and displacements Q X.
+/// Returns the data of the measurement with forces P F and displacements Q X.
 fn data(seed: u64, p: &DMatrix<f64>, q: &DMatrix<f64>) -> FrequencyData {
     let (omega, force, motion) = measurement(seed);
     let turned =
@@ -51,7 +52,8 @@ fn estimates(p: &DMatrix<f64>, q: &DMatrix<f64>) -> [Estimate; 3] {
     ]
 }
 
-/// Map of the twelve entries if M, C and K become P M Q⁻¹ and so on.
+/// Returns the matrix, 12 × 12, that maps the entries of M, C and K to the entries of P M Q⁻¹, P C
+/// Q⁻¹ and P K Q⁻¹.
 fn map(p: &DMatrix<f64>, q: &DMatrix<f64>) -> DMatrix<f64> {
     let inverse = q.clone().lu().solve(&DMatrix::identity(2, 2)).unwrap();
     DMatrix::from_fn(12, 12, |to, from| {
@@ -63,7 +65,8 @@ fn map(p: &DMatrix<f64>, q: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Scales of force and length, an exchange of the directions, a rotation of the axes.
+/// Returns random changes P of the forces and Q of the displacements: scales of force and length,
+/// an exchange of the directions, and a rotation of the axes.
 fn change() -> impl Strategy<Value = (DMatrix<f64>, DMatrix<f64>)> {
     let scale = || (-3.0..3.0f64).prop_map(|e| 10f64.powf(e));
     (scale(), scale(), any::<bool>(), -3.2..3.2f64).prop_map(|(force, length, exchange, angle)| {

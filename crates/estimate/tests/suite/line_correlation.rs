@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 /// Number of lines of a table.
 const LINES: usize = 300;
 
-/// Receptances with noise at lines 1 to [`LINES`], smoothed over neighbouring lines.
+/// Returns receptances at lines 1 to [`LINES`]; their noise is smoothed over neighbouring lines.
 fn table(weights: [f64; 3], seed: u64) -> FrequencyData {
     let system = Sdof::new(5.0, 60.0, 6e4).unwrap().system();
     let sampling = Sampling::new(1.0, LINES + 2).unwrap();
@@ -29,7 +29,8 @@ fn table(weights: [f64; 3], seed: u64) -> FrequencyData {
     FrequencyData::from_responses(&omega, &response, None, quantity, &[0]).unwrap()
 }
 
-/// Smoothing by ½, 1, ½ correlates neighbours by 2/3 and the next lines by 1/6: the variance is
+/// The intervals contain the truth for independent and for smoothed lines. The weights ½, 1, ½
+/// correlate neighbouring lines by 2/3 and lines at a distance of two by 1/6, so the variance is
 /// 8/3 times that of independent lines.
 #[test]
 fn intervals_hold_for_independent_and_for_smoothed_lines() {
@@ -45,7 +46,7 @@ fn intervals_hold_for_independent_and_for_smoothed_lines() {
             ratios.push(fit.variance_ratio);
         }
         let mean = ratios.iter().sum::<f64>() / 100.0;
-        // Of 300 intervals 285 hold on average, with a standard deviation of 4.
+        // On average, 285 of 300 intervals contain the truth, with a standard deviation of 4.
         assert!(held >= 273, "{weights:?}: {held} of 300");
         assert!((mean / ratio - 1.0).abs() < 0.1, "{weights:?}: {mean}");
     }

@@ -30,8 +30,8 @@ fn identified(system: &SecondOrderSystem, noise: f64) -> Estimate {
     equation_error(&data, &Unknowns::unknown_mass(system.dof()).unwrap()).unwrap()
 }
 
-/// The modes are printed in Appendix E, where the two damping ratios are interchanged, and the
-/// column of shapes with the heading y1/y2 has y2/y1.
+/// The computed modes agree with Appendix E of the dissertation. There the two damping ratios are
+/// interchanged, and the column of shapes with the heading y1/y2 has y2/y1.
 #[test]
 fn the_system_of_steffen_and_rade_has_its_published_modes() {
     let modes = identified(&steffen_rade(), 0.0).modes().unwrap();
@@ -53,7 +53,7 @@ fn the_system_of_steffen_and_rade_has_its_published_modes() {
     }
 }
 
-/// Returns the index of the entry of a shape that is 1 by its scaling.
+/// Returns the index of the entry of a mode shape that is 1 because of its scaling.
 fn one(shape: &DVector<Complex<f64>>) -> usize {
     shape.iter().position(|z| *z == Complex::from(1.0)).unwrap()
 }
@@ -89,7 +89,8 @@ fn standard_errors_follow_from_differences_of_the_modes() {
         };
         let count = theta.len();
         let n = system.dof();
-        // Per mode: frequencies, damping ratio, and the shape's parts, by central differences.
+        // Central differences give the gradients of each mode: its two frequencies, its damping
+        // ratio, and the real and imaginary parts of its shape.
         let mut gradients = vec![DMatrix::zeros(3 + 2 * n, count); modes.len()];
         for at in 0..count {
             let ((up, step), (down, _)) = (moved(at, 1.0), moved(at, -1.0));
@@ -131,14 +132,14 @@ fn modes_that_do_not_oscillate_have_a_frequency_of_zero_without_error() {
     for mode in &modes {
         assert_eq!(mode.damped_frequency_hz.value, 0.0);
         assert_eq!(mode.damped_frequency_hz.standard_error, 0.0);
-        // ζ = c / (2 √(km)) of the pair.
+        // The pair of real poles has ζ = c / (2 √(km)).
         assert!((mode.damping_ratio.value - 1.25).abs() < 1e-3, "{mode:?}");
         assert!(mode.natural_frequency_hz.standard_error > 0.0);
     }
     assert_eq!((modes[0].partner, modes[1].partner), (Some(1), Some(0)));
 }
 
-/// Machine with independent errors of its m, c, k.
+/// Returns a machine whose m, c and k have independent errors.
 fn uncertain(values: [f64; 3], errors: [f64; 3]) -> UncertainSystem {
     let system =
         SecondOrderSystem::new(dmatrix![values[0]], dmatrix![values[1]], dmatrix![values[2]]);
@@ -195,8 +196,9 @@ fn poles_and_damping_ratio_are_those_of_the_closed_form_above_critical_damping_t
     }
 }
 
-/// Free–free chains of two and three masses with all entries estimated: the stiffness is singular
-/// within its error, and the elastic modes are not rigid-body modes.
+/// Free–free chains of two and three masses, with the mass known and all other entries estimated:
+/// the stiffness is singular within its error, so the rigid-body mode is recognised. The elastic
+/// modes are not reported as rigid-body modes.
 #[test]
 fn a_rigid_body_mode_is_called_one_and_its_interval_contains_zero() {
     let chains = [
@@ -234,7 +236,7 @@ fn a_rigid_body_mode_is_called_one_and_its_interval_contains_zero() {
             assert!(others.iter().all(|mode| !mode.is_rigid_body));
         }
     }
-    // An interval of 95 % misses zero in 2.5 of 50 runs.
+    // On average, an interval of 95 % does not contain zero in 2.5 of 50 runs.
     assert!(called + 7 >= runs, "{called} of {runs}");
 }
 
@@ -261,14 +263,14 @@ fn warnings(damping: f64, noise: f64, runs: u64) -> (usize, usize) {
     (found.len(), warned.count())
 }
 
-/// The reference is the growth rate −c / 2m. At a level of 1 %, 1.5 ± 1.2 of 150 estimates of a
-/// machine that neither grows nor decays give a false alarm.
+/// The reference is the growth rate −c / 2m. If the free response neither grows nor decays, 1.5 ±
+/// 1.2 of 150 estimates give a false alarm at a level of 1 %.
 #[test]
 fn growth_is_told_where_noise_does_not_explain_it() {
     let (growing, warned) = warnings(1e-6, 0.05, 150);
     assert!((51..=99).contains(&growing), "{growing}");
     assert!(warned <= 6, "{warned}");
-    // Lightly damped: ζ of 0.1 %.
+    // A lightly damped oscillator: ζ is 0.1 %.
     let (_, warned) = warnings(0.447, 0.01, 60);
     assert_eq!(warned, 0);
     assert_eq!(warnings(-9.0, 0.01, 20), (20, 20));
@@ -305,7 +307,8 @@ fn intervals_of_frequency_and_damping_hold() {
         .collect();
     for quantity in 0..4 {
         let coverage = held.iter().filter(|h| h[quantity]).count() as f64 / runs as f64;
-        // As for the parameters themselves: 95 % ± three times 0.7 %.
+        // The share has a standard deviation of 0.7 %; the limits are about three standard
+        // deviations from 95 %.
         assert!((0.93..=0.97).contains(&coverage), "{quantity}: {coverage}");
     }
 }

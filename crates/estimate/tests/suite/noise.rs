@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 
-/// Records of `periods` periods of a steady state, with the motion in the requested quantity.
+/// Records of several periods of a steady state, with the response in the quantity `measured`.
 struct Setup {
     lines: Lines,
     force: Record,
@@ -77,7 +77,8 @@ fn the_scatter_of_the_periods_is_the_noise_that_was_added() {
         let found = periods.noise(pooling).unwrap();
         assert_eq!(found.degrees_of_freedom(), averages);
         for row in 0..40 {
-            // The known noise is that of one period, the estimated noise that of the mean of 400.
+            // The known noise is that of one period; the estimated noise is that of the mean of 400
+            // periods.
             let expected = known.covariance(row) / Complex::from(400.0);
             for i in 0..4 {
                 let variance = expected[(i, i)].re;
@@ -113,8 +114,8 @@ fn without_noise_every_estimator_is_exact() {
     }
 }
 
-/// Share of 95 % intervals that contain the truth, and mean error over standard deviation, per
-/// parameter.
+/// Returns for each parameter the share of 95 % intervals that contain the truth, and the mean
+/// error divided by the standard deviation.
 fn judge(
     system: &SecondOrderSystem,
     runs: u64,
@@ -152,7 +153,8 @@ fn noise_on_the_force_is_allowed_for() {
     };
     let (coverage, bias, misfit) = judge(&system, 1000, fit);
     for (coverage, bias) in coverage.iter().zip(&bias) {
-        // 95 % of 1,000 scatters by 0.7 %, a mean of 1,000 by 1/√1000 = 0.03.
+        // In 1,000 runs, a share of 95 % has a standard deviation of 0.7 %. The mean of 1,000
+        // errors of unit variance has a standard deviation of 1/√1000 = 0.03.
         assert!((0.925..=0.975).contains(coverage), "{coverage}");
         assert!(bias.abs() < 0.12, "{bias}");
     }
@@ -195,7 +197,7 @@ fn one_period_is_weighted_by_its_own_residual() {
 
 #[test]
 fn a_model_that_is_wrong_shows_in_the_misfit() {
-    // Two degrees of freedom, one of them tested.
+    // The bearing has two degrees of freedom, but the fitted model has one.
     let system = bearing();
     let setup = setup(&system, 8, ResponseQuantity::Displacement);
     let one = |r: &Record| Record::from_channel(r.sampling(), r.channel(0).to_vec()).unwrap();
@@ -207,7 +209,8 @@ fn a_model_that_is_wrong_shows_in_the_misfit() {
     assert!(fit.misfit_ratio > 100.0, "{}", fit.misfit_ratio);
 }
 
-/// Only the stiffness of the first equation is unknown; the second equation has no unknowns.
+/// All estimators find a single unknown, a stiffness in the first equation; the second equation has
+/// no unknowns.
 #[test]
 fn a_single_unknown_is_found_by_all() {
     let system = bearing();
@@ -306,8 +309,8 @@ fn noise_that_cannot_weigh_is_refused() {
     assert!(matches!(size, NumericsError::Size { expected: 1, got: 40, .. }), "{size:?}");
 }
 
-/// The reference is the noise on the lines of the seven periods as one record, between the lines of
-/// one period.
+/// Periods that are added in several parts give the same result as one record. The reference for
+/// the noise is the spectrum of all seven periods, at the lines between the lines of one period.
 #[test]
 fn periods_may_come_a_few_at_a_time() {
     let setup = setup(&bearing(), 7, ResponseQuantity::Velocity);
@@ -331,7 +334,8 @@ fn periods_may_come_a_few_at_a_time() {
     let all = Lines::new(force.sampling(), 1..=300).unwrap();
     let [f, v] = [&force, &motion].map(|record| all.read(record).unwrap());
     for (line, place) in setup.lines.as_slice().iter().enumerate().step_by(17) {
-        // Displacements from velocities, both at the line of the period.
+        // The spectrum of all periods together has lines between the lines of one period. The
+        // velocities at these lines are divided by iω of the nearest line of one period.
         let per_displacement = Complex::new(0.0, setup.lines.omega()[line]);
         let z = |at: usize| {
             DMatrix::from_fn(4, 1, |i, _| match i {

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 const LEVEL: f64 = 0.05;
 const KIND: ResponseQuantity = ResponseQuantity::Displacement;
 
-/// x_k = 0.9 x_{k−1} + e_k, of unit power.
+/// Returns the process x_k = 0.9 x_{k−1} + e_k with unit power.
 fn autoregressive(len: usize, seed: u64) -> Vec<f64> {
     const BEFORE: usize = 200;
     let time = Sampling::new(1.0, len + BEFORE).unwrap();
@@ -32,7 +32,8 @@ fn white(len: usize, seed: u64) -> Vec<f64> {
     noise::white(time, 1, 1.0, seed).unwrap().channel(0).to_vec()
 }
 
-/// 10 ẍ + 67 ẋ + 45000 x = F with its mode at line 12, driven on 100 lines.
+/// Test of the oscillator 10 ẍ + 67 ẋ + 45000 x = F. Its natural frequency is at line 12, and the
+/// force has 100 lines.
 struct Rig {
     system: SecondOrderSystem,
     /// One period.
@@ -67,8 +68,8 @@ impl Rig {
         RepeatedPeriods::new(&self.lines, &force, &x, KIND).unwrap()
     }
 
-    /// Returns the standard errors of maximum likelihood with a known noise spectrum of unit power,
-    /// given by the angle from sample to sample.
+    /// Returns the standard errors of maximum likelihood with a known noise spectrum of unit power;
+    /// `power` is a function of the phase angle per sample, in rad.
     fn bound(&self, power: impl Fn(f64) -> f64) -> Vec<f64> {
         let (period, all) = (self.lines.sampling(), self.lines.as_slice().iter());
         let samples = (period.len() * self.periods) as f64;
@@ -84,8 +85,8 @@ impl Rig {
         fit.estimate.parameters().map(|p| p.standard_error).collect()
     }
 
-    /// Smallest and largest share of 95 % intervals that contain the truth, and largest ratio of
-    /// the scatter to the bound.
+    /// Returns the smallest and the largest share of 95 % intervals that contain the truth, and the
+    /// largest ratio of the scatter to the bound.
     fn judge(&self, pooling: Pooling, bound: &[f64], runs: u64) -> [f64; 3] {
         let unknowns = Unknowns::unknown_mass(1).unwrap();
         let fits: Vec<_> = (0..runs)
@@ -116,10 +117,11 @@ impl Rig {
     }
 }
 
-/// The intervals contain the truth in 91 to 95 % of the runs: the mode is where the noise begins to
-/// fall, on few lines. Of 150 intervals of 92 % fewer than 85 % do so with a probability of 0.002,
-/// and standard deviations of 150 runs scatter by 6 %. With noise assumed white, some 70 to 76 % of
-/// the intervals contain the truth.
+/// The intervals contain the truth in 91 to 95 % of the runs. The coverage is not always 95 %,
+/// because the mode has few lines, and the noise spectrum begins to fall at these lines. The
+/// probability that fewer than 85 % of 150 intervals of 92 % contain the truth is 0.002, and
+/// standard deviations of 150 runs have an uncertainty of 6 %. If the noise is assumed white, about
+/// 70 to 76 % of the intervals contain the truth.
 #[test]
 fn intervals_hold_under_coloured_noise_of_few_periods() {
     for periods in [1, 2, 4] {
@@ -154,8 +156,8 @@ fn the_noise_model_is_chosen_from_the_scatter() {
         let coloured = models(&rig, &autoregressive);
         let count = share(&coloured, &|m| matches!(m, NoiseModel::Smooth { order: 1.., .. }));
         assert!(count >= 80, "{periods} periods: {count} of 100 smooth");
-        // A sine with five times the size of the noise and a frequency that drifts away from line
-        // 50.
+        // A sine whose amplitude is five times the RMS of the noise; its frequency is 0.3 line
+        // spacings above line 50.
         let spacing_hz = rig.lines.sampling().line_spacing_hz();
         let period = rig.lines.sampling().len() as f64;
         let disturbed = |len: usize, seed| {
@@ -174,9 +176,9 @@ fn the_noise_model_is_chosen_from_the_scatter() {
     }
 }
 
-/// The reference is the closed-form response to an unmeasured force whose period is four times as
-/// long as the record. If this noise is assumed to have a smooth spectrum, the tests of the
-/// residual warn.
+/// The noise is the closed-form response to an unmeasured force whose period is four times as long
+/// as the record. The noise model finds this force, and the tests of the residual then rarely warn.
+/// With a smooth noise spectrum instead, the tests warn in at least a third of the runs.
 #[test]
 fn an_unmeasured_force_is_found_and_is_no_cause_for_warnings() {
     const RUNS: u64 = 24;

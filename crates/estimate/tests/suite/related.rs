@@ -12,7 +12,8 @@ use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 /// Damping factors α (1/s) and β (s).
 const FACTORS: [f64; 2] = [0.4, 2e-4];
 
-/// Masses in a row, each on its own spring, with proportional damping.
+/// Returns a chain of `n` masses with proportional damping; each mass also has a spring to the
+/// ground.
 fn chain(n: usize) -> SecondOrderSystem {
     let vary = |at: usize, share: f64| 1.0 + share * (2.3 * at as f64).sin();
     let mass = DMatrix::from_fn(n, n, |i, j| if i == j { 2.0 * vary(i, 0.4) } else { 0.0 });
@@ -25,7 +26,8 @@ fn chain(n: usize) -> SecondOrderSystem {
     SecondOrderSystem::new(mass, damping, stiffness).unwrap()
 }
 
-/// Unknowns of such a chain.
+/// Returns the unknowns of a chain of `n` masses, with symmetric matrices and, if `proportional`,
+/// proportional damping.
 fn unknowns(n: usize, proportional: bool) -> Unknowns {
     let mut unknowns = Unknowns::unknown_mass(n).unwrap();
     for matrix in Matrix::ALL {
@@ -41,7 +43,7 @@ fn unknowns(n: usize, proportional: bool) -> Unknowns {
     if proportional { unknowns.proportional_damping().unwrap() } else { unknowns }
 }
 
-/// Frequencies across the modes of a machine.
+/// Returns equidistant angular frequencies over the range of the modes of a machine.
 fn omega(system: &SecondOrderSystem, lines: usize) -> Vec<f64> {
     let modes = system.modes().unwrap();
     let frequency = |mode: Option<&mechid_model::Mode>| mode.unwrap().natural_frequency();
@@ -49,7 +51,7 @@ fn omega(system: &SecondOrderSystem, lines: usize) -> Vec<f64> {
     (0..lines).map(|at| low + (high - low) * at as f64 / (lines - 1) as f64).collect()
 }
 
-/// Exact displacements under a force of 10 N at the first mass alone.
+/// Returns a force of 10 N at the first mass, and the exact displacements under this force.
 fn exact(system: &SecondOrderSystem, omega: &[f64]) -> [DMatrix<Complex<f64>>; 2] {
     let n = system.dof();
     let force = DMatrix::from_fn(omega.len(), n, |line, dof| match dof {
@@ -64,8 +66,8 @@ fn exact(system: &SecondOrderSystem, omega: &[f64]) -> [DMatrix<Complex<f64>>; 2
     [force, displacement]
 }
 
-/// The exact displacements with white noise, a fraction of the RMS of each channel, whose level is
-/// known.
+/// Returns the exact displacements with white noise of known level: a fraction `part` of the RMS of
+/// each channel.
 fn measured(system: &SecondOrderSystem, omega: &[f64], part: f64, seed: u64) -> FrequencyData {
     let [force, mut displacement] = exact(system, omega);
     let (lines, n) = displacement.shape();
@@ -126,8 +128,8 @@ fn one_force_determines_a_chain_of_unknown_masses() {
     assert!(matches!(refused, EstimateError::OnlyRatios { dof: 2, .. }), "{refused}");
 }
 
-/// A delay of half a sample is found with one force on five masses, and no delay is found without
-/// one.
+/// One force acts on five masses: delays of 0.5, −1.3 and 4 samples are found, and no delay is
+/// found in data without a delay.
 #[test]
 fn a_delay_of_the_force_on_a_chain_is_found() {
     let system = chain(5);
@@ -156,11 +158,12 @@ fn a_delay_of_the_force_on_a_chain_is_found() {
     }
 }
 
-/// Standard errors of the entries at the Cramér–Rao bound, by differences of exact responses.
+/// Returns the standard errors of the entries at the Cramér–Rao bound, from differences of exact
+/// responses.
 fn bound(system: &SecondOrderSystem, data: &FrequencyData, proportional: bool) -> DVector<f64> {
     let n = system.dof();
     let matrices = [system.mass(), system.damping(), system.stiffness()];
-    // Change of the matrices with each independent unknown.
+    // Derivatives of the matrices with respect to each independent unknown.
     let mut moves: Vec<[DMatrix<f64>; 3]> = Vec::new();
     let zero = || DMatrix::<f64>::zeros(n, n);
     for (at, matrix) in Matrix::ALL.into_iter().enumerate() {
@@ -220,8 +223,8 @@ fn bound(system: &SecondOrderSystem, data: &FrequencyData, proportional: bool) -
     )
 }
 
-/// 200 experiments on a chain of four masses with one force: coverage of the intervals, and scatter
-/// at the bound.
+/// In 200 experiments on a chain of four masses with one force, the intervals have the stated
+/// coverage and the scatter equals the Cramér–Rao bound.
 #[test]
 fn related_entries_are_estimated_at_the_bound_with_intervals_that_hold() {
     let system = chain(4);
@@ -255,7 +258,8 @@ fn related_entries_are_estimated_at_the_bound_with_intervals_that_hold() {
         assert!((0.93..=0.97).contains(&coverage), "proportional {proportional}: {coverage}");
         let ratio = (squares / runs as f64).map(f64::sqrt).component_div(&bound);
         let mean = ratio.mean();
-        // A standard deviation of 200 runs scatters by 5 %, and those of a chain are correlated.
+        // The standard deviation of 200 runs has an uncertainty of 5 %, and the standard deviations
+        // of the entries of a chain are correlated.
         assert!((0.9..1.1).contains(&mean), "proportional {proportional}: {ratio}");
         if proportional {
             let coverage = factors as f64 / (2.0 * runs as f64);
@@ -318,8 +322,8 @@ fn relations_that_contradict_are_refused() {
     assert!(matches!(refused, EstimateError::Related { .. }), "{refused}");
 }
 
-/// Two masses that no force and no spring connects to the others: the undetermined directions are
-/// named.
+/// Two masses are not connected, and only the first one has a force: the undetermined directions
+/// are named.
 #[test]
 fn what_relations_do_not_determine_is_named() {
     let system = SecondOrderSystem::new(

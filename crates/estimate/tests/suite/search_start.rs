@@ -14,9 +14,9 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::common::{oscillator, relative_error};
 
-/// Accelerances whose upper half is only noise, as above the band of a random excitation: because
-/// of their low coherence these lines have hardly any weight, in the initial estimates and in the
-/// search.
+/// Output error finds M, C and K, although the accelerances of the upper half of the lines are only
+/// noise, like lines above the band of a random excitation. The coherence of these lines is low, so
+/// they have hardly any weight in the initial estimates and in the search.
 #[test]
 fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
     let system = oscillator();
@@ -50,9 +50,9 @@ fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
     }
 }
 
-/// Displacements under a random force that ends at a third of the band: above this frequency the
-/// responses are noise divided by a very small force, which would make the identified machine far
-/// too soft for every segment length.
+/// The random force ends at a third of the band. Above this frequency, the frequency responses are
+/// noise divided by a very small force. A search that relied on these lines would find a machine
+/// that is far too soft, for every segment length.
 #[test]
 fn lines_of_next_to_no_force_do_not_lead_the_search_astray() {
     let system = oscillator();
@@ -95,8 +95,9 @@ fn measured(test: &Test, level: f64, seed: u64) -> FrequencyData {
         .unwrap()
 }
 
-/// Soft, free and one-force chains for which an earlier search found wrong minima or no end; the
-/// last one has several minima that the noise explains. The example `search_study` has 200.
+/// Chains with soft springs, free chains and chains with one force, for which an earlier search
+/// found wrong minima or did not end. The last chain has several minima that the noise explains.
+/// The example `search_study` has 200 chains.
 #[test]
 fn the_search_finds_a_minimum_as_low_as_one_from_the_true_machine() {
     for (index, level) in [(11, 7e-4), (22, 5e-3), (24, 1.3e-2), (34, 3.4e-3), (111, 1.24e-2)] {

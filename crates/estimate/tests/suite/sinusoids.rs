@@ -1,5 +1,5 @@
-//! Sinusoids in the responses of open records that are not due to a force, with known frequency and
-//! size.
+//! Detection of sinusoids in the responses of open records. No force causes these sinusoids, and
+//! their frequencies and amplitudes are known.
 
 use std::f64::consts::TAU;
 
@@ -25,7 +25,7 @@ fn rig(quantity: ResponseQuantity) -> RandomTest {
     RandomTest { system, sampling, quantity, force: 100.0 }
 }
 
-/// Force, and response with noise of 0.5 % of its RMS value.
+/// Returns the force, and the response with noise of 0.5 % of its RMS value.
 fn noisy(rig: &RandomTest, seed: u64) -> [Record; 2] {
     let [force, response] = rig.measure(seed).unwrap();
     let level = NoiseLevel::FractionOfRms(0.005);
@@ -39,16 +39,18 @@ fn fit(rig: &RandomTest, [force, response]: [&Record; 2]) -> OutputErrorFit {
     output_error(&data, &Unknowns::unknown_mass(rig.system.dof()).unwrap()).unwrap()
 }
 
-/// Mean square of the differences of parameters over their standard errors.
+/// Returns the mean square of the parameter differences between two fits, each difference divided
+/// by the standard error of `other`.
 fn gap(one: &OutputErrorFit, other: &OutputErrorFit) -> f64 {
     let pairs = one.estimate.parameters().zip(other.estimate.parameters());
     let squares = pairs.map(|(a, b)| ((a.value - b.value) / b.standard_error).powi(2));
     squares.sum::<f64>() / one.estimate.parameters().len() as f64
 }
 
-/// The references are the generator, and the fit to the same record without the sinusoids. The
-/// frequency of a sinusoid of amplitude A among N samples of noise σ is known to √24 σ/(A N^1.5 Δt)
-/// rad/s at best.
+/// Run-out adds two sinusoids to the response, between the lines. The fit finds both frequencies,
+/// and its parameters agree with those of the fit to the record without run-out. The smallest
+/// possible standard deviation of a frequency is √24 σ/(A N^1.5 Δt) rad/s, for amplitude A and
+/// noise σ in N samples.
 #[test]
 fn run_out_between_lines_does_no_harm() {
     for quantity in ResponseQuantity::ALL {
@@ -71,15 +73,15 @@ fn run_out_between_lines_does_no_harm() {
             gap(&with, &without)
         };
         let gaps: Vec<f64> = (0..2_u64).into_par_iter().map(check).collect();
-        // The lines next to a resonance contain less information if a sinusoid is there; this is
-        // the difference.
+        // A sinusoid next to a resonance reduces the information of the lines there, so the two
+        // estimates differ slightly.
         let gap = (gaps.iter().sum::<f64>() / gaps.len() as f64).sqrt();
         assert!(gap < 0.3, "{quantity}: {gap} standard errors");
     }
 }
 
-/// Fewer than one of 20 records has a sinusoid by chance. A resonance of 0.1 % damping is narrower
-/// than a line.
+/// No sinusoid is reported in six records without sinusoids, even if a resonance with 0.1 % damping
+/// is narrower than a line. By chance, fewer than one in 20 such records has a false report.
 #[test]
 fn records_without_sinusoids_have_none() {
     let light = Sdof::new(10.0, 2.0 * 0.001 * 10.0 * 157.0, 10.0 * 157.0 * 157.0).unwrap();
@@ -101,7 +103,7 @@ fn records_without_sinusoids_have_none() {
 }
 
 /// A disturbance over ten lines is noise, and a sinusoid at a line of the force may be the response
-/// of the machine.
+/// of the machine: neither is reported as a sinusoid.
 #[test]
 fn what_is_no_sinusoid_is_not_taken_for_one() {
     let rig = rig(ResponseQuantity::Displacement);
@@ -109,7 +111,8 @@ fn what_is_no_sinusoid_is_not_taken_for_one() {
         let [force, response] = noisy(&rig, seed);
         let spacing_hz = 1.0 / (SAMPLES as f64 * DT);
         let unit = response.column(0).variance().sqrt();
-        // Every line of a record eight times as long, with random phases.
+        // The disturbance has 80 neighbouring lines, with random phases, of a record eight times as
+        // long.
         let phases = noise::white(Sampling::new(1.0, 80).unwrap(), 1, 10.0, seed).unwrap();
         let disturbance = |t: f64| {
             let lines =

@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 
 use Discretisation::{Euler, FirstOrderHold, ZeroOrderHold};
 
-/// White forces on all degrees of freedom.
+/// Returns white forces on all degrees of freedom.
 fn white(sampling: Sampling, dof: usize, seed: u64) -> Record {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let data = DMatrix::from_fn(sampling.len(), dof, |_, _| random.random_range(-50.0..50.0));
@@ -48,7 +48,8 @@ fn error(found: &Estimate, system: &SecondOrderSystem) -> f64 {
     pairs.iter().map(|(a, b)| (a - *b).amax() / b.amax()).fold(0.0, f64::max)
 }
 
-/// Systems with a sampling of ten to twenty samples per period of their fastest mode.
+/// Returns systems with their names and time steps (s): ten to twenty samples per period of the
+/// fastest mode.
 fn machines() -> Vec<(&'static str, SecondOrderSystem, f64)> {
     let bearing = |sign| dissertation_bearing(sign).system();
     vec![
@@ -93,7 +94,8 @@ fn entries_that_are_known_are_held() {
     let system = dissertation_bearing(KyxSign::Minus).system();
     let force = white(Sampling::new(0.2, 400).unwrap(), 2, 3);
     let motion = exact_zoh_periodic(&system, &force).unwrap();
-    // Equal known couplings of the damping; no cross masses; the masses unknown.
+    // The masses are unknown, the mass matrix is diagonal, and one coupling of the damping is
+    // known.
     let unknowns = Unknowns::unknown_mass(2)
         .and_then(|u| u.fix(Matrix::Mass, 0, 1, 0.0))
         .and_then(|u| u.fix(Matrix::Mass, 1, 0, 0.0))
@@ -122,7 +124,7 @@ fn a_force_that_is_zero_is_left_out() {
     assert!(matches!(refused, Err(EstimateError::OnlyRatios { dof: 1, .. })), "{refused:?}");
 }
 
-/// exp(AΔt) − I by its Taylor series: the reference for the bias of Euler's rule.
+/// Returns exp(AΔt) − I by its Taylor series: the reference for the bias of Euler's rule.
 fn increment(system: &SecondOrderSystem, dt: f64) -> DMatrix<f64> {
     let small = system.state_matrix() * (dt / 1024.0);
     let mut term = small.clone();
@@ -161,13 +163,14 @@ fn the_bias_of_euler_is_that_of_one_plus_a_dt_and_shrinks_with_npi() {
             assert!(bias < 0.7 * last, "NPI {npi}: {bias}");
             last = bias;
         }
-        // At NPI = 1, with a period of 256 samples, the error is of the order of ωn Δt = 2π/256.
+        // At NPI = 1, the record of 256 samples is one natural period. The error is of the order of
+        // ωn Δt = 2π/256.
         assert!((1e-3..0.1).contains(&last));
     }
 }
 
-/// Intermediate points of a band-limited period are the samples that a faster recorder would have
-/// taken.
+/// Intermediate points of a band-limited period equal the samples of a faster recorder, so the
+/// refined record gives the same estimate as a faster record.
 #[test]
 fn a_refined_record_is_as_good_as_a_faster_one() {
     let system = dissertation_bearing(KyxSign::Minus).system();
@@ -297,15 +300,18 @@ fn records_that_do_not_belong_together_are_refused() {
     assert_eq!(Transitions::new(0, 0.1).unwrap_err(), EstimateError::NoDof);
 }
 
-/// 300 experiments with white disturbances of the state: coverage of the intervals, also through
-/// the logarithm. The binomial scatter of the coverage is 1.3 %, so 95 % ± 5 % is four times that.
+/// In 300 experiments with white disturbances of the state, 95 % of the intervals contain the
+/// truth, also for parameters from the logarithm of the transition matrix. The coverage of one
+/// parameter has a binomial standard deviation of 1.3 %; the tolerance of 5 % is four times this
+/// value.
 #[test]
 fn intervals_hold_through_the_logarithm() {
     let system = dissertation_bearing(KyxSign::Minus).system();
     let (dt, samples) = (0.3, 400);
     let states = increment(&system, dt) + DMatrix::identity(4, 4);
     let sampling = Sampling::new(dt, samples).unwrap();
-    // Γ of a held force by one exact step from rest under a unit force on each direction.
+    // One exact step from rest under a unit force on one direction gives one column of Γ of a held
+    // force.
     let gamma: Vec<_> = (0..2)
         .map(|direction| {
             let unit = Record::new(

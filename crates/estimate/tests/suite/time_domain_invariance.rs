@@ -36,13 +36,13 @@ fn mapped(record: &Record, sampling: Sampling, map: &DMatrix<f64>) -> Record {
     Record::new(sampling, record.data() * map.transpose()).unwrap()
 }
 
-/// Unknowns with a known mass, or with a diagonal unknown mass.
+/// Returns unknowns with this mass matrix if `known`, otherwise unknowns with a free mass matrix.
 fn unknowns(mass: &DMatrix<f64>, known: bool) -> Unknowns {
     if known { Unknowns::known_mass(mass).unwrap() } else { Unknowns::unknown_mass(2).unwrap() }
 }
 
-/// Maximum relative difference between equal estimates: rounding times the condition number of the
-/// regressors (below 1e3), compared with noise of 1e-3.
+/// Maximum relative difference between estimates that must be equal. It is above the rounding error
+/// times the condition number of the regressors (below 1e3), and far below the noise of 1e-3.
 const SAME: f64 = 1e-8;
 
 proptest! {
@@ -78,7 +78,8 @@ proptest! {
         }
     }
 
-    /// Rotated axes rotate the matrices; exchanged axes are numbered the other way round.
+    /// If the axes are rotated, the identified matrices are rotated; if the axes are exchanged, the
+    /// indices of their entries are exchanged.
     #[test]
     fn directions(seed in 0u64..1000, angle in -3.1..3.1f64, exchange: bool, known: bool) {
         let (s, c) = angle.sin_cos();

@@ -1,5 +1,5 @@
-//! The estimators of the time domain, on forces that are held, linear or band-limited between samples,
-//! without noise and with: hundreds of seeded experiments, each on an exact response.
+//! Time-domain estimators on forces that are held, linear or band-limited between samples, with and
+//! without noise: hundreds of seeded experiments, each on an exact response.
 
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{Estimate, Unknowns};
@@ -31,7 +31,7 @@ const ESTIMATORS: [(Estimator, &str); 4] = [
     (Estimator::EquationOfMotion, "equation of motion"),
 ];
 
-/// One period of force and exact motion.
+/// One period of a force and of the exact response to this force.
 struct Experiment {
     force: Record,
     motion: Response,
@@ -49,7 +49,8 @@ impl Experiment {
         Self { force, motion: motion.unwrap() }
     }
 
-    /// Experiment number `seed`, with independent noise on every motion.
+    /// Returns the response of the experiment with this seed, with independent noise on
+    /// displacement, velocity and acceleration.
     fn measure(&self, share: f64, seed: u64) -> Response {
         let add = |record: &Record, channel: u64| {
             noise::add_white(record, NoiseLevel::FractionOfRms(share), 3 * seed + channel).unwrap()
@@ -75,8 +76,8 @@ impl Experiment {
             .into_estimate()
     }
 
-    /// Largest bias and scatter among the parameters, relative, and the smallest and largest share
-    /// of 95 % intervals that contain the truth.
+    /// Returns four values over all parameters: the largest relative bias, the largest relative
+    /// scatter, and the smallest and the largest share of 95 % intervals that contain the truth.
     fn study(&self, estimator: Estimator, share: f64) -> [f64; 4] {
         let runs = if share > 0.0 { RUNS } else { 1 };
         let truth = [10.0, 180.0, 5000.0];
@@ -105,7 +106,7 @@ impl Experiment {
     }
 }
 
-/// The comparison in the page on estimators, computed.
+/// Computes the comparison table of the page on estimators.
 fn table() -> Vec<String> {
     let mut rows = Vec::new();
     for between in ["held", "linear", "band-limited"] {
@@ -138,8 +139,8 @@ fn the_table_of_the_time_domain_is_what_comes_out() {
     documented("<!-- time domain -->\n", "<!-- end of time domain -->\n", &all);
 }
 
-/// The main statement of the table: the estimator with the right assumption about the force is
-/// exact.
+/// The main statement of the table: without noise, an estimator is exact if its assumption about
+/// the force between samples is true.
 #[test]
 fn the_right_assumption_is_exact() {
     for (between, estimator) in [

@@ -1,4 +1,5 @@
-//! Accelerations alone show a force above a frequency, and the result states this frequency.
+//! If only accelerations are measured, the force is identified above a lowest frequency, and the
+//! result states this frequency.
 
 use mechid_force::{
     Filter, ForceUnknowns, Measurement, Noise, Start, Tuning, kalman, regularised, within_band,
@@ -12,9 +13,9 @@ use crate::study::accelerations::{found, row};
 
 #[test]
 fn the_force_is_found_in_the_band_that_they_show() {
-    // The band begins where the noise is as large as the force. Some of the 307 lines, near this
-    // end, cause an error of 10 %, and a larger error if stiff springs or distant masses amplify
-    // the noise.
+    // The band begins at the frequency at which the noise is as large as the force. The lines near
+    // this frequency, a few of 307, cause an error of 10 %, and a larger error if stiff springs or
+    // distant masses amplify the noise.
     for (dof, hz, level, most) in
         [(1, 1.0, 0.01, 0.1), (1, 40.0, 0.01, 0.35), (2, 40.0, 0.001, 0.2), (3, 1.0, 0.05, 0.5)]
     {
@@ -38,7 +39,7 @@ fn stiff_springs_hide_more_of_a_slow_force() {
     assert!(lowest(40.0) > 2.0 * lowest(1.0), "{} {}", lowest(40.0), lowest(1.0));
 }
 
-/// A whole period of 200 samples at 100 Hz; lines 3, 20 and 31 are driven.
+/// Returns a whole period of 200 samples at 100 Hz; the force drives lines 3, 20 and 31.
 fn period(system: &SecondOrderSystem) -> (Record, [Measurement; 2]) {
     let sampling = Sampling::new(0.01, 200).unwrap();
     let drive = Multisine::flat([3, 20, 31], 90.0, Phases::Schroeder).unwrap();
@@ -72,7 +73,7 @@ fn a_displacement_shows_a_force_at_all_frequencies() {
     }
 }
 
-/// A free mass is accelerated by a constant force, too.
+/// A constant force accelerates a free mass, so the accelerations show this force.
 #[test]
 fn without_a_spring_accelerations_show_a_constant_force() {
     let zero = DMatrix::zeros(1, 1);

@@ -1,4 +1,4 @@
-//! The discretised equation against responses in closed form.
+//! The discretised equation, compared with responses in closed form.
 
 use crate::common::{Oscillator, mixed, response};
 use mechid_force::{
@@ -14,7 +14,8 @@ fn machine() -> SecondOrderSystem {
     SecondOrderSystem::new(dmatrix![10.0], dmatrix![180.0], dmatrix![5000.0]).unwrap()
 }
 
-/// A force with content up to the third of the record's lines, not periodic in it.
+/// Returns a force with a mean value and the frequencies 7 and 19.3 rad/s; it is not periodic in
+/// the record.
 fn wobble(t: f64) -> f64 {
     40.0 * (7.0 * t).sin() + 25.0 * (19.3 * t + 0.4).cos() - 10.0
 }
@@ -28,7 +29,8 @@ fn as_record(sampling: Sampling, force: &[f64]) -> Record {
     Record::from_channel(sampling, force.to_vec()).unwrap()
 }
 
-/// Rounding of the state, 1e-16 relative, times M/Δt: below 1e-10 of the force at these steps.
+/// Tolerance for rounding, relative to the force. The relative rounding error of the state, 1e-16,
+/// is amplified by M/Δt; it remains below 1e-10 of the force at these steps.
 const ROUNDING: f64 = 1e-10;
 
 #[test]
@@ -111,7 +113,8 @@ fn coupled_machines_with_full_matrices_are_told_apart() {
 #[test]
 fn taylor_forms_converge_at_their_order() {
     for order in 1..=8 {
-        // Short enough for the leading term, long enough for order 8 to stay above rounding.
+        // The steps are short enough for the leading error term to dominate, and long enough for
+        // the error of order 8 to exceed rounding.
         let errors: Vec<f64> = [0.02, 0.01]
             .iter()
             .map(|&dt| {
@@ -125,7 +128,8 @@ fn taylor_forms_converge_at_their_order() {
             })
             .collect();
         let observed = (errors[0] / errors[1]).log2();
-        // The next term is ωn Δt / (p + 2) of the leading one, at most a third at these steps.
+        // The second term of the error is ωn Δt / (p + 2) times the leading term: at most a third
+        // at these steps.
         assert!((observed - order as f64).abs() < 0.4, "order {order}: {observed:.2} {errors:?}");
     }
 }

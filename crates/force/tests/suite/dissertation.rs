@@ -1,5 +1,6 @@
-//! The dissertation's own experiment: exact periodic responses of its schemes, parameters by its
-//! Euler least squares, and the force from its two equations.
+//! The experiment of the dissertation: exact periodic responses of its integration schemes,
+//! parameters from least squares with Euler's rule, and forces from the continuous and the
+//! discretised equation.
 
 use mechid_force::{continuous, discretised, spectrum_ratio, spurious_ratio};
 use mechid_integrate::{
@@ -11,7 +12,8 @@ use mechid_problems::{dissertation_bearing, dissertation_sdof};
 use mechid_signal::{Extent, Multisine, Phases, Record, Sampling, Spectrum, lines};
 use nalgebra::DMatrix;
 
-/// A flat multisine on every line strictly between DC and Nyquist, on the last degree of freedom.
+/// Returns a force on the last degree of freedom: a flat multisine on every line strictly between
+/// DC and Nyquist.
 fn excitation(sampling: Sampling, dof: usize, amplitude: f64) -> Record {
     let drive = Multisine::flat(lines::full(sampling), amplitude, Phases::SchroederBinary)
         .and_then(|multisine| multisine.sample(sampling))
@@ -27,9 +29,9 @@ fn excitation(sampling: Sampling, dof: usize, amplitude: f64) -> Record {
     Record::new(sampling, data).unwrap()
 }
 
-/// Dissertation eqs. (4.5.12) and (4.5.28): [x v F](k) φ = v(k+1) by least squares over the whole
-/// period with wrap-around, every entry free, unforced degrees of freedom left out; then
-/// K̂ = −φ M/Δt and Ĉ = (1 − φ) M/Δt with M known.
+/// Identifies C and K by dissertation eqs. (4.5.12) and (4.5.28): [x v F](k) φ = v(k+1) is solved
+/// by least squares over the whole period with wrap-around. Every entry of φ is free, and F has no
+/// columns for unforced degrees of freedom. With M known, K̂ = −φ M/Δt and Ĉ = (1 − φ) M/Δt.
 fn euler_least_squares(
     mass: &DMatrix<f64>,
     response: &Response,
@@ -73,9 +75,9 @@ fn advanced(record: &Record, lead: usize) -> Record {
     Record::new(record.sampling(), data).unwrap()
 }
 
-/// Returns the sequences that the printed parameters came from. In the central-difference runs of
-/// the dissertation, the displacement is one sample ahead of velocity and force; in its Wilson
-/// runs, the whole response is one sample ahead of the force.
+/// Returns the sequences that were used to compute the printed parameters. In the
+/// central-difference runs of the dissertation, the displacement is one sample ahead of velocity
+/// and force; in its Wilson runs, the whole response is one sample ahead of the force.
 fn as_stored(name: &str, response: &Response) -> Response {
     let (x, motion) = match name {
         "central difference" => (1, 0),
@@ -94,8 +96,8 @@ fn range(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, 0.0], |[low, high], v| [low.min(*v), high.max(*v)])
 }
 
-/// Tolerance of the ranges below: they were printed with three decimals, some after an earlier
-/// rounding.
+/// Tolerance of the ranges in this file. The dissertation prints them with three decimals, and some
+/// of them were rounded twice.
 const PRINTED: f64 = 6e-4;
 
 fn assert_range(what: &str, found: [f64; 2], expected: [f64; 2]) {
@@ -103,8 +105,9 @@ fn assert_range(what: &str, found: [f64; 2], expected: [f64; 2]) {
     assert!(agree, "{what}: {found:?}, expected {expected:?}");
 }
 
-/// Ranges of |F̂/F| over lines 1 to 127: continuous and discretised equation with the parameters
-/// identified in time, continuous equation with the exact ones.
+/// Ranges of |F̂/F| over lines 1 to 127: for the continuous and the discretised equation with the
+/// parameters identified in the time domain, and for the continuous equation with the exact
+/// parameters.
 type Ranges = [[f64; 2]; 3];
 
 fn check_single(npi: f64, expected: [Ranges; 4]) {
@@ -158,9 +161,10 @@ fn the_force_of_the_single_oscillator_at_npi_3_4() {
     );
 }
 
-/// Range of |F̂y/Fy| and the largest |F̂x/Fy|, true Fx being zero, by the continuous equation.
+/// Checks the range of |F̂y/Fy| and the largest |F̂x/Fy| of the force from the continuous equation;
+/// the true Fx is zero.
 fn check_bearing(len: usize, npi: f64, expected: [([f64; 2], f64); 4]) {
-    // The direct schemes of the dissertation ran on +Kyx; its ωn belongs to −Kyx.
+    // The dissertation used +Kyx with the direct schemes, although its value of ωn belongs to −Kyx.
     let bearing = dissertation_bearing(KyxSign::Plus).system();
     let sampling = npi_sampling(npi, len, 1.799248).unwrap();
     let force = excitation(sampling, 2, 100.0);
@@ -227,9 +231,10 @@ fn the_force_of_the_bearing_from_512_samples() {
     );
 }
 
-/// With identified parameters the discretised equation is the least-squares row itself without its
-/// force term: F̂ = ρ F + residual, ρ = φ̂_F M/Δt. The estimator leaves φ_F free and Euler's rule
-/// explains the force by the state instead, so that ρ is far from 1, and F̂ is far from F.
+/// If the parameters come from the Euler least-squares fit, the discretised equation is the fitted
+/// equation without its force term. The identified force is therefore F̂ = ρ F + residual with ρ =
+/// φ̂_F M/Δt. The estimator leaves φ_F free, and Euler's rule explains the force by the state
+/// instead. Therefore ρ is far from 1, and F̂ is far from F.
 #[test]
 fn the_discretised_force_is_a_fraction_of_the_force_and_a_residual() {
     let machine = dissertation_sdof();
@@ -243,7 +248,7 @@ fn the_discretised_force_is_a_fraction_of_the_force_and_a_residual() {
         let found = discretised(&identified, &response, Discretisation::Euler, Extent::WholePeriod);
         let found = found.unwrap().record().column(0).clone_owned();
         let truth = force.column(0);
-        // The residual of a least-squares fit is orthogonal to its regressors, F among them.
+        // The force F is a regressor of the least-squares fit, so the residual is orthogonal to F.
         let share = found.dot(&truth) / truth.norm_squared();
         assert!((share - printed).abs() < 5e-4, "NPI {npi}: {share:.4}");
     }

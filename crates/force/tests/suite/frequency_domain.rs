@@ -1,4 +1,4 @@
-//! The frequency-domain reconstruction against harmonic motions in closed form.
+//! The frequency-domain reconstruction, compared with harmonic motions in closed form.
 
 use mechid_force::{
     Channel, ForceError, Measurement, Noise, frequency_domain, inner_lines, line_errors,
@@ -25,7 +25,8 @@ fn period() -> Sampling {
 
 const LINES: [usize; 4] = [1, 4, 5, 30];
 
-/// Forces on both directions at the lines, and the motion of both, by Cramer's rule.
+/// Returns forces on both directions at `LINES`, and displacement, velocity and acceleration of
+/// both directions by Cramer's rule.
 fn harmonic(system: &SecondOrderSystem, forces: [f64; 2]) -> (Record, [Record; 3]) {
     let s = period();
     let z = || DMatrix::<Line>::zeros(s.lines(), 2);
@@ -64,7 +65,8 @@ fn every_quantity_of_every_degree_of_freedom_gives_both_forces() {
             let found =
                 frequency_domain(&rotor(), &measured, &[0, 1], lines, &Noise::Unknown).unwrap();
             let error = relative_error(found.record(), &force).unwrap();
-            // Condition of the dynamic stiffness × 1e-16, over the unexcited lines too.
+            // The error is the condition number of the dynamic stiffness × 1e-16; the unexcited
+            // lines are included.
             assert!(error < 1e-11, "{quantity}: {error:.1e}");
             let truth = Spectrum::from_record(&force);
             let ratio = spectrum_ratio(found.spectrum(), &truth, 0, &LINES).unwrap();
@@ -129,8 +131,7 @@ fn lines_the_machine_does_not_transmit_are_named() {
             assert!(matches!(error, ForceError::NotTransmitted { line: 0, .. }), "{error}");
         }
     }
-    // The two machines are not connected: the motion of one does not depend on the force on the
-    // other.
+    // The two machines are not coupled, so a force on one machine does not move the other machine.
     let apart = SecondOrderSystem::new(
         DMatrix::identity(2, 2),
         DMatrix::identity(2, 2),
@@ -152,10 +153,11 @@ fn lines_the_machine_does_not_transmit_are_named() {
         vec![Channel { dof: 0, quantity: ResponseQuantity::Velocity }],
     )
     .unwrap();
-    // With everything measured the dynamic stiffness is used as it is, zero at the resonance.
+    // If all degrees of freedom are measured, the dynamic stiffness itself is used, which is zero
+    // at the resonance.
     assert!(frequency_domain(&undamped, &velocity, &[0], &[2], &unknown).is_ok());
-    // With more channels than forces the inverse of the dynamic stiffness is needed, and it does
-    // not exist.
+    // With more channels than forces, the inverse of the dynamic stiffness is needed, which does
+    // not exist at an undamped resonance.
     let both = Record::new(period(), v.data().clone()).unwrap();
     let twice = vec![Channel { dof: 0, quantity: ResponseQuantity::Velocity }; 2];
     let twice = Measurement::new(both, twice).unwrap();

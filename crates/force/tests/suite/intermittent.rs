@@ -12,13 +12,14 @@ use crate::study::accelerations::row;
 
 const OVERSAMPLED: usize = 8;
 
-/// 10 kg, 9 Hz, a damping ratio of 3.5 %.
+/// Returns an oscillator of 10 kg with a natural frequency of 9 Hz and a damping ratio of 3.5 %.
 fn oscillator() -> SecondOrderSystem {
     let stiffness = 10.0 * (TAU * 9.0).powi(2);
     SecondOrderSystem::new(dmatrix![10.0], dmatrix![40.0], dmatrix![stiffness]).unwrap()
 }
 
-/// Every eighth sample of a force and of its exact accelerations from rest, which have 1 % of noise.
+/// Returns every eighth sample of a force and of the exact accelerations that it causes from rest.
+/// The accelerations have 1 % of noise.
 fn measured(
     system: &SecondOrderSystem,
     force: impl Fn(f64) -> f64,
@@ -44,8 +45,9 @@ fn measured(
     (every(&exact), Measurement::from_record(ResponseQuantity::Acceleration, noisy))
 }
 
-/// The spectrum of a pulse falls like that of a force model of low order, and this model mistakes
-/// all noise for force: with it, only 51 % of the intervals contained the force.
+/// The intervals contain the force of an impact at 88 % of the samples or more. The spectrum of a
+/// pulse falls like that of a stationary force model of low order. A fit of this model to the whole
+/// record mistakes all noise for force: only 51 % of its intervals contained the force.
 #[test]
 fn the_error_of_an_impact_is_that_of_its_noise() {
     let runs = 4;
@@ -69,7 +71,7 @@ fn the_error_of_an_impact_is_that_of_its_noise() {
     };
     let held: Vec<f64> = (1..=runs).map(held).collect();
     let mean = held.iter().sum::<f64>() / runs as f64;
-    // Errors are correlated over half a second: each record has a few dozen independent ones.
+    // The errors are correlated over half a second: each record has a few dozen independent errors.
     assert!(mean > 0.88, "{held:?}");
 }
 

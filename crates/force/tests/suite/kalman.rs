@@ -10,7 +10,7 @@ use mechid_problems::{dissertation_bearing, dissertation_sdof, exact_foh, random
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{DMatrix, dvector};
 
-/// A random walk of `walk` N/√s on one degree of freedom.
+/// Returns a random walk of `walk` N/√s on one degree of freedom.
 fn walking(sampling: Sampling, dof: usize, forced: usize, walk: f64, seed: u64) -> Record {
     let steps = noise::white(sampling, 1, walk * sampling.dt().sqrt(), seed).unwrap();
     let mut sum = 0.0;
@@ -27,14 +27,15 @@ fn walking(sampling: Sampling, dof: usize, forced: usize, walk: f64, seed: u64) 
     Record::new(sampling, data).unwrap()
 }
 
-/// Displacements with white noise of `level` times their size.
+/// Returns displacements with white noise of `level` times their RMS value.
 fn displacements(response: &Response, level: f64, seed: u64) -> Measurement {
     let level = NoiseLevel::FractionOfRms(level);
     let noisy = noise::add_white(response.displacement(), level, seed).unwrap();
     Measurement::from_record(ResponseQuantity::Displacement, noisy)
 }
 
-/// Intensity, in N/√s, of the random walk that a force of order 1 is over short times: τ √(2 ω_c).
+/// Returns the intensity τ √(2 ω_c), in N/√s, of the random walk that a force of order 1
+/// approximates over short times.
 fn walk(found: &KalmanForce, force: usize) -> f64 {
     found.model.rms[force] * (2.0 * std::f64::consts::TAU * found.model.corner_hz).sqrt()
 }
@@ -70,7 +71,8 @@ fn likelihood_finds_the_walk_the_noise_and_an_honest_error() {
             let size = response.displacement().column(c).norm() / 4000f64.sqrt();
             assert!((level / (0.02 * size) - 1.0).abs() < 0.05, "channel {c}: {level}");
         }
-        // Errors of neighbouring samples are correlated: some hundred independent ones remain.
+        // The errors of neighbouring samples are correlated, so some hundred independent errors
+        // remain.
         let surprise = surprise(&found, &truth, forced);
         assert!((0.75..1.3).contains(&surprise), "{surprise:.3}");
         // The smoothed motion is nearer to the truth than the measurement.
@@ -164,7 +166,8 @@ fn bad_requests_are_refused_with_their_numbers() {
         ask(&system, &one, &[0], &Tuning::NoiseKnown(vec![0.0])),
         ForceError::NotPositive { what: "noise level", value: 0.0 }
     );
-    // Two unconnected machines; and the same channel twice for two forces.
+    // Forces cannot be separated if the forced machine is not coupled to the measured machine, or
+    // if two channels measure the same quantity.
     let diagonal = |a: f64, b: f64| DMatrix::from_diagonal(&dvector![a, b]);
     let apart =
         SecondOrderSystem::new(diagonal(1.0, 1.0), diagonal(1.0, 1.0), diagonal(90.0, 70.0))

@@ -20,7 +20,8 @@ fn record(values: &[f64]) -> Record {
     Record::new(sampling, DMatrix::from_column_slice(LEN, DOF, values)).unwrap()
 }
 
-/// Displacement, velocity and acceleration that need not belong together.
+/// Returns a response with arbitrary displacement, velocity and acceleration, which need not be
+/// derivatives of each other.
 fn response(values: &[f64]) -> Response {
     let part = |i: usize| record(&values[i * LEN * DOF..][..LEN * DOF]);
     Response::new(part(0), part(1), part(2)).unwrap()
@@ -67,14 +68,15 @@ proptest! {
             let [a, b, both] = [&first, &second, &sum].map(|v| method(&system, v).record().data().clone());
             let expected = &a + &b * weight;
             let size = a.amax().max(weight.abs() * b.amax());
-            // These are rounding errors of sums of a few dozen terms. The start of the smoother
-            // depends on the size of the measurement, by less than the permitted ten-thousandth.
+            // The tolerance allows for rounding errors of sums of a few dozen terms. The initial
+            // state of the smoother depends on the size of the measurement, which changes the force
+            // by less than a ten-thousandth of its standard error.
             let tolerance = if name == "Kalman" { 1e-3 } else { 1e-11 };
             prop_assert!((&both - &expected).amax() <= tolerance * size, "{name}");
         }
     }
 
-    /// Twice the machine needs twice the force for the same motion.
+    /// If M, C and K are doubled, the force for the same motion doubles.
     #[test]
     fn the_force_follows_the_machine(
         values in prop::collection::vec(-1.0..1.0f64, 3 * LEN * DOF),

@@ -1,6 +1,7 @@
 //! Force identification, judged by closed forms and seeded experiments.
 //!
-//! One program of many modules: each test program of its own would compile nalgebra anew.
+//! All modules are in one test program, because every further test program would compile nalgebra
+//! again.
 
 mod accelerations;
 mod common;

@@ -26,7 +26,7 @@ fn levels() -> MotionNoise {
     MotionNoise::new(x, v, a).unwrap()
 }
 
-/// A motion of these samples × (x, v, a of both directions).
+/// Creates a response from `data`, samples × (x, v, a of both directions).
 fn response(data: &DMatrix<f64>) -> Response {
     let sampling = Sampling::new(DT, data.nrows()).unwrap();
     let part = |first| Record::new(sampling, data.columns(first, 2).into_owned()).unwrap();
@@ -49,8 +49,9 @@ fn scatter(runs: u64, samples: usize, find: impl Fn(&Response) -> Record) -> DMa
     sum.map(|s| (s / runs as f64).sqrt())
 }
 
-/// From 400 draws, a standard deviation is known to 1/√800 = 3.5 %; the limits are four times this
-/// at every sample, and a third of that over all twelve.
+/// Checks that stated and observed standard deviations agree. A standard deviation from 400 draws
+/// has an uncertainty of 1/√800 = 3.5 %. The limit is four times this value at every sample, and a
+/// third of that for the RMS over all twelve samples.
 fn agree(stated: &Record, seen: &DMatrix<f64>) {
     for (stated, seen) in stated.data().iter().zip(seen) {
         assert!((stated / seen - 1.0).abs() < 0.14, "{stated}, seen {seen}");
@@ -75,8 +76,8 @@ fn stated_errors_are_the_scatter_over_noisy_motions() {
     }
 }
 
-/// The force is linear in the motion: its variance is the sum of the squared effects of a unit at
-/// each sample of each channel.
+/// The force is linear in the motion. The reference for its variance is the sum of the squared
+/// forces that the noise of one sample of one channel causes, over all samples and channels.
 #[test]
 fn every_discretisation_carries_the_noise_of_every_sample() {
     let forms = Discretisation::ALL;

@@ -1,4 +1,5 @@
-//! The statements of the book (`studies/force.md`), and the agreement of its tables with the study.
+//! The statements of the book (`studies/force.md`), and the agreement of the tables in the book
+//! with the study.
 
 use crate::study::coverage::{INTERVALS, SHAPES, coverage};
 use crate::study::{
@@ -12,13 +13,13 @@ fn the_excited_lines_stay_near_the_noise_floor() {
     for case in cases() {
         let (found, floor) = (rms_error(&case, frequency_domain), case.floor());
         assert!(found < 1.2 * floor, "{}: {found:.4}, floor {floor:.4}", case.name);
-        // The floor is a lower bound, which ten realisations of 80 real amplitudes determine to 4
-        // %.
+        // The floor is a lower bound of the error. Ten realisations of 80 real amplitudes determine
+        // the error to 4 %.
         assert!(found > 0.85 * floor, "{}: {found:.4}, floor {floor:.4}", case.name);
     }
 }
 
-/// The numbers of a text, everything else kept as it is.
+/// Splits a text into numbers and words; the words are unchanged.
 fn tokens(text: &str) -> Vec<Result<f64, String>> {
     text.split(|c: char| c.is_whitespace() || "|()".contains(c))
         .filter(|token| !token.is_empty())
@@ -26,7 +27,7 @@ fn tokens(text: &str) -> Vec<Result<f64, String>> {
         .collect()
 }
 
-/// Returns the tables of the book, beginning with the one that starts with `header`.
+/// Returns the rows of the tables in the book, from the table with this `header` on.
 fn printed(header: &str) -> String {
     let book = include_str!("../../../../docs/book/src/studies/force.md");
     let start = book.find(header).expect("the book has the study's tables");
@@ -76,8 +77,8 @@ fn the_likelihood_rule_stays_near_the_best_parameter_as_the_book_prints() {
     assert_printed("| Excited |", &rule_table(&rows));
 }
 
-/// In the cases for which the book states that 95 % intervals hold, twelve records each contain 89
-/// to 99 % of the samples.
+/// Cases for which the book states that 95 % intervals contain the force: over twelve records, the
+/// intervals contain the force at 89 to 99 % of the samples.
 #[test]
 fn intervals_hold_the_force_of_bands_lines_and_walks() {
     for name in
@@ -96,7 +97,8 @@ fn intervals_hold_the_force_of_bands_lines_and_walks() {
     }
 }
 
-/// The rule needs no noise level: half and twice the noise change the parameter.
+/// The rule of maximum likelihood is given no noise level, but its regularisation parameter λ
+/// increases with the noise.
 #[test]
 fn more_noise_means_more_regularisation() {
     let parameter = |level: f64| {

@@ -1,4 +1,4 @@
-//! Regularised reconstruction against explicit normal equations.
+//! Regularised reconstruction, compared with explicit normal equations.
 
 use mechid_force::{
     Channel, Filter, ForceError, ForceUnknowns, Measurement, Noise, OPEN_UNKNOWNS, Rule, Start,
@@ -16,7 +16,8 @@ fn sampling(len: usize) -> Sampling {
     Sampling::new(DT, len).unwrap()
 }
 
-/// Displacement of the first and acceleration of the last degree of freedom.
+/// Returns two channels: the displacement of the first and the acceleration of the last degree of
+/// freedom.
 fn channels(dof: usize) -> Vec<Channel> {
     vec![
         Channel { dof: 0, quantity: ResponseQuantity::Displacement },
@@ -31,7 +32,7 @@ fn measure(response: &Response) -> Measurement {
     Measurement::new(Record::new(response.sampling(), data).unwrap(), channels(dof)).unwrap()
 }
 
-/// Samples × n, each sample of the forced degrees of freedom from `value`.
+/// Returns a force, samples × n; `value` gives the samples of the forced degrees of freedom.
 fn force(len: usize, dof: usize, forced: &[usize], value: impl Fn(usize, usize) -> f64) -> Record {
     let data =
         DMatrix::from_fn(len, dof, |k, i| if forced.contains(&i) { value(k, i) } else { 0.0 });
@@ -122,7 +123,8 @@ fn open_records_solve_their_normal_equations() {
     }
 }
 
-/// Appends columns for unit displacements and velocities at the first sample.
+/// Appends columns with the responses to a unit displacement and to a unit velocity of each degree
+/// of freedom at the first sample.
 fn with_starts(system: &SecondOrderSystem, g: DMatrix<f64>, scale: &[f64]) -> DMatrix<f64> {
     let (dof, rows, forces) = (system.dof(), g.nrows(), g.ncols());
     let silence = force(rows / 2, dof, &[], |_, _| 0.0);
@@ -229,7 +231,7 @@ fn without_noise_every_rule_gives_the_force() {
             let noise = Noise::Unknown;
             let found = regularised(&system, &measured, &[1], &extent, filter, &noise).unwrap();
             let error = relative_error(found.force.record(), &truth).unwrap();
-            // The grid of λ ends eight decades below the largest singular value.
+            // The smallest λ of the grid is eight decades below the largest singular value.
             assert!(error < 1e-3, "{extent:?}, {filter:?}: {error:.1e}");
         }
     }
@@ -322,7 +324,7 @@ proptest! {
         }
     }
 
-    /// With a given parameter the force is linear in the measurement.
+    /// With a given regularisation parameter, the force is linear in the measurement.
     #[test]
     fn a_given_parameter_makes_a_linear_map(
         first in prop::collection::vec(-1.0..1.0f64, 24),

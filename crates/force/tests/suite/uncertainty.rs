@@ -1,4 +1,4 @@
-//! Propagation of the uncertainty of the machine to the force.
+//! Effect of the uncertainty of the machine on the force.
 
 use mechid_force::{
     Filter, ForceUnknowns, Measurement, Noise, Rule, continuous, discretised, frequency_domain,
@@ -58,7 +58,7 @@ fn drawn(known: UncertainSystem, draws: usize) -> impl Iterator<Item = SecondOrd
     })
 }
 
-/// Standard deviation of the force over machines drawn from the covariance.
+/// Returns the standard deviation of the force over machines drawn from the covariance.
 fn scatter(find: impl Fn(&SecondOrderSystem) -> Record, draws: usize) -> DMatrix<f64> {
     let exact = find(&bearing());
     let mut sum = DMatrix::zeros(exact.len(), 2);
@@ -100,8 +100,9 @@ fn the_stated_error_is_the_scatter_over_machines() {
     assert_close(found.standard_error().unwrap(), &seen, 0.04, "discretised");
 }
 
-/// A truncation keeps the same components if the machine changes by a thousandth: if the threshold
-/// were a singular value itself, the least change would exclude it.
+/// A truncation keeps the same components if the machine changes by a thousandth. If the threshold
+/// were equal to a singular value, the smallest change of the machine could exclude the component
+/// of this singular value.
 #[test]
 fn a_truncation_is_not_at_the_mercy_of_the_machine() {
     let measured =
@@ -126,15 +127,15 @@ fn a_truncation_is_not_at_the_mercy_of_the_machine() {
     );
 }
 
-/// One force and two channels: the residual of an exact record for machines drawn from the
-/// covariance.
+/// For one force and two channels, the residual expected from the uncertainty of the system agrees
+/// with the RMS value of the residuals of an exact record over machines drawn from the covariance.
 #[test]
 fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
     let measured =
         Measurement::from_record(ResponseQuantity::Displacement, response().displacement().clone());
     let noise = Noise::PerChannel(vec![1e-3, 2e-3]);
-    // Under a force on the second direction, the first row of the equations gives the ratio of the
-    // two motions.
+    // If the force acts on the second direction only, the first row of the equation of motion gives
+    // the ratio of the two displacements.
     let uncertain = uncertain(&["c11", "k12"], &dmatrix![0.2, 0.0; 0.3, 0.4]);
     let rests = |s: &SecondOrderSystem| -> Vec<f64> {
         let found = frequency_domain(s, &measured, &[1], &LINES, &noise).unwrap();
@@ -181,7 +182,8 @@ fn both_uncertainties_add_in_variance() {
             force.standard_error().unwrap().channel(1)[k].powi(2)
         };
         let (sum, total) = (at(&noise_only) + at(&machine_only), at(&both));
-        // The weighting of the channels differs between the two; the force is the same.
+        // `machine_only` weights the channels by their size, the other two results weight them by
+        // their noise. The variances therefore agree to 2 % only.
         assert!((sum - total).abs() < 0.02 * total, "sample {k}: {sum} {total}");
     }
 }

@@ -1,4 +1,4 @@
-//! The part of the measured motion that a force does not explain, against its definition.
+//! The part of the measured motion that a force does not explain, compared with its definition.
 
 use mechid_force::{
     Channel, Filter, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, Unexplained,
@@ -17,7 +17,8 @@ fn bearing() -> SecondOrderSystem {
     dissertation_bearing(KyxSign::Minus).system()
 }
 
-/// Displacement of both directions under forces of these sizes on the same lines.
+/// Returns the displacement of both directions under forces of these sizes, which act at the same
+/// lines.
 fn displacement(sizes: [f64; 2]) -> Record {
     let sampling = Sampling::new(0.1, 64).unwrap();
     let wave = |seed: u64| {
@@ -58,7 +59,7 @@ fn on_lines_the_rest_is_that_of_least_squares() {
     let level = [2e-4, 5e-4];
     let noise = Noise::PerChannel(level.to_vec());
     let found = frequency_domain(&bearing(), &measured(record), &[0], &LINES, &noise).unwrap();
-    // Powers of rest, measurement and prediction; half the squared amplitude of each line.
+    // Powers of residual, measurement and prediction; each line adds half its squared amplitude.
     let mut powers = [[0.0; 3]; 2];
     for n in LINES {
         let (h, y) = (receptance(spectrum.omega(n)), [0, 1].map(|c| spectrum.line(n, c)));
@@ -77,7 +78,7 @@ fn on_lines_the_rest_is_that_of_least_squares() {
         close(channel.residual, rest, 1e-9);
         close(channel.motion, seen.max(made), 1e-9);
         close(channel.share(), rest / seen.max(made), 1e-9);
-        // Four lines of 64 samples hold 8 of 64 real parts of white noise.
+        // Four of the lines of 64 samples have 8/64 of the power of white noise.
         close(channel.noise.unwrap(), level[c] * (8.0_f64 / 64.0).sqrt(), 1e-12);
         assert!(channel.share() > 0.01 && channel.system.is_none());
     }
@@ -113,8 +114,8 @@ fn a_dead_sensor_is_wholly_unexplained() {
     let noise = Noise::PerChannel(vec![1e-3, 1e3]);
     let found = frequency_domain(&bearing(), &dead, &[0], &LINES, &noise).unwrap();
     let channel = found.unexplained().unwrap()[1];
-    // The other sensor is much more accurate and thus determines the force and the expected
-    // response.
+    // The sensor of the first channel is much more accurate. It therefore determines the force and
+    // the expected response.
     close(channel.residual, size, 1e-9);
     close(channel.share(), 1.0, 1e-12);
 }
@@ -134,14 +135,15 @@ fn noise_leaves_what_its_level_says() {
         let channels = found.unexplained().unwrap();
         sum += channels.iter().map(|c| (c.residual / c.noise.unwrap()).powi(2)).sum::<f64>();
     }
-    // Two channels and one force leave one of two complex numbers per line. χ² with eight degrees
-    // of freedom, divided by eight, has a standard deviation of 1/2; its mean over 400 runs has a
-    // standard deviation of 0.025.
+    // With two channels and one force, one of two complex numbers per line remains as the residual.
+    // χ² with eight degrees of freedom, divided by eight, has a standard deviation of 1/2; its mean
+    // over 400 runs has a standard deviation of 0.025.
     let mean = sum / runs as f64;
     assert!((mean - 1.0).abs() < 0.1, "{mean}");
 }
 
-/// Displacement of the first, velocity of the second, acceleration of the third degree of freedom.
+/// Returns a measurement of the displacement of the first, the velocity of the second and the
+/// acceleration of the third degree of freedom.
 fn mixed(response: &Response) -> Measurement {
     let quantities = [
         ResponseQuantity::Displacement,
@@ -157,7 +159,8 @@ fn mixed(response: &Response) -> Measurement {
     Measurement::new(record, channels.collect()).unwrap()
 }
 
-/// Checks that the residual is that of the motion which the force causes from rest, in closed form.
+/// Checks that the residual is the measured motion minus the motion that the force causes from
+/// rest, computed in closed form.
 fn is_rest_of(
     system: &SecondOrderSystem,
     force: &Record,
@@ -191,7 +194,8 @@ fn on_open_records_the_rest_is_that_of_the_motion_which_the_force_makes() {
     is_rest_of(&system, found.record(), &measured, found.unexplained().unwrap());
     let found = kalman(&system, &measured, &[0], Start::FromRest, &Tuning::Likelihood).unwrap();
     let channels = found.force.unexplained().unwrap();
-    // The smoother also returns the motion.
+    // The smoother returns displacement and velocity; the residual of these channels is the
+    // measured value minus the smoothed one.
     for (c, (channel, described)) in channels.iter().zip(measured.channels()).enumerate() {
         let found = match described.quantity {
             ResponseQuantity::Displacement => &found.displacement,
@@ -204,7 +208,8 @@ fn on_open_records_the_rest_is_that_of_the_motion_which_the_force_makes() {
     assert!(channels.iter().all(|c| c.noise.is_none()));
 }
 
-/// A machine is already in motion without a force: the initial state explains the whole motion.
+/// The machine already moves at the first sample. The estimated initial state and the force
+/// together explain the whole motion.
 #[test]
 fn a_motion_at_the_start_is_no_rest() {
     let system = random_stable(3, 4);

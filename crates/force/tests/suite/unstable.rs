@@ -10,14 +10,14 @@ use nalgebra::{DMatrix, dmatrix};
 
 const MASS: f64 = 25.0;
 
-/// m ẍ − m σ² x = F, whose free response grows like exp σt.
+/// Returns the system m ẍ − m σ² x = F, whose free response grows like exp σt.
 fn falling(rate: f64) -> SecondOrderSystem {
     let (m, k) = (dmatrix![MASS], dmatrix![-MASS * rate * rate]);
     SecondOrderSystem::new(m, dmatrix![0.0], k).unwrap()
 }
 
-/// A displacement with the frequencies 25 and 60 rad/s that starts from rest, and its force in
-/// closed form.
+/// Returns a displacement that starts from rest and has the frequencies 25 and 60 rad/s, and the
+/// force that causes it, in closed form.
 fn held_up(rate: f64, sampling: Sampling) -> (Measurement, Record) {
     let (w, u) = (25.0, 60.0);
     let x = |t: f64| (w * t).cos() - (u * t).cos() + (w * t).sin() - w / u * (u * t).sin();
@@ -83,7 +83,7 @@ fn the_kalman_smoother_needs_no_more_than_a_step_that_does_not_grow_too_much() {
 
 #[test]
 fn a_whole_period_asks_for_no_stability() {
-    // k = −10⁶ N/m; x of lines 2 and 5, D(ω) X in closed form.
+    // With k = −10⁶ N/m and lines 2 and 5 in x, the force D(ω) X is known in closed form.
     let system = falling(200.0);
     let sampling = Sampling::new(0.005, 256).unwrap();
     let wave = |gain: fn(f64) -> f64| {

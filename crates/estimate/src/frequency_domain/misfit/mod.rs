@@ -92,7 +92,7 @@ impl<'a> Misfit<'a> {
         };
         let rows = vec![Line::new(data.dof()); data.len()];
         let layout = Layout::new(unknowns, data.transient().ncols());
-        // On a line, only the transient of its own record is not zero.
+        // On a spectral line, only the transient of the record with this line is nonzero.
         let is_used = |line: usize, at: usize| match layout.columns()[at].1.checked_sub(data.dof())
         {
             None => true,
@@ -321,8 +321,8 @@ impl Restartable for Misfit<'_> {
             let rows = Sampling::new(1.0, self.shares.len()).ok()?;
             noise::white(rows, 2, 1.0, seed).ok()
         });
-        // If z is complex normal, |z|²/2 has an exponential distribution, and half of its square
-        // has the mean 1.
+        // If z is complex normal, |z|²/2 has an exponential distribution, and the mean of
+        // (|z|²/2)²/2 is 1.
         for (share, pair) in
             self.shares.iter_mut().zip(drawn.iter().flat_map(|d| d.data().row_iter()))
         {

@@ -130,7 +130,7 @@ fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
         assert!(equations.gram.diagonal().iter().all(|v| (v - 1.0).abs() < 1e-12));
 
         let (covariance, condition) = equations.covariance().unwrap();
-        // The unit is the length of each column, because the powers of s differ by orders of
+        // Each column is scaled to unit length, because the powers of s differ by orders of
         // magnitude.
         let lengths = gram.diagonal().map(f64::sqrt);
         let (to, back) = (DMatrix::from_diagonal(&lengths), lengths.map(f64::recip));
@@ -176,7 +176,8 @@ fn the_curvature_is_the_second_derivative_along_a_step() {
     }
 }
 
-/// Without noise on the force, both kinds of weighting give the same result.
+/// With negligible noise on the force, the weights for noisy forces and the weights for exact
+/// forces give the same sum of squares and Gram matrix.
 #[test]
 fn errors_in_variables_contain_output_error() {
     let exact = noise().with_exact_force();

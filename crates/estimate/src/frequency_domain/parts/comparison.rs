@@ -139,8 +139,8 @@ impl Scores<'_> {
         })
     }
 
-    /// Returns the largest ratio of a standard error from the scatter of the scores to its value
-    /// from the noise.
+    /// Returns the largest ratio, over all parameters, of the standard error from the scatter of
+    /// the scores to the standard error from the noise.
     fn largest_scatter(&self, level: f64) -> Option<f64> {
         let of_row = |row: usize| {
             let root = self.root.row(row).transpose();

@@ -22,7 +22,7 @@ pub(super) struct Linearised {
     pub(super) root: DMatrix<f64>,
     /// Range of the residuals of each open record, and an orthonormal basis of its transient.
     pub(super) transients: Vec<RecordColumns<DMatrix<f64>>>,
-    /// Covariance of the errors of pulses, whose most likely values are subtracted.
+    /// Covariance of the errors of pulses; the most likely errors are subtracted from the residual.
     pulses: Vec<RecordColumns<PulseCovariance>>,
     /// Factor of QᵀV⁻¹Q with the covariance V of lines and pulses; `None` without pulses.
     information: Option<Cholesky<f64, Dyn>>,
@@ -88,20 +88,21 @@ impl Linearised {
         &self.root * &self.coefficients
     }
 
-    /// Removes the component of the residual that the parameters still explain.
+    /// Subtracts the component that a step of the parameters explains from the residual, and sets
+    /// this step to zero.
     pub(super) fn finish_step(&mut self) {
         self.residual -= &self.basis * &self.coefficients;
         self.coefficients.fill(0.0);
     }
 
-    /// Replaces the independent unknowns by the entries; `tangent` is the derivative of the entries
-    /// with respect to the independent unknowns.
+    /// Replaces the independent unknowns by the free entries of M, C and K; `tangent` is the
+    /// derivative of the entries with respect to the independent unknowns.
     pub(super) fn relate(&mut self, tangent: &DMatrix<f64>) {
         self.root = tangent * &self.root;
     }
 
-    /// Returns D_p Q of a part without the components that the parameters and the transients of all
-    /// data explain.
+    /// Returns the columns `part` (D_p Q: the basis Q restricted to one part of the data) without
+    /// the components that the parameters and the transients of all data explain.
     pub(super) fn unexplained(&self, mut part: DMatrix<f64>) -> DMatrix<f64> {
         let explained = self.products_with_basis(&part);
         part.gemm(-1.0, &self.basis, &explained, 1.0);

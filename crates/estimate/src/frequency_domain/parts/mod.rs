@@ -47,7 +47,7 @@ pub struct PartsOfFit<'a> {
     /// Averaged responses, whose neighbouring lines have correlated errors; `None` if the data come
     /// from another source.
     responses: Option<&'a [(Frf, Vec<usize>)]>,
-    /// Ratio of the variance of a score to its value for exact weights, due to sampled weights.
+    /// Ratio of the variance of a score with sampled weights to its variance with exact weights.
     inflation: f64,
     /// Degrees of freedom of the noise level; `None` if it is estimated from the residual.
     known: Option<f64>,

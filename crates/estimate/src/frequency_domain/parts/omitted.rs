@@ -15,7 +15,7 @@ use crate::limits::PART_INFORMS;
 /// on the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OmittedTerms {
-    /// Term that is most likely.
+    /// Most likely term.
     pub term: OmittedTerm,
     /// Fraction of the residual power that the most likely term explains (pure number).
     pub explained: f64,
@@ -24,7 +24,7 @@ pub struct OmittedTerms {
     /// Change of each parameter with the most likely term, in the order and the unit of the
     /// parameters.
     pub changes: DVector<f64>,
-    /// Standard errors of `changes`, one for each parameter, in its unit.
+    /// Standard errors of `changes`, one for each parameter, in the unit of the parameter.
     pub errors: DVector<f64>,
     /// Mean square error that the terms add to the covariance of the parameters: the squares of the
     /// changes plus their covariance. Each term is weighted by its likelihood. The matrix is
@@ -47,16 +47,16 @@ struct Explained {
 }
 
 impl PartsOfFit<'_> {
-    /// Tests terms that the model leaves out by their scores at the optimum, with the change of
-    /// each parameter to first order. `records` has the samples of the rows; without them
+    /// Tests the terms that the model leaves out, by their scores at the optimum, and computes the
+    /// change of each parameter to first order. `records` has the samples of the rows; without them
     /// nonlinear terms are not tested. `None` if no term can be tested.
     ///
     /// C has the weighted changes of the response by a term as columns, and Z is C without the
     /// component that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and
-    /// the parameters change by −(QR)⁺C a, where QR are their sensitivities and e is the residual.
-    /// Around the estimate of the model without the term, the mean square error of the model with
-    /// the term is the covariance of these changes plus their square. The terms are weighted by
-    /// their likelihoods, as in an average of models.
+    /// the parameters change by −(QR)⁺C a, where QR are the sensitivities to the parameters and e
+    /// is the residual. Relative to the estimate of the model without the term, the term adds a
+    /// mean square error: the covariance of these changes plus the square of these changes. The
+    /// terms are weighted by their likelihoods, as in an average of models.
     ///
     /// # Source
     /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for
@@ -91,8 +91,8 @@ impl PartsOfFit<'_> {
         })
     }
 
-    /// Returns the test of a term with these columns, with the fraction of the residual power that
-    /// the term explains.
+    /// Returns the test of a term, with the fraction of the residual power that the term explains.
+    /// `columns` are the weighted changes of the response by the term.
     fn explained(&self, term: OmittedTerm, mut columns: DMatrix<f64>) -> Option<Explained> {
         remove(&self.linear.transients, &mut columns);
         let by_parameters = self.linear.effect_of(&columns);

@@ -27,7 +27,7 @@ pub enum Split {
 pub enum Part {
     /// Rows, by the index of the part in [`Split::Rows`].
     Rows {
-        /// Index, counted from 0.
+        /// Index of the part, counted from 0.
         index: usize,
     },
     /// Band of lines, in Hz.
@@ -46,13 +46,13 @@ pub enum Part {
     },
 }
 
-/// Selection D_p of a part.
+/// Selection D_p of the rows, or of the time samples, that belong to a part of the data.
 enum Cut {
     Rows(Vec<Range<usize>>),
     Time(Range<usize>),
 }
 
-/// Selections D_p of every part, with their names.
+/// Selections D_p of all parts, each with the name of its part.
 pub(super) struct Cuts(Vec<(Part, Cut)>);
 
 impl Cuts {
@@ -84,7 +84,8 @@ impl Cuts {
         self.0.iter().map(|(part, _)| *part)
     }
 
-    /// Returns D_p Q of every part.
+    /// Returns, for every part p of the data, D_p Q: the `columns` Q restricted to the data of the
+    /// part.
     pub(super) fn columns(
         &self,
         data: &FrequencyData,

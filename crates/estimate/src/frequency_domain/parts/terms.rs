@@ -20,17 +20,19 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 #[non_exhaustive]
 pub enum OmittedTerm {
     /// Displacement in phase with the forces; its ratio to the forces does not depend on the
-    /// frequency: modes above the band.
+    /// frequency. It describes modes above the band.
     ResidualFlexibility,
-    /// Force that grows with the fourth power of the frequency: masses on springs that have modes
-    /// above the band.
+    /// Force whose ratio to the displacement is proportional to ω⁴. It describes masses on springs
+    /// with modes above the band.
     HiddenMass,
-    /// Displacement that falls with the square of the frequency: modes below the band.
+    /// Displacement whose ratio to the forces is proportional to 1/ω². It describes modes below the
+    /// band.
     ResidualMass,
     /// Damping force in phase with the velocity; its ratio to the displacement does not grow with
     /// the frequency.
     StructuralDamping,
-    /// Change of an entry of M, C or K that is stated as known, such as a zero of the structure.
+    /// Change of an entry of M, C or K whose value is stated, such as an entry that is 0 because no
+    /// element couples two degrees of freedom.
     KnownEntry {
         /// The entry.
         #[cfg_attr(feature = "serde", serde(serialize_with = "as_text"))]
@@ -39,7 +41,7 @@ pub enum OmittedTerm {
     /// Force that follows a power of a displacement or velocity, to the ground or between two
     /// degrees of freedom.
     Nonlinear {
-        /// Power of the motion.
+        /// Power of the displacement or velocity to which the force is proportional.
         power: Power,
         /// Degree of freedom.
         #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
@@ -50,7 +52,7 @@ pub enum OmittedTerm {
     },
 }
 
-/// Power of a motion that is tested as a force.
+/// Power or sign of a displacement or velocity that is tested as a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Power {
@@ -99,13 +101,13 @@ pub struct SampledRows {
     pub sampling: Sampling,
 }
 
-/// Force and displacement of a term, rows × n, each up to a factor (from N and m).
+/// Change of force and displacement due to a term, each rows × n. The scale of a term is arbitrary.
 struct Change {
     force: ComplexMatrix,
     displacement: ComplexMatrix,
 }
 
-/// Most likely motion of a fit on its lines.
+/// Most likely displacement and force of a fit on all lines of its data.
 pub(super) struct LikelyMotion<'a> {
     fit: &'a PartsOfFit<'a>,
     system: SecondOrderSystem,
@@ -209,8 +211,8 @@ impl<'a> LikelyMotion<'a> {
         })
     }
 
-    /// Returns the force that a unit of an entry and, in a symmetric matrix, of the mirrored entry
-    /// causes.
+    /// Returns the force that a unit change of an entry causes. In a symmetric matrix, the mirrored
+    /// entry has the same change.
     fn by_entry(&self, entry: Parameter) -> Change {
         let (n, omega) = (self.fit.data.dof(), self.fit.data.omega());
         let (row, column) = (entry.row(), entry.column());
@@ -249,7 +251,7 @@ impl<'a> LikelyMotion<'a> {
 
     /// Returns the spectrum of a power of the motion, one value per row. The power is computed from
     /// all samples of each record. The initial and final conditions of a record add only a
-    /// transient to it.
+    /// transient to this spectrum.
     fn power_of(
         &self,
         power: Power,

@@ -14,7 +14,8 @@ pub enum Candidate {
     /// quantity.
     Sensor(Sensor),
     /// A second test with the same sensors. This force acts instead of the forces of the first
-    /// test. Its amplitude on each line is the root mean square of their amplitudes.
+    /// test. On each line, the amplitude of this force is the root mean square of the amplitudes of
+    /// the forces of the first test.
     Force(Input),
 }
 
@@ -77,7 +78,8 @@ impl MachineEstimate {
         Ok(gains)
     }
 
-    /// Returns JᵀJ of the present test with its priors, scaled by the values of the parameters.
+    /// Returns JᵀJ of the present test, including the priors. Each column of J is multiplied by the
+    /// scale of its parameter.
     fn information(
         &self,
         data: &LineData,
@@ -128,8 +130,8 @@ impl MachineEstimate {
         }
     }
 
-    /// Returns the noise of a sensor: the mean variance of the sensors of its quantity, or of all
-    /// sensors, corrected for the gains.
+    /// Returns the noise of a sensor: the mean variance of the sensors that measure the same
+    /// quantity, corrected for the gains. If there is no such sensor, the mean is over all sensors.
     fn sensor_variance(&self, instruments: &Instruments, sensor: &Sensor) -> DMatrix<f64> {
         let same = |at: &usize| instruments.sensors[*at].quantity == sensor.quantity;
         let sensors: Vec<usize> = (0..self.variance.ncols()).collect();
@@ -149,7 +151,8 @@ impl MachineEstimate {
         })
     }
 
-    /// Returns JᵀJ of a test, scaled by the values of the parameters.
+    /// Returns JᵀJ of a test with these instruments, inputs and lines. Each column of J is
+    /// multiplied by the scale of its parameter.
     fn gram(
         &self,
         machine: &Machine,
@@ -195,7 +198,7 @@ impl MachineEstimate {
     }
 }
 
-/// Returns the scale of a parameter.
+/// Returns the scale of a parameter: its absolute value, or 1 if the value is 0.
 fn scale(value: f64) -> f64 {
     if value == 0.0 { 1.0 } else { value.abs() }
 }

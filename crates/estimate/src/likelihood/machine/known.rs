@@ -21,13 +21,13 @@ use crate::likelihood::weights::Weights;
 pub struct FreedCoefficient {
     /// Name of the element and its coefficient.
     pub name: String,
-    /// Unit, as that of a parameter.
+    /// Unit of the coefficient.
     pub unit: &'static str,
-    /// Known value, in this unit.
+    /// Known value of the coefficient, in the unit `unit`.
     pub known: f64,
-    /// Most likely value, in this unit.
+    /// Most likely value of the coefficient, in the unit `unit`.
     pub value: f64,
-    /// Standard error of the value, in this unit.
+    /// Standard error of the most likely value, in the unit `unit`.
     pub standard_error: f64,
     /// Probability that at least one of the tested coefficients raises the likelihood by more than
     /// this one, if all known values are right.

@@ -18,9 +18,9 @@ use crate::likelihood::{Dimensions, LineResponse, ResponseModel};
 struct JointTerm {
     entries: JointPattern,
     power: Power,
-    /// Coefficient in the nominal machine.
+    /// Coefficient of this term in the nominal machine.
     nominal: Complex<f64>,
-    /// Index among the terms of the assembly.
+    /// Index of this term among the terms of the assembly.
     term: usize,
 }
 
@@ -35,7 +35,7 @@ enum JointPattern {
 struct Change(Vec<(usize, usize, Complex<f64>)>);
 
 impl Change {
-    /// Adds Δ times a matrix, given by its entries, to `sum`.
+    /// Adds the product of Δ and a matrix to `sum`; `entry` returns the entries of this matrix.
     fn add_product(
         &self,
         sum: &mut DMatrix<Complex<f64>>,
@@ -96,7 +96,7 @@ pub struct MachineLine<'a> {
     /// Motion of joints and support (j + 1) per unit of each input, load of the machine and state
     /// load.
     joints: DMatrix<Complex<f64>>,
-    /// Frequency factor of each term between the joints.
+    /// Frequency factor, such as −ω² for a mass, of each term between the joints.
     factors: Vec<Complex<f64>>,
     /// Response S (I − H Δ) of the sensors to motions of a measured part, and the forces on this
     /// part per unit of each input.
@@ -364,7 +364,8 @@ impl ResponseModel for MachineModel {
     }
 
     /// Returns the covariance of the outputs due to the errors of a measured receptance: Σ var_ij
-    /// |g_j|² P_i P_iᴴ with the forces g on the part and the readings P of its motions.
+    /// |g_j|² P_i P_iᴴ, where g are the forces on the measured part and column P_i is the response
+    /// of the sensors to a unit motion i of this part.
     fn covariance<'l>(
         &'l self,
         row: usize,
@@ -450,7 +451,8 @@ impl LineResponse for MachineLine<'_> {
 }
 
 impl MachineLine<'_> {
-    /// Writes the readings for the forces of a term of unit coefficient under `motion` (j + 1).
+    /// Writes the response of the sensors to the forces that a term with unit coefficient causes
+    /// under `motion` (j + 1 entries).
     fn response_to(
         &self,
         entries: &JointPattern,

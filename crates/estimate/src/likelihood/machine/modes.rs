@@ -19,7 +19,8 @@ pub struct MachineMode {
     pub damping_ratio_error: f64,
 }
 
-/// Relative shift from an eigenvalue for the inverse iteration of its left vector.
+/// Relative difference between an eigenvalue and the shift of the inverse iteration for its left
+/// eigenvector.
 const SHIFT: f64 = 1e-7;
 
 impl MachineEstimate {

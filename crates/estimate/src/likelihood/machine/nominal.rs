@@ -63,7 +63,8 @@ impl Places {
         Self { dofs, joints }
     }
 
-    /// Returns the index of a degree of freedom.
+    /// Returns the index of a degree of freedom in [`Places`]; `None` if [`Places`] does not
+    /// contain it.
     pub(super) fn index(&self, dof: usize) -> Option<usize> {
         self.dofs.iter().position(|at| *at == dof)
     }

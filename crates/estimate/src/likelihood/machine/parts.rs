@@ -31,9 +31,9 @@ struct Linearised<'a> {
 /// `names` are the names of the parameters. The list is empty for large fits, undetermined
 /// parameters, and too few residuals.
 ///
-/// The score of part p is Qᵀ D_p e with the selection D_p of its rows of the residual e. The
-/// covariance of the scores follows from that of e, which is the identity without the components
-/// that parameters, transients and errors of pulses explain.
+/// The score of part p is Qᵀ D_p e, where e is the residual and D_p selects the rows of the part.
+/// The covariance of the scores follows from the covariance of e, which is the identity without the
+/// components that parameters, transients and errors of pulses explain.
 ///
 /// # Source
 /// As [`PartsOfFit::compare`](crate::frequency_domain::PartsOfFit::compare).

@@ -101,7 +101,7 @@ struct Basis {
 }
 
 impl Basis {
-    /// Adds a vector of length at most 1.
+    /// Adds a vector whose norm is at most 1.
     ///
     /// # Source
     /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 5.2.9 (Gram–Schmidt; twice

@@ -144,7 +144,8 @@ fn input() -> DVector<Complex<f64>> {
     ])
 }
 
-/// Returns values that differ from the initial values, at which the nominal machine is prepared.
+/// Returns parameter values that differ from the initial values; the nominal machine is prepared at
+/// the initial values.
 fn moved(assembly: &Assembly) -> Vec<f64> {
     let start = assembly.start();
     start.iter().enumerate().map(|(at, value)| value * (1.0 + 0.2 * (at as f64).sin())).collect()
@@ -196,7 +197,8 @@ fn the_sensitivity_is_the_derivative_of_the_response() {
     }
 }
 
-/// If there are many lines, their responses are not stored between the residual and its derivative.
+/// With many lines, the responses are computed again for the Jacobian instead of being stored. This
+/// gives the same Jacobian as stored responses.
 #[test]
 fn the_jacobian_does_not_depend_on_what_is_kept() {
     let assembly = assembly(true);
@@ -280,7 +282,7 @@ fn the_gradient_includes_the_errors_of_pulses() {
 fn first_steps_have_lines_of_every_force_and_record() {
     let assembly = assembly(false);
     for thinning in 2..=6 {
-        // A line has six real numbers.
+        // A line has three complex outputs, which are six real numbers.
         let lines = (thinning * SEARCH_NUMBERS * assembly.parameters().len()).div_ceil(6);
         let omega: Vec<f64> = (1..=lines).map(|line| line as f64).collect();
         let model = MachineModel::new(&assembly, &omega, None, false).unwrap();
@@ -338,7 +340,8 @@ fn state_loads_contain_every_load_to_which_a_sensor_responds() {
         for line in 0..200 {
             let omega = 3.7 + 3.99 * line as f64;
             let stiffness = assembly.dynamic_stiffness(&parameters, omega, |_| true);
-            // The row of the inverse that belongs to the sensor.
+            // `row` is the row of the inverse dynamic stiffness for the sensor at degree of freedom
+            // 30.
             let mut unit = DVector::zeros(n);
             unit[30] = Complex::from(1.0);
             let row = stiffness.columns(0, n).transpose().lu().solve(&unit).unwrap();

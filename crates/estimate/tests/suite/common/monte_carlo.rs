@@ -89,7 +89,7 @@ impl Experiment {
         DVector::from_iterator(free.len(), free.iter().map(entry))
     }
 
-    /// Runs many experiments, the same ones for any number of threads.
+    /// Runs `runs` experiments; the result does not depend on the number of threads.
     pub fn scatter(&self, estimators: &[Estimator], runs: u64) -> Vec<Scatter> {
         let found: Vec<Vec<Estimate>> = (0..runs)
             .into_par_iter()
@@ -118,11 +118,12 @@ impl Experiment {
         Scatter { bias, deviation: variance.map(f64::sqrt), coverage }
     }
 
-    /// Smallest standard deviations of unbiased estimators, by the Cramér–Rao inequality.
+    /// Returns the smallest standard deviations of unbiased estimators, by the Cramér–Rao
+    /// inequality.
     ///
     /// The bound does not depend on the estimators. It follows from the sensitivities of the
-    /// closed-form displacement, by central differences, and from white noise of 4 s²/N on each
-    /// line of one period.
+    /// closed-form displacement, by central differences, and from white noise. Noise with the
+    /// standard deviation s has the power 4 s²/N on each line of N samples.
     pub fn bound(&self) -> DVector<f64> {
         let (truth, omega) = (self.truth(), self.lines.omega());
         let force = forces(self.lines.as_slice(), self.system.dof(), 50.0);
@@ -133,7 +134,7 @@ impl Experiment {
         let size = truth.amax();
         let sensitivities: Vec<_> = (0..truth.len())
             .map(|at| {
-                // Parameters whose value is zero need a step, too.
+                // A parameter whose value is zero also needs a step that is not zero.
                 let step = 1e-5 * truth[at].abs().max(1e-3 * size);
                 let (mut up, mut down) = (truth.clone(), truth.clone());
                 up[at] += step;

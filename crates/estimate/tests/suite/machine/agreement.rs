@@ -19,7 +19,8 @@ use nalgebra::{Complex, DMatrix, dmatrix};
 
 use super::generator::{complex_noise, random_phases};
 
-/// Two degrees of freedom, no symmetric matrix.
+/// Returns M, C and K of a system with two degrees of freedom; none of the three matrices is
+/// symmetric.
 fn truth() -> [DMatrix<f64>; 3] {
     [
         dmatrix![10.0, 0.5; 0.2, 8.0],
@@ -28,7 +29,8 @@ fn truth() -> [DMatrix<f64>; 3] {
     ]
 }
 
-/// All twelve entries of M, C and K as one block, with initial values near the truth.
+/// Returns a machine with all twelve entries of M, C and K in one element; the initial values are
+/// near the truth.
 fn machine() -> Machine {
     let start = |matrix: &DMatrix<f64>| {
         [(0, 0), (0, 1), (1, 0), (1, 1)].map(|at: (usize, usize)| {
@@ -61,8 +63,9 @@ fn identified(data: &LineData, quantity: ResponseQuantity) -> LikelihoodEstimate
     identify_machine(data, &machine(), &instruments, &settings).unwrap().likelihood
 }
 
-/// A predicted decrease below 10⁻¹² of the sum of squares ends a search; this leaves an error of
-/// 10⁻⁶·√(residuals) standard errors for about 400 residuals.
+/// Error that remains at the end of a search, in standard errors. A search ends if the predicted
+/// decrease of the sum of squares is below 10⁻¹² of this sum. The remaining error is 10⁻⁶ √n
+/// standard errors for n residuals; n is about 400.
 const SEARCH_END: f64 = 2e-5;
 
 /// Checks that the values agree to `tolerance` times the largest entry of the matrix plus
@@ -84,7 +87,8 @@ fn check(data: &FrequencyData, likelihood: &LikelihoodEstimate, tolerance: f64) 
     }
 }
 
-/// The same noisy amplitudes for both estimators, with noise on the forces or without.
+/// Returns the same noisy amplitudes for both estimators. The forces have noise of standard
+/// deviation `force_noise`.
 fn both(force_noise: f64, seed: u64) -> (FrequencyData, LineData) {
     let omega: Vec<f64> = (10..=90).map(|line| TAU * 0.5 * f64::from(line)).collect();
     let lines = omega.len();
@@ -125,9 +129,9 @@ fn known_noise_on_forces_and_responses() {
     }
 }
 
-/// The transient of an open record: one estimator has loads of order 5 on every degree of freedom,
-/// the other loads of order 1 and a polynomial of order 3 for every output; both span the same
-/// space.
+/// Two estimators give the same result for an open record. One describes the transient by loads of
+/// order 5 on every degree of freedom, the other by loads of order 1 and a polynomial of order 3
+/// for every output; both descriptions span the same space.
 #[test]
 fn open_records() {
     let rig = RandomTest {

@@ -31,7 +31,8 @@ pub fn chain(values: &[f64; 5]) -> DMatrix<f64> {
     matrix
 }
 
-/// Force on mass 1, displacements of masses 1 and 5 with 0.5 % noise.
+/// Returns data with the force on mass 1 and the displacements of masses 1 and 5, which have 0.5 %
+/// noise.
 pub fn data(stiffnesses: &[f64; 5], seed: u64) -> LineData {
     let omega: Vec<f64> = (4..=400).map(|line| TAU * 0.125 * f64::from(line)).collect();
     let phases = random_phases(omega.len(), 1, 1000 + seed);
@@ -41,7 +42,7 @@ pub fn data(stiffnesses: &[f64; 5], seed: u64) -> LineData {
     measured(&omega, phases, all.select_columns(&[0, 4]), 0.005, seed)
 }
 
-/// The chain with one initial value for all springs, and one for all dampers.
+/// Returns the chain with one initial value for all springs, and one for all dampers.
 pub fn machine() -> Machine {
     let mut machine = Machine::new(["x1", "x2", "x3", "x4", "x5"]);
     let dofs = machine.dofs.clone();
@@ -76,8 +77,8 @@ pub fn fit(seed: u64, settings: &Settings) -> Option<LikelihoodEstimate> {
     Some(identify_machine(&data, &machine(), &instruments(), settings).ok()?.likelihood)
 }
 
-/// The chain with a spring from the last mass to the support, which does not exist: `k >= 0` is
-/// active in about half of the experiments.
+/// Identifies the chain with an additional spring from the last mass to the support. The true chain
+/// does not have this spring, so the bound `k >= 0` is active in about half of the experiments.
 pub fn fit_with_bound(seed: u64) -> Option<LikelihoodEstimate> {
     let free = FreeCoefficient::from_start(1e3).at_least(0.0);
     let machine = machine().with("absent", Element::spring(["x5", "support"], free));
@@ -91,8 +92,8 @@ pub fn truth_with_bound() -> Vec<(String, f64)> {
     [truth(), vec![("absent".into(), 0.0)]].concat()
 }
 
-/// The chain with a prior of 1 % on the first spring. The mean of the prior is `away` standard
-/// deviations above the truth.
+/// Identifies the chain with a prior of 1 % on the first spring. The mean of the prior is `away`
+/// standard deviations above the truth.
 pub fn fit_with_prior(seed: u64, away: f64) -> Option<LikelihoodEstimate> {
     let data = data(&STIFFNESSES, seed);
     let settings = Settings::default();
@@ -121,7 +122,8 @@ fn a_bound_is_active_in_half_of_the_experiments() {
         estimate.as_ref().unwrap().parameter("absent").unwrap().at_bound
     };
     let active = estimates.iter().filter(|estimate| is_active(estimate)).count();
-    // Of 20 experiments, fewer than 4 or more than 16 are active with a probability of 0.003.
+    // The probability that the bound is active in fewer than 4 or more than 16 of 20 experiments is
+    // 0.003.
     assert!((4..=16).contains(&active), "{active}");
 }
 
@@ -135,19 +137,20 @@ fn a_prior_that_is_wrong_by_five_standard_deviations_is_told() {
     assert!((0..4).all(|seed| p_value(0.5, seed) > 0.01));
 }
 
-/// Of 200 intervals of 95 %, fewer than 90 % contain the truth with a probability of 0.002 if they
-/// are independent.
+/// At least 90 % of 200 intervals of 95 % contain the truth. For independent intervals, the
+/// probability of fewer is 0.002.
 #[test]
 fn intervals_of_springs_and_dampers_hold() {
     let judged = judge(&truth(), 20, |seed| fit(seed, &Settings::default()));
     assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
-    // In 20 experiments, 14 intervals or fewer contain the truth with a probability of 3e-4.
+    // The probability that at most 14 of 20 intervals contain the truth is 3e-4.
     assert!(judged.worst >= 0.7 && judged.worst_scatter < 1.6, "{judged:?}");
     assert!((0.85..1.15).contains(&judged.scatter), "{judged:?}");
 }
 
-/// Fewer than 87 % of 80 intervals contain the truth with a probability of 0.002 if their coverage
-/// is 95 %, and with a probability of 0.94 if it is 80 %.
+/// If the noise is estimated from the residual, at least 87 % of 80 intervals contain the truth.
+/// The probability of fewer is 0.002 if the coverage of the intervals is 95 %, and 0.94 if it is 80
+/// %.
 #[test]
 fn unknown_noise_is_found_from_the_residual() {
     for noise in [NoiseSource::WhiteResidual, NoiseSource::SmoothResidual] {
@@ -168,7 +171,8 @@ fn the_misfit_is_that_of_the_noise() {
     assert!(estimate.relative_residual.iter().all(|r| (r - 0.005).abs() < 0.001));
 }
 
-/// The modes of the identified chain, with their standard errors.
+/// The standard errors of natural frequencies and damping ratios agree with the errors of the modes
+/// of the identified chain.
 #[test]
 fn modes_of_the_identified_chain_have_honest_errors() {
     let mass = DMatrix::from_diagonal(&MASSES.to_vec().into());
@@ -187,11 +191,12 @@ fn modes_of_the_identified_chain_have_honest_errors() {
         }
     }
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    // 60 squares of unit mean: between 0.5 and 1.6 with a probability of 0.999.
+    // The mean of 60 squares with a mean of 1 each is between 0.5 and 1.6 with a probability of
+    // 0.999.
     assert!((0.5..1.6).contains(&mean), "{mean}");
 }
 
-/// Three masses of a chain, everything unknown, one force and two sensors.
+/// Identifies a chain of three masses from one force and two sensors; all coefficients are unknown.
 pub fn three_masses(seed: u64) -> Option<LikelihoodEstimate> {
     let [m, k, c] = [[2.0, 1.5, 1.2], [3e4, 2e4, 2.5e4], [6.0, 4.0, 3.0]];
     let omega: Vec<f64> = (8..=320).map(|line| TAU * 0.125 * f64::from(line)).collect();
@@ -232,8 +237,8 @@ pub fn three_masses_truth() -> Vec<(String, f64)> {
     (0..3).flat_map(of).collect()
 }
 
-/// Fewer than 89 % of 108 intervals contain the truth with a probability of 0.008 if their coverage
-/// is 95 %, and with a probability of 0.99 if it is 80 %.
+/// At least 89 % of 108 intervals contain the truth. The probability of fewer is 0.008 if the
+/// coverage of the intervals is 95 %, and 0.99 if it is 80 %.
 #[test]
 fn masses_springs_and_dampers_of_a_chain_with_an_unmeasured_mass() {
     let judged = judge(&three_masses_truth(), 12, three_masses);

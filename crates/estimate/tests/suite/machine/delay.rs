@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use super::chain;
 use super::open;
 
-/// Returns the same data without a stated noise and with every output late by its delay, in s.
+/// Returns `data` without its stated noise and with every output delayed by its entry of `delays`,
+/// in s.
 fn late(data: &LineData, delays: [f64; 2]) -> LineData {
     let omega = data.omega();
     let turned = |row: usize, output: usize| {
@@ -21,7 +22,8 @@ fn late(data: &LineData, delays: [f64; 2]) -> LineData {
     LineData::new(omega.to_vec(), data.inputs().clone(), outputs, kind).unwrap()
 }
 
-/// The chain with a prior of 1 % on the first spring, which has a part of the information.
+/// Identifies the chain from delayed outputs. A prior of 1 % on the first spring contributes a part
+/// of the information.
 fn of_prior(seed: u64, delays: [f64; 2]) -> MachineEstimate {
     let data = late(&chain::data(&chain::STIFFNESSES, seed), delays);
     let machine = chain::machine_with_prior(0.5);
@@ -41,7 +43,8 @@ fn of_open_record(seed: u64, delays: [f64; 2]) -> MachineEstimate {
     identify_machine(&data, &machine, &instruments, &Settings::default()).unwrap()
 }
 
-/// Of 10 tests at 5 %, more than 3 reject with a probability of 0.001.
+/// The score test of a delay, with a level of 5 %, rejects at most 3 of 10 records without a delay.
+/// The probability of more than 3 is 0.001.
 #[test]
 fn no_delay_is_found_in_right_data() {
     for test in [of_chain, of_prior, of_open_record] {
@@ -52,8 +55,9 @@ fn no_delay_is_found_in_right_data() {
     }
 }
 
-/// If the changes that the score test predicts are added, the parameters agree with the true ones.
-/// Intervals that include these changes contain the truth.
+/// The score test finds a delay of all sensors or of one sensor. The test predicts how far the
+/// delay shifts the parameters: with this correction, the parameters agree with the true values.
+/// Intervals that include the shift contain the truth.
 #[test]
 fn a_delay_of_all_sensors_or_of_one_is_found() {
     const DELAY: f64 = 1e-4;
@@ -86,7 +90,7 @@ fn a_delay_of_all_sensors_or_of_one_is_found() {
     }
 }
 
-/// A sensor with a delay among the parameters is not tested.
+/// The delay of a sensor is not tested if this delay is a parameter of the fit.
 #[test]
 fn a_delay_that_is_a_parameter_is_not_tested() {
     let data = late(&open::data(&open::rig(), 0, &[0, 1]), [0.0, 1e-4]);

@@ -18,7 +18,7 @@ fn system() -> SecondOrderSystem {
     SecondOrderSystem::new(mass, damping, stiffness).unwrap()
 }
 
-/// Symmetric matrices of a chain with proportional damping.
+/// Returns the unknowns of a chain with proportional damping: the matrices are symmetric.
 fn chain() -> Unknowns {
     let mut unknowns = Unknowns::unknown_mass(3).unwrap();
     for matrix in [Matrix::Mass, Matrix::Stiffness] {
@@ -30,7 +30,7 @@ fn chain() -> Unknowns {
     unknowns.fix(Matrix::Stiffness, 0, 2, 0.0).unwrap().proportional_damping().unwrap()
 }
 
-/// Force on mass 1, accelerations of masses 1 and 3.
+/// Identifies the entries from the force on mass 1 and the accelerations of masses 1 and 3.
 fn identified(unknowns: &Unknowns, seed: u64) -> LikelihoodEstimate {
     let exact = system();
     let omega: Vec<f64> = (8..=320).map(|line| TAU * 0.125 * f64::from(line)).collect();
@@ -69,12 +69,14 @@ fn entries_are_found_where_the_unmeasured_mass_is_known() {
         }
     }
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    // 72 squares of unit mean: between 0.5 and 1.6 with a probability of 0.999.
+    // The mean of 72 squares with a mean of 1 each is between 0.5 and 1.6 with a probability of
+    // 0.999.
     assert_eq!(squares.len(), 72);
     assert!((0.5..1.6).contains(&mean), "{mean}");
 }
 
-/// The displacement of a mass without a sensor may be scaled by any factor.
+/// The displacement of a mass without a sensor may be scaled by any factor, so only combinations of
+/// the entries of this mass are determined.
 #[test]
 fn the_scale_of_an_unmeasured_motion_is_undetermined() {
     let estimate = identified(&chain(), 1);

@@ -20,14 +20,15 @@ const DAMPINGS: [f64; 2] = [150.0, 90.0];
 /// Delay of the logger of the roof, in s, if it has a separate clock.
 const DELAY: f64 = 0.013;
 
-/// Accelerations of the storeys, each relative to the table or absolute, under the acceleration of
-/// the table; the roof is delayed by `delay` (s).
+/// Returns the accelerations of the storeys, each relative to the table or absolute, under the
+/// acceleration of the table. The channel of the roof is delayed by `delay` (s).
 fn data(is_relative: [bool; 2], delay: f64, seed: u64) -> LineData {
     let omega: Vec<f64> = (5..=160).map(|line| TAU * 0.1 * f64::from(line)).collect();
     let ground = random_phases(omega.len(), 1, 2000 + seed);
     let shear = |[first, second]: [f64; 2]| dmatrix![first + second, -second; -second, second];
     let mass = dmatrix![MASSES[0], 0.0; 0.0, MASSES[1]];
-    // Relative motion z under −M ι a, and x = z + x_g.
+    // The force −M ι a causes the relative motion z, where a is the acceleration of the table; the
+    // absolute motion is x = z + x_g.
     let force = DMatrix::from_fn(omega.len(), 2, |row, at| -ground[(row, 0)] * MASSES[at]);
     let relative = eliminated([&mass, &shear(DAMPINGS), &shear(STIFFNESSES)], &omega, &force);
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
@@ -44,7 +45,7 @@ pub fn fit(is_relative: [bool; 2], seed: u64) -> Option<LikelihoodEstimate> {
     fit_of_clocks(is_relative, None, seed)
 }
 
-/// The frame with an unknown delay of the roof between bounds.
+/// Identifies the frame; `delay` is the unknown delay of the roof with its bounds.
 fn fit_of_clocks(
     is_relative: [bool; 2],
     delay: Option<FreeCoefficient>,
@@ -89,19 +90,20 @@ pub fn truth() -> Vec<(String, f64)> {
 fn absolute_and_relative_accelerations_give_the_frame() {
     for is_relative in [[false, false], [true, true], [true, false]] {
         let judged = judge(&truth(), 12, |seed| fit(is_relative, seed));
-        // Of 60 intervals of 95 %, fewer than 51 contain the truth with a probability of 0.002.
+        // The probability that fewer than 51 of 60 intervals of 95 % contain the truth is 0.002.
         assert!(judged.failed == 0 && judged.held >= 0.85, "{is_relative:?} {judged:?}");
         assert!((0.75..1.3).contains(&judged.scatter), "{is_relative:?} {judged:?}");
     }
 }
 
-/// The reference is the delay that the generator gave to the roof.
+/// The unknown delay of the roof channel is identified together with the frame. The reference is
+/// the delay that the generator added to this channel.
 #[test]
 fn the_delay_of_a_logger_with_a_clock_of_its_own_is_found() {
     let delay = || FreeCoefficient::from_start(0.0).at_least(-0.05).at_most(0.05);
     let truth = [truth(), vec![("roof.delay".to_owned(), DELAY)]].concat();
     let judged = judge(&truth, 12, |seed| fit_of_clocks([false; 2], Some(delay()), seed));
-    // Of 72 intervals of 95 %, fewer than 61 contain the truth with a probability of 0.001.
+    // The probability that fewer than 61 of 72 intervals of 95 % contain the truth is 0.001.
     assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
     let error = fit_of_clocks([false; 2], Some(delay()), 0).unwrap();
     assert!(error.parameter("roof.delay").unwrap().standard_error.unwrap() < 1e-4);

@@ -4,7 +4,7 @@ use mechid_signal::{Sampling, noise};
 use mechid_spectra::{LineData, LineNoise, Transient};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Complex circular numbers of unit variance, rows × columns.
+/// Returns complex circular random numbers of unit variance, rows × columns.
 pub fn complex_noise(rows: usize, columns: usize, seed: u64) -> DMatrix<Complex<f64>> {
     let sampling = Sampling::new(1.0, rows).unwrap();
     let drawn = noise::white(sampling, 2 * columns, 0.5_f64.sqrt(), seed).unwrap();
@@ -18,8 +18,8 @@ pub fn random_phases(lines: usize, inputs: usize, seed: u64) -> DMatrix<Complex<
     complex_noise(lines, inputs, seed).map(|z| z / z.norm())
 }
 
-/// Returns data of the outputs with noise, and with the stated covariance of the noise. Its RMS on
-/// each output is a fraction `share` of the RMS of this output.
+/// Returns the inputs and the noisy outputs, with the stated covariance of the noise. The RMS of
+/// the noise on each output is a fraction `share` of the RMS of this output.
 pub fn measured(
     omega: &[f64],
     inputs: DMatrix<Complex<f64>>,

@@ -19,8 +19,9 @@ const DAMPING: f64 = 40.0;
 /// Number of nodes of each beam.
 const NODES: usize = 9;
 
-/// M, C and K of a free steel beam of a length (m), 20 mm square, with Euler–Bernoulli elements
-/// (deflection and slope at each node) and damping proportional to stiffness.
+/// Returns M, C and K of a free steel beam with this length (m) and a square section of 20 mm. The
+/// Euler–Bernoulli elements have deflection and slope at each node, and the damping is proportional
+/// to the stiffness.
 fn beam(length: f64) -> [DMatrix<f64>; 3] {
     let (n, l) = (2 * NODES, length / (NODES - 1) as f64);
     let (area, inertia) = (4e-4, 0.02_f64.powi(4) / 12.0);
@@ -46,7 +47,7 @@ fn beam(length: f64) -> [DMatrix<f64>; 3] {
     [mass, &stiffness * 2e-6, stiffness]
 }
 
-/// Both beams side by side, joined between their ends or not.
+/// Returns M, C and K of both beams side by side; if `is_joined`, the joint connects their ends.
 fn whole(is_joined: bool) -> [DMatrix<f64>; 3] {
     let (parts, n) = ([beam(0.8), beam(0.6)], 2 * NODES);
     let mut all = [0, 1, 2].map(|which| {
@@ -91,7 +92,8 @@ fn parts(omega: &[f64], seed: u64) -> MeasuredReceptance {
     MeasuredReceptance { receptance, variance: Some(variance) }
 }
 
-/// The joint from the receptances of the parts and the response of the whole at both far ends.
+/// Identifies the joint from the receptances of the parts and from the response of the assembly at
+/// both far ends.
 pub fn fit(seed: u64) -> Option<LikelihoodEstimate> {
     let omega: Vec<f64> = (10..=200).map(|line| TAU * 2.0 * f64::from(line)).collect();
     let n = 2 * NODES;
@@ -123,7 +125,7 @@ pub fn truth() -> Vec<(String, f64)> {
 #[test]
 fn the_joint_of_two_measured_beams_is_found() {
     let judged = judge(&truth(), 10, fit);
-    // Of 20 intervals of 95 %, fewer than 16 contain the truth with a probability of 0.003.
+    // The probability that fewer than 16 of 20 intervals of 95 % contain the truth is 0.003.
     assert!(judged.failed == 0 && judged.held >= 0.8, "{judged:?}");
     assert!((0.6..1.5).contains(&judged.scatter) && judged.bias < 4.0, "{judged:?}");
     let estimate = fit(3).unwrap();

@@ -8,19 +8,20 @@ use rayon::prelude::*;
 pub struct Judged {
     /// Share of the intervals that contain the truth, over all parameters.
     pub held: f64,
-    /// Share of the intervals of the worst parameter that contain the truth.
+    /// Smallest share, among the parameters, of intervals that contain the truth.
     pub worst: f64,
-    /// Root mean square error over root mean square standard error, over all parameters.
+    /// Root mean square, over all parameters, of the ratio of RMS error to RMS standard error.
     pub scatter: f64,
-    /// Root mean square error over root mean square standard error of the worst parameter.
+    /// Largest ratio of RMS error to RMS standard error of a parameter.
     pub worst_scatter: f64,
-    /// Largest mean error of a parameter, in standard errors of the mean.
+    /// Largest absolute mean error of a parameter, divided by the standard error of this mean.
     pub bias: f64,
     /// Number of experiments whose search failed.
     pub failed: usize,
 }
 
-/// Judges the estimates of `experiment` for seeds 0 … against the truth by name.
+/// Runs `experiment` for the seeds from 0 to `seeds` − 1 and compares the estimates with the true
+/// values. `truth` pairs the name of each parameter with its true value.
 pub fn judge(
     truth: &[(String, f64)],
     seeds: u64,

@@ -1,4 +1,5 @@
-//! A chain of forty masses in an open record, of which two springs and dampers are unknown.
+//! A chain of forty masses in an open record; two springs and two dampers to the support are
+//! unknown.
 
 use mechid_estimate::likelihood::machine::{MachineEstimate, identify_machine};
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
@@ -34,8 +35,8 @@ fn chain(value: f64) -> DMatrix<f64> {
     })
 }
 
-/// A window of the steady state under a random force with a period four times as long, with 0.5 %
-/// noise on the displacements.
+/// Returns a window of the steady state under a random force whose period is four times as long as
+/// the window. The displacements have 0.5 % noise.
 fn data(seed: u64) -> LineData {
     let system =
         SecondOrderSystem::new(DMatrix::identity(MASSES, MASSES), chain(DAMPING), chain(STIFFNESS));
@@ -99,7 +100,7 @@ pub fn fit(seed: u64) -> Option<LikelihoodEstimate> {
 fn an_open_record_of_a_large_machine_is_identified() {
     let estimates: Vec<_> = (0..3).into_par_iter().map(fit).collect();
     let judged = judge(&truth(), 3, |seed| estimates[seed as usize].clone());
-    // Of 12 intervals of 95 %, fewer than 9 contain the truth with a probability of 0.002.
+    // The probability that fewer than 9 of 12 intervals of 95 % contain the truth is 0.002.
     assert!(judged.failed == 0 && judged.held >= 0.75, "{judged:?}");
     assert!((0.4..1.8).contains(&judged.scatter) && judged.bias < 4.0, "{judged:?}");
     let stiffness = estimates[0].as_ref().unwrap().parameter("s30.k").unwrap();

@@ -19,7 +19,7 @@ pub fn rig() -> RandomTest {
     RandomTest { system, sampling, quantity: ResponseQuantity::Acceleration, force: 100.0 }
 }
 
-/// Spectra of forces and of some channels of the response with 1 % noise.
+/// Returns spectra of the forces and of these channels of the response, which have 1 % noise.
 pub fn data(rig: &RandomTest, seed: u64, channels: &[usize]) -> LineData {
     let [force, response] = rig.measure(seed).unwrap();
     let columns = response.data().select_columns(channels);

@@ -1,4 +1,5 @@
-//! Two masses struck by a hammer whose force has noise, which is common to all lines of a record.
+//! Two masses struck by a hammer. The measured force has noise during the hits, so the errors of
+//! all lines of a record are correlated.
 
 use mechid_checks::{Verdict, delay_of_sensors, whiteness_of_lines};
 use mechid_estimate::likelihood::machine::{MachineEstimate, identify_machine};
@@ -28,13 +29,13 @@ pub fn truth() -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Number of samples of a record, and of the period of its force: the response has no aliasing, and
-/// the record ends before the period.
+/// Number of samples of a record (`SAMPLES`) and of the period of its force (`PERIOD`). The record
+/// is a part of this period, and the response has no aliasing.
 const SAMPLES: usize = 3072;
 const PERIOD: usize = 4096;
 
-/// Exact force and accelerations of six hits on the first mass, whose pulses (sin⁸) have no power
-/// near half the sampling rate.
+/// Returns the exact force and accelerations of six hits on the first mass. The pulses (sin⁸) have
+/// no power near half the sampling rate.
 fn record(seed: u64) -> [Record; 2] {
     let system = SecondOrderSystem::new(
         dmatrix![MASS, 0.0; 0.0, MASS],
@@ -59,7 +60,8 @@ fn record(seed: u64) -> [Record; 2] {
     [force, steady.acceleration().clone()].map(|of_period| of_period.window(0, SAMPLES).unwrap())
 }
 
-/// Lines of a record with 0.5 % of noise on the responses, with the noise of the force or without.
+/// Returns the lines of a record with 0.5 % of noise on the responses; if `is_known`, the data
+/// state the noise of the force.
 pub fn data(force_noise: f64, is_known: bool, seed: u64) -> LineData {
     let [force, response] = record(seed);
     let level = NoiseLevel::StandardDeviation(force_noise);
@@ -105,7 +107,7 @@ fn fit(data: &LineData) -> Option<MachineEstimate> {
     identify_machine(data, &machine, &instruments, &Settings::default()).ok()
 }
 
-/// Estimate and number of warnings about the residual of one experiment.
+/// Returns the estimate of one experiment, and the number of warnings about its residual.
 pub fn experiment(
     force_noise: f64,
     is_known: bool,
@@ -131,15 +133,15 @@ fn noise_of_a_hammer_is_common_to_all_lines() {
     let judged = |estimates: &[(LikelihoodEstimate, usize)]| {
         judge(&truth(), 10, |seed| Some(estimates[seed as usize].0.clone()))
     };
-    // Of 40 intervals of 95 %, fewer than 33 hold with a probability of 0.001; if the fit ignores
-    // the noise of the force, about 55 % of the intervals hold.
+    // The probability that fewer than 33 of 40 intervals of 95 % contain the truth is 0.001. If the
+    // fit ignores the noise of the force, about 55 % of the intervals contain the truth.
     let [of_known, of_ignored] = [judged(&known), judged(&ignored)];
     assert!(of_known.held >= 0.825 && of_known.failed == 0, "{of_known:?}");
     assert!((0.75..1.3).contains(&of_known.scatter), "{of_known:?}");
     assert!(of_ignored.held < 0.8 && of_ignored.scatter > 1.6, "{of_ignored:?}");
     let warned = |of: &[(LikelihoodEstimate, usize)]| of.iter().filter(|(_, n)| *n > 0).count();
-    // An experiment has about four p-values, each with a limit of 1 %: at least three of ten
-    // experiments warn with a probability of 0.007.
+    // An experiment has about four p-values, each with a limit of 1 %. The probability that at
+    // least three of ten experiments warn is 0.007.
     assert!(warned(&known) <= 2, "{}", warned(&known));
     assert!(warned(&ignored) >= 5, "{}", warned(&ignored));
     let square_error = |estimates: &[(LikelihoodEstimate, usize)]| -> f64 {

@@ -1,4 +1,5 @@
-//! Bearings inside a flexible rotor with gyroscopic terms, probes away from the bearings.
+//! Bearings of a flexible rotor with gyroscopic terms are identified from probes that are not at
+//! the bearings.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,7 +22,8 @@ pub const BEARINGS: [[[f64; 4]; 2]; 2] = [
     [[1.5e7, -1.0e6, 3.0e6, 0.9e7], [1.5e3, 1.0e2, 3.0e2, 2.0e3]],
 ];
 
-/// A steel shaft of 1.3 m and 50 mm with three discs, on beam elements with x, ∂x/∂z, y, ∂y/∂z at each node.
+/// Steel shaft with a length of 1.3 m, a diameter of 50 mm and three discs. Each node of its beam
+/// elements has x, ∂x/∂z, y and ∂y/∂z.
 pub struct Rotor {
     pub nodes: usize,
     pub mass: DMatrix<f64>,
@@ -30,7 +32,7 @@ pub struct Rotor {
 }
 
 impl Rotor {
-    /// Creates a rotor with Young's modulus times a factor.
+    /// Creates a rotor whose Young's modulus is that of steel times `modulus_factor`.
     pub fn new(nodes: usize, modulus_factor: f64) -> Self {
         let n = 4 * nodes;
         let zero = || DMatrix::<f64>::zeros(n, n);
@@ -83,7 +85,8 @@ impl Rotor {
         (0..self.nodes).flat_map(names).collect()
     }
 
-    /// Response (all degrees of freedom) at ω and Ω to a load.
+    /// Returns the response of all degrees of freedom to a load at the angular frequency `omega`
+    /// and the rotor speed `speed` (rad/s).
     fn response(
         &self,
         omega: f64,
@@ -91,8 +94,7 @@ impl Rotor {
         load: &DVector<Complex<f64>>,
     ) -> DVector<Complex<f64>> {
         let mut dynamic = self.stiffness.zip_zip_map(&self.mass, &self.gyroscopic, |k, m, g| {
-            // 0.2 ms of stiffness-proportional damping of the shaft would be too much; 2 µs is
-            // used.
+            // The damping matrix of the shaft is 2 µs times its stiffness matrix.
             Complex::new(k - omega * omega * m, omega * (speed * g + 2e-6 * k))
         });
         for (node, [stiffness, damping]) in self.bearing_nodes().into_iter().zip(BEARINGS) {
@@ -104,7 +106,7 @@ impl Rotor {
         dynamic.lu().solve(load).unwrap()
     }
 
-    /// The machine with equal initial stiffness and damping of all bearings.
+    /// Returns the machine; all bearings have the same initial values of stiffness and damping.
     pub fn machine(&self) -> Machine {
         let shaft = MatrixElement::new(
             self.dofs(),
@@ -145,7 +147,8 @@ impl Rotor {
     }
 }
 
-/// One shaker at a constant speed, four probes with 0.5 % noise.
+/// Returns data of one shaker at a constant speed of the rotor, with four probes that have 0.5 %
+/// noise.
 pub fn shaken(rotor: &Rotor, lines: usize, seed: u64) -> LineData {
     let omega: Vec<f64> =
         (0..lines).map(|line| TAU * (10.0 + 240.0 * line as f64 / lines as f64)).collect();
@@ -197,8 +200,8 @@ fn sixteen_coefficients_from_four_probes() {
     let rotor = Rotor::new(13, 1.0);
     let judged =
         judge(&truth(), 6, |seed| Some(fit(&shaken(&rotor, 120, seed), &rotor).ok()?.likelihood));
-    // Errors of the coefficients of one experiment are correlated: 96 intervals have less
-    // information than independent ones.
+    // The errors of the coefficients in one experiment are correlated, so 96 intervals have less
+    // information than 96 independent intervals.
     assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
     assert!((0.75..1.25).contains(&judged.scatter), "{judged:?}");
 }
@@ -234,8 +237,8 @@ fn a_wrong_modulus_is_found_and_allowed_for() {
 /// Residual unbalance in kg·m, in addition to the trial weights.
 const RESIDUAL: Complex<f64> = Complex::new(-1e-4, 2e-4);
 
-/// Bearings and residual unbalance from runs at eight speeds each: with one trial weight at each of
-/// two places, and without a weight.
+/// Identifies the bearings and the residual unbalance from three runs at eight speeds each: two
+/// runs with a trial weight at one of two nodes, and one run without a weight.
 pub fn fit_unbalance(rotor: &Rotor, seed: u64) -> Option<LikelihoodEstimate> {
     let omega: Vec<f64> = (0..8).map(|at| 100.0 + 60.0 * f64::from(at)).collect();
     let trial = Complex::new(4e-4, 0.0);

@@ -39,14 +39,15 @@ fn identified(data: &LineData, machine: &Machine, instruments: &Instruments) -> 
     identify_machine(data, machine, instruments, &Settings::default()).unwrap().likelihood
 }
 
-/// Deviation from the truth in standard errors.
+/// Returns the deviation of a parameter from its true value, in standard errors.
 fn deviation(estimate: &LikelihoodEstimate, name: &str, truth: f64) -> f64 {
     let parameter = estimate.parameter(name).unwrap();
     (parameter.value - truth) / parameter.standard_error.unwrap()
 }
 
-/// Two storeys on a table whose acceleration is the input: the sensor of the roof measures absolute
-/// acceleration, that of the first storey relative acceleration.
+/// The unknown mass, springs and dampers of two storeys on a shake table are identified. The input
+/// is the acceleration of the table; the roof has a sensor of absolute acceleration, the first
+/// storey a sensor of relative acceleration.
 #[test]
 fn a_frame_on_a_shake_table() {
     let (m, k, c) = ([120.0, 100.0], [2e5, 1.5e5], [150.0, 90.0]);
@@ -55,7 +56,8 @@ fn a_frame_on_a_shake_table() {
     let stiffness = dmatrix![k[0] + k[1], -k[1]; -k[1], k[1]];
     let damping = dmatrix![c[0] + c[1], -c[1]; -c[1], c[1]];
     let mass = dmatrix![m[0], 0.0; 0.0, m[1]];
-    // Relative motion z under −M ι a, and x = z + x_g.
+    // The force −M ι a causes the relative motion z, where a is the acceleration of the table; the
+    // absolute motion is x = z + x_g.
     let force = DMatrix::from_fn(omega.len(), 2, |row, at| -ground[(row, 0)] * m[at]);
     let relative = eliminated([&mass, &damping, &stiffness], &omega, &force);
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
@@ -86,7 +88,8 @@ fn a_frame_on_a_shake_table() {
     assert!((estimate.misfit_ratio.unwrap() - 1.0).abs() < 0.3);
 }
 
-/// One mass on two springs; the true machine has no damper.
+/// Returns the data of a mass of 2 kg on springs with a total stiffness of 2e4 N/m and with this
+/// damping.
 fn oscillator(damping: f64, seed: u64) -> LineData {
     let omega = omega(10..=110, 0.25);
     // The seed differs from that of the noise, which must not be coherent with the force.
@@ -111,8 +114,8 @@ fn a_bound_is_active_and_its_interval_one_sided() {
     assert!(damper.interval[1] > 3.0 && damper.interval[1] < 3.5, "{:?}", damper.interval);
 }
 
-/// A damper with a small effect compared with the noise, for 40 seeds: its interval comes from the
-/// profile likelihood.
+/// The effect of the damper is small compared with the noise, so its interval comes from the
+/// profile likelihood. For 40 seeds, these intervals contain the truth as often as stated.
 #[test]
 fn profile_intervals_of_weak_parameters_hold() {
     let machine = Machine::new(["x"])
@@ -133,7 +136,7 @@ fn profile_intervals_of_weak_parameters_hold() {
         profiles += usize::from(damper.interval_kind != IntervalKind::Wald);
         held += usize::from((damper.interval[0]..=damper.interval[1]).contains(&5.0));
     }
-    // Of 40 intervals of 95 %, fewer than 34 contain the truth with a probability of 0.003.
+    // The probability that fewer than 34 of 40 intervals of 95 % contain the truth is 0.003.
     assert!(held >= 34 && profiles >= 35, "{held} {profiles}");
 }
 
@@ -188,7 +191,8 @@ fn springs_in_series_and_side_by_side_are_named() {
     let values = ["k3", "k4"].map(|name| estimate.parameter(name).unwrap().value);
     let sum = values.iter().map(|k| k.recip()).sum::<f64>().recip();
     assert!((sum / 2e4 - 1.0).abs() < 0.01, "{sum}");
-    // A sensor between the springs separates them; a second one on the mass does not.
+    // A sensor between the two springs makes both stiffnesses identifiable; a second sensor on the
+    // mass does not.
     let estimate = identify_machine(&data, &series, &instruments, &Settings::default()).unwrap();
     let candidates = ["x", "between"].map(|dof| Candidate::Sensor(Sensor::new(dof, Displacement)));
     let gains = estimate.rank_candidates(&data, &series, &instruments, &candidates).unwrap();
@@ -197,7 +201,8 @@ fn springs_in_series_and_side_by_side_are_named() {
     assert!(gains[0].standard_errors.iter().all(Option::is_some));
 }
 
-/// Free chains of four masses each, joined by a spring and a damper between their ends.
+/// The spring and the damper that join two free chains of four masses at their ends are identified
+/// from the receptances of the chains and a test of the assembly.
 #[test]
 fn a_joint_between_two_measured_parts() {
     let omega = omega(20..=400, 0.1);
@@ -307,7 +312,8 @@ fn bad_descriptions_are_refused_by_name() {
     let machine = with_mass().with("k1", foot(free(2e4)));
     let result = identify_machine(&data, &machine, &read(), &settings);
     assert!(matches!(result, Err(LikelihoodError::Setting { name: "confidence", .. })));
-    // A machine without unknowns, and data of wrong size, are not errors of the description.
+    // A machine without unknowns and data of wrong size have their own errors; the description
+    // itself is correct.
     let known = with_mass().with("k1", Element::spring(["x", "support"], 2e4));
     let result = identify_machine(&data, &known, &read(), &Settings::default());
     assert_eq!(result.unwrap_err(), LikelihoodError::NoParameter);
@@ -329,7 +335,8 @@ fn bad_descriptions_are_refused_by_name() {
     assert!(matches!(result, Err(LikelihoodError::Size { expected: 2, got: 1, .. })));
 }
 
-/// Noise on the force as well: errors in variables with fewer sensors than degrees of freedom.
+/// The force has noise, too (errors in variables), and there are fewer sensors than degrees of
+/// freedom: the errors agree with the standard errors.
 #[test]
 fn noisy_forces_are_allowed_for() {
     let omega = omega(10..=200, 0.25);
@@ -362,12 +369,13 @@ fn noisy_forces_are_allowed_for() {
         squares.extend(truth.map(|(name, truth)| deviation(&estimate, name, truth).powi(2)));
     }
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    // 48 squares of unit mean: between 0.5 and 1.7 with a probability of 0.998.
+    // The mean of 48 squares with a mean of 1 each is between 0.5 and 1.7 with a probability of
+    // 0.998.
     assert!((0.5..1.7).contains(&mean), "{mean}");
 }
 
-/// Open records, windows of a far longer period; if they are assumed to be periods, the errors are
-/// far larger than the intervals.
+/// Open records are windows of a far longer period, and the intervals agree with the errors. If the
+/// records are assumed to be periods, the error of a damper is more than five times as large.
 #[test]
 fn open_records_of_one_sensor() {
     let settings = Settings { noise: NoiseSource::WhiteResidual, starts: 1, ..Settings::default() };
@@ -381,7 +389,7 @@ fn open_records_of_one_sensor() {
     let rig = super::open::rig();
     let data: Vec<LineData> = (0..12).map(|seed| super::open::data(&rig, seed, &[1])).collect();
     let mean = data.iter().map(squares).sum::<f64>() / data.len() as f64;
-    // 48 squares of unit mean; those of one record are correlated.
+    // The 48 squares have a mean of 1 each; the squares of one record are correlated.
     assert!((0.4..1.9).contains(&mean), "{mean}");
     let errors = |data: &LineData| {
         let estimate = identify_machine(data, &super::open::machine(), &instruments, &settings);

@@ -13,7 +13,8 @@ pub struct Oscillator {
 }
 
 impl Oscillator {
-    /// Displacement and velocity after `t` seconds under f(τ) = f0 + rise·τ, textbook formula.
+    /// Returns displacement and velocity after `t` seconds under f(τ) = f0 + rise·τ, from the
+    /// textbook formula.
     pub fn advance(&self, (x, v): (f64, f64), f0: f64, rise: f64, t: f64) -> (f64, f64) {
         let Self { m, c, k } = *self;
         let decay = c / (2.0 * m);
@@ -29,7 +30,8 @@ impl Oscillator {
         )
     }
 
-    /// x and ẋ at the samples, from `start`; the force held, or linear between its samples.
+    /// Returns x and ẋ at the samples, from the initial state `start`. The force is held, or linear
+    /// between its samples.
     pub fn run(
         &self,
         start: (f64, f64),
@@ -49,8 +51,9 @@ impl Oscillator {
     }
 }
 
-/// Two oscillators q1, q2 seen in mixed coordinates: x = T q and F = S f, so that
-/// M = S m T⁻¹ and so on are full and not symmetric, yet the motion is known in closed form.
+/// Two uncoupled oscillators q1 and q2 in mixed coordinates x = T q, with forces F = S f. The
+/// matrices, for example M = S m T⁻¹, are full and not symmetric, but the motion is known in closed
+/// form.
 pub struct Mixed {
     pub oscillators: [Oscillator; 2],
     pub shape: DMatrix<f64>,
@@ -79,7 +82,7 @@ impl Mixed {
         SecondOrderSystem::new(matrix(a.m, b.m), matrix(a.c, b.c), matrix(a.k, b.k)).unwrap()
     }
 
-    /// Force record (N × 2) and response to it from rest.
+    /// Returns the force record (N × 2) and the response to this force from rest.
     pub fn run(&self, modal: [&[f64]; 2], dt: f64, linear: bool) -> (Record, Response) {
         let sampling = Sampling::new(dt, modal[0].len()).unwrap();
         let parts: Vec<_> =

@@ -1,4 +1,4 @@
-//! Accelerations alone: the identified force in the band that they show.
+//! Force identified from accelerations only, in the band in which they determine the force.
 
 use mechid_force::{Measurement, Start, Tuning, kalman, within_band};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
@@ -21,19 +21,19 @@ pub fn row(dof: usize, hz: f64) -> SecondOrderSystem {
     SecondOrderSystem::new(DMatrix::identity(dof, dof) * mass, damping, springs).unwrap()
 }
 
-/// Result of one record.
+/// Result for one record: the identified force compared with the true force.
 pub struct Found {
     pub band_hz: [f64; 2],
     /// RMS values of error and force within the band, in N.
     pub error: f64,
     pub size: f64,
-    /// Share of samples within 1.96 standard errors.
+    /// Share of samples whose error is at most 1.96 standard errors.
     pub held: f64,
 }
 
-/// Identifies a force of some 336 N from 0.2 to 60 Hz on the last mass. The accelerations are 1024
-/// samples at 200 Hz of a steady state in closed form, with white noise of `level` times the size
-/// of each acceleration.
+/// Identifies a force on the last mass: about 336 N, with lines from 0.2 to 60 Hz. The
+/// accelerations are 1024 samples at 200 Hz of a steady state in closed form, with white noise of
+/// `level` times the size of each acceleration.
 pub fn found(dof: usize, hz: f64, level: f64, seed: u64) -> Found {
     let system = row(dof, hz);
     let sampling = Sampling::new(0.005, 1024).unwrap();

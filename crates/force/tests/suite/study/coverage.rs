@@ -14,14 +14,14 @@ use super::machine;
 /// The forces of the coverage study.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Shape {
-    /// Lines of equal amplitude, phases drawn anew for each record.
+    /// Lines of equal amplitude; the phases are drawn anew for each record.
     Flat(&'static str, usize, usize, usize),
     /// A random walk, whose power falls as 1/f²; in a period, a walk that returns to its first
     /// value.
     Walk,
 }
 
-/// Flat bands, single lines and a walk.
+/// Forces of the coverage study: flat bands, single lines and a random walk.
 pub const SHAPES: [Shape; 5] = [
     Shape::Flat("lines 1–40", 1, 1, 40),
     Shape::Flat("lines 1–8", 1, 1, 8),
@@ -49,9 +49,9 @@ impl Shape {
 /// Kind of record.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Extent {
-    /// A period in steady state, no frequency above the last line of the force.
+    /// A period in steady state, without frequencies above the last line of the force.
     Period,
-    /// The same samples, but without the information that they are a period.
+    /// A period in steady state whose samples a method treats as an open record.
     Open,
     /// An open record with a force that is linear between its samples.
     Linear,
@@ -66,9 +66,10 @@ pub struct Draw {
     pub forced: [usize; 1],
 }
 
-/// One of the machines under a drawn force, displacements with noise of `level` times their size.
+/// Returns the displacements of one of the machines under a drawn force, with noise of `level`
+/// times their RMS value.
 ///
-/// Walks of open records begin at rest and are linear between samples.
+/// In an open record, the random walk begins with the system at rest and is linear between samples.
 pub fn draw(bearing: bool, shape: Shape, level: f64, open: Extent, seed: u64) -> Draw {
     let (system, sampling) = machine(bearing);
     let dof = system.dof();
@@ -150,7 +151,8 @@ fn unknown(bearing: bool, draw: &Draw, filter: Filter, open: bool) -> Option<Ide
 const TIKHONOV: Filter = Filter::Tikhonov(Rule::Likelihood);
 const TRUNCATED: Filter = Filter::TruncatedSvd(Rule::Likelihood);
 
-/// The methods whose standard error covers all errors, and whether the record is open.
+/// The methods whose standard error covers all errors, with the extent of the record and the
+/// function that identifies the force.
 pub const INTERVALS: [Interval; 12] = [
     ("frequency domain, lines known", Extent::Period, |b, s, d| known(b, s, d, None)),
     ("Tikhonov, lines known", Extent::Period, |b, s, d| known(b, s, d, Some(TIKHONOV))),
@@ -210,7 +212,7 @@ pub fn coverage(
     Some([held as f64 / samples as f64, (error / size).sqrt(), (stated / error).sqrt()])
 }
 
-/// The table of the coverage, in per cent.
+/// Returns the table of the coverage, in per cent.
 pub fn coverage_table(runs: u64, of: &[String]) -> String {
     let mut out =
         String::from("| Method | Force | SDOF, 1 % | SDOF, 5 % | bearing, 1 % | bearing, 5 % |\n");

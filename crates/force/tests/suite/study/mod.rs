@@ -16,7 +16,8 @@ use nalgebra::DMatrix;
 pub mod accelerations;
 pub mod coverage;
 
-/// The single oscillator or the bearing of the dissertation, and the time axis of its period.
+/// Returns the single oscillator or the bearing of the dissertation, and the time axis of its
+/// period.
 pub fn machine(bearing: bool) -> (SecondOrderSystem, Sampling) {
     if bearing {
         let sampling = npi_sampling(10.0, 256, 1.799248).unwrap();
@@ -73,7 +74,8 @@ impl Case {
         Measurement::from_record(ResponseQuantity::Displacement, noisy)
     }
 
-    /// ‖F̂ − F‖ / ‖F‖; a held force has its last step's value at the last sample.
+    /// Returns ‖F̂ − F‖ / ‖F‖. A force that is held over a step has no value at the last sample;
+    /// the value of the last step is used.
     pub fn error(&self, found: &IdentifiedForce) -> f64 {
         mechid_force::relative_error(found.record(), &self.force).unwrap()
     }
@@ -92,7 +94,8 @@ impl Case {
                 .zip(receptance.column(self.forced()[0]).iter())
                 .map(|(x, h)| h.norm_sqr() * len / (self.level * self.level * x.norm_squared()))
                 .sum();
-            // Each real part of the amplitude has variance 2/(N Σ|h|²/σ²).
+            // The real part of the amplitude has the variance 2/(N Σ|h|²/σ²), and so has the
+            // imaginary part.
             variance += 2.0 / len / information;
         }
         (variance * len).sqrt() / self.force.data().norm()
@@ -108,7 +111,7 @@ pub fn cases() -> Vec<Case> {
         .collect()
 }
 
-/// Other sets of excited lines, for the comparison of the rules.
+/// Returns cases with other sets of excited lines, for the comparison of the rules for λ.
 pub fn rule_cases() -> Vec<Case> {
     let sets: [(&'static str, bool, Vec<usize>); 5] = [
         ("SDOF, lines 1–127", false, (1..=127).collect()),
@@ -124,7 +127,8 @@ pub fn rule_cases() -> Vec<Case> {
         .collect()
 }
 
-/// Velocity and acceleration as a practitioner takes them from the displacement of a period.
+/// Returns the displacement of a period with velocity and acceleration by central differences, as a
+/// practitioner computes them.
 fn differenced(x: &Record) -> Response {
     let (len, dt) = (x.len(), x.sampling().dt());
     let at = |k: usize, c: usize| x.data()[(k % len, c)];
@@ -198,29 +202,31 @@ pub const UNKNOWN: [Method; 13] = [
     }),
 ];
 
-/// Root mean square over the seeds of the relative error.
+/// Returns the RMS value of the relative error over all seeds.
 pub fn rms_error(case: &Case, method: Method) -> f64 {
     let squares = (1..=SEEDS).map(|s| case.error(&method.1(case, &case.measured(s))).powi(2));
     (squares.sum::<f64>() / SEEDS as f64).sqrt()
 }
 
-/// All values of the parameter that are tried in the search for the best one, from strong
+/// Returns all values of the parameter that the search for the best value tries, from strong
 /// regularisation to none.
 fn parameters(case: &Case) -> Vec<f64> {
     let gain = case.system.stiffness().row(case.system.dof() - 1).amax().recip();
-    // Channels are scaled to size 1, so the largest singular value is about gain over size.
+    // Each channel is divided by its RMS value, so the largest singular value is about the gain
+    // divided by the RMS value.
     let size = case.exact.data().column(case.system.dof() - 1).norm() / 16.0;
     (0..=300).map(|j| 30.0 * gain / size * 10f64.powf(-f64::from(j) / 50.0)).collect()
 }
 
-/// Result of one rule for λ relative to the best λ: mean and worst case over the seeds.
+/// Error with one rule for λ divided by the error with the best λ: mean and maximum over the seeds.
 pub struct Ratio {
     pub mean: f64,
     pub worst: f64,
 }
 
-/// Returns the loss of each rule against the best parameter: likelihood, GCV, L-curve, and the
-/// textbook corner of the whole L-curve, which is not one of the crate's rules.
+/// Returns the error with each rule divided by the error with the best parameter, for likelihood,
+/// GCV, L-curve, and the textbook corner of the whole L-curve, which is not one of the crate's
+/// rules.
 pub fn rule_ratios(case: &Case, make: fn(Rule) -> Filter) -> [Ratio; 4] {
     let mut ratios: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::new());
     for seed in 1..=SEEDS {
@@ -242,7 +248,8 @@ pub fn rule_ratios(case: &Case, make: fn(Rule) -> Filter) -> [Ratio; 4] {
     })
 }
 
-/// Maximum curvature of log ‖residual‖ against log ‖force‖ over all parameters tried.
+/// Returns the index of the parameter with the maximum curvature of log ‖residual‖ against log
+/// ‖force‖.
 fn textbook_corner(case: &Case, m: &Measurement, trials: &[IdentifiedForce]) -> usize {
     let measured = Spectrum::from_record(m.record());
     let receptances: Vec<_> =
@@ -270,12 +277,12 @@ fn textbook_corner(case: &Case, m: &Measurement, trials: &[IdentifiedForce]) -> 
     (1..points.len() - 1).max_by(|a, b| curvature(*a).total_cmp(&curvature(*b))).unwrap()
 }
 
-/// The first table of the book (`studies/force.md`): the excited lines are known.
+/// Returns the first table of the book (`studies/force.md`), for known excited lines.
 pub fn known_table() -> String {
     table(&KNOWN, true)
 }
 
-/// Returns the same table for unknown lines.
+/// Returns the table for unknown excited lines.
 pub fn unknown_table() -> String {
     table(&UNKNOWN, false)
 }
@@ -297,10 +304,10 @@ fn table(methods: &[Method], floor: bool) -> String {
     out
 }
 
-/// A case, the name of a filter, and the loss of each rule.
+/// A case, the name of a filter, and the error ratio of each rule.
 pub type RuleRow = (Case, &'static str, [Ratio; 4]);
 
-/// The comparison of the rules.
+/// Returns the comparison of the rules for λ, one row for each filter and case.
 pub fn rule_rows() -> Vec<RuleRow> {
     type Make = fn(Rule) -> Filter;
     let filters: [(&str, Make); 2] =
@@ -315,7 +322,7 @@ pub fn rule_rows() -> Vec<RuleRow> {
     rows
 }
 
-/// The third table of the book (`studies/force.md`).
+/// Returns the third table of the book (`studies/force.md`): the comparison of the rules for λ.
 pub fn rule_table(rows: &[RuleRow]) -> String {
     let mut out = String::from(
         "| Excited | Noise | Filter | likelihood | GCV | L-curve | textbook corner |\n\
