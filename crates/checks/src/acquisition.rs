@@ -18,7 +18,8 @@ use super::open_fit::{joined, minimum_near, residuals_of_fit};
 use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
 use super::weighted_fit::{Weighing, after_spectral_fit};
 
-/// Deviation of the acquisition from a band-limited force and channels that pass all frequencies.
+/// Deviation of the acquisition from the assumptions of the fit: a band-limited force, and channels
+/// that pass all frequencies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     Between(Discretisation),
@@ -124,7 +125,8 @@ impl Residuals<'_> {
         scored.collect()
     }
 
-    /// Returns the weighted residuals of all records, without an amount of a fault if one is given.
+    /// Returns the weighted residuals of all records. If a fault and its amount are given, this
+    /// amount is removed from the records first.
     fn weighted(&self, without: Option<(Fault, f64)>) -> Option<Vec<DVector<f64>>> {
         let of_record = |at: usize| match without {
             None => self.weighing.residual_of(at, &self.records[at]),
@@ -133,14 +135,15 @@ impl Residuals<'_> {
         (0..self.records.len()).map(of_record).collect()
     }
 
-    /// Returns the weighted residuals of a record without an amount of a fault.
+    /// Returns the weighted residuals of a record after this `amount` of a fault is removed from
+    /// the record.
     fn without(&self, fault: Fault, amount: f64, at: usize) -> Option<DVector<f64>> {
         let removed = fault.removed(&self.records[at], self.system, self.dt, amount)?;
         self.weighing.residual_of(at, &removed)
     }
 
-    /// Returns the score of a fault in data without `amount` of this fault; the `residuals` of all
-    /// records are those of these data.
+    /// Returns the score of a fault after `amount` of this fault is removed from the records;
+    /// `residuals` are the residuals of these corrected records.
     ///
     /// # Source
     /// Rao's score test.
@@ -189,8 +192,8 @@ fn local_variance(deviations: &DVector<f64>, dof: usize) -> DVector<f64> {
     variance
 }
 
-/// Subtracts from the directions of each record the components that the parameters and the
-/// additional columns of this record explain.
+/// Removes from the vectors `directions`, one for each record, the components that the parameters
+/// and the additional columns of this record explain.
 fn without_explained(
     mut directions: Vec<DVector<f64>>,
     after: &[SpectralResidual],
@@ -269,9 +272,9 @@ pub fn fault_of_acquisition(
     Ok(best.map(|(_, finding)| finding))
 }
 
-/// Returns the courses of the force between samples `dt` (s) apart, held or linear, that change the
-/// residual of an `estimate` significantly; a new fit must show which course explains the residual.
-/// `records` are open records without their transients, and `after` are the residuals.
+/// Returns the assumptions on the force between samples `dt` (s) apart, held or linear, that change
+/// the residual of an `estimate` significantly; a new fit must show which assumption explains the
+/// residual. `records` are open records without their transients, and `after` are the residuals.
 ///
 /// # Source
 /// Rao's score test.
@@ -304,9 +307,9 @@ pub fn forces_between_samples(
 /// Finds AC coupling that explains the residual of a maximum-likelihood `fit` to hits
 /// ([`Finding::Alternative`]). `records` are the data of the fit, sampled every `dt` (s), `closed`
 /// are the data without the transients, and `after` are the residuals. The tests of the residual
-/// must warn. Without the AC coupling they must pass, or at most a quarter of the power may remain.
-/// Otherwise `None`. It is not sufficient that the residual is uncorrelated with the force, because
-/// a short force hardly shows a correlation.
+/// must warn. After the AC coupling is removed from the data, these tests must pass, or at most a
+/// quarter of the residual power may remain. Otherwise `None`. It is not sufficient that the
+/// residual is uncorrelated with the force, because a short force hardly shows a correlation.
 ///
 /// # Source
 /// Rao's score test; maximum likelihood with new transients for the corner frequency.

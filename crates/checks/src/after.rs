@@ -21,9 +21,9 @@ use super::whiteness::{NoiseSpan, Residual, Whiteness};
 /// passes. `noise_span` is the number of lags over which noise on the response correlates the
 /// residual: 0 if each sample contains the noise of one sample, 1 if it contains the noise of two
 /// consecutive samples ([`missing_force`](mechid_estimate::missing_force())), the window length
-/// minus one after a sliding polynomial. A residual correlated over that span and no further is
-/// reported as such. The test of the correlation with a force allows for the autocorrelation of the
-/// residual.
+/// minus one after a sliding polynomial. If a residual is correlated over this span only, the
+/// finding states this. The test of the correlation with a force allows for the autocorrelation of
+/// the residual.
 ///
 /// # Errors
 /// As [`whiteness_beyond`], and [`EstimateError::Signal`] or
@@ -94,8 +94,9 @@ fn colour(
         let estimate = autocorrelation(&e, lags + span);
         estimate.iter().enumerate().map(|(lag, c)| c * taper(lag)).collect()
     };
-    // The added term covers the error of these coefficients. Without it, this error would exceed
-    // the variance if the spectra of residual and force hardly overlap.
+    // The added term covers the estimation error of the coefficients. Without this term, the error
+    // would exceed the variance of the correlation with the force if the spectra of residual and
+    // force hardly overlap.
     coefficients[0] += 2.0 / (e.len() as f64).sqrt();
     Ok(coefficients)
 }

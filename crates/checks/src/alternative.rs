@@ -18,7 +18,7 @@ pub struct Alternative {
     /// Difference from the fitted model.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub cause: Cause,
-    /// Fraction of the residual power that remains with the other model.
+    /// Fraction of the residual power that remains with the alternative model.
     pub remaining: f64,
 }
 
@@ -43,16 +43,16 @@ pub enum Cause {
     },
     /// Responses of another quantity than stated.
     Quantity {
-        /// Quantity of the responses that fits.
+        /// Quantity that fits the responses.
         quantity: ResponseQuantity,
-        /// Quantity that was stated.
+        /// Quantity that is stated for the responses.
         stated: ResponseQuantity,
     },
     /// Magnitudes that are levels in dB.
     Decibels,
     /// Force that is held or linear between its samples.
     BetweenSamples {
-        /// Course of the force.
+        /// Behaviour of the force between its samples: held or linear.
         between_samples: Discretisation,
     },
     /// Channels with a first-order high-pass.
@@ -182,11 +182,11 @@ fn weighted(z: &DMatrix<Complex<f64>>, deviation: Option<&DMatrix<f64>>) -> DMat
     }
 }
 
-/// Returns which of `others` explains the responses best, and the fraction of the residual power of
-/// `fitted` that remains with it. `None` unless that model is more likely than the fitted one, and
-/// its residual is noise or has less than a quarter of the power. `omega` (rad/s) are the
-/// frequencies of the rows, `deviation` is the standard deviation of the noise if known, in the
-/// unit of the original responses.
+/// Returns the index of the model in `others` that explains the responses best, and the fraction of
+/// the residual power of `fitted` that remains with this model. `None` unless this model is more
+/// likely than `fitted`, and its residual is noise or has less than a quarter of the power. `omega`
+/// (rad/s) are the frequencies of the rows, `deviation` is the standard deviation of the noise if
+/// known, in the unit of the original responses.
 ///
 /// # Source
 /// The likelihood of complex normal noise of unknown level; the limits are ours.

@@ -11,9 +11,9 @@ use super::finding::Finding;
 use super::highest_mode::{HighestMode, ModeLimit, highest_mode};
 use super::{highest_mode, persistent_excitation};
 
-/// Checks excitation, conditioning and step before a time-domain fit of displacement (m), velocity
-/// (m/s) and force (N) of one record, or of several records that are fitted together, for example
-/// with one shaker at a time.
+/// Checks excitation, conditioning and sampling interval before a time-domain fit of displacement
+/// (m), velocity (m/s) and force (N) of one record, or of several records that are fitted together,
+/// for example with one shaker at a time.
 ///
 /// # Errors
 /// [`EstimateError::NoDof`] without a record; as [`Transitions::push`], and
@@ -44,9 +44,9 @@ pub fn before_fit(
     Ok(findings)
 }
 
-/// Checks excitation, conditioning and step before the equation of motion is fitted sample by
-/// sample to responses (x, ẋ, ẍ) and forces (N) of one record, or of several records that are
-/// fitted together.
+/// Checks excitation, conditioning and sampling interval before the equation of motion is fitted
+/// sample by sample to responses (x, ẋ, ẍ) and forces (N) of one record, or of several records that
+/// are fitted together.
 ///
 /// # Errors
 /// As [`EquationOfMotion::push_rows`] and [`EquationOfMotion::solve`].

@@ -22,7 +22,7 @@ pub struct Bias {
     pub parameter: Parameter,
     /// Value of the tested estimate, in the unit of the parameter.
     pub estimate: f64,
-    /// Value by the other estimator (unit of the parameter).
+    /// Value from the estimator `reference` (unit of the parameter).
     pub unbiased: f64,
     /// Standard error of `estimate` (unit of the parameter).
     pub standard_error: f64,
@@ -34,7 +34,7 @@ pub struct Bias {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Reference {
-    /// Instrumental variables: the samples before and after.
+    /// Instrumental variables, with the previous and the next sample as instruments.
     NeighbouringSamples,
     /// Maximum likelihood, one Gauss–Newton step from the estimate.
     MaximumLikelihood,
@@ -64,14 +64,14 @@ impl Check for Bias {
         if self.verdict() == Verdict::Good {
             write!(
                 f,
-                "the estimate agrees with {reference} ({p_value}): {parameter} is {value}, and {other} \
-                 by {reference}; they differ by {errors:.1} standard errors"
+                "the estimate agrees with {reference} ({p_value}): {parameter} is {value}, and \
+                 {reference} gives {other}; they differ by {errors:.1} standard errors"
             )
         } else {
             write!(
                 f,
                 "noise on the response biases the estimate ({p_value}): {parameter} is {value}, but \
-                 {other} by {reference}, a difference of {errors:.1} standard errors; \
+                 {reference} gives {other}, a difference of {errors:.1} standard errors; \
                  prefer maximum likelihood on whole periods"
             )
         }

@@ -19,7 +19,7 @@ pub struct Clipping {
     pub channel: Channel,
     /// Level of the clipping, in the unit of the channel.
     pub level: f64,
-    /// Number of samples at that level.
+    /// Number of samples at the level of the clipping.
     pub samples: usize,
 }
 

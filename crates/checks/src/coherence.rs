@@ -20,7 +20,7 @@ pub struct Coherence {
     pub averages: f64,
 }
 
-/// Checks the median coherence of frequency responses; `None` without a response.
+/// Checks the median coherence of frequency responses; `None` if there is no frequency response.
 ///
 /// # Source
 /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 6; the limits are ours.

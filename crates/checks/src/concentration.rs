@@ -16,26 +16,27 @@ pub(super) struct Part<'a> {
     pub dof: usize,
     /// Residuals: for each line and channel real and imaginary part.
     pub values: &'a DVector<f64>,
-    /// Q of their covariance I − QQᵀ, over all records together.
+    /// Q of the covariance I − QQᵀ of the residuals, over all records together.
     pub explained: &'a DMatrix<f64>,
     /// Expected square of a residual.
     pub unit: f64,
 }
 
-/// Residuals at one frequency: record and first row of each.
+/// Line at one frequency: the index of each record that has this line, and the row of its first
+/// residual.
 struct Line {
     omega: f64,
     rows: Vec<(usize, usize)>,
 }
 
 /// Finds the few lines that cause the misfit: at most [`MOST_DISTURBED`] lines, and at most an
-/// eighth of all, with at least the share [`CONCENTRATED`] of the residual power beyond the noise.
-/// `None` if there are no such lines, or if the other lines have more than [`DISTURBED_ALONE`]
-/// times the noise power: a wrong model, too, has its largest errors on few lines, near a
-/// resonance.
+/// eighth of all lines, with at least the share [`CONCENTRATED`] of the residual power beyond the
+/// noise. `None` if there are no such lines, or if the other lines have more than
+/// [`DISTURBED_ALONE`] times the noise power: a wrong model, too, has its largest errors on few
+/// lines, near a resonance.
 ///
-/// The line with the largest residual is removed from the linearised fit, then the next one: this
-/// also removes its effect on the residuals of the other lines.
+/// Lines are removed from the linearised fit one by one, each time the line with the largest
+/// residual. This also removes the effect of the line on the residuals of the other lines.
 ///
 /// # Source
 /// Cook & Weisberg, *Residuals and Influence in Regression* (1982), deletion of several cases.
@@ -52,7 +53,8 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
         return None;
     }
     let (mut values, mut chosen): (_, Vec<usize>) = (start.clone(), Vec::new());
-    // I − Q_Sᵀ Q_S and Q_Sᵀ e_S, with the rows Q_S and the residuals e_S of the removed lines S.
+    // `information` is I − Q_Sᵀ Q_S and `moved` is Q_Sᵀ e_S, with the rows Q_S and the residuals
+    // e_S of the removed lines S.
     let mut information = DMatrix::identity(parameters, parameters);
     let mut moved = DVector::zeros(parameters);
     let (mut remaining, mut share, mut ratio) = (count, 0.0, f64::INFINITY);
@@ -100,11 +102,11 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
 }
 
 /// Returns the frequency whose multiples are near all `chosen` lines: the distance is less than the
-/// spacing of the lines in `all`. `None` if random lines would satisfy this as well, or if there is
+/// spacing of the lines in `all`. `None` if this agreement may be due to chance, or if there is
 /// only one line in `chosen` or in `all`.
 ///
 /// Candidates are the fractions of the lowest chosen frequency. The probability that all lines of a
-/// random choice are multiples of one of them follows from the hypergeometric distribution, times
+/// random choice are multiples of one candidate follows from the hypergeometric distribution, times
 /// the number of candidates.
 fn common_divisor(chosen: &[f64], all: &[f64]) -> Option<f64> {
     let spacing = all.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
@@ -129,8 +131,8 @@ fn common_divisor(chosen: &[f64], all: &[f64]) -> Option<f64> {
     (probability * candidates.len() as f64 <= SIGNIFICANCE).then_some(divisor)
 }
 
-/// Returns the frequency with multiples nearest to the `chosen` lines, by least squares with the
-/// orders of the first estimate.
+/// Returns the frequency whose multiples are nearest to the `chosen` lines, by least squares. The
+/// order of each line is taken from the estimate `first`.
 fn refined(chosen: &[f64], first: f64) -> f64 {
     let orders = chosen.iter().map(|hz| (hz / first).round().max(1.0));
     let (products, squares) = chosen
@@ -165,7 +167,7 @@ mod tests {
     #[test]
     fn multiples_of_a_rotation_are_named_and_chance_is_not() {
         let all: Vec<f64> = (6..=64).map(|line| 4.0 * f64::from(line)).collect();
-        // 50 Hz lies between two lines, 100 Hz on one.
+        // 50 Hz lies between two lines, and 100 Hz is a line.
         let of_rotation = [48.0, 52.0, 100.0, 148.0, 152.0, 200.0];
         let divisor = common_divisor(&of_rotation, &all).unwrap();
         assert!((divisor - 50.0).abs() < 0.5, "{divisor}");

@@ -13,7 +13,7 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Conditioning {
-    /// Condition number with columns scaled to unit length.
+    /// Condition number of the regressors, with columns scaled to unit length.
     pub condition_number: f64,
     /// Number of combinations of regressors that do not vary.
     pub undetermined: usize,

@@ -25,7 +25,7 @@ use super::open_fit::{joined, minimum_near, residuals_of_fit};
 use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
 use super::{MAX_SAMPLES, Subject, Verdict};
 
-/// Maximum delay, in samples, to either side.
+/// Maximum magnitude of a delay, in samples; the response may be late or early.
 const MAX_DELAY: isize = 16;
 
 /// Maximum delay, in samples, if a response hardly follows the force: then a longer delay is
@@ -78,11 +78,11 @@ fn delay_of_equations(
 /// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
 /// uncorrelated with the forces. If the residuals `without_delay` are uncorrelated with the forces,
 /// too, either at most a quarter of the power may remain, or the tests of the residual warn without
-/// the delay and pass with it. If there is another explanation, the lines of all records without it
-/// are `other`; the power that remains with the delay must not be significantly above the power
-/// that remains with these lines. `dt` is the sampling interval in s; sinusoidal disturbances have
-/// been subtracted from the `records`. `None` if no delay of up to 16 samples (64 if the response
-/// hardly follows the force) satisfies this.
+/// the delay and pass with it. If the residual has another possible cause, `other` are the lines of
+/// all records after removal of this cause; the power that remains with the delay must not be
+/// significantly above the power that remains with these lines. `dt` is the sampling interval in s;
+/// sinusoidal disturbances have been subtracted from the `records`. `None` if no delay of up to 16
+/// samples (64 if the response hardly follows the force) satisfies these conditions.
 ///
 /// The transients are estimated again for each delay; otherwise they would contain a part of the
 /// effect of the delay.
@@ -140,11 +140,11 @@ pub fn delay_of_open_records(
     (is_most && is_uncorrelated(&with_delay)).then(delay)
 }
 
-/// Finds a delay of the responses of open records without which the maximum-likelihood search
-/// fails ([`Finding::Delay`]): with the delay the search succeeds, and its residual is uncorrelated
-/// with the forces. The fraction that remains is that of the equations of motion. `dt` is the
-/// sampling interval in s. `None` if no delay of up to 16 samples (64 if the response hardly follows
-/// the force) satisfies this.
+/// Finds a delay of the responses of open records without which the maximum-likelihood search fails
+/// ([`Finding::Delay`]): with the delay the search succeeds, and its residual is uncorrelated with
+/// the forces. The finding states the remaining fraction of the residual power of the equations of
+/// motion. `dt` is the sampling interval in s. `None` if no delay of up to 16 samples (64 if the
+/// response hardly follows the force) satisfies this.
 ///
 /// # Source
 /// As [`delay_of_open_records`].
@@ -181,15 +181,16 @@ pub fn delay_of_failed_search(
 enum OnFewer<'a> {
     /// The records have few lines, or the search failed.
     Unknown,
-    /// Another cause leaves significantly less power.
+    /// Another cause of the residual leaves significantly less residual power than a delay.
     Excluded,
     /// Delay, in samples, and the estimate with this delay.
     Found(f64, Box<ChangedRecords<'a>>),
 }
 
-/// Searches for a delay, in samples, on a part of the lines, from a delay `near` it. The search
-/// ends if the smallest residual power is significantly above that of the lines `other` without
-/// another cause.
+/// Searches for a delay, in samples, on a part of the lines, from the initial value `near`. If the
+/// residual has another possible cause, `other` are the lines after removal of this cause. The
+/// search ends if the smallest residual power with a delay is significantly above the residual
+/// power of `other`.
 fn on_fewer_lines<'a>(
     likelihood: &ChangedRecords<'a>,
     lines: &FrequencyData,
@@ -211,7 +212,8 @@ fn on_fewer_lines<'a>(
         let freedom = fewer.spare() as f64;
         let cost = |samples: f64| fewer.cost(&late(samples));
         let promises = |delayed: f64, decrease: Option<f64>| {
-            // The following steps decrease the power by less than this one.
+            // Each later step decreases the power by less than this step. Therefore the power
+            // `without_other` is out of reach if a second decrease of this size would not reach it.
             let is_out_of_reach =
                 decrease.is_some_and(|decrease| delayed - decrease > without_other);
             let equal_powers = FisherSnedecor::new(freedom, freedom);
@@ -280,7 +282,8 @@ pub fn delay_of_responses(
     Some(dt * delay_weighted(data, dt, unknowns, estimate)?.0)
 }
 
-/// Returns whether maximum likelihood, too, fits far better with the delay (s); true if it fails.
+/// Returns whether maximum likelihood, too, fits far better with the delay (s). Returns true if no
+/// noise is stated, or if the fits fail.
 fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
     let misfit = |data: &FrequencyData| Some(output_error(data, unknowns).ok()?.misfit_ratio);
     let both = || Some([misfit(data)?, misfit(&data.with_later_force(delay))?]);
@@ -291,9 +294,9 @@ fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
     delayed <= DELAY_REMAINING * undelayed
 }
 
-/// Finds a delay like [`delay_of_lines`] for a fit of the equation of motion, sample by sample, to
-/// a response and a force (N). The delay is a whole number of samples; only the first 32,768
-/// samples of a long record are used.
+/// Finds a delay as [`delay_of_lines`] does, but for a fit of the equation of motion, sample by
+/// sample, to a response and a force (N). The delay is a whole number of samples; only the first
+/// 32,768 samples of a long record are used.
 ///
 /// # Source
 /// Ours.
@@ -309,8 +312,8 @@ pub fn delay_at_samples(
     })
 }
 
-/// Finds a delay like [`delay_at_samples`] for a fit of displacement (m), velocity (m/s) and force
-/// (N) from sample to sample.
+/// Finds a delay as [`delay_at_samples`] does, but for a fit of the transition from sample to
+/// sample to displacement (m), velocity (m/s) and force (N).
 ///
 /// # Source
 /// Ours.
@@ -328,7 +331,8 @@ pub fn delay_between_samples(
     })
 }
 
-/// Window of a response record, shifted relative to the window of the force.
+/// Function that returns the window of a response record, shifted relative to the window of the
+/// force.
 type Shifted<'a> = dyn Fn(&Record) -> Result<Record, EstimateError> + 'a;
 
 fn delay_of_samples(
@@ -345,7 +349,7 @@ fn delay_of_samples(
         residual_power(&fit(&shifted, force.window(margin, len).ok()?).ok()?, &driven)
     };
     let longest = longest(power(0, MAX_DELAY)?, &driven);
-    // A record too short for a long delay is searched for a shorter one.
+    // If the record is too short for a long delay, the search is limited to a shorter delay.
     let longest = if power(0, longest).is_some() { longest } else { MAX_DELAY };
     let undelayed = power(0, longest)?;
     let delay = best_step(undelayed, longest, |samples| power(samples, longest));
@@ -359,7 +363,8 @@ fn delay_of_samples(
     )
 }
 
-/// Returns the maximum delay in samples, from the residual power without a delay.
+/// Returns the maximum delay of the search, in samples; it is larger if the residual power without
+/// a delay is large.
 fn longest(undelayed: f64, driven: &[usize]) -> isize {
     let hardly_follows = undelayed > HARDLY_FOLLOWS * driven.len() as f64;
     if hardly_follows { MAX_LONG_DELAY } else { MAX_DELAY }
@@ -371,13 +376,14 @@ fn driven(force: &DMatrix<f64>) -> Vec<usize> {
 }
 
 /// Returns the ratio of the residual power of an equation to the power of its right-hand side,
-/// added over the equations with a force.
+/// summed over the equations with a force.
 fn residual_power(estimate: &Estimate, driven: &[usize]) -> Option<f64> {
     let power = driven.iter().map(|dof| estimate.residual_nrmse()[*dof].powi(2)).sum::<f64>();
     (estimate.undetermined().is_empty() && power.is_finite()).then_some(power)
 }
 
-/// Returns the step with the smallest power; of two steps with nearly equal power, the shorter.
+/// Returns the delay, in steps of the search, with the smallest residual power; of two delays with
+/// nearly equal power, the shorter.
 fn best_step(undelayed: f64, max: isize, power: impl Fn(isize) -> Option<f64>) -> isize {
     let mut best = (0, undelayed);
     for step in (1..=max).flat_map(|size| [size, -size]) {

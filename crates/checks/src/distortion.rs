@@ -58,7 +58,8 @@ pub struct Distortion {
     /// Level of the response on odd lines without force relative to the driven lines, in dB, if
     /// only odd lines are driven; `None` otherwise, or if there is only noise.
     pub odd_db: Option<f64>,
-    /// Probability that noise alone makes one of the terms explain at least as much.
+    /// Probability that noise alone makes one of the tested terms explain at least as large a
+    /// fraction of the residual power.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

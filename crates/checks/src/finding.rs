@@ -19,7 +19,7 @@ pub(crate) trait Check {
     /// Returns the verdict on the data or the fit.
     fn verdict(&self) -> Verdict;
 
-    /// Returns the number that decides the verdict, in the unit of its field.
+    /// Returns the number that decides the verdict, in the unit of the field that has this number.
     fn value(&self) -> f64;
 
     /// Returns the p-value of a statistical test, to adjust it.
@@ -38,8 +38,8 @@ macro_rules! findings {
         /// Result of one check, with its numbers; [`Display`](std::fmt::Display) gives one
         /// sentence.
         ///
-        /// Channels, forces and degrees of freedom are counted from 0; in sentences and serialised
-        /// from 1.
+        /// Channels, forces and degrees of freedom are counted from 0 in the fields, and from 1 in
+        /// sentences and in serialised findings.
         #[derive(Debug, Clone, PartialEq)]
         #[cfg_attr(
             feature = "serde",
@@ -128,7 +128,7 @@ findings! {
     /// Negative mass.
     NegativeMass in mass,
     /// Damping and stiffness that are symmetric except for one factor between two degrees of
-    /// freedom, the effect of a wrong gain.
+    /// freedom; a wrong gain has this effect.
     Gain in gain,
     /// Residual power compared with the noise power.
     Misfit in misfit,
@@ -171,7 +171,7 @@ impl Finding {
         self.check().verdict()
     }
 
-    /// Returns the number that decides the verdict, in the unit of its field.
+    /// Returns the number that decides the verdict, in the unit of the field that has this number.
     pub fn value(&self) -> f64 {
         self.check().value()
     }
@@ -187,8 +187,8 @@ impl Finding {
         self.check_mut().p_value_mut()
     }
 
-    /// Removes the lines with most of a misfit (`concentration`), for a misfit with another
-    /// explanation.
+    /// Removes the list of the lines with most of the misfit (`concentration`) from the finding.
+    /// Use this function if another cause explains the misfit.
     pub fn forget_lines(&mut self) {
         if let Self::Misfit(misfit) = self {
             misfit.concentration = None;
@@ -248,7 +248,7 @@ pub struct Channel {
     /// Quantity measured.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
     pub quantity: Quantity,
-    /// Index among the channels of that quantity.
+    /// Index of the channel among the channels of `quantity`.
     #[cfg_attr(
         feature = "serde",
         serde(rename = "channel", serialize_with = "crate::serialised::from_one")

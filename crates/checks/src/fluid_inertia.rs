@@ -11,7 +11,8 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FluidInertia {
-    /// Twice the logarithm of the likelihood ratio of twelve coefficients and eight (pure number).
+    /// Twice the logarithm of the likelihood ratio of the model with twelve coefficients to the
+    /// model with eight (pure number).
     pub statistic: f64,
     /// Probability of a statistic at least as large for a fluid without inertia.
     #[cfg_attr(feature = "serde", serde(flatten))]
@@ -50,12 +51,13 @@ impl Check for FluidInertia {
         if self.verdict() == Verdict::Good {
             return write!(
                 f,
-                "no inertia of the fluid was found: the likelihood ratio is {statistic} ({p_value})"
+                "no inertia of the fluid was found: the likelihood-ratio \
+                 statistic is {statistic} ({p_value})"
             );
         }
         write!(
             f,
-            "the fluid has inertia (likelihood ratio {statistic}, {p_value}). Eight coefficients \
+            "the fluid has inertia (likelihood-ratio statistic {statistic}, {p_value}). Eight coefficients \
              ignore this inertia and are biased: identify twelve (`coefficients`)"
         )
     }

@@ -11,15 +11,15 @@ use super::finding::{Check, Finding, Names};
 use super::limits::{GAIN_AGREES, GAIN_NEAR, GAIN_SIGNIFICANT};
 use super::{Subject, Verdict};
 
-/// Damping and stiffness that are symmetric except for one factor between two degrees of freedom,
-/// the effect of a wrong gain.
+/// Damping and stiffness that are symmetric except for one factor between two degrees of freedom; a
+/// wrong gain has this effect.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Gain {
     /// Degree of freedom whose responses (or forces) are too large by the factor.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub row: usize,
-    /// Other degree of freedom.
+    /// The other degree of freedom, whose responses and forces are the reference.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub column: usize,
     /// Factor (pure number).
@@ -29,8 +29,8 @@ pub struct Gain {
 }
 
 /// Finds a pair of degrees of freedom between which damping and stiffness are symmetric except for
-/// the same factor; `None` if there is none. If there are several pairs, the most significant one
-/// is returned.
+/// the same factor; `None` if there is no such pair. If there are several pairs, the most
+/// significant one is returned.
 ///
 /// A response or a force that is measured g times too large multiplies a column or a row of both C
 /// and K: symmetric matrices then have c_ij/c_ji = k_ij/k_ji = g, while a diagonal M stays

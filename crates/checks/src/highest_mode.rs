@@ -26,9 +26,9 @@ use super::{Subject, Verdict};
 pub struct HighestMode {
     /// Natural frequency, in Hz.
     pub frequency_hz: f64,
-    /// Samples per period of that mode (pure number).
+    /// Samples per period of the highest mode (pure number).
     pub samples_per_period: f64,
-    /// Requirement on the step or the band.
+    /// Requirement on the sampling interval or on the band.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub limit: ModeLimit,
 }
@@ -59,8 +59,8 @@ pub enum ModeLimit {
 }
 
 /// Returns the natural frequency (Hz) of the highest oscillating mode and its samples per period.
-/// If no mode oscillates, the frequency is the geometric mean of all natural frequencies, because
-/// fast decays need not be resolved.
+/// If no mode oscillates, the frequency is the geometric mean of all natural frequencies, because a
+/// fit does not need to resolve fast decays.
 pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 2], EstimateError> {
     let modes = system.modes()?;
     let oscillating = modes.iter().filter(|mode| mode.oscillates());
@@ -74,7 +74,7 @@ pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 
     Ok([highest / TAU, TAU / (highest * dt)])
 }
 
-/// Compares the highest mode of the data (force held between samples) with the step.
+/// Compares the highest mode of the data (force held between samples) with the sampling interval.
 pub(super) fn step(
     rows: &Transitions,
     discretisation: Discretisation,

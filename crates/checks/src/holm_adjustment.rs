@@ -20,8 +20,8 @@ pub fn adjust_p_values<'a>(findings: impl IntoIterator<Item = &'a mut Finding>) 
     };
     let (bias, remaining): (Vec<&mut Finding>, Vec<&mut Finding>) =
         findings.into_iter().partition(of_parameters);
-    // The test for growth is made only if the estimate grows, and its p-value already covers all
-    // modes.
+    // The test for growth is made only if a mode of the estimate grows. Its p-value already covers
+    // all modes and is not adjusted here.
     let remaining =
         remaining.into_iter().filter(|f| !matches!(f, Finding::Instability(_))).collect::<Vec<_>>();
     for group in [bias, remaining] {
@@ -51,7 +51,8 @@ mod tests {
         Finding::Misfit(Misfit { ratio: 1.0, p_value, source, concentration: None })
     }
 
-    /// The example of R's `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")`: 0.03, 0.06, 0.06, 0.02.
+    /// The adjusted p-values equal those of R: `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")` gives
+    /// 0.03, 0.06, 0.06, 0.02.
     #[test]
     fn p_values_are_adjusted_step_by_step_down() {
         let mut findings = [0.01, 0.04, 0.03, 0.005].map(misfit);

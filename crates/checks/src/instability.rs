@@ -62,7 +62,7 @@ pub struct Instability {
     pub mode: usize,
     /// Damped frequency of the mode, in Hz; 0 for a growth without oscillation.
     pub frequency_hz: f64,
-    /// Real part of its eigenvalue, in 1/s.
+    /// Real part of the eigenvalue of the mode, in 1/s.
     pub growth_rate: f64,
     /// Standard error of the growth rate, in 1/s.
     pub standard_error: f64,

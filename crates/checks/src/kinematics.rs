@@ -13,7 +13,7 @@ use super::limits::KINEMATIC_GAIN;
 use super::limits::STANDARD_ERRORS;
 use super::{Subject, Verdict};
 
-/// Finds the channels in which one response quantity does not change as another predicts
+/// Finds the channels in which one response quantity does not change as another quantity predicts
 /// ([`Finding::Kinematics`]): a wrong unit (mm/s for m/s), interchanged columns or a wrong sign.
 /// Checks each pair of displacement (m), velocity (m/s) and acceleration (m/s²) that is measured,
 /// in that order.
@@ -63,13 +63,14 @@ pub fn kinematics(
     Ok(findings)
 }
 
-/// Ratio of the change of a quantity to the change that another predicts.
+/// Ratio of the change of a quantity to the change that another quantity predicts.
 struct Gain {
     value: f64,
     standard_error: f64,
 }
 
-/// Returns the gain of a channel; `None` if it is constant or too short.
+/// Returns the gain of a channel; `None` if one of the two channels is constant, or if they are too
+/// short.
 fn gain(low: &[f64], high: &[f64], dt: f64, twice: bool) -> Option<Gain> {
     let pairs: Vec<[f64; 2]> = if twice {
         let steps = low.windows(3).zip(high.iter().skip(1));

@@ -57,7 +57,8 @@ pub struct Leakage {
     pub frequency_hz: f64,
     /// Half-power bandwidth 2ζf divided by the line spacing (pure number).
     pub lines: f64,
-    /// Number of samples of a segment with sufficiently many lines in the bandwidth.
+    /// Minimum number of samples of a segment for a sufficient number of lines in the half-power
+    /// bandwidth.
     pub samples_needed: usize,
     /// True if the smoothing by the window could be separated from the resonance.
     pub settled: bool,

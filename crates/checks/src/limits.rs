@@ -81,8 +81,8 @@ pub const DELAY_REMAINING: f64 = 0.25;
 /// rate.
 pub const KINEMATIC_GAIN: f64 = 3.0;
 
-/// Power that forces extract from a machine, relative to the apparent power, above which it is
-/// neither noise nor leakage.
+/// Power that forces extract from a machine, relative to the apparent power, above which neither
+/// noise nor leakage explains this power.
 pub const POWER_TAKEN_OUT: f64 = 0.05;
 
 /// Maximum number of distinct values of a coarsely quantised response.
@@ -99,7 +99,7 @@ pub const ROUNDING: f64 = 1e-9;
 /// Number of lags of the correlation of a residual; with a force, on either side of lag 0.
 pub const LAGS: usize = 25;
 
-/// Minimum number of samples per lag.
+/// Minimum number of samples per lag of the correlation; a short residual is tested at fewer lags.
 pub const SAMPLES_PER_LAG: usize = 4;
 
 /// Maximum difference of two mirrored entries of M, relative to the geometric mean of the diagonal
@@ -115,8 +115,8 @@ pub const UNMEASURED_FORCE: f64 = 0.1;
 /// deviation may be due to noise.
 pub const GAIN_SIGNIFICANT: f64 = 5.0;
 
-/// Maximum difference, in standard errors, between the ratios of mirrored entries in damping and in
-/// stiffness that count as the same gain.
+/// Maximum difference, in standard errors, between the ratio of mirrored entries in damping and the
+/// ratio in stiffness, for the two ratios to count as the same gain.
 pub const GAIN_AGREES: f64 = 2.5;
 
 /// Maximum difference between the logarithms of the ratios of mirrored entries in damping and in
@@ -130,15 +130,16 @@ pub const REPEATED_SAMPLES: f64 = 0.2;
 /// Minimum number of samples per level of a quantised channel.
 pub const SAMPLES_PER_LEVEL: usize = 16;
 
-/// Maximum difference between the neighbours of a spike, relative to the spike.
+/// Maximum difference between the two neighbours of a spike, relative to the distance of the spike
+/// from their mean.
 pub const RETURN: f64 = 0.1;
 
 /// Maximum deviation of a level from a multiple of the step, relative to the step, that counts as
 /// rounding.
 pub const LEVEL_ROUNDING: f64 = 1e-6;
 
-/// Minimum amplitude of a strong line, relative to the strongest line of its force: the response to
-/// it exceeds the noise.
+/// Minimum amplitude of a strong line, relative to the strongest line of the same force; the
+/// response to a strong line exceeds the noise.
 pub const STRONG_LINE: f64 = 0.01;
 
 /// Minimum number of lines per reported line: at most an eighth of all lines are reported.
@@ -154,14 +155,15 @@ pub(crate) const HARDLY_FOLLOWS: f64 = 0.25;
 /// Number of reductions of the interval around the best delay, each to two thirds.
 pub(crate) const DELAY_REDUCTIONS: usize = 24;
 
-/// Maximum delay from the equations of motion, in samples, at which the search by maximum
-/// likelihood starts from the fit without a delay.
+/// Maximum delay, in samples, as estimated from the equations of motion, for which the search by
+/// maximum likelihood starts from the fit without a delay.
 pub(crate) const DELAY_NEAR: f64 = 0.5;
 
 /// Half width of the first parabola through the sums of squares around a delay, in samples.
 pub(crate) const DELAY_REACH: f64 = 0.25;
 
-/// Half width of the first parabola around a delay found on a part of the lines, in samples.
+/// Half width, in samples, of the first parabola in the search on all lines, if a search on some of
+/// the lines has already found the delay.
 pub(crate) const DELAY_REFINED: f64 = 0.02;
 
 /// Maximum number of parabolic steps in the search for a delay or a corner frequency.
@@ -184,48 +186,52 @@ pub(crate) const DELAY_PREFERRED: f64 = 0.99;
 /// that counts as significant.
 pub(crate) const STANDARD_ERRORS: f64 = 4.0;
 
-/// Maximum number of sensitivities, residuals times parameters; in larger fits the residual is not
+/// Maximum number of sensitivities (residuals times parameters); in larger fits the residual is not
 /// corrected for the errors of the estimate.
 pub(crate) const LINEARITY_SENSITIVITIES: usize = 1 << 22;
 
 /// Number of lines on either side in the averages of a residual spectrum.
 pub(crate) const LINEARITY_NEIGHBOURS: usize = 10;
 
-/// Mismatch above which a force does not repeat, relative to √2 times its RMS.
+/// Maximum mismatch, relative to √2 times the RMS of the force, at which the force counts as
+/// repeating.
 pub(crate) const PERIOD_WORST: f64 = 0.1;
 
-/// Maximum ratio between squared mismatches of lags at which the force repeats equally well.
+/// Maximum ratio of the squared mismatch at a lag to the smallest squared mismatch, at which the
+/// force counts as repeating equally well at this lag.
 pub(crate) const PERIOD_ALIKE: f64 = 2.0;
 
-/// Squared mismatch due to rounding of Fourier transforms.
+/// Maximum squared mismatch that rounding of Fourier transforms causes.
 pub(crate) const PERIOD_ROUNDING: f64 = 1e-12;
 
 /// Maximum difference in length between a claimed and a neighbouring period, in samples.
 pub(crate) const PERIOD_NEIGHBOURS: usize = 2;
 
-/// Mismatch above which a force does not repeat, even with noise on the force, relative to √2 times
-/// its RMS.
+/// Maximum mismatch, relative to √2 times the RMS of the force, at which a force with noise counts
+/// as repeating.
 pub(crate) const PERIOD_REPEATS: f64 = 0.5;
 
 /// Minimum reduction of the squared mismatch, relative to its scatter, for a neighbouring period to
-/// be better.
+/// count as better.
 pub(crate) const PERIOD_CLEARLY: f64 = 4.0;
 
-/// Minimum ratio of the squared mismatch across an interruption to that at the other samples.
+/// Minimum ratio of the squared mismatch across an interruption to the squared mismatch at the
+/// other samples.
 pub(crate) const PERIOD_INTERRUPTED: f64 = 10.0;
 
 /// Number of strongest lines in the test of the power flow: for a finding, at least the fraction
 /// [`STRONGEST_FRACTION`] of these lines must extract power.
 pub(crate) const STRONGEST_LINES: usize = 32;
 
-/// Minimum fraction of the strongest lines that extract power: chance does not reach it, even for
-/// seven lines.
+/// Minimum fraction of the strongest lines that must extract power for a finding; chance does not
+/// reach this fraction, even for seven lines.
 pub(crate) const STRONGEST_FRACTION: f64 = 0.9;
 
 /// Minimum amplitude of a line with force, relative to the strongest line.
 pub(crate) const FORCE_FLOOR: f64 = 1e-3;
 
-/// Minimum number of samples per unknown.
+/// Minimum number of samples per unknown of an equation of motion; with fewer samples, the equation
+/// is not tested for noise on the response.
 pub(crate) const SAMPLES_PER_UNKNOWN: usize = 4;
 
 /// Maximum of 1 − coherence (median over the lines) that counts as rounding.
@@ -242,18 +248,21 @@ pub(crate) const MAX_DISTANCES: usize = 12;
 /// with fewer pairs of lines, the sum of their products is not normally distributed.
 pub(crate) const LINES_PER_DISTANCE: usize = 8;
 
-/// Minimum number of pairs of lines with a given distance.
+/// Minimum number of pairs of lines with a given distance; with fewer pairs, the correlation at
+/// this distance is not tested.
 pub(crate) const RESPONSE_PAIRS: usize = 8;
 
 /// Minimum number of lines per distance of the correlation from line to line, and per lag of the
 /// correlation with a force: with fewer lines, noise and model error could not be distinguished.
 pub(crate) const LINES_PER_CORRELATION: usize = 8;
 
-/// Minimum number of residuals, real and imaginary parts, in excess of the parameters.
+/// Minimum number of residuals (real and imaginary parts) in excess of the number of parameters;
+/// with fewer, the residuals are not tested.
 pub(crate) const FREE_RESIDUALS: f64 = 8.0;
 
-/// Minimum residual power relative to the stated power of the response to an unmeasured force: the
-/// mean of the periods may contain only this fraction of the response.
+/// Minimum residual power, relative to the stated power of the response to an unmeasured force,
+/// that agrees with this power: the mean of the periods may contain only this fraction of the
+/// response.
 pub(crate) const SPECTRAL_LEAKED: f64 = 0.5;
 
 /// Minimum singular value of the sensitivity (columns of unit length), relative to the largest; a
@@ -274,12 +283,12 @@ pub(crate) const FIT_STEPS: usize = 8;
 /// which the steps end.
 pub(crate) const FIT_SETTLED: f64 = 0.01;
 
-/// Maximum number of sensitivities, residuals times parameters; in larger fits the residual of the
+/// Maximum number of sensitivities (residuals times parameters); in larger fits the residual of the
 /// estimate is tested without Gauss–Newton steps.
 pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
 
-/// Maximum number of products, sensitivities times parameters, for Gauss–Newton steps; this number
-/// takes some seconds.
+/// Maximum number of products (sensitivities times parameters) for which Gauss–Newton steps are
+/// made; this number of products takes some seconds.
 pub(crate) const FIT_PRODUCTS: usize = 1 << 32;
 
 /// Number of samples on either side of a run of equal samples that decide whether the run is a
@@ -287,7 +296,7 @@ pub(crate) const FIT_PRODUCTS: usize = 1 << 32;
 pub const DROP_OUT_NEIGHBOURS: usize = 64;
 
 /// Minimum standard deviation, in steps of the converter, of the samples on either side of a run of
-/// equal samples if the channel counts as moving; a structure that comes to rest moves by a few
+/// equal samples, for the channel to count as moving; a structure that comes to rest moves by a few
 /// steps only.
 pub const DROP_OUT_MOTION: f64 = 10.0;
 
@@ -299,11 +308,11 @@ pub const DROP_OUT_LEVEL: f64 = 1e-4;
 pub(crate) const ACQUISITION_ROUNDS: usize = 4;
 
 /// Half width of the first and of the last parabola through the sums of squares around a corner
-/// frequency of hits, relative to its first estimate.
+/// frequency of hits, relative to the first estimate of this frequency.
 pub(crate) const CORNER_WIDTHS: [f64; 2] = [0.5, 0.01];
 
-/// Step of the corner frequency, relative to the lowest line, in the derivative of the effect of a
-/// high-pass.
+/// Step of the corner frequency in the numerical derivative of the effect of a high-pass, relative
+/// to the frequency of the lowest line.
 pub(crate) const HIGH_PASS_STEP: f64 = 1e-3;
 
 /// Maximum number of changes in the sentence about an omitted term; the finding itself has all
@@ -314,8 +323,8 @@ pub(crate) const LISTED_CHANGES: usize = 3;
 /// samples is a pause of the excitation.
 pub const DROP_OUT_FORCE_PAUSE: f64 = 0.05;
 
-/// Minimum fraction of the other samples at which a force with a drop-out acts; hammers and bursts
-/// rest for a larger part of the record.
+/// Minimum fraction of the samples outside a drop-out at which the force acts. Hammers and bursts
+/// act at a smaller fraction of the samples.
 pub const DROP_OUT_FORCE_ACTING: f64 = 0.75;
 
 /// Minimum jump of a force at the beginning or the end of a drop-out near the mean of the force, in

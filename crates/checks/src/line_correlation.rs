@@ -56,8 +56,8 @@ pub(crate) fn correlation_of_lines(
         coefficients,
         bound: 1.96 * (0.5 / residual.len() as f64).sqrt(),
         statistic,
-        // The squared magnitude of a complex number is a sum of two squares, each with half of its
-        // mean.
+        // The squared magnitude of a complex number is a sum of two squares, and the mean of each
+        // square is half of the mean of the sum.
         p_value: probability_above_of(statistic, (last + 1 - first) as f64, 0.5 * square),
     })
 }

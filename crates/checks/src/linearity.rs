@@ -22,13 +22,13 @@ use super::{Subject, Verdict};
 /// cube or the sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], for the
 /// power with the strongest correlation).
 ///
-/// Frequency responses do not show this: under a random force a hardening spring looks like a
-/// stiffer one with more noise, and dry friction like damping. Therefore the motion is predicted
-/// over the whole record, and its powers, minus their linear parts, are applied as forces at each
-/// degree of freedom in turn. For a linear system the responses to them are uncorrelated with the
-/// residual; under a Gaussian force they are also uncorrelated with errors of the linear model. The
-/// residual is weighted by Hann's window, which suppresses the transients at the ends of the
-/// record.
+/// Frequency responses do not show a nonlinearity: under a random force a hardening spring looks
+/// like a stiffer one with more noise, and dry friction like damping. Therefore the motion is
+/// predicted over the whole record, and its powers, minus their linear parts, are applied as forces
+/// at each degree of freedom in turn. For a linear system the responses to these forces are
+/// uncorrelated with the residual; under a Gaussian force they are also uncorrelated with errors of
+/// the linear model. The residual is weighted by Hann's window, which suppresses the transients at
+/// the ends of the record.
 ///
 /// # Errors
 /// As [`predict_periodic`]; [`EstimateError::Undetermined`] if the estimate is not a system,
@@ -62,8 +62,8 @@ pub fn linearity(
     tested.under_hann_window().finding(estimate, force, &lines.as_slice()[1..count - 1], &HANN)
 }
 
-/// Tests the linearity like [`linearity`] in an open record: from its `data` on some lines after
-/// subtraction of the transients, and the measured force (N).
+/// Tests the linearity as [`linearity`] does, for an open record: from its `data` on some lines,
+/// without the transients, and from the measured force (N).
 ///
 /// # Errors
 /// The errors of [`linearity`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if
@@ -131,8 +131,8 @@ impl Tested {
         }
     }
 
-    /// Returns orthonormal columns that span the sensitivities, weighted by the sizes of the
-    /// residuals.
+    /// Returns orthonormal columns that span the sensitivities, weighted with `sizes` as in
+    /// [`weighted`].
     fn explained(&self, sizes: &[Vec<f64>]) -> DMatrix<f64> {
         let columns: Vec<DVector<f64>> = self
             .sensitivities
@@ -150,8 +150,9 @@ impl Tested {
         }
     }
 
-    /// Returns the finding for the power of the motion whose response has the strongest correlation
-    /// with the residual. `correlation` is the correlation of neighbouring lines.
+    /// Returns the finding for one power (square, cube or sign) of displacement or velocity. The
+    /// response to this power, applied as a force, has the strongest correlation with the residual.
+    /// `correlation` is the correlation of neighbouring lines.
     fn finding(
         &self,
         estimate: &Estimate,
@@ -216,15 +217,15 @@ fn sensitivities(estimate: &Estimate, data: &FrequencyData) -> Option<Vec<DMatri
         DMatrix::from_fn(n, data.len(), |channel, row| {
             let at = 2 * (n * row + channel);
             // The weights convert only the magnitude of a displacement into the measured quantity;
-            // this adds the phase.
+            // this factor adds the phase.
             Complex::new(column[at], column[at + 1]) * (units[row] / units[row].norm())
         })
     };
     Some(white.sensitivity.column_iter().map(|one| column(one.as_view())).collect())
 }
 
-/// Returns real and imaginary parts of values, channels × lines, each divided by the root of its
-/// size.
+/// Returns real and imaginary parts of values, channels × lines, each divided by the square root of
+/// the entry of `sizes` for its channel and line.
 fn weighted(values: &DMatrix<Complex<f64>>, sizes: &[Vec<f64>]) -> DVector<f64> {
     let mut parts = DVector::zeros(2 * values.len());
     for ((channel, at), pair) in
@@ -250,7 +251,8 @@ fn places((channels, lines): (usize, usize)) -> impl Iterator<Item = (usize, usi
     (0..lines).flat_map(move |at| (0..channels).map(move |channel| (channel, at)))
 }
 
-/// Returns a power of the motion of a degree of freedom without its mean and its linear part.
+/// Returns a power of the motion of a degree of freedom, minus the mean and the linear part of this
+/// power.
 fn without_linear_part(
     predicted: &Response,
     dof: usize,
@@ -311,7 +313,7 @@ fn p_value(
     }
 }
 
-/// Returns the mean of the neighbours of each value.
+/// Returns, for each value, the mean of this value and its neighbours on either side.
 fn around(values: &[f64]) -> Vec<f64> {
     let count = values.len();
     let window = |at: usize| {
@@ -325,7 +327,7 @@ fn around(values: &[f64]) -> Vec<f64> {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Linearity {
-    /// Power with the strongest correlation.
+    /// Power (or sign) of displacement or velocity that has the strongest correlation.
     pub power: Power,
     /// Degree of freedom of the motion.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]

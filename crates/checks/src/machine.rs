@@ -17,10 +17,9 @@ use super::search::SearchAgreement;
 use super::whiteness::{Residual, Whiteness};
 
 /// Tests the power of the residual against the noise if `source` states the origin of the noise
-/// power ([`Finding::Misfit`]), parts of the data against each other
-/// ([`Finding::PartsAgreement`]), priors against the data ([`Finding::PriorAgreement`]), and
-/// whether
-/// several searches agree ([`Finding::SearchAgreement`]).
+/// power ([`Finding::Misfit`]), parts of the data against each other ([`Finding::PartsAgreement`]),
+/// priors against the data ([`Finding::PriorAgreement`]), and the agreement of several searches
+/// ([`Finding::SearchAgreement`]).
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model

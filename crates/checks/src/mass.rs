@@ -59,7 +59,8 @@ pub struct NegativeMass {
     pub mass: f64,
     /// Standard error of the mass, in kg.
     pub standard_error: f64,
-    /// Probability that noise alone makes the estimate of any mass of zero at least as negative.
+    /// Probability that noise alone makes the estimate of any mass with the true value zero at
+    /// least as negative.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

@@ -13,9 +13,9 @@ use super::{Subject, Verdict};
 pub struct Misfit {
     /// Ratio of the residual power to its expectation for noise alone (pure number).
     pub ratio: f64,
-    /// Probability that noise alone gives a ratio that deviates at least as much from 1. The
-    /// deviation is upwards for coherence, downwards for the noise of the force, and to either side
-    /// for periods.
+    /// Probability that noise alone gives a ratio that deviates at least as much from 1. The test
+    /// is two-sided for noise from periods. For the noise of the force, only ratios below 1 count;
+    /// for other sources, only ratios above 1 count.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Source of the noise power.

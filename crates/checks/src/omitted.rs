@@ -1,4 +1,4 @@
-//! Terms that a model leaves out, and what they would change.
+//! Terms that a model omits, and the changes of the parameters if these terms are included.
 
 use std::fmt::{self, Formatter};
 
@@ -21,25 +21,27 @@ pub struct TermLeftOut {
     pub term: OmittedTerm,
     /// Fraction of the residual power that the term explains.
     pub explained: f64,
-    /// Probability that noise alone makes one of the terms explain at least as much.
+    /// Probability that noise alone makes one of the tested terms explain at least as large a
+    /// fraction of the residual power.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// Changes by the term, parameter by parameter (unit of the parameter).
+    /// Change of each parameter if the term is included (unit of the parameter).
     pub changes: Vec<ChangeByTerm>,
 }
 
-/// Change of a parameter by an omitted term.
+/// Change of a parameter if an omitted term is included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ChangeByTerm {
     /// The parameter.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
     pub parameter: Parameter,
-    /// Change, to first order (unit of the parameter).
+    /// Change of the parameter, to first order (unit of the parameter).
     pub by: f64,
     /// Standard error of the change (unit of the parameter).
     pub standard_error: f64,
-    /// Ratio of the change to the standard error of the parameter without the term (pure number).
+    /// Ratio of the change to the standard error of the parameter in the fit without the term (pure
+    /// number).
     pub in_errors: f64,
 }
 
@@ -86,11 +88,11 @@ pub struct NonlinearTermsLeftOut {
     /// least as many standard errors as the most significant coefficient of these terms.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// Changes by the terms, parameter by parameter (unit of the parameter).
+    /// Change of each parameter if the terms are included (unit of the parameter).
     pub changes: Vec<NamedChange>,
 }
 
-/// Change of a named parameter by omitted terms.
+/// Change of a named parameter if the omitted terms are included.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct NamedChange {
@@ -98,9 +100,10 @@ pub struct NamedChange {
     pub parameter: String,
     /// SI unit of the parameter.
     pub unit: String,
-    /// Change (unit of the parameter).
+    /// Change of the parameter (unit of the parameter).
     pub by: f64,
-    /// Ratio of the change to the standard error of the parameter without the terms (pure number).
+    /// Ratio of the change to the standard error of the parameter in the fit without the terms
+    /// (pure number).
     pub in_errors: f64,
 }
 

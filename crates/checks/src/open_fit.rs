@@ -9,8 +9,8 @@ use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::after_spectral_fit;
 
 /// Returns the residuals of a new maximum-likelihood fit to all changed records together. The fit
-/// begins at the last estimate of `likelihood`; the errors of the pulses and the transients are
-/// subtracted from the records. `None` if the fit fails.
+/// begins at the last estimate of `likelihood`; the estimated errors of the force pulses and the
+/// estimated transients are subtracted from the records. `None` if the fit fails.
 pub(super) fn residuals_of_fit(
     records: &[FrequencyData],
     likelihood: &ChangedRecords<'_>,
@@ -29,8 +29,9 @@ pub(super) fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
 
 /// Returns the position of the minimum of a `cost` near `start`, and the cost there. The search
 /// uses parabolas with a half width that decreases from the first of `widths` to the last. `None`
-/// if a cost does not exist or if `promises` rejects the cost after a step; its second argument is
-/// the decrease by this step, `None` for a step that was limited.
+/// if a cost cannot be computed, or if `promises` returns false after a step. The arguments of
+/// `promises` are the cost after the step and the decrease of the cost by this step, which is
+/// `None` if the length of the step was limited.
 pub(super) fn minimum_near(
     start: f64,
     widths: [f64; 2],

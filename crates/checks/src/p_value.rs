@@ -71,7 +71,7 @@ pub struct CorrelationTest {
 }
 
 impl CorrelationTest {
-    /// Creates the result of a test; `rounding` states that the residual is rounding.
+    /// Creates the result of a test; `rounding` states whether the residual is only rounding.
     pub(super) fn new(correlation: &Correlation, rounding: bool) -> Self {
         Self {
             coefficients: correlation.coefficients.len(),

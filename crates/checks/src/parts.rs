@@ -11,26 +11,27 @@ use super::p_value::PValue;
 use super::{Subject, Verdict};
 use crate::Finding;
 
-/// Difference between the parameters that parts of the data give: records, bands of lines, sections
-/// of time.
+/// Difference between the parameters that are estimated from parts of the data (records, bands of
+/// lines, sections of time).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PartsAgreement {
-    /// Probability that noise alone makes the parts of any split differ at least as much.
+    /// Probability that noise alone makes the parts of any split differ at least as much as the
+    /// parts of this finding.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// The part that differs most from the others.
     pub part: DataPart,
     /// Parameter in which this part differs most.
     pub parameter: String,
-    /// Value by the part (unit of the parameter).
+    /// Value of the parameter from this part of the data (unit of the parameter).
     pub by_part: f64,
-    /// Value by the other parts (unit of the parameter).
+    /// Value of the parameter from the other parts of the data (unit of the parameter).
     pub by_others: f64,
-    /// Standard error of the difference by the noise alone (unit of the parameter).
+    /// Standard error of `by_part` − `by_others` due to noise alone (unit of the parameter).
     pub standard_error: f64,
-    /// Ratio of standard errors from the scatter of the parts to those from the noise (pure
-    /// number).
+    /// Ratio of the standard errors from the scatter of the parts to the standard errors from the
+    /// noise (pure number).
     pub scatter: f64,
     /// Number of independent differences of the parts that `scatter` is computed from.
     pub degrees_of_freedom: usize,
@@ -44,15 +45,15 @@ pub struct PartsAgreement {
     serde(tag = "split", rename_all = "snake_case")
 )]
 pub enum DataPart {
-    /// One of several records, or of the hits of a hammer test.
+    /// One of several records, or one of the hits of a hammer test.
     Records {
-        /// Number of the record.
+        /// Index of the record, counted from 0.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         record: usize,
     },
     /// Half of the periods of every record.
     Halves {
-        /// Number of the half.
+        /// Index of the half, counted from 0.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         half: usize,
     },

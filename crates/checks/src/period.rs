@@ -15,11 +15,12 @@ use super::{Subject, Verdict};
 /// Checks a claimed period (in samples) with a force (N) that covers one or several claimed
 /// periods; `None` if the force does not contradict it.
 ///
-/// Three faults are detected ([`PeriodFault`]): the force repeats better after one or two samples
-/// more or less; it repeats after the claimed period except at one sample, where samples are
-/// missing or inserted; or it repeats after a different number of samples, and the claimed period
-/// is not a multiple of it. The last fault is detected even in a single claimed period, if this
-/// contains at least four thirds of the true one; the sentence then names the compared samples.
+/// Three faults are detected ([`PeriodFault`]): the force repeats better after a period that is one
+/// or two samples longer or shorter; it repeats after the claimed period except at one sample,
+/// where samples are missing or inserted; or it repeats after a different number of samples, and
+/// the claimed period is not a multiple of it. The last fault is detected even in a single claimed
+/// period, if this contains at least four thirds of the true one; the sentence then names the
+/// compared samples.
 pub fn claimed_period(force: &Record, period: usize) -> Option<Finding> {
     let channels: Vec<Vec<f64>> = (0..force.channels()).filter_map(|c| unit(force, c)).collect();
     if channels.is_empty() || period == 0 || period > force.len() {
@@ -81,7 +82,8 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
 /// the other samples relative to √2 times the RMS of the force.
 fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let pairs = channels[0].len().checked_sub(period)?;
-    // At least one period outside the stretch must be comparable with the next period.
+    // `pairs` is the number of pairs of samples that are one claimed period apart. The interruption
+    // may affect `period` of these pairs; at least as many other pairs must remain.
     if pairs < 2 * period {
         return None;
     }
@@ -98,7 +100,8 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let within = |first: usize| (sums[first + period] - sums[first]) / period as f64;
     let stretches = 0..=pairs - period;
     let worst = stretches.max_by(|a, b| within(*a).total_cmp(&within(*b)))?;
-    // The sum is computed again, because the difference of large sums would be rounding.
+    // The sum is computed again, because the difference of large sums would consist of rounding
+    // errors.
     let outside: f64 = squares[..worst].iter().chain(&squares[worst + period..]).sum();
     let outside = outside / (pairs - period) as f64;
     if within(worst) <= PERIOD_WORST * PERIOD_WORST
@@ -106,8 +109,8 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     {
         return None;
     }
-    // A single sample may by chance agree with the sample one period before, or differ from it by
-    // noise.
+    // The limit for a differing sample is needed because a single sample may agree by chance with
+    // the sample one period before, or differ from this sample by noise.
     let off = outside.max(within(worst) / PERIOD_INTERRUPTED);
     let first = (worst..worst + period).find(|k| squares[*k] > off)?;
     Some(PeriodFault::Interruption { sample: first + period, mismatch: outside.sqrt() })
@@ -129,12 +132,14 @@ fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let first = (apart..squares.len()).find(repeats_equally)?;
     let around = (first..squares.len()).take_while(repeats_equally);
     let nearest = around.min_by(|a, b| squares[*a].total_cmp(&squares[*b]))?;
-    // A signal with slow drift may repeat better after several periods.
+    // A signal with slow drift may repeat better after several periods; this does not contradict
+    // the claimed period.
     let repeats = squares.get(period).is_some_and(|square| *square <= PERIOD_WORST * PERIOD_WORST);
     if repeats && nearest % period == 0 {
         return None;
     }
-    // Each period may be half a sample longer or shorter.
+    // The true period may be half a sample longer or shorter than `nearest`, and this error adds up
+    // over several periods.
     let times = (period as f64 / nearest as f64).round();
     let off = (period as f64 - times * nearest as f64).abs();
     (off > 0.5 * times + 0.5).then(|| PeriodFault::Other {
@@ -153,7 +158,7 @@ fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
     for x in channels {
         let products = aperiodic_autocorrelation(x);
         let total: f64 = x.iter().map(|v| v * v).sum();
-        // Squares outside the overlap, at the end and at the beginning.
+        // Sums of the squares outside the overlap, at the end and at the beginning.
         let (mut end, mut beginning) = (0.0, 0.0);
         for (lag, (difference, overlap)) in sums.iter_mut().enumerate() {
             let power = (total - end) + (total - beginning);
@@ -189,15 +194,15 @@ pub struct WrongPeriod {
     serde(tag = "fault", rename_all = "snake_case")
 )]
 pub enum PeriodFault {
-    /// The force repeats better after one or two samples more or less.
+    /// The force repeats better after a period that is one or two samples longer or shorter.
     Neighbour {
         /// Number of samples after which the force repeats best.
         period: usize,
-        /// Ratio of the RMS difference from one of these periods to the next to √2 times the RMS of
-        /// the force (pure number).
+        /// RMS difference between successive periods of this length, relative to √2 times the RMS
+        /// of the force (pure number).
         mismatch: f64,
-        /// RMS difference after the claimed period, relative to √2 times the RMS of the force (pure
-        /// number).
+        /// RMS difference between samples one claimed period apart, relative to √2 times the RMS of
+        /// the force (pure number).
         claimed_mismatch: f64,
     },
     /// The force repeats after the claimed period except at one sample, where samples are missing
@@ -206,8 +211,8 @@ pub enum PeriodFault {
         /// First sample that does not repeat, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         sample: usize,
-        /// RMS difference at the other samples, relative to √2 times the RMS of the force (pure
-        /// number).
+        /// RMS difference after the claimed period at the samples outside the interruption,
+        /// relative to √2 times the RMS of the force (pure number).
         mismatch: f64,
     },
     /// The force repeats after a different number of samples, and the claimed period is not a
@@ -215,8 +220,8 @@ pub enum PeriodFault {
     Other {
         /// Number of samples after which the force repeats.
         period: usize,
-        /// Ratio of the RMS difference from one of these periods to the next to √2 times the RMS of
-        /// the force (pure number).
+        /// RMS difference between successive periods of this length, relative to √2 times the RMS
+        /// of the force (pure number).
         mismatch: f64,
         /// Number of samples of the force.
         samples: usize,

@@ -62,7 +62,8 @@ pub fn power(
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PowerFlow {
-    /// Mean power into the system relative to the apparent power, negative (pure number).
+    /// Mean power into the system relative to the apparent power (pure number); negative, because
+    /// the forces extract power.
     pub fraction: f64,
 }
 

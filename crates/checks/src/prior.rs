@@ -7,10 +7,10 @@ use super::finding::{Check, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Agreement of the prior of a parameter with its estimate from the data.
+/// Agreement of the prior of a parameter with the data.
 ///
-/// If both are right, estimate − mean has the variance s² − v, with the variance s² of the prior
-/// and v of the estimate.
+/// The estimate is from the prior and the data together. If prior and data agree, estimate − mean
+/// has the variance s² − v, with the variance s² of the prior and the variance v of the estimate.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PriorAgreement {
@@ -22,7 +22,7 @@ pub struct PriorAgreement {
     pub standard_deviation: f64,
     /// Estimate, in the unit of the parameter.
     pub estimate: f64,
-    /// Probability of an estimate at least as far from the mean.
+    /// Probability of an estimate at least as far from the mean of the prior.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

@@ -54,8 +54,8 @@ fn quantisation(x: &[f64]) -> Option<(usize, f64)> {
     let multiple =
         |gap: f64| (gap / step - (gap / step).round()).abs() <= LEVEL_ROUNDING * gap / step;
     let repeated = x.windows(2).filter(|pair| pair[0] == pair[1]).count();
-    // A channel that is at rest before it moves, or that has a short period, does not satisfy all
-    // conditions below.
+    // A channel that is at rest before it moves, or that has a short period, violates at least one
+    // of the conditions below.
     let coarse = levels.len() > 2
         && x.len() >= SAMPLES_PER_LEVEL * levels.len()
         && repeated as f64 >= REPEATED_SAMPLES * x.len() as f64

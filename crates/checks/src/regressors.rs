@@ -16,12 +16,13 @@ use super::limits::SAMPLES_PER_UNKNOWN;
 use super::limits::{LAGS, ROUNDING, SIGNIFICANCE};
 use super::p_value::PValue;
 
-/// Tests whether the response one sample before and after explains the residual of the equation of
-/// motion, fitted sample by sample to displacement, velocity, acceleration and force (N)
-/// ([`Finding::Bias`]): white noise on the response has this effect, noise on the force does not.
-/// `None` if the neighbours do not explain the residual, if no parameter changes by more than its
-/// standard error with the neighbours as instruments, if the residual is not white (another check
-/// reports this), or if there is no noise. Only the first 32,768 samples of a long record are used.
+/// Tests whether the response at the previous and at the next sample explains the residual of the
+/// equation of motion, fitted sample by sample to displacement, velocity, acceleration and force
+/// (N) ([`Finding::Bias`]): white noise on the response has this effect, noise on the force does
+/// not. `None` if the neighbours do not explain the residual, if no parameter changes by more than
+/// its standard error with the neighbours as instruments, if the residual is not white (another
+/// check reports this), or if there is no noise. Only the first 32,768 samples of a long record are
+/// used.
 ///
 /// The finding names the parameter with the largest change, in standard errors of `estimate`.
 ///
@@ -77,12 +78,13 @@ pub fn noise_on_response(
 /// One equation of motion at all samples except the first and the last.
 struct Equation {
     regressors: DMatrix<f64>,
-    /// Mean of the regressors one sample before and after.
+    /// Mean of the regressors at the previous sample and at the next sample.
     neighbours: DMatrix<f64>,
     target: DMatrix<f64>,
 }
 
-/// Change of a parameter with the neighbours as instruments.
+/// Change of a parameter from least squares to instrumental variables with the neighbouring samples
+/// as instruments.
 struct Change {
     p_value: f64,
     parameter: Parameter,
@@ -160,7 +162,8 @@ impl Equation {
         Ok(largest_change(estimate, parameters, &values, p_value))
     }
 
-    /// Returns Π⁻¹b, with both scaled by the norms of the regressors.
+    /// Returns Π⁻¹b, where Π is `projection`. The equations are scaled by the norms of the
+    /// regressors before they are solved.
     fn scaled_solve(
         &self,
         mut projection: DMatrix<f64>,
@@ -184,7 +187,7 @@ fn fit(regressors: &DMatrix<f64>, targets: &DMatrix<f64>) -> Result<Solution, Nu
     rows.solve()
 }
 
-/// Returns the largest change of a parameter, in its standard errors.
+/// Returns the change that is largest relative to the standard error of its parameter.
 fn largest_change(
     estimate: &Estimate,
     parameters: &[Parameter],

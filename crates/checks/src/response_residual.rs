@@ -113,9 +113,9 @@ impl Expected {
 struct Series<'a> {
     /// Residuals over the lines, in the order of the forces and, for each force, of the responses.
     each: Vec<Vec<Complex<f64>>>,
-    /// Numbers of the lines, sorted, and their indices in `each`.
+    /// Number of each line, in rising order, with the index of the line in the series of `each`.
     lines: Vec<(usize, usize)>,
-    /// Correlation of the noise of two lines, by their distance in lines, from 0.
+    /// Correlation between the noise of two lines; the index is their distance, in lines, from 0.
     correlation: &'a [f64],
 }
 
@@ -162,8 +162,8 @@ impl<'a> Series<'a> {
         Some(expected.misfit(power, NoiseSource::Coherence))
     }
 
-    /// Returns the correlation Σ r̄(n) r(n + d) at distances d that the window does not correlate,
-    /// and the smallest of these distances; `None` if there are too few lines.
+    /// Returns the correlation Σ r̄(n) r(n + d) at distances d at which the window causes no
+    /// correlation, and the smallest of these distances; `None` if there are too few lines.
     fn line_to_line(&self, residual: &[Complex<f64>]) -> Option<(Correlation, usize)> {
         let (count, first) = (residual.len() as f64, self.correlation.len());
         let distances: Vec<usize> = (first..self.lines.len() / LINES_PER_DISTANCE)

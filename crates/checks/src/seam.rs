@@ -1,4 +1,4 @@
-//! Curvature of a response where the last sample of a period meets the first.
+//! Curvature of a response at the seam, where the last sample of a period meets the first.
 
 use std::fmt::{self, Formatter};
 
@@ -19,7 +19,7 @@ pub struct Seam {
 
 /// Checks whether a record of any response quantity is one whole period of a steady state: the
 /// curvature across the seam, from the last sample to the first, relative to the RMS curvature
-/// inside ([`Finding::Seam`]). In a whole period the seam is like any other sample.
+/// inside the record ([`Finding::Seam`]). In a whole period the seam is like any other sample.
 ///
 /// # Source
 /// Ours.
@@ -27,9 +27,9 @@ pub fn periodicity(response: &Record) -> Finding {
     periodicity_across(response, response)
 }
 
-/// Checks the seam like [`periodicity`] for a period too long for the memory: the RMS curvature is
-/// computed from its `beginning`; `end` has at least its last two samples (samples × channels, the
-/// same quantity and channels).
+/// Checks the seam as [`periodicity`] does, for a period too long for the memory. The RMS curvature
+/// is computed from the `beginning` of the period; `end` has at least the last two samples of the
+/// period (samples × channels, the same quantity and channels).
 ///
 /// # Panics
 /// If `end` has fewer channels.

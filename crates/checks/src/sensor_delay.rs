@@ -9,7 +9,7 @@ use super::finding::{Check, Finding, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Delay that explains most of the residual of a machine, of one sensor or of all.
+/// Delay of one sensor, or of all sensors, that explains most of the residual of a machine.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SensorDelay {

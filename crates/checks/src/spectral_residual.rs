@@ -31,15 +31,17 @@ pub struct SpectralResidual {
     values: DVector<f64>,
     /// Q of the covariance I − QQᵀ of the values.
     explained: DMatrix<f64>,
-    /// Values and Q with the transients of the record, if these are part of the noise and of its
-    /// stated power.
+    /// Weighted residual, and Q of its covariance I − QQᵀ, before the transients are projected out,
+    /// for the power test; `None` unless the noise is the response to an unmeasured force, whose
+    /// stated power includes the transients.
     with_ends: Option<(DVector<f64>, DMatrix<f64>)>,
-    /// Standard deviation of every residual before the fit of the parameters, from its own size.
+    /// Standard deviation of every residual before the fit of the parameters, estimated from the
+    /// magnitude of this residual.
     deviations: DVector<f64>,
-    /// QᵀΣQ with the diagonal matrix Σ of the squared `deviations`.
+    /// QᵀΣQ, where Q is `explained` and Σ is the diagonal matrix of the squared `deviations`.
     explained_spread: DMatrix<f64>,
-    /// Forces, rows × n, without the part of their noise that follows from the residual: even the
-    /// residual of a correct model is correlated with this part.
+    /// Forces, rows × n, without the part of their noise that can be estimated from the residual:
+    /// even the residual of a correct model is correlated with this part.
     force: DMatrix<Complex<f64>>,
     rounding: bool,
     /// Ratio of residual power to noise power on the lines where force noise dominates, and the
@@ -72,8 +74,8 @@ fn passes(mut findings: Vec<Finding>) -> bool {
 }
 
 impl SpectralResidual {
-    /// Creates the residual of data with or without stated noise, from weighted values with
-    /// covariance I − QQᵀ for the `explained` Q.
+    /// Creates the residual of data with or without stated noise, from weighted `values`. Their
+    /// covariance is I − QQᵀ, where Q is `explained`.
     pub(super) fn new(
         data: FrequencyData,
         noise_stated: bool,
@@ -101,7 +103,9 @@ impl SpectralResidual {
         }
     }
 
-    /// Sets values and Q of the power test, if these include the transients.
+    /// Sets the weighted residual and the explained columns Q for the power test, without a
+    /// projection of the transients; `None` if the power test uses the same residual and Q as the
+    /// other tests.
     pub(super) fn with_ends(self, with_ends: Option<(DVector<f64>, DMatrix<f64>)>) -> Self {
         Self { with_ends, ..self }
     }
@@ -190,7 +194,7 @@ impl SpectralResidual {
         })
     }
 
-    /// Returns values and explained columns for the power test.
+    /// Returns the weighted residual and the explained columns for the power test.
     fn whole(&self) -> (&DVector<f64>, &DMatrix<f64>) {
         match &self.with_ends {
             Some((values, explained)) => (values, explained),
@@ -214,7 +218,8 @@ impl SpectralResidual {
         &self.explained
     }
 
-    /// Returns the standard deviation of each residual, from its own size.
+    /// Returns the standard deviation of each residual, estimated from the magnitude of this
+    /// residual.
     pub(super) fn deviations(&self) -> &DVector<f64> {
         &self.deviations
     }
@@ -225,8 +230,9 @@ impl SpectralResidual {
         self.data.dof()
     }
 
-    /// Returns the test of the residual power against its expectation for the noise of a source,
-    /// such as covariances from few periods.
+    /// Returns the test of the residual power against its expectation for noise alone, where
+    /// `source` is the origin of the noise power. The test allows for covariances that are
+    /// estimated from few periods.
     pub(super) fn misfit(&self, source: NoiseSource) -> Option<Finding> {
         let noise = self.data.noise().filter(|_| self.noise_stated && !self.rounding)?;
         let (n, rows) = (self.data.dof() as f64, self.data.len() as f64);
@@ -256,11 +262,11 @@ impl SpectralResidual {
         };
         let (values, explained) = self.whole();
         let (power, mean, above) = power_of(values, explained);
-        // A power far below the noise is also significant: then the periods differ by more than
-        // noise.
+        // If the noise power is estimated from the scatter of the periods, a residual power far
+        // below the noise power is also significant: the periods then differ by more than noise.
         let below = match &self.with_ends {
-            // The noise estimate from few periods also contains the transients of an unmeasured
-            // force.
+            // A power somewhat below the noise is no fault here, because the noise estimate from
+            // few periods also contains the transients of an unmeasured force.
             Some(_) if power > SPECTRAL_LEAKED * mean => 1.0,
             _ => 1.0 - above,
         };
@@ -342,8 +348,8 @@ impl SpectralResidual {
                 weight *= turn;
             }
         }
-        // The left columns are the residuals of each channel, the right ones their variances times
-        // the weights of the first lag.
+        // The left columns are the residuals of each channel. The right columns are the variances
+        // of these residuals times the weights of the first lag.
         let right = DMatrix::from_fn(2 * lines, 2 * dof, |at, column| {
             let row = self.row(at / 2, column % dof) + at % 2;
             if column < dof {
@@ -406,8 +412,8 @@ impl SpectralResidual {
     }
 }
 
-/// Returns the standard deviation of every residual before the fit of the parameters, from its own
-/// size.
+/// Returns the standard deviation of every residual before the fit of the parameters, estimated
+/// from the magnitude of this residual.
 fn deviations(values: &DVector<f64>, explained: &DMatrix<f64>) -> DVector<f64> {
     let leverage = |row: usize| explained.row(row).norm_squared();
     let mut deviations = DVector::zeros(values.len());

@@ -83,19 +83,20 @@ pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MassSymmetry {
-    /// Degree of freedom of the row of `above`, and of the column of `below`.
+    /// Degree of freedom: row of the entry `above` and column of the entry `below`.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub row: usize,
-    /// Degree of freedom of the column of `above`, and of the row of `below`.
+    /// Degree of freedom: column of the entry `above` and row of the entry `below`.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub column: usize,
     /// Entry (`row`, `column`) of M, in kg.
     pub above: f64,
     /// Entry (`column`, `row`) of M, in kg.
     pub below: f64,
-    /// Standard error of the difference, in kg.
+    /// Standard error of `above` − `below`, in kg.
     pub standard_error: f64,
-    /// Probability that noise alone makes any two mirrored entries differ at least as much.
+    /// Probability that noise alone makes any two mirrored entries differ at least as much as these
+    /// two.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

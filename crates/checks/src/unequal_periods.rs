@@ -25,8 +25,8 @@ pub struct UnequalPeriods {
     pub fraction: f64,
 }
 
-/// Tests whether the force differs from period to period by more than the noise of its channel;
-/// such noise causes no response.
+/// Tests whether the force differs from period to period by more than the noise of its channel. The
+/// noise of the channel causes no response.
 pub(super) fn unequal_periods(
     force: &Record,
     response: &Record,

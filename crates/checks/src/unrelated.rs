@@ -83,7 +83,7 @@ mod tests {
         // A response with noise of the same power still follows the force.
         assert_eq!(unrelated_response(0.5_f64.sqrt(), 2000, 3), None);
         assert_eq!(unrelated_response(0.97_f64.sqrt(), 2000, 3), None);
-        // The test is impossible if there are not more equations than unknowns.
+        // The test needs more equations than unknowns.
         assert_eq!(unrelated_response(0.5, 3, 3), None);
         assert_eq!(unrelated_response(f64::NAN, 100, 3), None);
     }

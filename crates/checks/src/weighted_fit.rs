@@ -1,5 +1,5 @@
-//! Residuals of spectra weighted by their covariance, without the part that other parameters
-//! explain.
+//! Residuals of spectra weighted by their covariance, without the part that other values of the
+//! parameters explain.
 
 use mechid_estimate::Relations;
 use mechid_estimate::frequency_domain::Whitened;
@@ -40,16 +40,16 @@ pub struct AfterSpectralFit {
 ///
 /// The covariance follows from the noise of force and response that the data state. A few
 /// Gauss–Newton steps of maximum likelihood remove the part of the weighted residual that other
-/// parameters explain: the tests of [`SpectralResidual::findings`] then concern the model and not
-/// the estimator. The bias of the estimator has a separate test: the sum of these steps relative to
-/// the standard errors of the estimate, for all parameters together and for the one with the
-/// largest change. If a record states no noise, or only rounding, all residuals are weighted as for
-/// white noise on the response, plus the stated noise of the forces.
+/// values of the parameters explain: the tests of [`SpectralResidual::findings`] then concern the
+/// model and not the estimator. The bias of the estimator has a separate test: the sum of these
+/// steps relative to the standard errors of the estimate, for all parameters together and for the
+/// one with the largest change. If a record states no noise, or only rounding, all residuals are
+/// weighted as for white noise on the response, plus the stated noise of the forces.
 ///
-/// Noise in an open record has different values at its two ends; this step correlates the low lines
-/// and is projected out of the tests. The transients of the response have been subtracted from the
-/// data. The transients of the response to an unmeasured force in several periods are projected
-/// out, too, if the noise is such a response.
+/// Noise in an open record has different values at its two ends. This jump between final and
+/// initial value correlates the low lines, and is projected out of the tests. The transients of the
+/// response have been subtracted from the data. The transients of the response to an unmeasured
+/// force in several periods are projected out, too, if the noise is such a response.
 ///
 /// # Errors
 /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the estimate has another number
@@ -107,7 +107,8 @@ impl Linearised {
         Some(Self { weighted, basis, explained, coefficients })
     }
 
-    /// Creates residuals without the effect of the parameters.
+    /// Creates the residuals of a fit whose sensitivities are not used: the parameters explain no
+    /// part of these residuals.
     fn without_sensitivity(weighted: Vec<Whitened>, parameters: usize) -> Self {
         let no_columns = |record: &Whitened| DMatrix::zeros(record.residual.len(), 0);
         Self {
@@ -255,8 +256,9 @@ impl<'a> Weighing<'a> {
     }
 
     /// Returns the columns that are projected out of the residual of a record. For an open record
-    /// these are steps between the final and initial values of each channel; for periods whose
-    /// noise is the response to an unmeasured force, they are the transients of this response.
+    /// these are the effects of a jump between the final and initial values of each channel; for
+    /// periods whose noise is the response to an unmeasured force, they are the transients of this
+    /// response.
     fn end_effects(&self, at: usize, values: &DVector<f64>) -> Vec<DVector<f64>> {
         let entries = self.entries_of(values);
         let weighted = |data: FrequencyData| {
@@ -275,8 +277,8 @@ impl<'a> Weighing<'a> {
         end_effects.into_iter().filter_map(weighted).map(|effect| effect.residual).collect()
     }
 
-    /// Returns the residual of a record, given its values and the columns that the parameters
-    /// explain.
+    /// Returns the residual of a record from its weighted values and from the columns that span the
+    /// effect of the parameters.
     fn residual(
         &self,
         at: usize,
@@ -333,7 +335,8 @@ impl WeightedFit {
         let step = change.component_div(&scale);
         let count = scale.len() as f64;
         let together = if estimate.unknowns().is_related() {
-            // The covariance of related entries is singular, so there is no joint test.
+            // The covariance of related entries is singular. A joint test is not possible, and its
+            // p-value is set to 1.
             1.0
         } else {
             let statistic = estimate.squared_length(change)?;
@@ -490,8 +493,8 @@ fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
             column /= length;
         }
     }
-    // If no parameters are dependent, the inverse of the triangular factor suffices, and takes a
-    // fraction of the time.
+    // If no parameters are dependent, the inverse of the triangular factor is sufficient, and
+    // faster than the singular value decomposition.
     if let Some(inverse) = r.solve_upper_triangular(&DMatrix::identity(parameters, parameters))
         && r.norm() * inverse.norm() * FIT_RANK < 1.0
     {
@@ -514,7 +517,8 @@ fn has_unmeasured_force(data: &FrequencyData) -> bool {
     data.noise().is_some_and(|noise| noise.models().iter().any(by_force))
 }
 
-/// Projects `parts` out of the values, and adds them to the orthonormal explained columns.
+/// Projects the columns `parts` out of the `values`, and adds these columns, orthonormalised, to
+/// the `explained` columns.
 fn without(
     parts: &[DVector<f64>],
     mut values: DVector<f64>,

@@ -49,7 +49,7 @@ pub enum Residual {
         /// Degree of freedom of the force.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         force: usize,
-        /// Smallest distance of the correlated lines.
+        /// Smallest distance of the lines whose correlation is tested.
         distance: usize,
     },
 }
@@ -62,7 +62,7 @@ pub struct NoiseSpan {
     pub lags: usize,
     /// Autocorrelation at lag 1 (pure number).
     pub first_coefficient: f64,
-    /// Result of the test beyond the lags of the span.
+    /// Result of the test at lags longer than `lags`.
     pub beyond: CorrelationTest,
 }
 

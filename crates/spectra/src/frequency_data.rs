@@ -247,12 +247,12 @@ impl FrequencyData {
             let samples = pulse.sampling.len();
             for (what, expected, got) in [
                 (
-                    "index of a force channel with noise, below this number",
+                    "index of a force channel with noise, which must be below the expected number",
                     self.dof(),
                     pulse.channel,
                 ),
                 (
-                    "index of a sample with noise, below this number",
+                    "index of a sample with noise, which must be below the expected number",
                     samples,
                     pulse.samples.end.saturating_sub(1),
                 ),

@@ -7,12 +7,13 @@ pub(crate) const SCATTER_ROUNDING: f64 = 1e-10;
 /// stronger channels always count as forces.
 pub(crate) const AVERAGE_IDLE: f64 = 0.1;
 
-/// Maximum mean of −ln p over lines and channels that counts as no coherence; without a signal its
-/// expectation is 1.
+/// Maximum mean of −ln p over lines and channels that counts as no coherence; p is the probability
+/// of a coherence at least as large as observed if there is no signal. The expected mean is then 1.
 pub(crate) const MEAN_EVIDENCE: f64 = 3.0;
 
-/// Maximum of −ln p, minus the logarithm of the number of values, that counts as no coherence: a
-/// probability of 10⁻³.
+/// Maximum difference between the largest of several values −ln p and the logarithm of the number
+/// of values; a larger difference shows coherence. Without coherence, the probability of a larger
+/// difference is 10⁻³.
 pub(crate) const LARGEST_EVIDENCE: f64 = 6.9;
 
 /// Maximum power of a line that may be unexcited, relative to the strongest line of the same force.
@@ -29,8 +30,9 @@ pub(crate) const AVERAGE_PEAK: usize = 2;
 /// dependent.
 pub(crate) const FORCE_TOLERANCE: f64 = 1e-10;
 
-/// Probability of the observed coherence between two forces on interleaved lines above which the
-/// coherence is attributed to noise of the channel.
+/// Maximum probability that noise causes the observed coherence between two forces on interleaved
+/// lines, at which the coherence counts as crosstalk. Above it the coherence is attributed to noise
+/// of the channel.
 pub(crate) const INTERLEAVED_CHANCE: f64 = 1e-4;
 
 /// Maximum amplitude of a force that counts as rounding, relative to the force that excites the
@@ -38,7 +40,8 @@ pub(crate) const INTERLEAVED_CHANCE: f64 = 1e-4;
 pub(crate) const INTERLEAVED_ROUNDING: f64 = 1e-9;
 
 /// Number of iterations that subtract the responses to the other forces: each iteration multiplies
-/// the remaining part by the ratio of these forces to the force that excites the lines.
+/// what remains of these responses by the ratio of these forces to the force that excites the
+/// lines.
 pub(crate) const INTERLEAVED_ROUNDS: usize = 8;
 
 /// Minimum of 1 − γ²: rounding of the sums limits the accuracy of a coherence.
@@ -49,8 +52,8 @@ pub(crate) const COHERENCE_ROUNDING: f64 = 1e-14;
 /// tenth.
 pub(crate) const SCATTER_DEVIATIONS: f64 = 20.0;
 
-/// Minimum number of averages for weights from single lines; with fewer, responses over whole
-/// periods are pooled over neighbouring lines, too.
+/// Minimum number of averages, minus the number of forces, for weights from single lines. Below it,
+/// the variances of tabulated responses over whole periods are pooled over neighbouring lines, too.
 pub(crate) const SCATTER_FEW: f64 = 8.0;
 
 /// Maximum correlation of two lines that count as independent.
@@ -73,9 +76,8 @@ pub(crate) const LINE_ROUNDING: f64 = 1e-12;
 /// Maximum number of consecutive periods whose spectrum is taken as the spectrum of one record.
 pub(crate) const MAX_PERIODS: usize = 16;
 
-/// Minimum number of consecutive periods whose spectrum is taken as the spectrum of one record:
-/// with two periods, the only line between two lines of a period has the same distance from both
-/// lines.
+/// Minimum number of consecutive periods whose spectrum is taken as the spectrum of one record. Two
+/// periods have only one line between two lines of a period, and it is equally far from both lines.
 pub(crate) const MIN_PERIODS: usize = 3;
 
 /// Maximum number of buffered samples over all channels: 8 MB.
@@ -112,8 +114,8 @@ pub(crate) const LINES_PER_ORDER: usize = 8;
 /// Maximum number of bumps on a smooth spectrum.
 pub(crate) const MAX_BUMPS: usize = 24;
 
-/// Minimum length of the part of a bump outside the span of the polynomial and the other bumps,
-/// relative to the length of the bump; a smaller part is rounding.
+/// Minimum norm of the component of a bump that is orthogonal to the polynomial and the other
+/// bumps, relative to the norm of the bump; a smaller component is rounding.
 pub(crate) const BUMP_REMAINDER: f64 = 1e-8;
 
 /// Minimum number of complex deviations for a noise level that is lower than on the neighbouring
@@ -155,8 +157,8 @@ pub(crate) const BUMP_WIDER: f64 = 1.3;
 /// flanks.
 pub(crate) const BUMP_HIGHER: f64 = 3.0;
 
-/// Distance at which a peak is truncated, relative to the distance at which its power equals that
-/// of the floor.
+/// Distance from the middle of a resonance peak at which the peak is truncated, relative to the
+/// distance at which the power of the peak equals the power of the floor.
 pub(crate) const PEAK_REACH: f64 = 10.0;
 
 /// Width of the groups of lines that the search for a bump represents by their mean level, relative
@@ -164,7 +166,8 @@ pub(crate) const PEAK_REACH: f64 = 10.0;
 /// half-width of the bump.
 pub(crate) const BUMP_GROUP: f64 = 0.03125;
 
-/// Number of flat bumps of different widths around which other shapes are tried.
+/// Number of flat bumps with the largest gains, each of a different width, around which other
+/// shapes are tried.
 pub(crate) const BEST_WIDTHS: usize = 6;
 
 /// Maximum number of rounds in which a bump is varied.
@@ -195,10 +198,12 @@ pub(crate) const PERIODS_HALVINGS: usize = 50;
 /// 20 independent lines.
 pub(crate) const SINUSOID_CONSPICUOUS: f64 = 30.0;
 
-/// Number of lines to either side whose median is the level around a line.
+/// Number of lines on either side of a line whose median power determines the level around this
+/// line.
 pub(crate) const SINUSOID_AROUND: usize = 24;
 
-/// Number of nearest lines to either side that are excluded from the median around a line.
+/// Number of nearest lines on either side of a line that are excluded from the median around this
+/// line.
 pub(crate) const SINUSOID_NEXT: usize = 3;
 
 /// Minimum number of lines that determine the level around a line.
@@ -208,7 +213,8 @@ pub(crate) const SINUSOID_FEWEST: usize = 16;
 /// is negligible on other lines.
 pub(crate) const SINUSOID_FITTED: usize = 4;
 
-/// Number of lines to either side whose power above the level a sinusoid must explain.
+/// Number of lines on either side of a peak over which a sinusoid must explain the power above the
+/// level.
 pub(crate) const SINUSOID_EXPLAINED: usize = 8;
 
 /// Maximum fraction of the power above the level that a sinusoid may leave unexplained. A band of

@@ -180,7 +180,7 @@ impl LineData {
                 return Err(SpectraError::Size { what, expected, got });
             }
         }
-        // The amplitudes are unitary.
+        // The amplitudes are those of a unitary transform, which has the factor 1/√N.
         let unit = |samples: usize| (samples as f64).sqrt().recip();
         let pulse_errors = PulseErrors::all(pulses, &self.omega, unit)?;
         Ok(Self { pulse_errors, ..self })
@@ -241,8 +241,8 @@ impl LineData {
         self.rows(&rows)
     }
 
-    /// Returns the lines with these indices, which must be in ascending order; `None` without an
-    /// index.
+    /// Returns the lines with these indices, which must be in ascending order; `None` if the list
+    /// is empty.
     pub fn rows(&self, rows: &[usize]) -> Option<Self> {
         if rows.is_empty() {
             return None;
@@ -311,8 +311,8 @@ impl LineData {
         &self.pulse_errors
     }
 
-    /// Returns the number of effects of the errors of pulses on all outputs: real and imaginary
-    /// parts of lines × patterns.
+    /// Returns the number of effects of the errors of pulses: two (real and imaginary part) for
+    /// each output, line and pattern.
     pub fn pulse_effects(&self) -> usize {
         let patterns = |pulse: &PulseErrors| pulse.rows().len() * pulse.count();
         2 * self.outputs.ncols() * self.pulse_errors.iter().map(patterns).sum::<usize>()

@@ -60,8 +60,8 @@ impl LineNoise {
         self.degrees_of_freedom
     }
 
-    /// Returns the total number of complex deviations of all covariances; ∞ if the covariances are
-    /// known exactly.
+    /// Returns the total number of complex deviations that were averaged to get all the
+    /// covariances; ∞ if the covariances are known exactly.
     pub fn total_degrees_of_freedom(&self) -> f64 {
         self.total_degrees_of_freedom
     }

@@ -36,7 +36,8 @@ pub struct RepeatedPeriods {
     sum: DMatrix<Complex<f64>>,
     half_sums: [DMatrix<Complex<f64>>; 2],
     /// Sum Σ (z − z̄)(z − z̄)ᴴ over the periods so far, per line, 2n×2n. If several periods are
-    /// taken as one record, it is an equivalent sum over the lines between the lines of a period.
+    /// taken as one record, an equivalent sum over the lines between the lines of a period replaces
+    /// it.
     scatter: Vec<DMatrix<Complex<f64>>>,
     /// Periods that are not included in the scatter yet.
     together: BetweenLines,
@@ -47,8 +48,8 @@ pub struct RepeatedPeriods {
 }
 
 impl RepeatedPeriods {
-    /// Splits records of several whole periods; `lines` belong to one period. An incomplete period
-    /// at the end is ignored.
+    /// Splits records of several whole periods into periods; `lines` are the lines of one period.
+    /// An incomplete period at the end is ignored.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if the records have different numbers of channels,
@@ -123,8 +124,8 @@ impl RepeatedPeriods {
         self.steps.iter().enumerate().map(of_channel).collect()
     }
 
-    /// Creates the buffer for the next periods whose spectrum is taken together, if `remaining` are
-    /// expected.
+    /// Creates the buffer for the next group of periods, whose spectrum is taken as that of one
+    /// record. `remaining` is the number of periods that are still expected.
     fn together(lines: &Lines, dof: usize, remaining: usize) -> BetweenLines {
         let (period, channels) = (lines.sampling().len(), 2 * dof);
         BetweenLines::new(periods_as_one(remaining, period, channels), period, channels)
@@ -138,7 +139,7 @@ impl RepeatedPeriods {
     pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), SpectraError> {
         force.check_same_sampling(motion)?;
         let period = self.lines.sampling().len();
-        // `window` also refuses a record that is shorter than a period.
+        // If the record is shorter than a period, `window` returns an error.
         check_sampling(self.lines.sampling(), force.window(0, period)?.sampling())?;
         let dof = self.dof.max(1);
         for (what, got) in [
@@ -216,8 +217,8 @@ impl RepeatedPeriods {
         &self.lines
     }
 
-    /// Returns the mean over all periods, without a noise spectrum. The data only state the force
-    /// noise due to quantisation ([`RepeatedPeriods::with_quantisation`]).
+    /// Returns the mean over all periods, without a noise spectrum. The only noise stated in the
+    /// data is the force noise due to quantisation ([`RepeatedPeriods::with_quantisation`]).
     ///
     /// # Errors
     /// As [`FrequencyData::from_amplitudes`], and [`SpectraError::TooFewAverages`] if there is no
@@ -387,7 +388,8 @@ mod tests {
 
     use super::*;
 
-    /// The reference is the error of the rounded samples.
+    /// The variance of the rounding error that is equal in all periods is computed from the scatter
+    /// alone, and agrees with the error of simulated rounded samples.
     #[test]
     fn rounding_alike_is_found_from_the_scatter() {
         const SAMPLES: usize = 4000;

@@ -37,17 +37,18 @@ impl Sinusoid {
         self.omega
     }
 
-    /// Returns the complex amplitudes c of each channel, in the unit of the measured quantity.
+    /// Returns the complex amplitude c of each channel, in the unit of the measured quantity.
     pub fn amplitude(&self) -> &[Complex<f64>] {
         &self.amplitude
     }
 
-    /// Returns the number of real unknowns.
+    /// Returns the number of real unknowns: two for each channel, and the frequency.
     pub fn unknowns(&self) -> usize {
         2 * self.amplitude.len() + 1
     }
 
-    /// Returns the amplitude of channel `channel` at a line, in the unit of the measured quantity.
+    /// Returns the amplitude of the sinusoid in channel `channel` at a line, in the unit of the
+    /// measured quantity.
     fn read(&self, sampling: Sampling, line: usize, channel: usize) -> Complex<f64> {
         let [before, after] = sides(sampling, self.omega, line);
         self.amplitude[channel] * before + self.amplitude[channel].conj() * after
@@ -103,8 +104,8 @@ impl FrequencyData {
 ///
 /// Lines with a peak of the force are excluded, because the residual on them may come from the
 /// system. If the `system` is given, the threshold at its resonances is multiplied by the ratio of
-/// the squared receptance to that on the lines around, because a disturbance of the force has the
-/// shape of the receptance.
+/// the squared receptance at the resonance to the squared receptance on the surrounding lines,
+/// because the response to a disturbance of the force has the shape of the receptance.
 ///
 /// # Source
 /// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a
@@ -124,17 +125,18 @@ pub fn find(
     sinusoids.collect()
 }
 
-/// Lines of one record, from the first to the last.
+/// Search for sinusoids in one record, on all lines from the first to the last line of the record.
 struct Search<'a> {
     system: Option<&'a SecondOrderSystem>,
     measured: ResponseQuantity,
     sampling: Sampling,
     first: usize,
-    /// `true` for each line whose neighbours are in the data, too.
+    /// `true` for each line that is in the data together with the lines before and after it.
     whole: Vec<bool>,
     /// Residual in the measured quantity, lines × channels.
     residual: DMatrix<Complex<f64>>,
-    /// Power around each line under Hann's window; infinite if there are too few lines.
+    /// Mean power around each line under Hann's window, lines × channels; infinite if there are too
+    /// few lines around it.
     level: DMatrix<f64>,
     /// `true` for each line whose level includes the factor for the receptance.
     is_resonant: Vec<bool>,
@@ -273,14 +275,16 @@ impl<'a> Search<'a> {
         (0..windowed.ncols()).map(of).fold(0.0, f64::max)
     }
 
-    /// Returns the most conspicuous line and its power ratio.
+    /// Returns the largest ratio of the power of a line to the level around it, and the index of
+    /// this line. Excluded lines are ignored.
     fn most_conspicuous(&self, windowed: &DMatrix<Complex<f64>>) -> Option<(f64, usize)> {
         let open = (0..self.done.len()).filter(|at| !self.done[*at]);
         let ratios = open.map(|at| (self.stands_out(windowed, at), at));
         ratios.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Returns the power above the level around a line, relative to the level.
+    /// Returns the sum, over the lines around a line and over all channels, of the power above the
+    /// level, relative to the level.
     fn excess(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
         let rows = around(at, SINUSOID_EXPLAINED, self.done.len()).filter(|row| self.whole[*row]);
         let of = |row: usize| -> f64 {

@@ -1,4 +1,4 @@
-//! Choice of one of every n rows.
+//! Thinning of data: one of every n rows is used.
 
 /// Fractional part of the golden ratio; its multiples, modulo 1, are spread evenly and without a
 /// period.

@@ -24,11 +24,16 @@ impl<'a> TransientLoad<'a> {
     /// # Panics
     /// If the number of loads differs from [`len`].
     pub fn new(data: &'a FrequencyData, tau: &'a [f64]) -> Self {
-        assert_eq!(tau.len(), len(data), "one load of every record, power and degree of freedom");
+        assert_eq!(
+            tau.len(),
+            len(data),
+            "one load for every transient column, power of s and degree of freedom"
+        );
         Self { data, tau }
     }
 
-    /// Subtracts (τ₀ + τ₁ s + …) Z of every row from forces, degrees of freedom × rows, in N.
+    /// Subtracts the transient (τ₀ + τ₁ s + …) Z of every row from forces, degrees of freedom ×
+    /// rows, in N. Z is the entry of [`FrequencyData::transient`].
     ///
     /// # Panics
     /// If the forces do not have one column for every row of the data.
@@ -60,13 +65,13 @@ pub fn len(data: &FrequencyData) -> usize {
     Matrix::ALL.len() * data.dof() * data.transient().ncols()
 }
 
-/// Returns the index of a load: for a column of the transient, a power and one of `n` degrees of
-/// freedom.
+/// Returns the index of the load that belongs to a column of the transient, to the power of s that
+/// multiplies `matrix`, and to one of `n` degrees of freedom.
 pub fn index(n: usize, column: usize, matrix: Matrix, dof: usize) -> usize {
     (Matrix::ALL.len() * column + matrix as usize) * n + dof
 }
 
-/// Returns s², s and 1 with s = iω (rad/s), in the order M, C, K.
+/// Returns s², s and 1, the factors of M, C and K in the dynamic stiffness, with s = iω (rad/s).
 pub fn powers(omega: f64) -> [Complex<f64>; 3] {
     let mut powers = [Complex::from(1.0); 3];
     powers[Matrix::Mass as usize] = Complex::from(-omega * omega);

@@ -56,7 +56,7 @@ fn trouble_is_seen_before_the_fit() {
     let transient = exact_zoh(&system, &rich, &InitialState::rest(2)).unwrap();
     assert_eq!(verdict(held, &transient, &rich, Subject::Periodicity), Verdict::Bad);
 
-    // 1.7 samples per period of the mode at 1.8 rad/s.
+    // The mode at 1.8 rad/s has 1.7 samples per period.
     let slow = force(Sampling::new(2.0, 512).unwrap(), 1..=250);
     let aliased = exact_zoh_periodic(&system, &slow).unwrap();
     assert_eq!(verdict(held, &aliased, &slow, Subject::Step), Verdict::Bad);
@@ -72,12 +72,12 @@ fn residuals_are_told_from_noise() {
         rejected += usize::from(whiteness(e, 20).unwrap().p_value < 0.05);
         rejected += usize::from(cross_correlation(e, u, 10).unwrap().p_value < 0.05);
     }
-    // 5 % of 400 is 20, and its standard deviation 4.4.
+    // At a level of 5 %, 20 of 400 tests reject on average, with a standard deviation of 4.4.
     assert!((5..=35).contains(&rejected), "{rejected}");
 
     let white = noise::white(sampling, 1, 1.0, 1).unwrap();
     let u = white.channel(0);
-    // A residual that contains the input two samples late, and its own previous value.
+    // The residual contains the input two samples late, and the previous value of the residual.
     let mut e = vec![0.0; 2000];
     for k in 2..2000 {
         e[k] = 0.5 * e[k - 1] + 0.3 * u[k - 2];
@@ -92,8 +92,9 @@ fn residuals_are_told_from_noise() {
     assert!(whiteness(&e, 0).is_err() && whiteness(&e[..10], 9).is_err());
 }
 
-/// Coefficients of a slow input are correlated with one another: if they counted as 51 independent
-/// ones, their squares would exceed the limit of 1 % in one record of ten.
+/// White noise seems correlated with a slow input no more often than with a fast one. The 51
+/// coefficients of a slow input are correlated with one another: if they counted as independent,
+/// their squares would exceed the limit of 1 % in one record of ten.
 #[test]
 fn a_slow_input_is_no_more_often_found_in_noise_than_a_fast_one() {
     let sampling = Sampling::new(1.0 / 128.0, 512).unwrap();
@@ -114,8 +115,9 @@ fn a_slow_input_is_no_more_often_found_in_noise_than_a_fast_one() {
     }
 }
 
-/// Differences of white noise are correlated at lag 1; beyond it, their coefficients scatter √1.5
-/// times as much as those of white noise.
+/// Differences of white noise are correlated at lag 1, and the test must find no correlation at
+/// longer lags. At these lags, the coefficients of the differences scatter √1.5 times as much as
+/// the coefficients of white noise.
 #[test]
 fn noise_of_a_known_span_has_nothing_beyond_it() {
     let sampling = Sampling::new(0.1, 2001).unwrap();
@@ -131,7 +133,8 @@ fn noise_of_a_known_span_has_nothing_beyond_it() {
         [0, 1].map(|at| found.iter().filter(|p| p[at] < level).count())
     };
     let [all, beyond] = rejected(0.0, 0.05);
-    // 50 expected, with a standard deviation of 7.
+    // On average, the test at lags above 1 rejects 50 of 1000 records, with a standard deviation of
+    // 7.
     assert!(all == 1000 && (22..=78).contains(&beyond), "{all} {beyond}");
     let [_, beyond] = rejected(0.6, 0.01);
     assert!(beyond > 900, "{beyond}");
@@ -208,7 +211,8 @@ fn residuals_of_a_right_model_are_rounding() {
     assert!(right.kinematic_error() < 1e-9);
     let wrong = fit(Discretisation::ZeroOrderHold);
     let residual = wrong.one_step_errors(x, v, &force, Extent::Open).unwrap();
-    // The force of the next sample is missing, which appears at lag −1.
+    // The zero-order hold ignores the force of the next sample; this error appears as a correlation
+    // at lag −1.
     let column: Vec<f64> = residual.column(1).iter().copied().collect();
     let cross = cross_correlation(&column, &force.channel(0)[..199], 3).unwrap();
     assert!(cross.p_value < 1e-6 && cross.coefficients[2].abs() > 0.5, "{cross:?}");
@@ -241,15 +245,16 @@ fn a_sweep_is_the_same_on_any_number_of_threads_and_finds_the_best() {
     let best = found.best().unwrap();
     let smallest = found.points().iter().filter_map(|p| p.error).fold(f64::INFINITY, f64::min);
     assert_eq!(best.error, Some(smallest));
-    // Without a reference the standard errors decide.
+    // Without a reference system, the standard errors determine the best point.
     assert!(sweep(&settings, None, run, |_| {}).best().is_some());
-    // Failures are points, too: at the end of the range the mode is above half the sampling rate.
+    // Failed runs are points of the sweep, too, with the error as their outcome.
     let failing = sweep(&[1.0, 2.0], None, |_| Err::<Estimate, _>(EstimateError::NoDof), |_| {});
     assert_eq!(failing.best(), None);
     assert_eq!(failing.points()[1].outcome, Err(EstimateError::NoDof));
 }
 
-/// Multisines over the whole band and over its lowest hundredth, with the noise of a load cell.
+/// The force contradicts a wrong period, but not a right one. The forces are multisines over the
+/// whole band and over its lowest hundredth, without noise and with the noise of a load cell.
 #[test]
 fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
     let sampling = Sampling::new(0.01, 1024).unwrap();
@@ -281,8 +286,8 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
             }
         }
     }
-    // One claimed period that contains one and a half true ones; a fifth of the period is not a
-    // whole number of samples.
+    // The claimed period contains one and a half true periods. The force also repeats five times in
+    // a true period, but a fifth of this period is not a whole number of samples.
     let force = wide().unwrap().sample(sampling).unwrap().repeated(2).unwrap();
     let found = claimed_period(&force.window(0, 1536).unwrap(), 1536).unwrap();
     let Finding::WrongPeriod(WrongPeriod { claimed: 1536, fault }) = found else {
@@ -312,8 +317,9 @@ fn a_period_some_samples_off_is_replaced_by_the_right_one_only() {
     }
 }
 
-/// Rows missing from a record, and rows of a second run after it: the samples on the two sides of a
-/// gap agree after other lags, too, which is no evidence of another period.
+/// The check reports an interruption if rows are missing from a record, or if rows of a second run
+/// follow. The samples before and after a gap also agree at other lags, but this is no evidence of
+/// another period.
 #[test]
 fn a_gap_in_the_record_is_no_other_period() {
     let sampling = Sampling::new(0.01, 256).unwrap();
@@ -335,13 +341,15 @@ fn a_gap_in_the_record_is_no_other_period() {
             else {
                 panic!("{found:?}");
             };
-            // A sample or two after the gap may agree with the expected ones by chance.
+            // One or two samples after the gap may agree by chance with the samples one period
+            // earlier.
             assert!((gap..gap + 7).contains(&sample), "{gap} {missing}: {sample}");
         }
     }
 }
 
-/// A force that never repeats, one that hardly varies, and one that is zero most of the time.
+/// The check reports no period for a random force, a constant force, a force that is zero most of
+/// the time, and a ramp.
 #[test]
 fn nothing_is_said_of_a_force_that_does_not_repeat() {
     let sampling = Sampling::new(0.01, 1000).unwrap();

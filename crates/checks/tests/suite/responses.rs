@@ -27,14 +27,14 @@ fn verdicts(checks: &[Finding]) -> [bool; 3] {
     })
 }
 
-/// Share of `runs` experiments in which each check reports a fault.
+/// Returns, for each check, the share of `runs` experiments in which the check reports a fault.
 fn faulted<const N: usize>(runs: u64, check: impl Fn(u64) -> [bool; N] + Sync + Send) -> [f64; N] {
     let found: Vec<[bool; N]> = (0..runs).into_par_iter().map(check).collect();
     let share = |at: usize| found.iter().filter(|good| !good[at]).count() as f64 / runs as f64;
     std::array::from_fn(share)
 }
 
-/// Samples of the random records.
+/// Number of samples of each random record.
 const LONG: usize = 1 << 13;
 
 struct Random {
@@ -85,9 +85,10 @@ fn linear(force: &Record) -> Record {
     exact_harmonic_periodic(&oscillator(), force).unwrap().displacement().clone()
 }
 
-/// At a level of 1 %, a test warns in 1 of 100 runs with a standard deviation of 1. Products of a
-/// hundred lines are not quite normally distributed: their sum exceeds its limit in 2 to 3 % of 400
-/// runs of the same experiments.
+/// The tests after a fit seldom warn if the model is right. At a level of 1 %, a test warns in 1 of
+/// 100 runs on average, with a standard deviation of 1. The test from line to line warns in 2 to 3
+/// % of 400 runs, because its statistic is a sum of products of a hundred lines and is not quite
+/// normally distributed.
 #[test]
 fn checks_of_responses_seldom_find_fault_with_a_right_machine() {
     let windowed = |hop, window| Segments::Windowed { len: 512, hop, window };
@@ -123,8 +124,9 @@ fn a_wrong_machine_is_found_out_after_a_fit_of_responses() {
     }
 }
 
-/// m ẍ + c ẋ + k x + k₃ x³ = F from rest by the classic Runge–Kutta rule, eight steps per sample, the
-/// force band-limited. At the RMS displacement the spring is a tenth stiffer.
+/// Returns the solution of m ẍ + c ẋ + k x + k₃ x³ = F from rest, by the classic Runge–Kutta rule
+/// with eight steps per sample and a band-limited force. At the RMS displacement of the linear
+/// system, the cubic spring adds a tenth to the stiffness.
 fn hardening(force: &Record) -> Record {
     let fine = refine(force, 16, Interpolation::BandLimited).unwrap();
     let (f, h) = (fine.channel(0), force.sampling().dt() / 8.0);
@@ -148,8 +150,8 @@ fn hardening(force: &Record) -> Record {
     Record::from_channel(force.sampling(), x).unwrap()
 }
 
-/// A second mass, a tenth of the first, is attached to the first by a spring, with a natural
-/// frequency of 20 rad/s, and is not measured.
+/// Returns the displacement of the first of two masses. The second mass is not measured; it is a
+/// tenth of the first, and its natural frequency on the spring to the first mass is 20 rad/s.
 fn with_a_second_mass(force: &Record) -> Record {
     let of = |a: f64, b: f64, c: f64| DMatrix::from_row_slice(2, 2, &[a, b, b, c]);
     let (m, c, k) = (of(10.0, 0.0, 1.0), of(180.0, -2.0, 2.0), of(5400.0, -400.0, 400.0));
@@ -160,7 +162,8 @@ fn with_a_second_mass(force: &Record) -> Record {
     Record::from_channel(force.sampling(), motion.displacement().channel(0).to_vec()).unwrap()
 }
 
-/// At a level of 1 %, 2 of 200 runs warn, with a standard deviation of 1.4.
+/// The right model gives 2 warnings in 200 runs on average at a level of 1 %, with a standard
+/// deviation of 1.4. A mass wrong by a tenth gives a warning in nearly all runs.
 #[test]
 fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
     let period = Sampling::new(0.02, 256).unwrap();
@@ -196,9 +199,10 @@ fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
     }
 }
 
-/// Eight masses in a row, all measured and two of them driven: the response to the true forces,
-/// with a cubic spring that has this share of the first mass's stiffness at its RMS displacement,
-/// to first order.
+/// Returns the finding of [`linearity`] for eight masses in a row, all of them measured and two of
+/// them driven, with noise on forces and responses. The first mass has a cubic spring, whose effect
+/// is simulated to first order. At the RMS displacement of the first mass, the stiffness of this
+/// spring is `cubic` times the first diagonal entry of the stiffness matrix.
 fn eight_sensors(cubic: f64, seed: u64) -> Finding {
     let system = chain(8, Support::Held, 0.02, 5);
     let sampling = Sampling::new(0.01, 1 << 12).unwrap();
@@ -250,9 +254,10 @@ fn eight_sensors(cubic: f64, seed: u64) -> Finding {
     linearity(&estimate.unwrap(), &force, &motion, kind, [0.5, 25.0]).unwrap()
 }
 
-/// The reference is the generator. Noise on a force appears in all responses: eight sensors are not
-/// eight independent observations. At a level of 1 %, more than 3 of 60 runs warn with a
-/// probability of 0.003.
+/// The test of linearity reports a cubic spring, but not noise on the forces. This noise affects
+/// all eight responses; they are not eight independent observations. The tested estimate has the
+/// true parameters. At a level of 1 %, the probability of a warning in more than 3 of 60 runs is
+/// 0.003.
 #[test]
 fn noise_on_the_forces_of_eight_sensors_is_no_nonlinearity() {
     let warned = |cubic: f64, runs: u64| {

@@ -22,7 +22,7 @@ fn bearing() -> SecondOrderSystem {
     dissertation_bearing(KyxSign::Minus).system()
 }
 
-/// Two multisines with random phases on some lines of one period.
+/// Returns two forces: multisines with random phases on these `lines` of one period.
 fn force(dt: f64, samples: usize, lines: std::ops::RangeInclusive<usize>) -> Record {
     let sampling = Sampling::new(dt, samples).unwrap();
     let channel = |seed| {
@@ -36,7 +36,8 @@ fn of(checks: &[Finding], subject: Subject) -> &Finding {
     checks.iter().find(|c| c.subject() == subject).unwrap()
 }
 
-/// The fastest mode of the machine is at 1.8 rad/s.
+/// The checks before a fit report too few lines, a wrong period and large noise. They accept the
+/// good record, whose lines extend beyond the fastest mode at 1.8 rad/s.
 #[test]
 fn trouble_with_spectra_is_seen_before_the_fit() {
     let system = bearing();
@@ -57,7 +58,8 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
     let good = look(0.2, 1..=60, 512, 0.01);
     assert_eq!(good.iter().map(|c| c.verdict()).max(), Some(Verdict::Good), "{good:?}");
     assert_eq!(of(&good, Subject::Excitation).value(), 60.0);
-    // The noise of 1 % does not repeat, and determines the largest of three deviations.
+    // The periods differ by the noise of 1 % only. The value is the largest deviation of the three
+    // periods from their mean.
     assert!((0.007..0.011).contains(&of(&good, Subject::Periodicity).value()));
 
     // One line gives two equations for four unknowns; two lines give four equations.
@@ -70,7 +72,8 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
     assert_eq!(of(&look(0.2, 1..=60, 512, 0.2), Subject::Periodicity).verdict(), Verdict::Doubtful);
 }
 
-/// The fastest mode of the machine is at 1.8 rad/s.
+/// The check after a fit reports a mode above the fitted lines, and a mode above the Nyquist
+/// frequency. The fastest mode of the machine is at 1.8 rad/s.
 #[test]
 fn a_mode_beyond_the_lines_or_the_sampling_is_seen_after_the_fit() {
     let system = bearing();
@@ -89,7 +92,7 @@ fn a_mode_beyond_the_lines_or_the_sampling_is_seen_after_the_fit() {
     assert_eq!((good.subject(), good.verdict()), (Subject::Step, Verdict::Good));
     let samples = std::f64::consts::TAU / (fastest * 0.2);
     assert!((good.value() / samples - 1.0).abs() < 1e-6, "{good} {samples}");
-    // Line 20 of 102.4 s is at 1.23 rad/s.
+    // Line 20 of a record of 102.4 s is at 1.23 rad/s, below the fastest mode.
     assert_eq!(look(0.2, 1..=20).verdict(), Verdict::Doubtful);
     assert_eq!(look(2.0, 1..=250).verdict(), Verdict::Bad);
 }
@@ -143,7 +146,8 @@ fn residuals_are_judged_channel_by_channel() {
     let force = noise::white(sampling, 2, 1.0, 4).unwrap();
     let fitted = noise::white(sampling, 2, 100.0, 5).unwrap();
     let checks = after_fit(&white, &fitted, &force, 20, 0).unwrap();
-    // Each residual is tested alone and with each force.
+    // Each of the two residuals has three tests: whiteness, and correlation with each of the two
+    // forces.
     assert_eq!(checks.len(), 6);
     assert!(checks.iter().all(|c| c.verdict() == Verdict::Good), "{checks:?}");
 
@@ -167,8 +171,8 @@ fn residuals_are_judged_channel_by_channel() {
         "{checks:?}"
     );
 
-    // Relative to a far larger fitted signal the same residual is only rounding, and a constant
-    // force is not tested.
+    // Relative to a far larger fitted signal, the same residual is only rounding. A constant force
+    // is not tested.
     let large = Record::new(sampling, fitted.data() * 1e10).unwrap();
     let still = Record::new(sampling, DMatrix::from_element(2000, 1, 3.0)).unwrap();
     let checks = after_fit(&residual, &large, &still, 20, 0).unwrap();
@@ -178,7 +182,8 @@ fn residuals_are_judged_channel_by_channel() {
     assert!(matches!(after_fit(&residual, &other, &force, 20, 0), Err(EstimateError::Signal(_))));
 }
 
-/// The reference is the closed form of the problems, which does not use the estimators.
+/// The predicted steady state equals the closed form of the simulated problems, which does not use
+/// the estimators.
 #[test]
 fn the_steady_state_is_predicted_line_by_line() {
     let system = bearing();
@@ -259,7 +264,8 @@ fn a_start_is_found_from_any_kind_of_motion() {
     assert_eq!((found.displacement()[0], found.velocity()[0]), (0.0, 0.0));
 }
 
-/// Squares of 1e300 are beyond the largest number.
+/// A known mass of 1e300 kg is refused, because its square exceeds the largest floating-point
+/// number.
 #[test]
 fn a_mass_beyond_all_reason_is_refused() {
     let force = force(0.02, 100, 1..=40);

@@ -107,9 +107,9 @@ impl FrequencyData {
         Self { displacement, ..self.clone() }
     }
 
-    /// Returns the lines as if all records were whole periods: the response of `system` to the load
-    /// of the transients, which is the force minus the `closed` force (N), is subtracted from the
-    /// displacement (m).
+    /// Returns the lines as if all records were whole periods. The load of the transients is the
+    /// force minus the `closed` force (N). The response of `system` to this load is subtracted from
+    /// the displacement (m).
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (the response as receptance times force).
@@ -121,8 +121,8 @@ impl FrequencyData {
     ) -> Self {
         let mut alone = self.clone();
         for (row, omega) in self.omega.iter().enumerate() {
-            // The receptance is infinite at an undamped resonance, so the displacement is not
-            // changed.
+            // At an undamped resonance the receptance is infinite, so the displacement on this line
+            // is not changed.
             if let Ok(receptance) = system.receptance(*omega) {
                 let load = (closed.row(row) - self.force.row(row)).transpose();
                 let displacement = self.displacement.row(row) - (receptance * load).transpose();
@@ -148,8 +148,8 @@ impl FrequencyData {
         }
     }
 
-    /// Returns data of a transient load on degree of freedom `dof`, the polynomial term s^`power`,
-    /// without a response.
+    /// Returns data whose force is the term s^`power` of a transient on degree of freedom `dof`;
+    /// all displacements are zero.
     pub fn load_data(&self, dof: usize, power: usize) -> Self {
         let load = |row: usize, column: usize| {
             let omega = self.omega[row];

@@ -115,9 +115,10 @@ impl FrfAverage {
     }
 
     /// Returns the force channels, counted from 0, that contain only noise: they are weaker than a
-    /// tenth of the strongest force, and on no line coherent with another force or a response. Such
-    /// channels come from shakers or points without a force; if they were used as forces, they
-    /// would seem to have no effect: the responses to them would be biased towards zero.
+    /// tenth of the strongest force, and are not coherent with another force or a response on any
+    /// line. Such channels come from shakers or points without a force; if they were used as
+    /// forces, they would seem to have no effect: the responses to them would be biased towards
+    /// zero.
     ///
     /// # Source
     /// Goodman (1957), *On the joint estimation of the spectra, cospectrum and quadrature spectrum
@@ -198,12 +199,13 @@ impl FrfAverage {
 
     /// Returns the indices of the excited lines, counted from 0.
     ///
-    /// A line is not excited if every force has on it less than a hundredth of the power of the
-    /// strongest line of this force, and if no response is coherent with a force on eight
-    /// neighbouring lines. On such lines the force channels contain only noise, and the estimated
-    /// responses would be responses to noise. The whole range of weak lines around these eight
-    /// lines is excluded. On either side, further lines over half the width of the peak of a window
-    /// are excluded because of leakage. If no line would remain, all lines are returned.
+    /// A line counts as not excited if two conditions are met: the power of every force on this
+    /// line is less than a hundredth of the power on the strongest line of the same force, and no
+    /// response is coherent with a force on eight neighbouring lines. On such lines the force
+    /// channels contain only noise, and the estimated responses would be responses to noise. The
+    /// whole range of weak lines around these eight lines is excluded. Because of leakage, a few
+    /// further lines on either side are excluded, too: half the width of the peak of a window. If
+    /// no line would remain, all lines are returned.
     /// # Source
     /// The coherence is the same as in [`FrfAverage::idle_inputs`]; the limits are ours.
     pub fn driven(&self) -> Vec<usize> {

@@ -66,8 +66,8 @@ impl CrossSpectra {
         self.force[(input, input)].re
     }
 
-    /// Returns the ratio of the coherent part of a force to another force; 0 if the other force is
-    /// zero.
+    /// Returns the ratio of two amplitudes: the part of the force `input` that is coherent with the
+    /// force `driver`, divided by `driver`; 0 if `driver` is zero.
     pub(super) fn force_ratio(&self, input: usize, driver: usize) -> Complex<f64> {
         let power = self.force_power(driver);
         if power > 0.0 { self.force[(input, driver)] / power } else { Complex::ZERO }
@@ -137,7 +137,8 @@ impl CrossSpectra {
             });
             return h.iter().all(|z| z.is_finite()).then_some(h);
         }
-        // H S_FX = S_XX is transposed, so that the unknown is on the right.
+        // The equation H S_FX = S_XX is transposed, so that the unknown H is the right-hand factor,
+        // as the solver requires.
         let solution = self.motion_force.map(|z| z.conj()).lu().solve(&self.motion.transpose());
         solution.map(|h| h.transpose()).filter(|h| h.iter().all(|z| z.is_finite()))
     }

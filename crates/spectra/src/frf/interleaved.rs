@@ -8,7 +8,7 @@ use super::{Frf, FrfAverage, FrfEstimator};
 use crate::SpectraError;
 use crate::limits::{INTERLEAVED_CHANCE, INTERLEAVED_ROUNDING, INTERLEAVED_ROUNDS};
 
-/// Frequency responses to forces that are excited on interleaved lines.
+/// Frequency responses to forces that excite interleaved lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterleavedResponses {
     /// Responses to each force, responses × 1, on the lines that this force excites.
@@ -22,10 +22,10 @@ pub struct InterleavedResponses {
 pub struct Crosstalk {
     /// Force that acts on the lines of the other force, counted from 0.
     pub force: usize,
-    /// Force that excites these lines, counted from 0.
+    /// Force that excites the lines on which `force` also acts, counted from 0.
     pub driver: usize,
-    /// RMS over these lines of the ratio of the amplitude of `force` to that of `driver`, a pure
-    /// number.
+    /// Ratio of the amplitude of `force` to the amplitude of `driver` (RMS over the lines of
+    /// `driver`), a pure number.
     pub share: f64,
 }
 
@@ -87,8 +87,8 @@ struct Coupling {
 }
 
 impl Coupling {
-    /// Estimates the coherent part of a force on the lines of the driver; `None` if it may be
-    /// noise.
+    /// Estimates the part of a force that is coherent with the driver, on the lines of the driver;
+    /// `None` if this part may be noise.
     fn estimate(average: &FrfAverage, force: usize, driver: usize) -> Option<Self> {
         let (mut common, mut left) = (0.0, 0.0);
         let mut ratio = Vec::with_capacity(average.sums.len());

@@ -149,7 +149,8 @@ pub fn smoothing_bias(
     let finite = |place: i64| {
         response(place as f64 * step).filter(|h| h.iter().all(|z: &Complex<f64>| z.is_finite()))
     };
-    // Neighbouring lines share most of the frequencies, so computed responses are stored.
+    // The responses are needed at several frequencies around each line. Neighbouring lines need
+    // mostly the same frequencies, so computed responses are stored.
     let mut known: HashMap<i64, Option<ComplexMatrix>> = HashMap::new();
     let bias_at = |line: &usize| {
         let centre = (line * SMOOTHING_STEPS) as i64;

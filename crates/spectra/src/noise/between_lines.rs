@@ -10,8 +10,8 @@ use crate::limits::{MAX_BUFFERED, MAX_PERIODS, MIN_PERIODS};
 ///
 /// The spectrum of B periods has B − 1 lines between two lines of one period. On these lines, noise
 /// with a long correlation time (an unmeasured force through a resonance) has the same level as on
-/// the lines of the mean. The scatter of single periods is larger, because it also contains the
-/// transients of the periods; these transients nearly cancel in the mean.
+/// the lines of the mean over the periods. The scatter of single periods is larger, because it also
+/// contains the transients of the periods; these transients nearly cancel in the mean.
 #[derive(Debug, Clone)]
 pub(crate) struct BetweenLines {
     /// Number of samples in a period.

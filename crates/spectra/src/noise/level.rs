@@ -46,8 +46,8 @@ pub struct ResponseNoise {
 impl ResponseNoise {
     /// Chooses the most likely noise of residuals, which are circular Gaussian numbers: white
     /// noise, noise in proportion to the response, or the sum of both. The sum is chosen only if
-    /// Schwarz's criterion accepts its second unknown. Each entry is a pair of squared magnitudes:
-    /// that of the residual and that of the response.
+    /// Schwarz's criterion accepts its second unknown. Each entry is the pair of the squared
+    /// magnitudes of a residual and of the response on its line.
     ///
     /// # Source
     /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring);
@@ -92,7 +92,8 @@ impl ResponseNoise {
     /// one of the variances is not positive.
     fn scored(mut self, residuals: &[(f64, f64)]) -> Option<Self> {
         for _ in 0..LEVEL_ROUNDS {
-            // Weighted normal equations of the powers v = s² + r² |x|².
+            // These sums are the entries of the weighted normal equations for s² and r², where the
+            // powers have the expected values s² + r² |x|².
             let [mut ss, mut sr, mut rr, mut sp, mut rp] = [0.0; 5];
             for (power, response) in residuals {
                 let weight = self.variance(*response).powi(-2);
@@ -109,7 +110,8 @@ impl ResponseNoise {
                 return None;
             }
             let before = self;
-            // The decrease per step is limited for the same reason as in `motion_level`.
+            // The decrease per step is limited: if the variances are too small, a few lines get all
+            // the weight and the search oscillates.
             self = Self {
                 white: white.max(0.1 * before.white),
                 relative: relative.max(0.1 * before.relative),
@@ -129,7 +131,8 @@ mod tests {
 
     use super::{ResponseNoise, motion_level};
 
-    /// Powers of lines with the variances s² + g.
+    /// Returns the pair (|e|², g) of each line: e is a simulated residual with the variance s² + g,
+    /// where s is `level` and g is the entry of `known`.
     fn powers(level: f64, known: &[f64], seed: u64) -> Vec<(f64, f64)> {
         let sampling = Sampling::new(1.0, known.len()).unwrap();
         let drawn = noise::white(sampling, 2, 0.5_f64.sqrt(), seed).unwrap();
@@ -147,9 +150,9 @@ mod tests {
         assert!((level - mean.sqrt()).abs() < 1e-6 * level, "{level}");
     }
 
-    /// A resonance in the known noise, a hundred times as high as the white noise, does not hide
-    /// the level of the white noise: about 350 lines beside the resonance determine the level to
-    /// 2.7 %, and the mean of 40 experiments to a sixth of this error.
+    /// The level of white noise must be found, although the resonance of the known noise is a
+    /// hundred times as high as this level. About 350 lines outside the resonance determine the
+    /// level with a standard error of 2.7 %; the mean of 40 experiments has a sixth of this error.
     #[test]
     fn the_level_is_found_beside_a_resonance() {
         let known: Vec<f64> =

@@ -26,7 +26,7 @@ type Covariances = Vec<DMatrix<Complex<f64>>>;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
 pub enum Pooling {
-    /// The choice among the other variants that predicts the samples best.
+    /// Automatic choice: the variant among all others that predicts the samples best.
     #[default]
     Automatic,
     /// One covariance for all lines: white noise in the measured quantity.
@@ -35,8 +35,9 @@ pub enum Pooling {
     /// frequency, and some bands may have another level. The correlations of channels are equal on
     /// all lines. Order and bands are chosen from the samples, so that white noise is recognised.
     Smooth,
-    /// Mean of the covariances over a line and this many chosen lines on either side; at the ends
-    /// of the band the total number of lines is the same.
+    /// Mean of the covariances over a line and this many neighbouring lines on either side. Near an
+    /// end of the band more lines are taken from the other side, so that the total number of lines
+    /// is the same.
     Neighbours(usize),
     /// A separate covariance for every line; this choice needs many periods.
     PerLine,
@@ -108,14 +109,14 @@ pub enum NoiseModel {
         /// Bands in which the forces have other levels: lowest and highest line, in Hz.
         bands_hz: Vec<[f64; 2]>,
     },
-    /// Noise in proportion to the magnitude of the response.
+    /// Noise whose standard deviation is proportional to the magnitude of the response.
     Proportional {
         /// `true` if white noise is added.
         with_white: bool,
     },
     /// Means over neighbouring lines.
     Neighbours {
-        /// Number of lines to either side.
+        /// Number of neighbouring lines on either side of a line.
         half_width: usize,
     },
     /// A separate level at every line.
@@ -259,7 +260,8 @@ impl Candidate {
         let noisy: Vec<usize> = channels
             .filter(|channel| {
                 let sum = power(*channel).sum::<f64>();
-                // The logarithm needs squares that neither overflow nor vanish.
+                // The fit uses the logarithm of the power, so a channel with an infinite or almost
+                // zero power counts as a channel without noise.
                 sum.is_finite() && sum > f64::MIN_POSITIVE / f64::EPSILON
             })
             .collect();
@@ -400,8 +402,8 @@ fn window(line: usize, half_width: usize, lines: usize) -> Range<usize> {
     first..first + width
 }
 
-/// Multiplies or divides each entry of the covariances by the standard deviations of its two
-/// channels; these are lines × channels.
+/// Multiplies or divides (`put`) each entry of the covariances by the standard deviations of its
+/// two channels. The `deviations` are lines × channels.
 fn scaled(
     covariance: &[DMatrix<Complex<f64>>],
     deviations: &DMatrix<f64>,
@@ -426,7 +428,8 @@ fn sample_cost(s: &DMatrix<Complex<f64>>, sample: &DMatrix<Complex<f64>>) -> Opt
     Some(log_determinant(factor.l_dirty())? + factor.solve(sample).trace().re)
 }
 
-/// Returns the [`sample_cost`] of independent channels, from pairs of a variance and its sample.
+/// Returns the [`sample_cost`] of independent channels, from pairs of a modelled variance and a
+/// sample variance.
 fn independent_cost(variances: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     let cost = |(variance, sample): (f64, f64)| {
         (variance > 0.0).then(|| variance.ln() + sample / variance)

@@ -89,7 +89,7 @@ impl NoiseSpectrum {
 
     /// Creates white noise of known standard deviation on the samples of every response channel (in
     /// the measured unit) and force channel (N), on the spectral lines of one period: E|X_n|² = 4
-    /// s²/N. For the mean of P periods divide both by √P.
+    /// s²/N. For the mean of P periods, divide the standard deviations by √P.
     ///
     /// # Errors
     /// As [`NoiseSpectrum::new`].
@@ -116,7 +116,7 @@ impl NoiseSpectrum {
         Self::new(omega, covariance)
     }
 
-    /// Estimates the spectrum from sample covariances of the measured quantity, each of
+    /// Estimates the spectrum from sample covariances of the measured quantity, each with
     /// `degrees_of_freedom`. Instead of the spectrum, the ratio of the spectrum to the `relative`
     /// powers of the channels (rows × 2n) may be smooth.
     ///
@@ -232,7 +232,7 @@ impl NoiseSpectrum {
         self.total_degrees_of_freedom
     }
 
-    /// Returns the same noise with the form that was chosen for it.
+    /// Returns the same noise with `model` as the form of its spectrum.
     #[must_use]
     pub fn with_model(self, model: NoiseModel) -> Self {
         Self { models: vec![model], ..self }
@@ -275,7 +275,8 @@ impl NoiseSpectrum {
         if nu.is_infinite() { 1.0 } else { nu / (nu - channels as f64) }
     }
 
-    /// Returns the covariance of means of fewer periods: every entry times `factor`, a pure number.
+    /// Returns the noise with every entry of the covariances multiplied by `factor`, a pure number:
+    /// for example the noise of a mean of fewer periods.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         self.covariance.iter_mut().for_each(|c| c.scale_mut(factor));

@@ -30,8 +30,8 @@ impl Neighbours {
         Self { samples, channels }
     }
 
-    /// Returns minus the log-likelihood, per complex deviation, that the covariance with the
-    /// entries `model` gives to the covariance of a line; `None` if the model is singular.
+    /// Returns minus the log-likelihood, per complex deviation, of the covariance with the entries
+    /// `model`, given the sample covariance of a line; `None` if the model is singular.
     fn cost_of(&self, model: DVector<Complex<f64>>, line: usize) -> Option<f64> {
         let sample = self.samples.column(line);
         if self.samples.nrows() == self.channels {
@@ -42,9 +42,9 @@ impl Neighbours {
         sample_cost(&self.matrix(model), &self.matrix(sample.into_owned()))
     }
 
-    /// Returns, for each line, the sum of `count` consecutive covariances, beginning with that of
-    /// the line. The sums are combined from sums of 1, 2, 4 … lines according to the binary digits
-    /// of `count`, because the subtraction of running sums would lose digits.
+    /// Returns, for each line, the sum of `count` consecutive covariances, beginning with the
+    /// covariance of this line. The sums are combined from sums of 1, 2, 4 … lines according to the
+    /// binary digits of `count`, because the subtraction of running sums would lose digits.
     fn sums(&self, count: usize) -> DMatrix<Complex<f64>> {
         let lines = self.samples.ncols();
         let mut total = DMatrix::zeros(self.samples.nrows(), lines + 1 - count);
@@ -75,8 +75,9 @@ impl Neighbours {
         windows.map(mean).collect()
     }
 
-    /// Returns the sum over lines of the cost when the mean of the other lines in the window
-    /// predicts a line.
+    /// Returns the cost of prediction, summed over all lines: the covariance of each line is
+    /// predicted by the mean covariance of the other lines in its window. `None` if a predicted
+    /// covariance is singular.
     ///
     /// # Source
     /// Stone (1974), Journal of the Royal Statistical Society B 36, 111–147.
@@ -126,8 +127,8 @@ mod tests {
     use super::super::mean;
     use super::*;
 
-    /// The reference is the definition of the sums, line by line, with powers that differ by twelve
-    /// decades.
+    /// Means over windows, and the cost of prediction, agree with sums that are computed separately
+    /// for each line, although the powers of the lines differ by twelve decades.
     #[test]
     fn neighbours_are_added_as_by_definition() {
         let vary = |k: usize| (0.618_033_988_75 * k as f64).fract();
@@ -160,7 +161,8 @@ mod tests {
         }
     }
 
-    /// Reference: log det S + tr(S⁻¹Ŝ) of full matrices, by determinants and LU.
+    /// The cost of uncorrelated channels equals the sum of log det S + tr(S⁻¹Ŝ) of full matrices,
+    /// computed with determinants and LU factors.
     #[test]
     fn uncorrelated_channels_have_the_cost_of_full_matrices() {
         let vary = |k: usize| (0.618_033_988_75 * k as f64).fract();

@@ -13,9 +13,9 @@ use crate::limits::{
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bump {
     shape: Shape,
-    /// Middle, as an index of lines.
+    /// Middle of the bump, as an index of lines; it may be between two lines.
     middle: f64,
-    /// Distance, in lines, from the middle to the ends.
+    /// Distance from the middle of the bump to each of its ends, in lines.
     reach: f64,
 }
 
@@ -223,7 +223,8 @@ impl FlatGains {
         let mut best = highest.map(|start| (self.gain(start, width), start));
         for (start, bound) in bounds.into_iter().enumerate() {
             let least = best.map_or(f64::NEG_INFINITY, |(gain, _)| gain);
-            // Most bands are excluded without a logarithm.
+            // The upper bound excludes most bands, so the gain with its logarithms is computed for
+            // few bands only.
             if bound >= least {
                 let gain = Some(self.gain(start, width)).filter(|gain| *gain >= least);
                 best = gain.map(|gain| (gain, start)).or(best);
@@ -263,10 +264,10 @@ struct Levels {
     count: f64,
     /// Number of all other lines.
     others: f64,
-    /// Sum over all lines.
+    /// Sum of the levels v/p over all lines.
     total: f64,
     mean: f64,
-    /// `true` if the band is wide enough to be quieter than all other lines.
+    /// `true` if the band has enough complex deviations for a level below that of the other lines.
     may_be_quiet: bool,
 }
 
@@ -309,14 +310,15 @@ impl Levels {
 /// Bump with its most likely heights.
 struct Gained {
     bump: Bump,
-    /// Reduction of Σ log p + v/p.
+    /// Reduction of Σ log p + v/p by the bump, with the power p and the sample variance v.
     gain: f64,
     /// Height for each channel, in the logarithm of the power.
     heights: Vec<f64>,
 }
 
 impl Gained {
-    /// Fits the heights, beginning with `start`, to the levels v/p with these cumulative sums.
+    /// Fits the heights of a bump, one for each channel, to levels v/p (sample variance divided by
+    /// power) whose cumulative sums are `sums`. The search begins with the heights `start`.
     fn fit(bump: Bump, start: &[f64], sums: &FlatGains) -> Self {
         let lines = sums.below.nrows() - 1;
         let groups = bump.groups(lines);
@@ -338,7 +340,7 @@ impl Gained {
 
 /// Group of lines on which the height of a bump is nearly constant.
 struct Part {
-    /// Height relative to the middle of the bump.
+    /// Ratio of the height on this group to the height in the middle of the bump.
     height: f64,
     lines: f64,
 }
@@ -372,8 +374,8 @@ fn raised(
             first += part.height * scaled_level;
             second += part.height * part.height * scaled_level;
         }
-        // The cost L log Σ v/p + height Σ part is convex, so Newton's method with bisection finds
-        // its minimum.
+        // The cost lines · log Σ v/p + height · area is convex in the height, so Newton's method
+        // with bisection finds its minimum.
         let slope = area - lines * first / sum;
         let curvature = lines * (second / sum - (first / sum).powi(2));
         if slope < 0.0 {
@@ -387,7 +389,8 @@ fn raised(
         let step = if newton { next } else { 0.5 * (least + most) } - *height;
         *height += step;
         if step.abs() <= HEIGHT_TOLERANCE {
-            // The last step of Newton's method adds this gain, up to third order.
+            // The gain was computed before the last step of Newton's method. This term is the gain
+            // of that step, up to third order.
             gain += if newton { 0.5 * slope * slope / curvature } else { 0.0 };
             break;
         }
@@ -402,8 +405,9 @@ fn raised(
 mod tests {
     use super::*;
 
-    /// The gain of a peak is that of the exact likelihood of all lines, at the height that maximises
-    /// it, for peaks from two lines to half the band wide.
+    /// The gain that follows from groups of lines agrees with the largest gain of the exact
+    /// likelihood of all lines over a grid of heights. The peaks have half widths from 0.5 to 150
+    /// of 2,000 lines.
     #[test]
     fn gains_of_grouped_lines_are_those_of_all_lines() {
         let (lines, nu) = (2000, 1.0);
