@@ -1,5 +1,6 @@
-//! Free decays known exactly, under white and coloured noise: percentage of records with the right
-//! number of modes, coverage of the 95 % intervals, ratio of the scatter to the Cramér–Rao bound.
+//! Study of free decays with exactly known modes, under white and coloured noise: percentage of
+//! records with the right number of modes, coverage of the 95 % intervals, ratio of the scatter to
+//! the Cramér–Rao bound.
 //!
 //! ```sh
 //! cargo run --release -p mechid-modal --example decay_study -- 1000

@@ -16,8 +16,8 @@ const MAX_FREQUENCY_RATIO: f64 = 1.25;
 /// common.
 const MIN_MAC: f64 = 0.3;
 
-/// Ratio of an eigenvalue of the covariance of a shape difference to the largest one, at or below
-/// which the test omits this direction.
+/// Ratio of an eigenvalue of the covariance of a shape difference to the largest eigenvalue. At or
+/// below this ratio, the test omits the direction of the eigenvalue.
 const COVARIANCE_RANK: f64 = 1e-12;
 
 /// Value with its standard error. The standard error is 0 for an exact value, such as that of a

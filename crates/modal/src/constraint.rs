@@ -106,7 +106,7 @@ impl ModalConstraint {
                     if points[..k].iter().any(same) {
                         return refused(
                             point.output,
-                            "a driving point that shares neither output nor input with another one",
+                            "a driving point that shares neither output nor input with another driving point",
                         );
                     }
                 }
@@ -154,8 +154,9 @@ impl ModalConstraint {
     }
 }
 
-/// Returns statistic and degrees of freedom of the constraints on a mode, and the constrained mode;
-/// `None` without constraints, or if a constrained quantity has no finite variance.
+/// Returns the test statistic and the degrees of freedom of the constraints on a mode, and the
+/// constrained mode; `None` without constraints, or if a constrained quantity has no finite
+/// variance.
 pub(crate) fn impose(
     constraints: &[ModalConstraint],
     estimate: &ModeParameters,
@@ -309,8 +310,9 @@ mod tests {
             },
         ];
         let estimate = mode(entries, [0.01, 0.01]);
-        // The estimated participation of input 1 is real, and its imaginary part is uncertain: its
-        // equation is satisfied, but counts as a degree of freedom.
+        // The imaginary part of the estimated participation of input 1 is 0, but uncertain. So the
+        // estimate already satisfies the equation of this imaginary part, but the equation counts
+        // as a degree of freedom.
         let one = ModeParameters { covariance: with_variance(&estimate, 9, 0.01), ..estimate };
         let (statistic, freedom, result) = impose(&[real], &one).unwrap();
         assert_eq!(freedom, 3);

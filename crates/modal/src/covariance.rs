@@ -112,7 +112,7 @@ impl Covariance {
         })
     }
 
-    /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened
+    /// Returns B_i = A⁺ ∂A/∂θ x_i for the two unknowns of one mode and for one output, in whitened
     /// units.
     fn response_of_unknowns(&self, mode: usize, output: usize) -> DMatrix<f64> {
         let outputs = self.sensor.len();
@@ -133,8 +133,8 @@ impl Covariance {
     /// Returns the covariance of real and imaginary part of a shape divided by its entry
     /// `reference`.
     ///
-    /// An unmeasured force on the mode multiplies all its entries by the same factor, which cancels
-    /// in the quotient.
+    /// An unmeasured force on the mode multiplies all entries of the shape by the same factor,
+    /// which cancels in the quotient.
     pub(crate) fn normalised_entry_covariance(
         &self,
         mode: usize,
@@ -186,7 +186,8 @@ impl Covariance {
     /// covariance.
     ///
     /// To first order the error of entry i of a shape is A⁺ times the noise of output i minus B_i
-    /// dθ; an unmeasured force on a mode multiplies all its entries by the same complex factor.
+    /// dθ; an unmeasured force on a mode multiplies all entries of the shape of this mode by the
+    /// same complex factor.
     pub(crate) fn joint(
         &self,
         fit: &Fit<'_>,
@@ -329,8 +330,8 @@ fn unknowns_by_parameter(
     (sum, rows)
 }
 
-/// Returns the variance of the score, and of the unknowns of each output, from the noise of the
-/// sensors.
+/// Returns the variance that the sensor noise causes in the score and in the unknowns of each
+/// output.
 fn sensor_variance(
     fit: &Fit<'_>,
     noise: &Noise,
@@ -432,8 +433,9 @@ fn least_determined(curvature: &[f64], pairs: &[(usize, Option<usize>)]) -> Opti
 mod tests {
     use super::*;
 
-    /// Three modes with one pole each and one participation; the curvature is almost singular in a
-    /// direction of the second mode, or has a parameter without any effect.
+    /// Three modes have one pole and one participation each. The function returns the second mode
+    /// if the curvature is almost singular in a direction of this mode, and the third mode if a
+    /// parameter of the third mode has no effect.
     #[test]
     fn the_mode_of_a_singular_direction_is_named() {
         let pairs = [(0, None), (1, None), (2, None), (0, Some(1)), (1, Some(1)), (2, Some(1))];

@@ -212,9 +212,9 @@ impl<D: Design> Trial<'_, D> {
     }
 }
 
-/// Returns the effective number 3(Σr²)²/Σr⁴ of residuals r. For normal residuals it is equal to
-/// their number. It is smaller if errors of the initial poles make the residuals near resonances
-/// large.
+/// Returns the effective number 3(Σr²)²/Σr⁴ of residuals r. For normal residuals, this number is
+/// equal to the number of residuals. It is smaller if errors of the initial poles make the
+/// residuals near resonances large.
 fn effective_count(values: &[f64]) -> f64 {
     let fourth: f64 = values.iter().map(|value| value.powi(4)).sum();
     3.0 * square(values).powi(2) / fourth

@@ -80,7 +80,7 @@ pub enum ModalError {
         setting: &'static str,
         /// Value that was given.
         value: f64,
-        /// Values that are possible.
+        /// Allowed values of the setting.
         required: &'static str,
     },
     /// A decomposition of the numerical kernel failed.

@@ -215,8 +215,8 @@ impl ModalEstimate {
     }
 
     /// Returns the same estimate; the standard errors of each mode are multiplied by the entry of
-    /// `scales` for this mode (a pure number). Use it if parts of the data differ by more than the
-    /// noise.
+    /// `scales` for this mode (a pure number). Use this method if parts of the data differ by more
+    /// than the noise.
     ///
     /// # Errors
     /// [`ModalError::Setting`] for another number of modes, or a scale that is not positive and
@@ -258,13 +258,13 @@ impl ModalEstimate {
     }
 
     /// Returns, for each sensor, the RMS value of its noise on a line, in the unit of the output;
-    /// unmeasured forces are not part of it.
+    /// the noise does not include unmeasured forces.
     pub fn noise_levels(&self) -> &[f64] {
         &self.noise_level
     }
 
-    /// Returns the variance of the noise of each sensor on every line: `[output][line]`; unmeasured
-    /// forces are not part of it.
+    /// Returns the variance of the noise of each sensor on every line: `[output][line]`; the noise
+    /// does not include unmeasured forces.
     pub fn noise_spectra(&self) -> &[Vec<f64>] {
         &self.noise_spectrum
     }

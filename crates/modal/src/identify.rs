@@ -36,7 +36,7 @@ pub struct ModalSettings {
     pub near_hz: Vec<f64>,
     /// Largest number of modes that is tried.
     pub max_modes: usize,
-    /// `true` if unmeasured forces through the modes are part of the noise.
+    /// `true` if the noise includes the response of the modes to unmeasured forces.
     pub unmeasured_forces: bool,
     /// Powers of jω that represent modes outside the band; `None` chooses them by Akaike's
     /// criterion.
@@ -102,8 +102,8 @@ pub fn identify_modes(
 /// Fits the modes of an estimate to other data of the same structure: a part of the record, or a
 /// record of another day.
 ///
-/// The search starts from the poles of the estimate and uses its residual powers and delays. The
-/// result has only modes that the data determine.
+/// The search starts from the poles of the estimate, and uses the residual terms and delays of the
+/// estimate. The result has only modes that the data determine.
 ///
 /// # Errors
 /// [`ModalError`] as for [`identify_modes`].
@@ -164,14 +164,14 @@ struct Identification<'a> {
     fit: Fit<'a>,
     noise: Noise,
     dropped: Vec<DroppedCandidate>,
-    /// `true` after the first choice of the residual powers. The noise is then known well enough to
-    /// choose these powers again after a mode is removed.
+    /// `true` after the first choice of the residual terms. The noise is then known well enough to
+    /// choose these terms again after a mode is removed.
     has_chosen_powers: bool,
 }
 
 impl<'a> Identification<'a> {
     /// Searches from given poles and from the requested frequencies, and chooses modes and residual
-    /// powers.
+    /// terms.
     fn selected(
         lines: &'a Lines,
         settings: &'a ModalSettings,
@@ -195,7 +195,8 @@ impl<'a> Identification<'a> {
         search
     }
 
-    /// Returns the same state for lines with other delays.
+    /// Returns the identification with the same model, weights and noise, for `lines`; other delays
+    /// were removed from the outputs of these lines.
     fn on<'b>(self, lines: &'b Lines) -> Identification<'b>
     where
         'a: 'b,
@@ -334,7 +335,7 @@ impl<'a> Identification<'a> {
     }
 
     /// Removes roots that are damped too much for a resonance, and roots outside the band whose
-    /// gain is less than the penalty of their parameters; returns whether it removed any.
+    /// gain is less than the penalty of their parameters; returns whether a root was removed.
     ///
     /// A strong mode outside the band remains in the model: with residual terms alone, modes near
     /// the edge would be biased.
@@ -358,7 +359,7 @@ impl<'a> Identification<'a> {
     }
 
     /// Removes modes whose removal costs less likelihood than the penalty of their parameters,
-    /// until all remaining modes are significant; returns whether it removed any.
+    /// until all remaining modes are significant; returns whether a mode was removed.
     fn remove_insignificant(&mut self, required: f64) -> bool {
         let mut removed = false;
         loop {
@@ -382,7 +383,7 @@ impl<'a> Identification<'a> {
     }
 
     /// Removes the weakest modes if the likelihood, maximised again without them, falls by less
-    /// than the penalty of their parameters; returns whether it removed any.
+    /// than the penalty of their parameters; returns whether a mode was removed.
     ///
     /// If other modes can represent the response of a mode, the fall at fixed poles and
     /// participations is larger than the fall after the new search.
@@ -405,15 +406,16 @@ impl<'a> Identification<'a> {
             trial.model.select(&retained);
             trial.refresh();
             trial.search_roughly_to(self.fit.cost() + required);
-            // Another mode may move to the place of the removed mode and so leave the band or the
-            // permitted range of damping. This mode would then be lost, too.
+            // In the new search another mode may move towards the pole of the removed mode, and so
+            // leave the band or the permitted range of damping. The other mode would then be lost,
+            // too.
             let is_lost = |(before, after): (&usize, &Complex<f64>)| -> bool {
                 self.is_possible(self.fit.model.poles[*before]) && !self.is_possible(*after)
             };
             let loses = retained.iter().zip(&trial.model.poles).any(is_lost);
             let gain = trial.cost() - self.fit.cost();
             log::debug!(
-                "without {:.3} Hz: loss {:.0}, {gain:.0} after {} steps, required {required:.0}",
+                "mode {:.3} Hz removed: cost +{:.0}, +{gain:.0} after {} steps; limit +{required:.0}",
                 self.fit.model.poles[mode].im / TAU,
                 losses[mode],
                 trial.steps - self.fit.steps,
@@ -500,9 +502,9 @@ impl<'a> Identification<'a> {
         retained
     }
 
-    /// Chooses the residual powers by Akaike's criterion: too few terms bias the poles, too many
-    /// only add variance. Each unknown beyond the current number has the given `penalty` instead of
-    /// Akaike's.
+    /// Chooses the residual terms by Akaike's criterion: too few terms bias the poles, too many
+    /// terms only add variance. Each unknown beyond the current number has the given `penalty`
+    /// instead of Akaike's.
     fn choose_powers(&mut self, penalty: f64) {
         if self.settings.residual_powers.is_some() {
             return;
@@ -520,7 +522,7 @@ impl<'a> Identification<'a> {
             let criterion =
                 trial.cost() + AKAIKE * count.min(current) + penalty * (count - current).max(0.0);
             log::debug!(
-                "{} and {} residual terms of forces and transients, criterion {criterion:.1}",
+                "{} residual terms for forces, {} for transients: criterion {criterion:.1}",
                 powers.forces.len(),
                 powers.transients.len()
             );
@@ -556,8 +558,8 @@ impl<'a> Identification<'a> {
     }
 
     /// Returns the covariance of the last fit; `None` if the curvature of the last mode is
-    /// singular. While the curvature is singular, the modes outside the band are removed, and then,
-    /// one after another, those that the data determine least.
+    /// singular. While the curvature is singular, the modes outside the band are removed; then the
+    /// mode that the data determine least is removed, one mode at a time.
     fn covariance_of_all(&mut self) -> Option<Covariance> {
         loop {
             let covariance = Covariance::new(&self.fit, &self.noise);
@@ -592,7 +594,7 @@ impl<'a> Identification<'a> {
         self.update_noise();
         self.update_noise();
         self.fit.search();
-        // The last search can move a mode out of the band, or make one insignificant.
+        // The last search can move a mode out of the band, or make a mode insignificant.
         let required = required_gain(self.lines);
         while self.remove_impossible() || self.remove_insignificant(required) {
             self.update_noise();
@@ -659,8 +661,8 @@ fn weigh(fit: &mut Fit<'_>, noise: &Noise) {
 /// Penalty of one unknown in −2 log L by Akaike's criterion.
 const AKAIKE: f64 = 2.0;
 
-/// Returns the sets of residual powers that are compared. In free decays the modes outside the band
-/// act by their transients only.
+/// Returns the sets of residual terms that are compared, each as powers of jω. In free decays the
+/// modes outside the band act only through their transients.
 fn power_sets(inputs: usize) -> Vec<ResidualPowers> {
     if inputs == 0 {
         let largest = [None, Some(0), Some(1), Some(2), Some(4), Some(6)];

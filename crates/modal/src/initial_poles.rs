@@ -37,7 +37,7 @@ const MAX_ORDER: usize = 72;
 /// Largest number of block rows times channels.
 const MAX_ROWS: usize = 520;
 
-/// Root of one order.
+/// Root that the subspace method finds for one order.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Root {
     pub(crate) pole: C,
@@ -62,9 +62,9 @@ pub(crate) fn initial_poles(lines: &Lines) -> Result<Vec<C>, ModalError> {
     Ok(clusters(roots, orders))
 }
 
-/// Returns the poles of the subspace models of rising order, the initial poles of the
-/// identification. The vector of each pole has a single entry of 1, because these models are
-/// compared by their poles only.
+/// Returns the poles of the subspace models of rising order. The poles on which these orders agree
+/// are the initial poles of the identification. The vector of each pole has a single entry of 1,
+/// because these models are compared by their poles only.
 ///
 /// # Errors
 /// As [`identify_modes`](crate::identify_modes).
@@ -275,7 +275,7 @@ fn solve_ridged(mut matrix: Mat<C>, right: &Mat<C>) -> Result<Mat<C>, ModalError
     }
 }
 
-/// Sums of products of channels times powers of z.
+/// Sums, over the lines, of the products of two channels times a power of z.
 struct Lags {
     channels: usize,
     /// `[lag][a + channels · b]`: Σ z^lag v_a v_b*.
@@ -307,7 +307,8 @@ fn lags(channels: &[Vec<C>], turn: &[C], count: usize) -> Lags {
     Lags { channels: n, sums: (0..count).into_par_iter().map(sum).collect() }
 }
 
-/// Returns the eigenvalues of the shift matrix of the leading `order` directions.
+/// Returns the `order` eigenvalues of the shift matrix, which follows from the first `order`
+/// columns of `basis`.
 fn shift_roots(basis: &Mat<C>, outputs: usize, order: usize) -> Result<Vec<C>, ModalError> {
     let rows = basis.nrows() - outputs;
     let upper = basis.submatrix(0, 0, rows, order).to_owned();

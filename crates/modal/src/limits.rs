@@ -3,8 +3,8 @@
 /// Number of lines in a block of the parallel sums. Blocks limit the memory of a sum and fix the
 /// order of its terms, so that the result does not depend on the number of processors.
 pub const BLOCK_LINES: usize = 256;
-/// Part of a column that the preceding columns do not explain, as a fraction of the column (in
-/// norms), at or below which the column counts as linearly dependent; such a column has no
+/// Maximum ratio of two norms for a linearly dependent column: the norm of the part of the column
+/// that the preceding columns do not explain, and the norm of the column. A dependent column has no
 /// coefficient.
 pub const DEPENDENT_COLUMN: f64 = 1e-11;
 /// Largest number of damped steps of one search.
@@ -21,15 +21,15 @@ pub const ROUGH_STEPS: usize = 10;
 /// Minimum curvature that scales a step: a pole outside the band has curvatures of 1e-10, which
 /// would block the steps of all other poles.
 pub const LEAST_CURVATURE: f64 = 1e-2;
-/// Largest step of the logarithm of a decay rate.
+/// Maximum change of the logarithm of a decay rate in one step of the search.
 pub const MAX_DECAY_STEP: f64 = 1.0;
 /// Largest relative step of a natural frequency, in damping ratios.
 pub const MAX_FREQUENCY_STEP_DAMPINGS: f64 = 3.0;
 /// Relative step of a natural frequency that is always allowed, even for very small damping.
 pub const MIN_FREQUENCY_STEP: f64 = 2e-3;
-/// Half-width of the average of a noise spectrum, as a fraction of the number of lines.
+/// Half-width of the averaging window of a noise spectrum, as a fraction of the number of lines.
 pub const NOISE_WINDOW_SHARE: f64 = 1.0 / 16.0;
-/// Minimum half-width of the average of a noise spectrum, in lines.
+/// Minimum half-width of the averaging window of a noise spectrum, in lines.
 pub const MIN_NOISE_WINDOW: usize = 15;
 /// Largest number of scoring steps for the variances of unmeasured forces.
 pub const SCORING_STEPS: usize = 12;
@@ -39,8 +39,8 @@ pub const NEAR_RESONANCE: f64 = 1e-2;
 /// Minimum ratio of the power of an unmeasured force to the sensor noise at which a line
 /// contributes to the estimate of the force; below it the force counts as sensor noise.
 pub const NEAR_PROCESS_POWER: f64 = 0.1;
-/// Minimum contribution of an unmeasured force to the noise power of a line; smaller contributions
-/// are neglected.
+/// Minimum contribution of an unmeasured force to the noise power of a line, relative to the noise
+/// power of the weights; smaller contributions are neglected.
 pub const NEGLIGIBLE_PROCESS_POWER: f64 = 1e-3;
 /// Maximum damping ratio of an initial mode; roots above it are ignored.
 pub const MAX_INITIAL_DAMPING: f64 = 0.1;
@@ -49,7 +49,8 @@ pub const MAX_INITIAL_DAMPING: f64 = 0.1;
 pub const MAX_DAMPING: f64 = 0.3;
 /// Largest number of leading components of the outputs that the first estimate uses.
 pub const MAX_COMPONENTS: usize = 8;
-/// Number of shifts of the block rows of the first estimate.
+/// Minimum number of block rows of the initial estimate if the data have enough lines for this
+/// number.
 pub const SUBSPACE_SHIFTS: usize = 24;
 /// Fraction of the unit circle to which the initial estimate maps the band; the remaining gap
 /// separates the two edges of the band.
@@ -63,9 +64,11 @@ pub const CLUSTER_DAMPING: f64 = 0.3;
 /// Maximum number of failed trials in the search for further modes, and in the search for modes
 /// that other modes can replace.
 pub const MAX_TRIES: usize = 3;
-/// Distance from a candidate, in half-widths, within which the lines are used for its gain.
+/// Distance from a candidate mode, in half-widths, within which the lines are used to compute the
+/// gain of this mode.
 pub const SCAN_HALF_WIDTHS: f64 = 12.0;
-/// Minimum number of lines on either side of a candidate that are used for its gain.
+/// Minimum number of lines on either side of a candidate mode that are used to compute the gain of
+/// this mode.
 pub const MIN_SCAN_LINES: usize = 12;
 /// Minimum ratio of the damping of a mode to its standard error; below it the damping is
 /// undetermined.
@@ -96,8 +99,8 @@ pub const GROUP_HALF_WIDTHS: f64 = 10.0;
 /// Distance from a mode, in half-widths, within which the unmeasured force on this mode may hide
 /// another mode: the response to this force is large only near the resonance.
 pub const HIDDEN_HALF_WIDTHS: f64 = 1.0;
-/// Largest ratio of the widths of two modes at which one may hide the other; if the ratio is
-/// larger, the tails of the wider mode are visible next to the narrower one.
+/// Largest ratio of the widths of two modes at which one mode may hide the other mode; if the ratio
+/// is larger, the tails of the wider mode are visible next to the narrower one.
 pub const HIDDEN_WIDTHS: f64 = 3.0;
 /// Minimum fraction of the residual around a mode that the measured forces must explain before a
 /// hidden mode is tried; above it the likelihood decides. If the residual is only noise, the
@@ -110,7 +113,7 @@ pub const LEAST_NOISE: f64 = 1e-6;
 /// a mode outside the band; the likelihood decides whether this mode is significant.
 pub const OUTSIDE_DISTANCE: f64 = 0.5;
 /// Number of steps to a constrained estimate: the equations are nearly linear within a standard
-/// error, so that already the second step is accurate to a few digits.
+/// error, so the second step is already accurate to a few digits.
 pub const CONSTRAINT_STEPS: usize = 4;
 /// Eigenvalue of the covariance of a constraint's equations, relative to the largest eigenvalue,
 /// below which an equation counts as dependent on the other equations.
@@ -120,8 +123,8 @@ pub const DEPENDENT_EQUATION: f64 = 1e-9;
 pub(crate) const MAX_DELAY_TURNS: f64 = 1.0;
 /// Number of outputs that give the initial estimate of the delay.
 pub(crate) const DELAY_OUTPUTS: usize = 4;
-/// Maximum number of Gauss–Newton steps of the delays with the initial poles. This gives rough
-/// delays, which are refined with the final modes.
+/// Maximum number of Gauss–Newton steps of the delays with the initial poles. These steps give
+/// rough delays, which are refined with the final modes.
 pub(crate) const ROUGH_DELAY_STEPS: usize = 4;
 /// Maximum number of Gauss–Newton steps of the delays with the final modes.
 pub(crate) const DELAY_STEPS: usize = 10;
@@ -133,6 +136,6 @@ pub(crate) const LEAST_DELAY_INFORMATION: f64 = 0.5;
 pub(crate) const MAX_DELAY_STEP: f64 = 0.1;
 /// Step of a delay, in standard errors of the delay, below which the steps end.
 pub(crate) const DELAY_SETTLED: f64 = 0.1;
-/// Minimum number of lines at a resonance, weighted by their information, for an estimate of the
-/// scatter of the residual along the shape.
+/// Minimum effective number of lines at a resonance for an estimate of the scatter of the residual
+/// along the mode shape; each line is weighted by its information about the pole.
 pub const LEAST_SCATTER_LINES: f64 = 3.0;

@@ -9,7 +9,7 @@ use crate::ModalError;
 use crate::delays::OutputDelay;
 use crate::limits::{BLOCK_LINES, DEAD_CHANNEL, DEPENDENT_INPUTS, OUTSIDE_DISTANCE};
 
-/// One column of the extended inputs.
+/// One column of the inputs: a measured force, or the transient of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Load {
     /// A measured input.
@@ -23,9 +23,9 @@ pub(crate) enum Load {
 pub(crate) struct Block {
     /// Rows of the line data.
     pub(crate) rows: Range<usize>,
-    /// Loads that act on these lines.
+    /// Loads that act on the lines of the block.
     pub(crate) active: Vec<usize>,
-    /// Time between two samples and e^{−jωΔt} of each line, if the record is open.
+    /// Sampling interval Δt, in s, and e^{−jωΔt} on each line; `None` unless the record is open.
     pub(crate) delay: Option<(f64, Vec<Complex<f64>>)>,
 }
 
@@ -146,12 +146,13 @@ impl Lines {
         pole.im > (low - margin).max(0.0) && pole.im < high + margin
     }
 
-    /// Returns the amplitude of a load on a line of a block in which it acts.
+    /// Returns the amplitude of a load on a line; the load must act in the block of this line.
     pub(crate) fn load(&self, load: usize, row: usize) -> Complex<f64> {
         self.amplitude[load].get(row).copied().unwrap_or(Complex::new(1.0, 0.0))
     }
 
-    /// Returns the root-mean-square of a load over the lines on which it acts, or 0.
+    /// Returns the root-mean-square of a load over the lines on which it acts; 0 if it acts on no
+    /// line.
     pub(crate) fn load_level(&self, load: usize) -> f64 {
         let acts = |block: &&Block| block.active.contains(&load);
         let (mut power, mut count) = (0.0, 0);

@@ -94,7 +94,7 @@ impl ModalTerm {
         (pairs().map(|(l, f)| l * f).sum(), pairs().map(|(l, f)| l.conj() * f).sum())
     }
 
-    /// Number of parameters of the mode in a covariance.
+    /// Returns the number of parameters of the mode in a covariance.
     fn parameters(&self) -> usize {
         2 + 2 * self.shape.len() + 2 * self.participation.len()
     }
@@ -278,7 +278,7 @@ impl ModalModel {
     }
 }
 
-/// Returns Σ_ab g_a C_ab h_b* with the covariance of a group.
+/// Returns Σ_ab g_a C_ab h_b*, where C is the covariance of a group of modes.
 fn product(group: &ModalGroup, g: &[(usize, C)], h: &[(usize, C)]) -> C {
     let row = |(a, left): &(usize, C)| {
         let sum: C = h.iter().map(|(b, right)| right.conj() * group.entry(*a, *b)).sum();

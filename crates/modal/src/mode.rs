@@ -93,11 +93,12 @@ pub enum DropReason {
     /// The data do not determine this mode in addition to the other modes: the likelihood does not
     /// change along one direction of its parameters.
     Undetermined,
-    /// The root is outside the band: too far from it, insignificant, or not determined.
+    /// The root is outside the band and is not part of the model: it is too far from the band,
+    /// insignificant, or not determined by the data.
     OutsideBand,
     /// Another mode within a half-width has the same shape and participations.
     Twin {
-        /// Natural frequency of the other mode, in Hz.
+        /// Natural frequency, in Hz, of the mode with the same shape and participations.
         other_hz: f64,
     },
     /// The unmeasured force on the mode is too large relative to the measured force.
@@ -138,7 +139,7 @@ pub struct DroppedCandidate {
 }
 
 impl DroppedCandidate {
-    /// Creates the entry for a rejected pole (rad/s).
+    /// Creates the description of the rejected candidate with this pole (rad/s).
     pub(crate) fn new(pole: Complex<f64>, reason: DropReason) -> Self {
         let size = pole.norm();
         Self { frequency_hz: size / std::f64::consts::TAU, damping_ratio: -pole.re / size, reason }

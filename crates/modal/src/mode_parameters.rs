@@ -18,8 +18,8 @@ type C = Complex<f64>;
 pub(crate) struct ModeParameters {
     pub(crate) outputs: usize,
     pub(crate) inputs: usize,
-    /// Index of the load whose participation is 1; an index that is not the index of an input
-    /// belongs to a transient.
+    /// Index of the load whose participation is 1; an index of `inputs` or more belongs to a
+    /// transient.
     pub(crate) gauge: usize,
     pub(crate) values: DVector<f64>,
     pub(crate) covariance: DMatrix<f64>,
@@ -30,10 +30,11 @@ pub(crate) struct ModeParameters {
 /// and imaginary parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MassNormalised {
-    /// Entries at the outputs.
+    /// Entries of the shape at the outputs, each with its standard errors.
     pub outputs: Vec<(C, C)>,
-    /// Entries at the points and in the directions of the inputs, which must be forces on one
-    /// structure: those of a roving hammer, for example.
+    /// Entries of the shape at the points and in the directions of the inputs, each with its
+    /// standard errors. All inputs must be forces on one structure, for example the forces of a
+    /// roving hammer.
     pub inputs: Vec<(C, C)>,
 }
 
@@ -146,7 +147,8 @@ impl ModeParameters {
     pub(crate) fn modal_mass(&self, point: DrivingPoint, derivative: i32) -> Option<Uncertain> {
         let (mass, gradient) = self.complex_mass(point, derivative);
         let variance = gradient.dot(&(&self.covariance * &gradient));
-        // A mode without motion or force at the point does not determine its mass.
+        // If the mode has no motion or no force at the point, the data do not determine its modal
+        // mass.
         let size = mass.norm();
         (size.is_finite() && variance.is_finite()).then(|| Uncertain {
             value: size.copysign(mass.re),

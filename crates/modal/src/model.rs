@@ -19,14 +19,14 @@ use crate::order::Candidate;
 /// Powers of jω of the residual terms, which represent all modes outside the band.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResidualPowers {
-    /// Powers for each measured input.
+    /// Powers of jω for each measured input.
     pub forces: Vec<i32>,
-    /// Powers for the transient of each record.
+    /// Powers of jω for the transient of each record.
     pub transients: Vec<i32>,
 }
 
 impl ResidualPowers {
-    /// Returns the powers of a load.
+    /// Returns the powers of jω in the residual terms of a load.
     pub(crate) fn for_load(&self, load: Load) -> &[i32] {
         match load {
             Load::Force(_) => &self.forces,
@@ -35,8 +35,8 @@ impl ResidualPowers {
     }
 }
 
-/// Poles, participations and residual powers. The search changes the poles and participations; the
-/// residual powers define the linear unknowns.
+/// Poles, participations, and the powers of jω in the residual terms. The search changes the poles
+/// and participations; the powers define which residual terms are linear unknowns.
 #[derive(Debug, Clone)]
 pub(crate) struct Model {
     pub(crate) poles: Vec<Complex<f64>>,
@@ -45,11 +45,11 @@ pub(crate) struct Model {
     /// For each mode, the load whose participation is 1.
     pub(crate) gauge: Vec<usize>,
     pub(crate) powers: ResidualPowers,
-    /// Angular frequency that scales the residual powers.
+    /// Angular frequency ω₀ of the residual terms, which are powers of jω/ω₀, in rad/s.
     pub(crate) reference: f64,
 }
 
-/// Returns the initial residual powers.
+/// Returns the initial powers of jω in the residual terms.
 pub(crate) fn first_powers(lines: &Lines) -> ResidualPowers {
     let transients = if lines.inputs() == 0 { Vec::new() } else { vec![0, 1, 2] };
     ResidualPowers { forces: vec![-4, -2, 0, 2, 4], transients }
@@ -112,7 +112,7 @@ impl Model {
         2 * self.modes() * lines.loads.len()
     }
 
-    /// Returns the columns of the residual powers of each load.
+    /// Returns the indices of the columns of the residual terms, one range for each load.
     pub(crate) fn residual_columns(&self, lines: &Lines) -> Vec<Range<usize>> {
         let mut next = 2 * self.modes();
         let take = |load: &Load| {
@@ -136,15 +136,15 @@ impl Model {
         (0..2 * self.modes()).chain(active).collect()
     }
 
-    /// Returns the index of the pair of parameters of a participation; the participation must not
-    /// be the gauge of the mode.
+    /// Returns the index of the pair of parameters of a participation. The load must not be the
+    /// gauge of the mode, whose participation is fixed at 1.
     pub(crate) fn pair_of(&self, mode: usize, load: usize, loads: usize) -> usize {
         let before = load - usize::from(load > self.gauge[mode]);
         self.modes() + mode * (loads - 1) + before
     }
 
-    /// Returns mode and load of every pair of parameters of the search; the poles (without a load)
-    /// come first.
+    /// Returns the mode and the load of every pair of parameters of the search. The poles come
+    /// first; they have no load.
     pub(crate) fn pairs(&self, loads: usize) -> Vec<(usize, Option<usize>)> {
         let poles = (0..self.modes()).map(|mode| (mode, None));
         let free = (0..self.modes()).flat_map(|mode| {
@@ -177,7 +177,7 @@ impl Model {
         self.fill_residuals(lines, block, weight, residual_columns);
     }
 
-    /// Writes the columns of the residual powers of a block.
+    /// Writes the columns of the residual terms of a block.
     pub(crate) fn fill_residuals(
         &self,
         lines: &Lines,
@@ -323,7 +323,8 @@ pub(crate) fn select_kernel(load: Load, force: Kernel, transient: Kernel) -> Ker
     }
 }
 
-/// Writes the real columns a + b and j(a − b) of one line.
+/// Writes the entries of one line in the columns a + b and j(a − b), each as a real part and an
+/// imaginary part.
 pub(crate) fn write_pair(
     pair: &mut [f64],
     line: usize,

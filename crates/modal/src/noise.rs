@@ -1,4 +1,5 @@
-//! Noise of the outputs: a smooth spectrum per sensor, and unmeasured forces through the modes.
+//! Noise of the outputs: a smooth spectrum for each sensor, and the response of the modes to
+//! unmeasured forces.
 //!
 //! The noise is e(ω) = Σ_r φ_r w_r(ω)/(jω − λ_r) + n(ω), with the unmeasured force w_r on mode r
 //! and the noise n_i of sensor i; E|w_r|² = S_r, and E|n_i|² = D_i(ω) is smooth. A resonance is
@@ -64,11 +65,11 @@ impl Noise {
         noise
     }
 
-    /// Returns the weights as a level of each output and a shape that all outputs share.
+    /// Returns the weights: a level of each output, and a spectral shape that all outputs share.
     ///
-    /// The level of an output is the level of its sensor noise. The common shape is the mean shape
-    /// of the sensor noise times 1 + Σ_r S_r |h_r|² φ_rᴴ D⁻¹ φ_r, the noise in the direction of the
-    /// modes.
+    /// The level of an output is the level of its sensor noise. The square of the common spectral
+    /// shape is the mean of the sensor noise powers, each divided by its squared level, times 1 +
+    /// Σ_r S_r |h_r|² φ_rᴴ D⁻¹ φ_r, the noise in the direction of the modes.
     pub(crate) fn weights(&self, lines: &Lines, model: &Model, shapes: &[Vec<C>]) -> Weights {
         let count = lines.len() as f64;
         let directions = self.directions(shapes);
@@ -273,7 +274,7 @@ pub(crate) fn noise_window(lines: &Lines) -> usize {
     record_rows(lines).into_iter().map(window).min().unwrap_or(0)
 }
 
-/// Returns the number of lines on either side in the averaging window of a record.
+/// Returns the half-width, in lines, of the averaging window of a record.
 fn half_window(lines: usize) -> usize {
     ((lines as f64 * NOISE_WINDOW_SHARE) as usize).max(MIN_NOISE_WINDOW)
 }
@@ -339,7 +340,8 @@ pub(crate) fn modal_gain(pole: C, omega: f64) -> C {
     1.0 / (C::new(0.0, omega) - pole)
 }
 
-/// Step of the log variances of unmeasured forces below which their iteration ends.
+/// Largest step of the log variances of the unmeasured forces below which the scoring iteration
+/// ends.
 const SETTLED: f64 = 0.05;
 /// Maximum step of the log variance of an unmeasured force. The variance of a force that does not
 /// exist shrinks by the factor e in each step.

@@ -1,8 +1,8 @@
 //! Normal equations of poles and participations, with the linear unknowns projected out (Kaufman).
 //!
-//! The derivative of output i with respect to a pair of parameters is one pair of columns for all
-//! outputs, multiplied by the 2 × 2 matrix of the shape φ_i: JᵀJ = Σ_i T_iᵀ (CᵀP⊥C) T_i needs one
-//! product CᵀC for any number of outputs.
+//! All outputs share one pair of columns of C for each pair of parameters. The derivatives of
+//! output i are this pair multiplied by T_i, the 2 × 2 matrix of the shape φ_i. The matrix JᵀJ =
+//! Σ_i T_iᵀ (CᵀP⊥C) T_i therefore needs one product CᵀC for any number of outputs.
 //!
 //! # Source
 //! Kaufman, BIT 15 (1975) 49.
@@ -121,8 +121,8 @@ pub(crate) fn parameter_scale(pairs: &[(usize, Option<usize>)], model: &Model) -
     pairs.iter().flat_map(scale).collect()
 }
 
-/// Sums over outputs of the products of two modes' shapes, real with real (xx), real with imaginary
-/// (xy) and so on.
+/// Sums, over the outputs, of the products of the shapes of two modes: real part times real part
+/// (xx), real part times imaginary part (xy), and so on.
 pub(crate) struct ShapeProducts {
     modes: usize,
     sums: Vec<f64>,
@@ -143,7 +143,8 @@ impl ShapeProducts {
     }
 }
 
-/// Returns Σ_i T_iᵀ G T_i for a lower triangle G, scaled, as a full symmetric matrix.
+/// Returns Σ_i T_iᵀ G T_i as a full symmetric matrix; each entry is multiplied by the scales of its
+/// row and its column. `lower` is the lower triangle of G.
 pub(crate) fn turn(
     lower: &[f64],
     pairs: &[(usize, Option<usize>)],
@@ -271,8 +272,8 @@ mod tests {
     use crate::projection::Weights;
     use crate::search::Fit;
 
-    /// Two records of two inputs and three outputs: one open record, and one whose second input is
-    /// zero.
+    /// Returns two records of two inputs and three outputs: one open record, and one record whose
+    /// second input is zero.
     fn lines() -> Lines {
         let value = |k: usize| ((k * k + 3 * k) as f64 * 0.7).sin();
         let data = |shift: usize, silent: bool, transient| {

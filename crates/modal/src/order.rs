@@ -22,7 +22,7 @@ const GRID_STEP: f64 = 0.5;
 /// are not tried.
 const TRIAL_GAIN: f64 = 0.5;
 
-/// Candidate of a further mode in the residual.
+/// Candidate for a further mode in the residual.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) pole: C,
@@ -40,8 +40,8 @@ pub(crate) fn required_gain(lines: &Lines) -> f64 {
     parameters as f64 * lines.schwarz()
 }
 
-/// Returns the increase of the cost if one mode is removed and all other poles and participations
-/// stay as they are.
+/// Returns, for each mode, the increase of the cost if this mode is removed and all other poles and
+/// participations stay as they are.
 pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
     let (triangle, modes) = (&fit.projection.triangle, fit.model.modes());
     let columns = triangle.size;
@@ -77,7 +77,7 @@ pub(crate) fn is_within_resonance(pole: C, modes: &[C]) -> bool {
 }
 
 /// Returns the best candidate within the resonance of a mode of the fit. The response of the
-/// candidate to the measured forces must explain most of the residual around it.
+/// candidate to the measured forces must explain most of the residual around the candidate.
 ///
 /// If two close modes are fitted as one mode, the unmeasured force on this mode represents the
 /// remaining response, and the weights hide the second mode. Such a residual depends on the
@@ -207,7 +207,8 @@ fn rank_one(
     if !(trace > 0.0 && trace.is_finite()) {
         return None;
     }
-    // Cholesky factor in place: square = F Fᴴ; cross becomes F⁻¹ cross.
+    // This loop replaces `square` by its Cholesky factor F (square = F Fᴴ), and `cross` by F⁻¹
+    // cross.
     for k in 0..loads {
         for j in 0..k {
             let sum: C = (0..j).map(|i| square[k * loads + i] * square[j * loads + i].conj()).sum();
@@ -268,7 +269,7 @@ pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candi
         let pole = trial.model.poles[fit.model.modes()];
         let possible = -pole.re / pole.norm() < MAX_DAMPING && fit.lines.reaches(pole);
         log::debug!(
-            "candidate {:.3} Hz, gain {:.0} by the scan, {gain:.0} after {} steps, required {required:.0}",
+            "candidate {:.3} Hz: gain {:.0} in the scan, {gain:.0} after {} steps; required {required:.0}",
             pole.im / std::f64::consts::TAU,
             candidate.gain,
             trial.steps - fit.steps,

@@ -33,10 +33,10 @@ const MAX_COMPANION: usize = 400;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PlscfError {
-    /// Two sizes that must agree differ.
+    /// Two sizes that must be equal are different.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
-        /// Name of the items counted.
+        /// Name of the counted items.
         what: &'static str,
         /// Number expected.
         expected: usize,
@@ -207,9 +207,10 @@ pub fn initial_poles(
 /// Normal equations of the denominators of all orders up to a highest one.
 struct NormalEquations {
     inputs: usize,
-    /// Reduced normal matrix of each order n, ((n + 1) q)²; entry n.
+    /// Reduced normal matrix of each order n, (n + 1) q × (n + 1) q; entry n of the list belongs to
+    /// order n.
     reduced: Vec<DMatrix<f64>>,
-    /// First angular frequency, in rad/s, and Δ, in s.
+    /// First angular frequency ω₁, in rad/s, of z = exp(−j(ω − ω₁)Δ); the field `delta` is Δ, in s.
     first: f64,
     delta: f64,
 }
@@ -242,8 +243,8 @@ impl NormalEquations {
         for sums in &outputs {
             total += &sums.denominator;
         }
-        // Row n of the whitened numerators gives the additional part that the numerator of order n
-        // explains.
+        // Row n of the whitened matrix gives the part of the denominator sums that a numerator of
+        // order n explains in addition to a numerator of order n − 1.
         let mut explained = DMatrix::zeros(len * inputs, len * inputs);
         let mut reduced = Vec::with_capacity(len);
         for n in 0..len {
@@ -263,8 +264,8 @@ impl NormalEquations {
         let normal = &self.reduced[order];
         let corner = normal.view((0, 0), (size, size)).into_owned();
         let right = normal.view((0, size), (size, q)).into_owned();
-        // The highest coefficient is the identity, because the poles that represent noise then tend
-        // to be unstable.
+        // The highest coefficient is the identity: the poles that represent noise then tend to be
+        // unstable, and unstable poles are not returned.
         let coefficients = -scaled_solve(corner, right)?;
         let block = |power: usize| coefficients.rows(power * q, q).transpose();
         let mut companion = DMatrix::zeros(size, size);
@@ -296,8 +297,9 @@ impl NormalEquations {
 
 /// Sums over the lines of one output.
 struct OutputSums {
-    /// L⁻¹ S with the Cholesky factor L of the sums of the numerator; its leading rows and columns
-    /// belong to the lower orders.
+    /// L⁻¹ S, where L is the Cholesky factor of the sums of the numerator, and S contains the mixed
+    /// sums of numerator and denominator. The leading rows and columns of L⁻¹ S belong to the lower
+    /// orders.
     whitened: DMatrix<f64>,
     /// Sums of the denominator.
     denominator: DMatrix<f64>,
@@ -309,7 +311,8 @@ impl OutputSums {
     fn new(table: &ResponseTable, powers: &[Vec<Complex<f64>>], output: usize) -> Option<Self> {
         let (len, q) = (powers[0].len(), table.inputs());
         let mut numerator = vec![0.0; len];
-        // Sums of z^lag H_j and z^lag H_i* H_j, lags −(len − 1) to len − 1.
+        // The loop computes the sums of z^lag H_j and z^lag H_i* H_j for the lags −(len − 1) to len
+        // − 1.
         let lags = 2 * len - 1;
         let mut mixed = DMatrix::<f64>::zeros(lags, q);
         let mut squared = DMatrix::<f64>::zeros(lags, q * q);

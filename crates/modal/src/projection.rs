@@ -5,9 +5,8 @@ use rayon::prelude::*;
 use crate::dense::{Triangle, add_product, triangularise};
 use crate::lines::{Block, Lines};
 
-/// Approximate standard deviation of the noise for the search. It is the product of a shape over
-/// the lines, which all outputs share, and a level of each output. E|n_i(ω)|² is (shape(ω)
-/// level_i)².
+/// Approximate standard deviation of the noise for the search. It is the product of a spectral
+/// shape, which all outputs share, and a level of each output: E|n_i(ω)|² = (shape(ω) level_i)².
 #[derive(Debug, Clone)]
 pub(crate) struct Weights {
     pub(crate) shape: Vec<f64>,
@@ -15,8 +14,8 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    /// Returns √2/shape on the lines of a block: the factor that gives real and imaginary parts
-    /// variance 1.
+    /// Returns √2/`shape` on the lines of a block. If an output is divided by its level and
+    /// multiplied by this factor, the real and imaginary parts of its noise have variance 1.
     pub(crate) fn block_weights(&self, block: &Block) -> Vec<f64> {
         let whiten = |shape: &f64| std::f64::consts::SQRT_2 / shape;
         self.shape[block.rows.clone()].iter().map(whiten).collect()
@@ -51,13 +50,13 @@ impl Design for crate::model::Model {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BlockArrays {
     pub(crate) weight: Vec<f64>,
-    /// Whitened outputs, 2n rows each.
+    /// Whitened outputs, 2n rows each for n lines.
     pub(crate) outputs: Vec<f64>,
     /// Indices of the columns of the whole problem that act on the block.
     pub(crate) columns: Vec<usize>,
-    /// Whitened columns, 2n rows each.
+    /// Whitened columns, 2n rows each for n lines.
     pub(crate) design: Vec<f64>,
-    /// Whitened residuals, 2n rows each.
+    /// Whitened residuals, 2n rows each for n lines.
     pub(crate) residual: Vec<f64>,
     /// Design and outputs, replaced by their triangular factor.
     stacked: Vec<f64>,
@@ -117,7 +116,7 @@ impl Projection {
         self.cost
     }
 
-    /// Joins the triangular factors of the blocks and solves.
+    /// Joins the triangular factors of the blocks and solves for the linear unknowns.
     fn join(&mut self, columns: usize, outputs: usize) {
         let height = |arrays: &BlockArrays| {
             let rows = 2 * arrays.weight.len();

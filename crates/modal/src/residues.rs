@@ -105,8 +105,9 @@ pub(crate) fn with_participations(
 /// Returns the leading right singular direction of a matrix given by its rows, by power iteration
 /// of RᴴR.
 pub(crate) fn leading_row(rows: &[Vec<Complex<f64>>]) -> Vec<Complex<f64>> {
-    /// Number of steps of the iteration; if two singular values are nearly equal, either direction
-    /// serves as an initial estimate.
+    /// Number of steps of the power iteration. If two singular values are nearly equal, the
+    /// iteration does not converge, but any of its directions is good enough as an initial
+    /// estimate.
     const STEPS: usize = 30;
     let norm = |row: &Vec<Complex<f64>>| row.iter().map(|z| z.norm_sqr()).sum::<f64>();
     let Some(strongest) = rows.iter().max_by(|a, b| norm(a).total_cmp(&norm(b))) else {

@@ -14,29 +14,33 @@ use crate::search::Fit;
 
 type C = Complex<f64>;
 
-/// Products of one block after projection.
+/// Matrix products of one block, after the linear unknowns are projected out.
 pub(crate) struct BlockProducts {
-    /// C̃ᵀRC̃ of all parameters with the relative variances R, lower triangle.
+    /// Lower triangle of C̃ᵀRC̃ for all parameters, with the projected derivatives C̃ and the
+    /// relative variances R.
     pub(crate) gram: Vec<f64>,
-    /// A⁺R(A⁺)ᵀ of the rows of A⁺ that belong to modes.
+    /// A⁺R(A⁺)ᵀ with the relative variances R, for the rows of the pseudoinverse A⁺ that belong to
+    /// modes.
     pub(crate) inverse: Vec<f64>,
-    /// Rows of A⁺ that belong to modes, as columns of 2n rows.
+    /// Rows of the pseudoinverse A⁺ that belong to modes; each is stored as a column of 2n entries.
     influence: Vec<f64>,
     /// Projected derivatives, 2n rows.
     derivatives: Vec<f64>,
 }
 
-/// Covariances that the unmeasured force on a mode causes in the two unknowns of its shape, for a
-/// whitened shape of 1.
+/// Covariances of the two unknowns of the shape of a mode (real and imaginary part) due to the
+/// unmeasured force on this mode, for a whitened shape of 1.
 #[derive(Debug, Clone)]
 pub(crate) struct ProcessEffect {
-    /// Covariance of the two unknowns.
+    /// Covariance of the two unknowns of the shape, 2 × 2.
     pub(crate) own: DMatrix<f64>,
-    /// Covariance with the score, for a shape of phase zero, `2 × parameters`.
+    /// Covariance of the two unknowns of the shape with the score, `2 × parameters`, for a shape of
+    /// phase zero.
     pub(crate) cross: DMatrix<C>,
 }
 
-/// Returns the rows of a block from columns of the whole problem.
+/// Returns the entries at `indices` of every column in `columns_of_all`. Each column has `columns`
+/// entries, one for each linear unknown of the whole problem.
 fn local_rows(columns_of_all: &[f64], columns: usize, indices: &[usize]) -> Vec<f64> {
     let chunks = columns_of_all.chunks_exact(columns.max(1));
     chunks.flat_map(|column| indices.iter().map(|index| column[*index])).collect()
@@ -172,7 +176,8 @@ impl Scores<'_> {
 }
 
 impl ProcessEffect {
-    /// Adds one line, given the response of the two unknowns and of the scores to a unit force.
+    /// Adds one line; `unknowns` and `scores` are the responses of the two unknowns and of the
+    /// scores to a unit force.
     fn add_line(&mut self, unknowns: [C; 2], scores: &[f64], rows: usize, line: usize) {
         for (a, value) in unknowns.iter().enumerate() {
             for (b, other) in unknowns.iter().enumerate() {

@@ -44,7 +44,7 @@ impl<'a> Fit<'a> {
         self.projection.solve(self.lines, &self.model);
     }
 
-    /// Takes at most `MAX_STEPS` steps, until the cost no longer falls.
+    /// Takes at most `MAX_STEPS` steps, until a step lowers the cost by less than `COST_TOLERANCE`.
     pub(crate) fn search(&mut self) {
         self.search_until(MAX_STEPS, COST_TOLERANCE, f64::INFINITY);
     }
@@ -61,8 +61,8 @@ impl<'a> Fit<'a> {
     }
 
     /// Takes at most `limit` steps, until a step lowers the cost by less than `tolerance` or the
-    /// time limit is over. It also ends if the cost would remain above `goal` even if all further
-    /// steps were as effective as the last one.
+    /// time limit is over. The search also ends if the cost would remain above `goal` even if every
+    /// further step lowered the cost as much as the last step.
     fn search_until(&mut self, limit: usize, tolerance: f64, goal: f64) {
         if self.model.modes() == 0 {
             return;

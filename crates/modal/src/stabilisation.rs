@@ -26,8 +26,9 @@ const CLUSTER_REACH: f64 = 0.005;
 /// of the centre.
 const CLUSTER_DAMPING: f64 = 0.3;
 
-/// Distance in frequency from the median of a cluster within which further poles belong to this
-/// cluster, relative to the decay rate of the median.
+/// Maximum distance in frequency between a cluster and a further pole that counts as part of this
+/// cluster. The distance is from the median of the cluster, relative to the decay rate of the
+/// median.
 const CLUSTER_CLAIM: f64 = 0.3;
 
 /// Pole of a model of one order.
@@ -80,7 +81,8 @@ impl StabilisationPole {
 /// Cluster of poles of several orders.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoleCluster {
-    /// Medians of real and imaginary part, in rad/s, and the common direction of the vectors.
+    /// Medians of the real and imaginary parts of the poles in the cluster, in rad/s, and the
+    /// common direction of their vectors.
     pub pole: Pole,
     /// Fraction of the orders that have a member in the cluster.
     pub share: f64,

@@ -9,8 +9,9 @@ use crate::model::{growth, kernels};
 
 type C = Complex<f64>;
 
-/// Adds to `predicted` the transients of open records, fitted to the outputs minus the prediction
-/// so far: one complex load of each mode for each record, and real residual terms of each output.
+/// Adds to `predicted` the transients of open records, fitted to the difference between the outputs
+/// and the initial `predicted`: one complex load of each mode for each record, and real residual
+/// terms of each output.
 pub(crate) fn add_transients(
     lines: &Lines,
     modes: &[&IdentifiedMode],
@@ -85,9 +86,9 @@ impl Record<'_> {
         C::i().powi(power) * (omega / self.reference).powi(power)
     }
 
-    /// Returns the triangular factor of an output's columns and its number of rows. The columns of
-    /// the residual terms come first, so that these terms can be projected out; the loads, which
-    /// all outputs share, remain.
+    /// Returns the columns of one output, reduced to a triangular factor, and the number of rows of
+    /// these columns. The columns of the residual terms come first, so that these terms can be
+    /// projected out; the loads, which all outputs share, remain.
     fn reduced(
         &self,
         lines: &Lines,

@@ -49,7 +49,7 @@ impl ForceSums {
     }
 }
 
-/// Data that define the posterior of a line.
+/// Data that define the posterior distribution of the unmeasured forces on a line.
 #[derive(Clone, Copy)]
 pub(crate) struct ForceModel<'a> {
     pub(crate) noise: &'a Noise,
@@ -62,8 +62,8 @@ pub(crate) struct ForceModel<'a> {
     pub(crate) directions: &'a [f64],
 }
 
-/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e, where φ_r h_r are the columns of B and V is the
-/// covariance of the line. The memory is reused from line to line.
+/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e, where φ_r h_r with h_r = 1/(jω − λ_r) are the columns
+/// of B, and V is the covariance of the line. The memory is reused from line to line.
 #[derive(Default)]
 pub(crate) struct Posterior {
     active: Vec<usize>,

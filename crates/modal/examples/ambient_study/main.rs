@@ -36,8 +36,8 @@ struct Case {
     rate_hz: f64,
     len: usize,
     noise: Noise,
-    /// Number of samples of the moving mean that is applied to the record. It has the effect of
-    /// forces whose spectrum has zeros; 1 for white forces.
+    /// Number of samples of the moving mean that is applied to the record; 1 for white forces. A
+    /// longer mean has the effect of forces whose spectrum has zeros.
     mean: usize,
 }
 
@@ -438,7 +438,7 @@ impl SubspaceErrors {
         }
     }
 
-    /// Adds for each true mode the pole of each order that is nearest to it.
+    /// Adds, for each true mode, the nearest pole of each order.
     fn add(&mut self, row: usize, models: &Stabilisation, truth: &Structure) {
         self.records += usize::from(row == 0);
         let all = truth.poles();

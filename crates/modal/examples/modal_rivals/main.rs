@@ -46,7 +46,7 @@ fn main() {
     }
 }
 
-/// Writes the records of a case (forces, then motion), its true modes and the estimates.
+/// Writes the records of a case (forces, then responses), its true modes and the estimates.
 fn write(case: &Case, seeds: u64, folder: &Path) -> std::io::Result<()> {
     let name = case.name.split(',').next().unwrap_or_default().replace(' ', "-");
     let [low, high] = case.band_hz;
@@ -95,8 +95,8 @@ fn compare(case: &Case, seeds: u64) {
         "{}, {seeds} records: RMS errors of the usual tool over those of identify_modes",
         case.name
     );
-    // Over all modes: errors of f relative to the half-width of the mode, errors of ζ relative to
-    // ζ, with the setting that is best for all modes together.
+    // Over all modes, errors of f are relative to the half-width of the mode and errors of ζ are
+    // relative to ζ. The setting is the best one for all modes together.
     let widths: Vec<f64> =
         modes.iter().map(|mode| case.damping[*mode] * case.frequency_hz[*mode]).collect();
     let pooled = |squares: &[Squares]| {
@@ -169,8 +169,8 @@ fn add(case: &Case, modes: &[usize], poles: &[C], squares: &mut [Squares]) {
 enum Setting {
     /// Hann-windowed segments of a length in samples.
     Hann(usize),
-    /// Blocks of a length in samples from each hit, and the value of the exponential window at
-    /// their end.
+    /// Blocks of this length (in samples) from each hit, and the value of the exponential window at
+    /// the end of a block.
     Exponential(usize, f64),
 }
 

@@ -28,7 +28,8 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// Returns the root-mean-square bound over the records of `seeds`.
+    /// Returns the bound of f and ζ of each mode as the root-mean-square value over the records of
+    /// `seeds`.
     pub fn of(case: &Case, seeds: &[u64]) -> Self {
         let modes = case.frequency_hz.len();
         let mut variance = vec![0.0; 2 * modes];
@@ -145,8 +146,8 @@ fn decay(case: &Case, mode: usize, shape: &[C]) -> DMatrix<C> {
     LineData::from_open_record(None, &record, case.band_hz).unwrap().outputs().clone()
 }
 
-/// Power of a line of an unmeasured force in unitary lines: its amplitude S has E|S|² = 2, and half
-/// of the power is at the negative frequency.
+/// Power of an unmeasured force on one line, in unitary lines: the amplitude S of the sinusoid has
+/// E|S|² = 2, so that the power is 1, and half of this power is at the negative frequency.
 const LINE_POWER: f64 = 0.5;
 
 enum Covariance {

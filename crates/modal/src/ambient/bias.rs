@@ -134,7 +134,7 @@ impl Excess {
         self.direct_power += (&moved.direct_power - &self.centre.direct_power) * weight;
     }
 
-    /// Returns M at a line with the noise variances `variances`.
+    /// Returns the mean excess M at a line, for the noise variances `variances`.
     pub(super) fn at(
         &self,
         line: &PooledLines,

@@ -24,7 +24,7 @@ pub enum AmbientError {
     /// A channel has almost no signal in the band.
     #[error(
         "channel {}: its RMS value in the band is {rms:.2e}, {:.0e} times that of the \
-         strongest channel: the sensor is dead, or its unit is not that of the others",
+         strongest channel: the sensor is dead, or its unit differs from that of the other channels",
         channel.saturating_add(1), ratio
     )]
     DeadChannel {

@@ -24,7 +24,7 @@ pub struct Harmonic {
     pub frequency_hz: f64,
     /// Channel that shows the sinusoid most clearly, counted from 0.
     pub channel: usize,
-    /// Amplitude in that channel, in its unit.
+    /// Amplitude in the channel `channel`, in the unit of this channel.
     pub amplitude: f64,
     /// F statistic of a line relative to the neighbouring lines; it has 2 and 2 × tapers − 2
     /// degrees of freedom.
@@ -173,7 +173,8 @@ fn fitted(samples: &[f64], angle: f64, windowed: bool) -> Complex<f64> {
     sum * 2.0 / len
 }
 
-/// Returns the excess kurtosis of the signal within two lines of a frequency in cycles per sample.
+/// Returns the excess kurtosis of the signal in a band of two lines on either side of a frequency,
+/// which is given in cycles per sample.
 fn narrow_kurtosis(samples: &[f64], cycles: f64) -> f64 {
     let len = samples.len() as f64;
     let lines: Vec<Complex<f64>> = (-2..=2)

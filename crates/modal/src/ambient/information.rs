@@ -143,7 +143,8 @@ impl LineInformation<'_> {
                     let rows = if a < b { p } else { j + 1 };
                     let (turned, inner) = (whitened[(j, a)], gram[(a, b)]);
                     let entries = column[first..first + rows].iter_mut();
-                    // P is Hermitian: P_ji is the conjugate of P_ij, which is next to P_i+1,j.
+                    // P is Hermitian: P_ji is the conjugate of P_ij, and the entries P_ij of column
+                    // j are contiguous in memory.
                     let factors = whitened.column(b).into_iter().zip(self.inverse.column(j));
                     for (entry, (other, inverse)) in entries.zip(factors) {
                         let value = turned * other + inverse.conj() * inner;

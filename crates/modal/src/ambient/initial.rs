@@ -17,7 +17,7 @@ use crate::stabilisation::Pole;
 /// noise of the sensor.
 const NOISE_QUANTILE: f64 = 0.1;
 
-/// Number of corrections of the amplitudes; one is not enough, because modes overlap.
+/// Number of corrections of the amplitudes; one correction is not enough, because modes overlap.
 const AMPLITUDE_STEPS: usize = 3;
 
 /// Half width, in decay rates, of the lines that determine an amplitude.
@@ -169,8 +169,8 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
             }
             let eigen = crate::decomposition::hermitian_eigen(sum)?;
             let best = eigen.eigenvalues.imax();
-            // This is the likelihood ratio of a power of 1 + excess along one direction against a
-            // power of 1.
+            // The gain is the likelihood-ratio statistic of a power of 1 + excess along one
+            // direction against a power of 1.
             let excess: f64 = eigen.eigenvalues[best] / total;
             let gain = 2.0 * (excess - excess.ln_1p()) * total * total / squares;
             let near = band.omega.partition_point(|w| *w < centre).min(band.omega.len() - 1);

@@ -96,7 +96,7 @@ pub(super) const HARMONIC_LEVEL: f64 = 1e-3;
 pub(super) const TAPERS: usize = 7;
 
 /// Number of lines excluded on either side of a harmonic: the subtraction of the sinusoid is not
-/// exact there.
+/// exact on these lines.
 pub(super) const EXCLUDED_LINES: f64 = 2.0;
 
 /// Minimum share of a channel's power that another channel does not explain; below it the two

@@ -24,7 +24,7 @@ pub(super) struct BandLines {
     pub amplitudes: DMatrix<Complex<f64>>,
     /// RMS value of each output in the band.
     pub scale: Vec<f64>,
-    /// Time axis of the record; endless if the transient was subtracted.
+    /// Time axis of the record; its duration is infinite if the transient was subtracted.
     pub span: Span,
     /// Remaining uncertainty of the transient, if it was subtracted.
     pub transient: Option<Transient>,
@@ -67,7 +67,7 @@ impl BandLines {
 
     /// Pools lines over the fraction `part` of their distance to the nearest of the `poles`, or to
     /// zero frequency. At zero frequency the spectrum of an acceleration has a zero: with little
-    /// noise, it changes there by orders of magnitude from line to line.
+    /// noise, the spectrum changes there by orders of magnitude from line to line.
     pub fn pooled(
         &self,
         poles: &[Complex<f64>],
@@ -79,7 +79,7 @@ impl BandLines {
     }
 
     /// Pools lines as [`Self::pooled`] does, but divides a group in halves while the spectrum of
-    /// the parameters changes too much in it.
+    /// the parameters changes too much in the group.
     ///
     /// A change that is small relative to the resonances can be large relative to the noise.
     pub fn pooled_evenly(&self, parameters: &Parameters, part: f64) -> Vec<PooledLines> {
@@ -102,8 +102,8 @@ impl BandLines {
         self.ranges(&parameters.poles(), part).into_par_iter().flat_map_iter(divided).collect()
     }
 
-    /// Returns whether the mean spectrum of a group of lines is nearly that of its centre, also in
-    /// the directions in which the spectrum is smallest.
+    /// Returns whether the mean spectrum of a group of lines is close to the spectrum at the centre
+    /// of the group, also in the directions in which the spectrum is smallest.
     fn is_even(
         &self,
         range: &Range<usize>,

@@ -102,6 +102,7 @@ pub(super) fn misfit(
 mod tests {
     use super::*;
 
+    /// The deviate of a gamma quantile is nearly the normal quantile of the same probability.
     /// Reference: quantiles of the gamma distribution with shape 64 at probabilities of 1, 50, 99
     /// and 99.9 % (`gamma.ppf` of SciPy).
     #[test]

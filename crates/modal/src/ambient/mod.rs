@@ -156,7 +156,8 @@ impl AmbientEstimate {
     }
 }
 
-/// Returns the clusters in the band, by falling number of orders.
+/// Returns the poles of the clusters in the band; clusters that appear in more model orders come
+/// first.
 fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2]) -> Vec<Pole> {
     let inside = |pole: &Pole| {
         let frequency_hz = pole.natural_frequency_hz();

@@ -1,4 +1,4 @@
-//! Number of polynomials of the sensors' noise: decided by Akaike's criterion.
+//! Number of noise polynomials of the sensors, chosen by Akaike's criterion.
 
 use mechid_numerics::time_limit;
 
@@ -26,7 +26,7 @@ pub(super) fn with_more_noise_terms(fit: &Fit, band: &BandLines) -> Option<Fit> 
     Some(best)
 }
 
-/// Returns the fit with further polynomials if they reduce Akaike's criterion.
+/// Returns the fit with further noise polynomials if they reduce Akaike's criterion.
 fn extended(fit: &Fit, band: &BandLines) -> Option<Fit> {
     let layout = &fit.parameters.layout;
     let terms = layout.noise_terms + NOISE_TERMS_ADDED;

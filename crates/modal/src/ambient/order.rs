@@ -85,7 +85,7 @@ impl Choice<'_> {
         (2.0 * self.band.omega.len() as f64).ln()
     }
 
-    /// Returns the penalty of all polynomials of the noise.
+    /// Returns the penalty of all noise polynomials of a fit.
     fn penalty_of_noise(&self, fit: &Fit) -> f64 {
         let layout = &fit.parameters.layout;
         (layout.noise_terms * layout.outputs) as f64 * self.penalty_of_parameter()
@@ -128,7 +128,7 @@ impl Choice<'_> {
             let mode = accepted.remove(weakest);
             self.drop_mode(&fit.parameters, mode, DropReason::NumberReached { number });
         }
-        // A search may change the order of the poles by frequency.
+        // After a search, the poles may be in another order of frequency.
         let omega = |mode: &usize| fit.parameters.omega(*mode);
         accepted.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
         Chosen { fitted, accepted }
@@ -184,8 +184,9 @@ impl Choice<'_> {
         })
     }
 
-    /// Removes modes that are insignificant in the likelihood with the transient. A chance peak can
-    /// be significant beside leakage that the expected periodogram does not describe exactly.
+    /// Removes modes that are insignificant in the likelihood with the transient. Where the
+    /// expected periodogram does not describe the leakage exactly, a chance peak can seem
+    /// significant.
     fn confirmed(&mut self, mut known: FitWithTransient) -> FitWithTransient {
         while let Some((next, mode, reason)) = self.unconfirmed(&known) {
             self.drop_mode(&known.fit.parameters, mode, reason);

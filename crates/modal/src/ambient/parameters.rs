@@ -10,7 +10,7 @@ pub(super) enum Kernel {
     /// Static deflection in a record without an anti-aliasing filter: frequencies above half the
     /// sampling rate fold into the band.
     Sampled,
-    /// No deflection, s/(λ(s − λ)): for accelerations and for velocities.
+    /// No static deflection, s/(λ(s − λ)): for accelerations and for velocities.
     Vanishing,
 }
 
@@ -168,7 +168,7 @@ impl Parameters {
     }
 
     /// Returns the parameters with one more mode at the end, whose force is independent of the
-    /// others.
+    /// forces of the other modes.
     pub fn with_mode(&self, pole: Complex<f64>, shape: &DVector<Complex<f64>>) -> Self {
         let modes = self.layout.modes;
         let layout = Layout::new(modes + 1, self.layout.outputs, self.layout.noise_terms);

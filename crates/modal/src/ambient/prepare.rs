@@ -108,7 +108,7 @@ pub(super) fn subspace_models(
         .ok_or(AmbientError::Numerics { what: "the subspace model", size: highest })
 }
 
-/// Returns the samples of a band at a rate suited to it, and the sample interval.
+/// Returns the samples of a band at a rate that suits the band, and the sample interval.
 fn resampled(record: &Record, band_hz: [f64; 2], scale: &[f64]) -> (DMatrix<f64>, f64) {
     let (len, duration) = (record.len(), record.sampling().duration());
     let wanted = (RESAMPLING * band_hz[1] * duration).ceil() as usize;

@@ -206,8 +206,8 @@ impl AmbientEstimate {
     }
 
     /// Returns the same estimate; the standard errors of each mode are multiplied by the entry of
-    /// `scales` for this mode (a pure number). Use it if the halves of a record give modes that
-    /// differ by more than their standard errors.
+    /// `scales` for this mode (a pure number). Use this method if the halves of a record give modes
+    /// that differ by more than their standard errors.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -270,7 +270,7 @@ impl AmbientMode {
     }
 }
 
-/// Scales of the record of a fit.
+/// Time axis and units of the record of a fit.
 #[derive(Clone, Copy)]
 pub(super) struct RecordScale<'a> {
     pub span: Span,

@@ -90,8 +90,8 @@ pub(super) struct Fit {
 pub(super) struct SearchLines<'a> {
     /// Lines of the likelihood.
     pub pooled: &'a [PooledLines],
-    /// The same lines, pooled at least as coarsely as in `pooled`, for the information of the
-    /// steps. The information affects the path of the search, not the maximum.
+    /// The same lines, pooled at least as coarsely as in `pooled`. They give the Fisher information
+    /// of the steps, which affects the path of the search, not the maximum.
     pub coarse: &'a [PooledLines],
     pub span: Span,
 }
@@ -106,7 +106,8 @@ pub(super) fn search(start: Parameters, lines: SearchLines<'_>, effort: Effort) 
     search_with_information(start, information, 0, lines, effort)
 }
 
-/// Searches from `start` with information that was computed at `start` (no `updates`) or near it.
+/// Searches from `start`. The matrix `information` was computed at `start` (no `updates`) or near
+/// `start`.
 fn search_with_information(
     start: Parameters,
     information: DMatrix<f64>,
@@ -362,8 +363,8 @@ mod tests {
 
     #[test]
     fn an_undetermined_combination_does_not_change_other_variances() {
-        // The second and the third parameter act only by their sum; rounding makes an eigenvalue
-        // negative.
+        // The likelihood depends only on the sum of the second and the third parameter; rounding
+        // makes an eigenvalue of the information negative.
         let information = nalgebra::dmatrix![
             1.0, 0.3, 0.3;
             0.3, 1.0, 1.0 + 1e-9;

@@ -44,7 +44,7 @@ pub(super) struct Coefficients {
 pub(super) struct Direction {
     /// Index of the parameter.
     pub index: usize,
-    /// Mode whose pole depends on the parameter, and ∂λ.
+    /// Mode whose pole depends on the parameter, and the derivative ∂λ of this pole.
     pub pole: Option<(usize, Complex<f64>)>,
     /// Modes whose γ changes, and ∂γ.
     pub covariances: Vec<(usize, DVector<Complex<f64>>)>,

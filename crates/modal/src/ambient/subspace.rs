@@ -1,6 +1,6 @@
 //! Covariance-driven stochastic subspace identification (SSI-cov): poles and shapes of models of
-//! rising order, from the covariances of the outputs. They are the initial estimates for the
-//! maximum of the likelihood.
+//! rising order, from the covariances of the outputs. The poles and shapes are the initial
+//! estimates for the search for the maximum of the likelihood.
 
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;

@@ -158,7 +158,7 @@ fn without_poles_every_line_stands_alone() {
     assert_eq!(band.pooled(&[], 0.0, 1).len(), 360);
 }
 
-/// The largest of Yᴴ S⁻¹ Y, relative to its mean, over groups of lines with the expected power.
+/// Returns the largest ratio of Yᴴ S⁻¹ Y to its mean over groups of lines with the expected power.
 fn largest_excess(pooled: &[PooledLines], band: &BandLines, parameters: &Parameters) -> f64 {
     let coefficients = Coefficients::new(parameters);
     let spectrum = |omega: f64, terms: &[f64]| {
@@ -180,7 +180,8 @@ fn largest_excess(pooled: &[PooledLines], band: &BandLines, parameters: &Paramet
 }
 
 /// One force drives three modes: the outputs move along one direction, which changes from line to
-/// line, and all other directions contain only noise.
+/// line, and all other directions contain only noise. With even pooling, the spectrum of a group of
+/// lines changes little in these directions, too; with pooling by distance it does not stay even.
 #[test]
 fn pooled_lines_are_even_also_in_the_noise() {
     let mut parameters = parameters(Kernel::Static, 4);
@@ -281,8 +282,8 @@ fn the_bias_of_a_damping_ratio_is_that_of_an_autoregression() {
     assert!((bias * decay_times - 1.0).abs() < 0.1, "{}", bias * decay_times);
 }
 
-/// The reference is half the sum of all mixed second differences of the spectrum times the
-/// covariances.
+/// The reference is half the sum, over all pairs of parameters, of the second difference of the
+/// spectrum times the covariance of the pair.
 #[test]
 fn the_mean_excess_is_half_the_second_derivative_times_the_covariance() {
     let parameters = parameters(Kernel::Vanishing, 2);
@@ -318,8 +319,8 @@ fn the_mean_excess_is_half_the_second_derivative_times_the_covariance() {
 }
 
 /// The reference is the covariance of two lines, computed as the double sum of the covariance
-/// function of the state equations over all pairs of samples. Away from a resonance this covariance
-/// is that of the transient.
+/// function of the state equations over all pairs of samples. Away from a resonance, only the
+/// transient causes this covariance.
 #[test]
 fn the_transient_correlates_the_lines() {
     let omega: [f64; 2] = [2.0, 2.1].map(|hz| hz * std::f64::consts::TAU);

@@ -171,9 +171,9 @@ fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
 
 /// Sums over the lines for the prediction.
 struct TransientSums {
-    /// 2 Re Σ Gᴴ S⁻¹ G with the lines G of unit changes.
+    /// 2 Re Σ Gᴴ S⁻¹ G, where the columns of G are the lines for unit changes of the modes.
     information: DMatrix<f64>,
-    /// 2 Re Σ Gᴴ S⁻¹ Y.
+    /// 2 Re Σ Gᴴ S⁻¹ Y, where the columns of G are the lines for unit changes of the modes.
     score: DVector<f64>,
     /// −log L of the lines with no transient.
     cost: f64,
@@ -286,7 +286,8 @@ impl TransientResponse {
         [of_changes, transfer * self.mean_forces(omega)]
     }
 
-    /// Returns the mean of the forces W on the modes for unit changes, modes × 2 modes.
+    /// Returns the mean of the forces W on the modes for unit changes of the modes over the record,
+    /// modes × 2 modes.
     fn mean_forces(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let Coefficients { poles, correlation, .. } = &self.coefficients;
         let modes = poles.len();
@@ -316,7 +317,7 @@ impl TransientResponse {
 struct TransientKernel {
     /// Response to a force.
     inverse: Complex<f64>,
-    /// Factor L of the change over the record.
+    /// Factor L of the transient, which multiplies the change of the mode over the record.
     leakage: Complex<f64>,
 }
 

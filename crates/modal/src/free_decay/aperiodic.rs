@@ -10,7 +10,7 @@ use super::limits::{FASTEST_DECAY, FREE_DECAY_SURE, RATE_REFINEMENTS, SLOWEST_RE
 /// fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Aperiodic {
-    /// Rates per sample and their standard errors, rising.
+    /// Decay rates, in rising order, each with its standard error, in nepers per sample.
     pub rates: Vec<[f64; 2]>,
     /// Bayesian information criterion of the decays with white noise.
     pub criterion: f64,
@@ -62,7 +62,8 @@ fn criterion(data: &Data, rates: &[f64]) -> Option<f64> {
     Some(information(data, residual.column_iter().map(|e| e.norm_squared()), unknowns))
 }
 
-/// Returns the residual of the decays and the constant.
+/// Returns the residual of the samples after a least-squares fit of decays with these `rates`, and
+/// of a constant if `data` includes one.
 fn residual(data: &Data, rates: &[f64]) -> Option<DMatrix<f64>> {
     let columns = rates.len() + usize::from(data.constant);
     if columns == 0 {

@@ -5,14 +5,14 @@ use nalgebra::Complex;
 
 use super::limits::{MOST_ORDER, SAMPLES_PER_ORDER};
 
-/// Noise of one channel as an autoregression; of order 0 it is white.
+/// Noise of one channel as an autoregression; order 0 is white noise.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Autoregression {
-    /// Coefficients of the best predictions from the preceding 1, 2 … samples; the coefficient of
-    /// the latest sample is the first.
+    /// Coefficients of the best prediction from p preceding samples, one list for each order p = 0,
+    /// 1, …; each list begins with the coefficient of the latest sample.
     predictors: Vec<Vec<f64>>,
-    /// Standard deviation of the error of each prediction from 0, 1 … samples, relative to that of
-    /// the last prediction in the list.
+    /// Standard deviation of the prediction error for each order p = 0, 1, …, relative to the
+    /// standard deviation for the highest order.
     deviations: Vec<f64>,
 }
 
@@ -59,7 +59,7 @@ impl Autoregression {
         Self { predictors, deviations }
     }
 
-    /// Number of samples that each sample depends on.
+    /// Returns the order: the number of preceding samples on which each sample depends.
     pub(super) fn order(&self) -> usize {
         self.predictors.len().saturating_sub(1)
     }

@@ -23,7 +23,7 @@ pub struct Backbone {
     /// Modes of the linear model that the backbone replaces: their indices among all modes by
     /// rising frequency.
     pub modes: Vec<usize>,
-    /// Frequency and damping from the first amplitude down to the last one above the noise.
+    /// Frequency and damping, from the first amplitude down to the last amplitude above the noise.
     pub points: Vec<BackbonePoint>,
     /// Number of unknowns of the slow flow and of its amplitudes; the unknowns of other modes are
     /// not counted.
@@ -94,7 +94,7 @@ fn horner(coefficients: &[f64], u: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * u + c)
 }
 
-/// Record minus the response of all modes that are not replaced, before it is whitened.
+/// Record minus the response of all modes that the backbone does not replace, without whitening.
 struct Target<'a> {
     data: &'a Data,
     fit: &'a Fit,
@@ -184,7 +184,7 @@ impl<'a> Target<'a> {
         Some(DMatrix::from_columns(&columns.collect::<Option<Vec<_>>>()?))
     }
 
-    /// Searches for the flow with the smallest sum of squared residuals.
+    /// Searches for the slow flow with the smallest sum of squared residuals.
     fn settled(&self, start: Flow) -> Option<Fitted> {
         let mut best = self.fitted(start)?;
         for _ in 0..BACKBONE_STEPS {

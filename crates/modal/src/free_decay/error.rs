@@ -11,9 +11,9 @@ pub enum FreeDecayError {
         "the record has {samples} samples, but at most {most} can be fitted: use a part of it, or every n-th sample"
     )]
     TooLong {
-        /// Samples of the record.
+        /// Number of samples of the record.
         samples: usize,
-        /// Samples that can be fitted.
+        /// Maximum number of samples that can be fitted.
         most: usize,
     },
     /// A channel is constant.
@@ -43,7 +43,7 @@ pub enum FreeDecayError {
         message::count(*samples, "sample")
     )]
     NoDecay {
-        /// Samples of the record.
+        /// Number of samples of the record.
         samples: usize,
         /// Twice the gain in log-likelihood due to the best oscillation, a pure number.
         gained: f64,
@@ -58,12 +58,15 @@ pub enum FreeDecayError {
     ExcitedAgain {
         /// Time of the second excitation, in s from the first sample of the record.
         seconds: f64,
-        /// Probability of so large a prediction error in a response without a second excitation, a
-        /// pure number.
+        /// Probability that a response without a second excitation has such a large prediction
+        /// error, a pure number.
         p_value: f64,
     },
     /// A response returns to rest without oscillation.
-    #[error("the response does not oscillate: {} it better than oscillations", returns(rates))]
+    #[error(
+        "the response does not oscillate: {} the response better than oscillations",
+        returns(rates)
+    )]
     NoOscillation {
         /// One or two decay rates, in rising order, each with its standard error, in 1/s.
         rates: Vec<[f64; 2]>,
@@ -89,7 +92,7 @@ pub enum FreeDecayError {
         if *searches == 1 { "one search".to_owned() } else { format!("{searches} searches") }
     )]
     NotConverged {
-        /// Number of searches, each from another start.
+        /// Number of searches, each from a different initial estimate.
         searches: usize,
         /// Maximum number of steps of the first search.
         steps: usize,
@@ -100,8 +103,8 @@ pub enum FreeDecayError {
 }
 
 impl FreeDecayError {
-    /// Returns the error with times from an instant that is `seconds` (s) before the first sample
-    /// of the record.
+    /// Returns the error with its times counted from an instant that is `seconds` (s) before the
+    /// first sample of the record.
     #[must_use]
     pub fn from_earlier(self, seconds: f64) -> Self {
         match self {

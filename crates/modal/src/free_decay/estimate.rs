@@ -137,7 +137,7 @@ impl FreeDecayEstimate {
 /// Covariance of the unknowns of a fit.
 struct Spread<'a> {
     fit: &'a Fit,
-    /// Covariance of growth and turn of each pole, times N².
+    /// Covariance of N·`growth` and N·`turn` of all poles, for N samples.
     poles: DMatrix<f64>,
     /// Derivatives of the linear unknowns of each channel with respect to the poles.
     slopes: Vec<DMatrix<f64>>,
@@ -192,7 +192,8 @@ impl<'a> Spread<'a> {
         let mut through_poles = DVector::zeros(self.poles.nrows());
         let mut variance = 0.0;
         for (channel, weight) in weights {
-            // A = a − i b.
+            // The complex amplitude is A = a − i b, where a and b are the amplitudes of cosine and
+            // sine.
             let (cos, sin) = (weight.re, weight.im);
             let slopes = &self.slopes[*channel];
             through_poles += slopes.row(2 * mode).transpose() * cos;
@@ -219,7 +220,8 @@ pub(super) fn estimate(
     scale: &[f64],
 ) -> Option<Result<FreeDecayEstimate, FreeDecayError>> {
     let spread = Spread::new(data, fit)?;
-    // The scales are relative to the largest one, because its square may overflow.
+    // The scales are divided by the largest scale, because the square of a large scale may
+    // overflow.
     let unit = scale.iter().copied().fold(0.0, f64::max);
     let relative: Vec<f64> = scale.iter().map(|scale| scale / unit).collect();
     let energies = energies(data, fit, &relative);
@@ -344,7 +346,7 @@ fn channel(
         offset: if data.constant { scale * linear[linear.len() - 1] } else { 0.0 },
         noise: scale * (square / len).sqrt(),
         noise_order: noise.order(),
-        // Channels have unit variance.
+        // Each channel has unit variance, so `square / len` is the unexplained fraction.
         explained: 1.0 - square / len,
         whiteness: whiteness(&white, lags)?,
         onset: Onset::new(&white),

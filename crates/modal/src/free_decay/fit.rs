@@ -40,12 +40,12 @@ pub(super) struct ChannelFit {
     pub square: f64,
     /// Triangular factor of the linear columns.
     pub factor: DMatrix<f64>,
-    /// Part of the derivatives in the space of the linear columns. The derivatives are those with
-    /// respect to growth and turn of each pole, times N.
+    /// Components of the derivatives in the space of the linear columns. The derivatives are those
+    /// with respect to N·`growth` and N·`turn` of each pole, for N samples.
     pub along: DMatrix<f64>,
-    /// Part of the derivatives orthogonal to the linear columns.
+    /// Components of the derivatives orthogonal to the linear columns.
     pub across: DMatrix<f64>,
-    /// Components of the residual along the orthogonal parts of the derivatives.
+    /// Components of the residual in the same orthogonal directions as the rows of `across`.
     pub side: DVector<f64>,
 }
 
@@ -81,7 +81,7 @@ impl Data {
     }
 
     /// Returns the triangular factor of \[linear columns | columns of poles times k/N | channels\]
-    /// from sample `from` on, with the channels as in `white`.
+    /// from sample `from` on; the channels are those of `white`.
     fn triangle(
         &self,
         poles: &[Pole],
@@ -138,9 +138,9 @@ impl Data {
         few.is_none_or(|columns| columns.merge_into(&mut factor)).then_some(factor)
     }
 
-    /// Returns the triangular factor of one channel after whitening: from the common factor of all
-    /// rows from sample `from` on, and from the rows before, which have fewer predecessors than the
-    /// autoregression.
+    /// Returns the triangular factor of one channel after whitening. The common factor of all
+    /// channels contains the rows from sample `from` on. The rows before this sample are whitened
+    /// separately, because they have fewer preceding samples than the order of the autoregression.
     fn whitened_triangle(
         &self,
         poles: &[Pole],
@@ -320,12 +320,12 @@ impl Fit {
     }
 }
 
-/// Triangular factor of the rows in which only some of the poles have not decayed.
+/// Triangular factor of rows in which some poles have decayed; decayed poles have no columns.
 struct FewColumns {
-    /// Indices of these poles among all poles.
+    /// Indices, among all poles, of the poles that have not decayed.
     alive: Vec<usize>,
     poles: Vec<Pole>,
-    /// Indices of their columns among the columns of all poles.
+    /// Index of each column of `factor` among the columns of all poles and channels.
     columns: Vec<usize>,
     width: usize,
     factor: TriangularFactor,
@@ -345,7 +345,8 @@ impl FewColumns {
         Self { alive, poles, columns, width, factor }
     }
 
-    /// Adds the rows to the triangle of all poles; returns `false` if a square overflows.
+    /// Adds the rows of `factor` to the triangular factor of all poles; returns `false` if a square
+    /// overflows.
     fn merge_into(self, whole: &mut TriangularFactor) -> bool {
         let r = self.factor.r();
         let mut rows = DMatrix::zeros(r.nrows(), self.width);
@@ -356,8 +357,9 @@ impl FewColumns {
     }
 }
 
-/// Returns a matrix of coefficients. With these coefficients, the columns times k/N give the
-/// derivatives of a channel with respect to growth and turn of each pole, times N.
+/// Returns a matrix of coefficients. The columns of the poles, times k/N at sample k, and
+/// multiplied by this matrix, are the derivatives of a channel with respect to N·`growth` and
+/// N·`turn` of each pole.
 fn slopes(linear: &DVector<f64>, nonlinear: usize) -> DMatrix<f64> {
     let mut slopes = DMatrix::zeros(nonlinear, nonlinear);
     for at in (0..nonlinear).step_by(2) {
@@ -380,7 +382,7 @@ fn damped_step(
     let mut stacked = DMatrix::zeros(rows + columns, columns + 1);
     stacked.view_mut((0, 0), (rows, columns)).copy_from(jacobian);
     stacked.view_mut((0, columns), (rows, 1)).copy_from(side);
-    // A minimum damping keeps the diagonal away from zero.
+    // A minimum Levenberg–Marquardt damping keeps the diagonal of the factor away from zero.
     for j in 0..columns {
         stacked[(rows + j, j)] = damping.max(1e-14).sqrt();
     }
@@ -397,7 +399,8 @@ mod tests {
 
     use super::*;
 
-    /// Record of two channels that covers several segments, with noise of different colours.
+    /// Returns a record of two channels with noise of different colours; it is longer than one
+    /// segment.
     fn record(len: usize) -> DMatrix<f64> {
         let white = noise::white(Sampling::new(1.0, len).unwrap(), 2, 1.0, 3).unwrap();
         let mut samples = white.data().clone();

@@ -79,7 +79,8 @@ impl Subspace {
                 let sum = |i: usize, j: usize, from: usize, count: usize| {
                     x.rows(i * stride + from, count).dot(&y.rows(j * stride + from, count))
                 };
-                // Along a diagonal the range of each sum moves by one stride.
+                // Between neighbouring entries of a diagonal, the range of the sum moves by one
+                // stride, so only two short sums are computed.
                 for diagonal in 0..rows {
                     for (i0, j0) in [(diagonal, 0), (0, diagonal)] {
                         let mut value = sum(i0, j0, 0, columns);

@@ -13,7 +13,7 @@ pub(crate) const ESTIMATE_LAGS: usize = 20;
 /// compared with that of the other samples.
 pub(crate) const ONSET_SHARE: usize = 50;
 
-/// Minimum number of samples of the onset.
+/// Minimum number of samples of the onset, the first part of a record.
 pub(crate) const LEAST_ONSET: usize = 10;
 
 /// Number of rows of a block of columns; it limits the memory.
@@ -31,14 +31,16 @@ pub(crate) const DEAD: f64 = 35.0;
 /// Maximum number of steps of a search.
 pub(crate) const MAX_STEPS: usize = 50;
 
-/// Decrease of minus twice the log-likelihood in a step below which the last search ends.
+/// Minimum decrease of minus twice the log-likelihood in one step of the last search; below it the
+/// search ends.
 pub(crate) const FINE: f64 = 1e-7;
 
-/// Decrease of minus twice the log-likelihood in one step, below which a search ends while numbers
-/// of modes are compared.
+/// Minimum decrease of minus twice the log-likelihood in one step of a search that compares numbers
+/// of modes; below it the search ends.
 pub(crate) const COARSE: f64 = 1e-2;
 
-/// Damping of a step above which a search ends, because no step lowers the cost.
+/// Maximum Levenberg–Marquardt damping of a step; above it the search ends, because no step lowers
+/// the cost.
 pub(crate) const MAX_DAMPING: f64 = 1e8;
 
 /// Maximum residual, relative to the RMS of a channel, that counts as rounding.
@@ -100,7 +102,7 @@ pub(crate) const FIRST_DECAY: f64 = 2.0;
 /// Ratio of the decay of a matched filter to that of the preceding filter.
 pub(crate) const INITIAL_FASTER: f64 = 3.0;
 
-/// Growth, over the record, of the matched filter for a growing response, in nepers.
+/// Growth over the record, in nepers, of the matched filter for a growing response.
 pub(crate) const INITIAL_GROWTH: f64 = 6.0;
 
 /// Lowest order of the polynomials of a backbone: linear and quadratic damping.
@@ -120,11 +122,11 @@ pub(crate) const BACKBONE_POINTS: usize = 8;
 /// represent the same nonlinear mode; its harmonics are farther away.
 pub(crate) const NEIGHBOURHOOD: f64 = 0.5;
 
-/// Minimum amplitude, relative to the first amplitude, of the data for the initial estimate of a
-/// backbone; below it noise dominates.
+/// Minimum amplitude of the data for the initial estimate of a backbone, relative to the first
+/// amplitude; below it noise dominates.
 pub(crate) const SMALLEST_AMPLITUDE: f64 = 1e-3;
 
-/// Minimum decay, over the record, of a response without oscillation, in nepers; a slower change
+/// Minimum decay over the record, in nepers, of a response that does not oscillate; a slower change
 /// counts as drift.
 pub(crate) const SLOWEST_RETURN: f64 = 1.0;
 

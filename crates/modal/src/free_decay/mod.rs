@@ -40,7 +40,8 @@ pub struct FreeDecay {
 }
 
 impl Default for FreeDecay {
-    /// Chooses up to ten modes by the likelihood, with a constant in each channel.
+    /// Returns the default settings: the likelihood chooses up to ten modes, and each channel has a
+    /// constant.
     fn default() -> Self {
         Self { modes: None, max_modes: 10, offset: true }
     }

@@ -28,9 +28,10 @@ pub(super) fn restart(data: &Data, fit: &Fit) -> Option<(usize, f64)> {
     (decrease > 0.0).then_some((sample, decrease))
 }
 
-/// Returns the sample of a second excitation, counted from 0, in a response that coloured noise
-/// describes better than decays, and the p-value of its prediction errors. `None` if no prediction
-/// error is larger than chance allows, or if the response is no decay after this sample.
+/// Returns the sample of a second excitation, counted from 0, and the p-value of the prediction
+/// errors at this sample. The function is for a response that coloured noise describes better than
+/// decays. `None` if no prediction error is larger than chance allows, or if the response after
+/// this sample is not a decay.
 ///
 /// Without an excitation, the free response predicts the next sample from the preceding ones, as an
 /// autoregression does. A hit is an error of this prediction at one sample.
@@ -61,7 +62,8 @@ pub(super) fn shock(data: &Data, fit: &Fit) -> Option<(usize, f64)> {
     (p_value < FALSE_DECAY && decays()?).then_some((sample, p_value))
 }
 
-/// Returns the largest decrease of minus twice the log-likelihood and its sample.
+/// Returns the largest decrease of minus twice the log-likelihood that a second excitation at a
+/// candidate sample causes, and this sample.
 fn best(data: &Data, fit: &Fit, candidates: Vec<usize>) -> Option<(f64, usize)> {
     let sums = sums(data, fit, &candidates);
     let (gram, products) = sums.last()?;
@@ -81,7 +83,8 @@ fn best(data: &Data, fit: &Fit, candidates: Vec<usize>) -> Option<(f64, usize)> 
     candidates.iter().enumerate().filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Returns BᵀB and BᵀX for the rows before each candidate sample; the last entry is for all rows.
+/// Returns BᵀB and BᵀX for the rows before each candidate sample, with the columns B of the poles
+/// and the record X; the last entry is for all rows.
 fn sums(data: &Data, fit: &Fit, candidates: &[usize]) -> Vec<(DMatrix<f64>, DMatrix<f64>)> {
     let linear = linear_columns(&fit.poles, data.constant);
     let mut gram = DMatrix::zeros(linear, linear);
@@ -107,7 +110,7 @@ fn sums(data: &Data, fit: &Fit, candidates: &[usize]) -> Vec<(DMatrix<f64>, DMat
     sums
 }
 
-/// Returns the sum of squares of each channel that the columns explain.
+/// Returns, for each channel, the part of its sum of squares that the columns of the poles explain.
 fn explained(gram: &DMatrix<f64>, products: &DMatrix<f64>) -> Option<Vec<f64>> {
     let scale: DVector<f64> = gram.diagonal().map(|g| if g > 0.0 { g.sqrt().recip() } else { 0.0 });
     let scaling = DMatrix::from_diagonal(&scale);

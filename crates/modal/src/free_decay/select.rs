@@ -14,8 +14,8 @@ use super::poles::{Pole, linear_columns};
 /// decay.
 ///
 /// A decay has two unknowns, and two more per channel. In noise alone, with one independent
-/// frequency for each sample, the best frequency exceeds this decrease with the probability
-/// [`FALSE_DECAY`].
+/// frequency for each sample, the decrease at the best frequency exceeds this minimum with the
+/// probability [`FALSE_DECAY`].
 pub(super) fn least_gain(len: usize, channels: usize) -> f64 {
     let level = FALSE_DECAY / len as f64;
     let distribution = ChiSquared::new(2.0 * channels as f64 + 2.0);
@@ -97,7 +97,7 @@ impl<'a> Search<'a> {
         Self { data, raw: Subspace::new(&centred) }
     }
 
-    /// Returns the fits whose number of decays, at most `most`, has the lowest cost.
+    /// Returns the fits with the lowest cost; the number of decays is at most `most`.
     pub(super) fn best(&self, most: usize) -> Option<Selected> {
         let per_decay = least_gain(self.data.len(), self.data.channels());
         let cost = |of: &Candidate| of.cost + per_decay * of.fit.poles.len() as f64;
@@ -125,8 +125,9 @@ impl<'a> Search<'a> {
         Some(Selected { best, white, first_gain })
     }
 
-    /// Fits a given number of decays, with initial poles from the unwhitened record: an
-    /// autoregression must not replace one of the decays.
+    /// Fits a given number of decays under white noise; the autoregression of the noise is
+    /// estimated last. An autoregression estimated earlier could describe one of the decays as
+    /// noise.
     pub(super) fn exactly(&self, decays: usize) -> Option<Candidate> {
         let raw = |wanted: usize| self.raw.as_ref().map(|raw| raw.poles(wanted));
         let mut fit = self.data.refined(&[], &self.white(), COARSE)?;
@@ -192,7 +193,8 @@ impl<'a> Search<'a> {
         Some(poles)
     }
 
-    /// Returns the fit, or a better fit with the autoregression of its residual.
+    /// Returns the given fit or, if its cost is lower, a fit whose noise is the autoregression of
+    /// the residual.
     fn candidate(&self, mut fit: Fit) -> Candidate {
         let mut best = self.rated(&fit);
         for _ in 0..COLOUR_ROUNDS {
@@ -224,7 +226,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns samples × channels whitened and scaled to unit variance.
+/// Returns the residual (samples × channels) after whitening, scaled to unit variance.
 fn normalised(residual: &DMatrix<f64>, noise: &[Autoregression]) -> DMatrix<f64> {
     let mut white = residual.clone();
     for (mut column, noise) in white.column_iter_mut().zip(noise) {

@@ -82,7 +82,8 @@ mod tests {
 
     use super::*;
 
-    /// Two orthogonal modes of equal size at one frequency, and a third mode at a higher frequency.
+    /// Returns the responses of two orthogonal modes of equal size at one frequency, and of a third
+    /// mode at a higher frequency.
     fn responses(omegas: &[f64]) -> Vec<DMatrix<Complex<f64>>> {
         let shapes = [dvector![1.0, 1.0, 0.5], dvector![1.0, -1.0, 0.0], dvector![0.5, 0.5, -2.0]];
         let at = |omega: f64| {
@@ -103,7 +104,8 @@ mod tests {
         let indicator = complex_mode_indicator(&responses(&[13.5, 10.0, 17.0])).unwrap();
         assert!(indicator[(1, 1)] > 0.3 * indicator[(1, 0)]);
         assert!(indicator[(2, 1)] < 0.05 * indicator[(2, 0)]);
-        // The third mode alone at its resonance: |φ| |φ of the two inputs| / (2 ζ ω²).
+        // The response of the third mode alone, at its resonance, is |φ| |φ of the two inputs| / (2
+        // ζ ω²).
         let alone = 4.5f64.sqrt() * 0.5f64.sqrt() / (0.02 * 289.0);
         assert!((indicator[(2, 0)] / alone - 1.0).abs() < 0.05, "{}", indicator[(2, 0)]);
         assert!(indicator[(2, 0)] > 5.0 * indicator[(0, 0)]);

@@ -21,10 +21,10 @@ use propagation::propagate;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IndicatorError {
-    /// Two sizes that must agree differ.
+    /// Two sizes that must be equal are different.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
-        /// Name of the items counted.
+        /// Name of the counted items.
         what: &'static str,
         /// Number expected.
         expected: usize,
@@ -201,9 +201,9 @@ mod tests {
         let set = DMatrix::from_columns(&[a.clone(), b.clone()]);
         let matrix = mac_matrix(&set, &set).unwrap();
         assert!((matrix - nalgebra::dmatrix![1.0, 0.02; 0.02, 1.0]).norm() < 1e-15);
-        // Perpendicular phases of equal size: φᵀφ = 1 − 1.
+        // Two entries of equal size with a phase difference of 90 degrees give φᵀφ = 1 − 1 = 0.
         assert_eq!(mpc(&shape(&[(1.0, 0.0), (0.0, 1.0)])), 0.0);
-        // All entries are on a line at 30 degrees, with alternating signs.
+        // All entries are on a line at 30 degrees in the complex plane, with alternating signs.
         let line = Complex::cis(std::f64::consts::FRAC_PI_6);
         let line = DVector::from_vec(vec![line, -line * 2.0, line * 0.1]);
         assert!((mean_phase(&line) - std::f64::consts::FRAC_PI_6).abs() < 1e-15);

@@ -72,8 +72,9 @@ pub(crate) fn mac_standard_errors(
 }
 
 /// Returns the derivatives of real and imaginary part (rows) of a complex function of a shape with
-/// respect to the real parts and then the imaginary parts of the entries (columns). `change` is the
-/// derivative for an entry that changes in proportion to 1 or to j.
+/// respect to the real parts and then the imaginary parts of the entries (columns). `change`
+/// returns the derivative of the function if an entry changes in the direction 1 (real) or j
+/// (imaginary).
 fn gradient(
     shape: &DVector<Complex<f64>>,
     change: impl Fn(usize, Complex<f64>) -> Complex<f64>,

@@ -63,7 +63,7 @@ fn found(sampling: Sampling, channels: &[Vec<f64>]) -> Result<FreeDecayEstimate,
     free_decay(&Record::from_channels(sampling, channels).unwrap(), &FreeDecay::default())
 }
 
-/// Without noise, the residual is rounding.
+/// Without noise, only rounding errors remain in the estimates.
 #[test]
 fn exact_decays_are_found_to_rounding() {
     let sampling = Sampling::new(1e-3, 1500).unwrap();
@@ -166,8 +166,8 @@ fn what_is_no_free_decay_is_told() {
     }
 }
 
-/// Low modes at a high sampling rate need a long record, for which a square matrix would not fit
-/// into memory.
+/// Low modes at a high sampling rate need a long record. The modes must be found, although a square
+/// Hankel matrix of this record would not fit into memory.
 #[test]
 fn low_modes_of_a_long_record_are_found() {
     let sampling = Sampling::new(1e-4, 30_000).unwrap();

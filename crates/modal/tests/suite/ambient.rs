@@ -70,9 +70,9 @@ fn all_modes_of_each_quantity_are_found_and_no_other() {
     }
 }
 
-/// With little noise, the lines between zero frequency and the modes have as much weight as the
-/// resonances: the leakage at these lines is larger than the noise, and the spectrum of an
-/// acceleration falls to zero.
+/// All modes of a record with little noise must be found. In such a record, the lines between zero
+/// frequency and the modes have as much weight as the resonances: the leakage at these lines is
+/// larger than the noise, and the spectrum of an acceleration falls to zero.
 #[test]
 fn good_accelerometers_lose_no_mode() {
     let frame = Structure {
@@ -81,7 +81,8 @@ fn good_accelerometers_lose_no_mode() {
         shapes: dmatrix![0.5, 1.0; 1.0, -0.6].map(Complex::from),
         forces: dmatrix![1.0, 0.5; 1.0, -0.6],
     };
-    // In the records of the tower, a chance peak is significant before the leakage is known.
+    // In the records of the tower, a random peak is significant in the first fit, which describes
+    // the leakage only approximately. The fit with the transient must reject this peak.
     for (truth, rate_hz, len, seeds) in
         [(frame, 64.0, 2048, [20, 21, 22]), (tower(), 20.0, 6000, [1001, 1002, 1006])]
     {
@@ -108,9 +109,9 @@ fn mast() -> Structure {
     }
 }
 
-/// Reference: the true modes of twelve records. At least 61 of 72 intervals of 95 % contain them;
-/// 61 is four standard deviations below the expected number. The long study is
-/// `examples/ambient_study`.
+/// Reference: the true frequencies and damping ratios in twelve records. At least 61 of 72
+/// intervals of 95 % must contain the true value; 61 is four standard deviations below the expected
+/// number. The example `examples/ambient_study` is a longer study.
 #[test]
 fn intervals_hold_the_truth() {
     let truth = mast();
@@ -133,8 +134,8 @@ fn intervals_hold_the_truth() {
     assert!(covered >= 61, "{covered} of {all}");
 }
 
-/// A mean over twelve samples filters the record as it would filter the forces: their spectrum has
-/// four zeros in the band.
+/// A moving mean over twelve samples has the same effect on the record as on the forces: the
+/// spectrum has four zeros in the band. The misfit must become significant.
 #[test]
 fn forces_whose_spectrum_is_not_flat_are_seen() {
     let record = mast().record(Quantity::Velocity, 30.0, 6000, 0.05, 60);
@@ -147,6 +148,7 @@ fn forces_whose_spectrum_is_not_flat_are_seen() {
 }
 
 /// The noise of the sensors falls over the band in a way that a few polynomials cannot describe.
+/// The mean error of the first damping ratio must be consistent with its standard error.
 #[test]
 fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
     let truth = tower();
@@ -158,12 +160,13 @@ fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
             (mode.damping_ratio.value - truth.dampings[0]) / standard_error
         })
         .collect();
-    // The sum of four errors has a standard deviation of 2.
+    // Each error is in standard errors, so the sum of four errors has a standard deviation of 2.
     assert!(errors.iter().sum::<f64>().abs() < 6.0, "{errors:?}");
 }
 
-/// Noise that falls steeply, in two records for which the first polynomials and a mode with a damping
-/// ratio of 15 % describe it better than the first polynomials alone.
+/// The noise of two records falls steeply with frequency: the first polynomials and a mode with a
+/// damping ratio of 15 % describe this noise better than the first polynomials alone. Only the four
+/// true modes must be found.
 #[test]
 fn noise_that_falls_steeply_is_no_mode() {
     let noise = Noise { level: 0.1, pole: 0.9 };
@@ -178,10 +181,11 @@ fn noise_that_falls_steeply_is_no_mode() {
     }
 }
 
-/// Two records for which a wrong quantity has the larger maximum of the likelihood, and two for
-/// which the likelihood of independent lines has a false maximum, because the state of a mode
-/// differs much between the two ends of the record. The wrong maxima are at damping ratios of at
-/// most a tenth of the true values.
+/// In two records, the likelihood has a larger maximum for a wrong measured quantity (displacement,
+/// velocity or acceleration) than for the right quantity. In two other records, the likelihood of
+/// independent lines has a false maximum, because the state of a mode differs much between the two
+/// ends of the record. The wrong maxima are at damping ratios of at most a tenth of the true
+/// values; the estimates must be near the true values.
 #[test]
 fn no_resonance_becomes_a_sinusoid() {
     let truth = tower();
@@ -220,8 +224,9 @@ fn halves_of_an_unchanged_structure_agree() {
     }
 }
 
-/// The highest mode is 1 % lower in the second half of the record, as much as half the width of its
-/// resonance; the others do not change.
+/// In the second half of the record, the frequency of the highest mode is 1 % lower, which is half
+/// the width of its resonance; the other modes do not change. Only the intervals of the highest
+/// mode must become wider.
 #[test]
 fn a_mode_that_changes_has_wider_intervals() {
     let truth = tower();
@@ -281,7 +286,8 @@ fn a_harmonic_is_named_and_left_out_on_request() {
     assert!((harmonic.amplitude / amplitude - 1.0).abs() < 0.1, "{harmonic:?}");
     assert!(harmonic.p_value < 1e-5 && harmonic.kurtosis < -1.0, "{harmonic:?}");
     assert_eq!((estimate.modes.len(), is_right(&estimate, &truth)), (4, 4));
-    // If the frequency is stated, the result is the same, and hardly any of the record is lost.
+    // If the frequency of the harmonic is stated, hardly any of the record is lost: the damping
+    // ratios are the same as without the harmonic.
     let stated = AmbientSettings { without_hz: vec![frequency_hz], ..AmbientSettings::default() };
     let again = identified(&disturbed, stated);
     let undisturbed = identified(&record, AmbientSettings::default());
@@ -291,7 +297,8 @@ fn a_harmonic_is_named_and_left_out_on_request() {
         let gap = (mode.damping_ratio.value - other.damping_ratio.value).abs();
         assert!(gap < 0.3 * error, "{gap} {error}");
     }
-    // Otherwise it is reported, and a mode at its frequency has a note.
+    // With the default settings the harmonic is not excluded: it is reported, and a mode at its
+    // frequency has a note.
     let estimate = identified(&disturbed, AmbientSettings::default());
     assert_eq!(estimate.harmonics.len(), 1);
     let at = |f: f64| (f - frequency_hz).abs() < 0.02;
@@ -300,14 +307,15 @@ fn a_harmonic_is_named_and_left_out_on_request() {
     }
 }
 
-/// Resonances are not harmonics if the record has at least 15 of their decay times; the level of
-/// the test allows one false harmonic in a thousand records.
+/// A resonance must not be reported as a harmonic if the record lasts at least 15 decay times of
+/// each mode. The significance level of the harmonic test allows one false harmonic in a thousand
+/// records.
 #[test]
 fn resonances_are_not_taken_for_harmonics() {
     let truth = mast();
     let mut false_alarms = 0;
     for seed in 0..40 {
-        // ζωT is 18 to 37.
+        // The record lasts ζωT = 18 to 37 decay times of the modes.
         let record = truth.record(Quantity::Velocity, 30.0, 2200, 0.05, 90 + seed);
         false_alarms += harmonics(&record, [0.5, 12.0]).unwrap().len();
     }
@@ -336,7 +344,8 @@ fn a_stated_number_of_modes_is_kept() {
     assert_eq!(estimate.modes.len(), 2);
     let reached = |reason: &DropReason| matches!(reason, DropReason::NumberReached { number: 2 });
     assert!(estimate.dropped.iter().any(|dropped| reached(&dropped.reason)));
-    // The other two modes remain in the spectrum, so that they do not bias these two.
+    // The two modes that are not reported remain in the model of the spectrum, so that they do not
+    // bias the two reported modes.
     let all = identified(&record, AmbientSettings::default());
     for mode in &estimate.modes {
         let is_same = |other: &AmbientMode| {

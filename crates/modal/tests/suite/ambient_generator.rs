@@ -49,8 +49,8 @@ impl Structure {
         self.frequencies_hz.iter().zip(&self.dampings).map(pole).collect()
     }
 
-    /// Record of displacements or velocities: the modal states are advanced exactly from sample to
-    /// sample, with the covariance that white forces add in one step.
+    /// Returns a record of displacements or velocities. The modal states are advanced exactly from
+    /// sample to sample; in each step, white forces add a random change with the exact covariance.
     pub fn record(
         &self,
         quantity: Quantity,
@@ -97,7 +97,7 @@ impl Structure {
         with_noise(data, rate_hz, noise.into(), seed)
     }
 
-    /// Record of accelerations: a part of a steady state four times as long under forces that are
+    /// Returns a record of accelerations. It is one quarter of a steady state under forces that are
     /// white up to 90 % of half the sampling rate.
     pub fn accelerations(
         &self,
@@ -151,7 +151,8 @@ fn with_noise(mut data: DMatrix<f64>, rate_hz: f64, noise: Noise, seed: u64) -> 
     Record::new(Sampling::from_rate_hz(rate_hz, len).unwrap(), data).unwrap()
 }
 
-/// Covariance of the real and imaginary parts of the modal states, from a function of λ_a + λ_b.
+/// Returns the covariance of the real and imaginary parts of the modal states; `integral` is a
+/// function of the sum of two poles, λ_a + λ_b.
 fn real_covariance(
     poles: &[Complex<f64>],
     power: &DMatrix<f64>,
@@ -172,7 +173,7 @@ fn real_covariance(
     covariance
 }
 
-/// Returns a root L Lᵀ of a covariance that may be singular.
+/// Returns the lower triangle L of a covariance L Lᵀ that may be singular.
 fn root(covariance: DMatrix<f64>) -> DMatrix<f64> {
     let size = covariance.nrows();
     let ridge = 1e-13 * covariance.diagonal().amax();
@@ -184,8 +185,8 @@ fn complex(parts: &DVector<f64>) -> Vec<Complex<f64>> {
     (0..m).map(|r| Complex::new(parts[r], parts[m + r])).collect()
 }
 
-/// Returns the means over `count` successive samples of a record: its spectrum then has zeros, as
-/// under forces whose spectrum has zeros.
+/// Returns the means over `count` successive samples of a record. The spectrum of these means has
+/// zeros, like a response to forces whose spectrum has zeros.
 pub fn moving_mean(record: &Record, count: usize) -> Record {
     let len = record.len() + 1 - count;
     let mean =

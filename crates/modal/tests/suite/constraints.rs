@@ -1,5 +1,5 @@
-//! Real shapes and reciprocity: true constraints make the intervals shorter, false ones are
-//! rejected. Also changes between two records.
+//! Real shapes and reciprocity: true constraints make the intervals shorter, and false constraints
+//! are rejected. Another test compares the modes of two records, between which one mode changes.
 
 use mechid_modal::compare::{Difference, ModePair};
 use mechid_modal::{DrivingPoint, ModalConstraint, ModalSettings, identify_modes};
@@ -32,11 +32,12 @@ fn true_constraints_hold_and_narrow_the_intervals() {
     ];
     let known = ModalSettings { constraints, ..ModalSettings::default() };
     let (free, constrained) = (Score::of(&case, 0..4), Score::with(&case, 0..4, &known));
-    // 48 tests: two or three of them reject at 5 % by chance.
+    // The true constraints give 48 tests; two or three of these tests reject at 5 % by chance.
     assert_eq!(constrained.tests[0], 48);
     assert!(constrained.tests[1] <= 8, "{:?}", constrained.tests);
     assert!(constrained.shape_coverage() > 88.0, "{}", constrained.shape_coverage());
-    // For the pair 1 % apart, the free shapes are the most uncertain ones.
+    // Without constraints, the shapes of the two modes that are 1 % apart are the most uncertain.
+    // The constraints must not increase the standard error of a damping ratio.
     let [free, constrained] = [free, constrained].map(|score| score.damping.standard_error());
     assert!(constrained.iter().zip(&free).all(|(with, without)| *with < 1.001 * without));
 }
@@ -61,7 +62,7 @@ fn constraints_that_name_no_channel_are_refused() {
 fn a_mode_that_changes_between_two_records_is_named() {
     let case = Case { samples: 4096, ..pair(8) };
     let mut warmer = case.clone();
-    // This is a change of forty standard errors.
+    // A change of 0.2 % is forty standard errors.
     warmer.frequency_hz[1] *= 0.998;
     let estimate =
         |case: &Case, seed| identify_modes(&case.lines(seed), &ModalSettings::default()).unwrap();

@@ -50,7 +50,7 @@ pub struct Case {
     /// Delays of the outputs behind the forces, in samples; the list is repeated if there are more
     /// outputs than delays.
     pub delays: Vec<f64>,
-    /// One record for each struck point instead of one record of all forces.
+    /// `true` for one record for each struck point; `false` for one record with all forces.
     pub roving: bool,
 }
 
@@ -105,7 +105,7 @@ impl Case {
         })
     }
 
-    /// Adds the accelerations of one line of forces, mode by mode.
+    /// Adds to `motion` the accelerations due to the forces on one line, mode by mode.
     fn add_response(
         &self,
         omega: f64,
@@ -243,7 +243,7 @@ impl Case {
     }
 }
 
-/// Real shapes drawn at random, the same for every seed of a case.
+/// Returns random real shapes and random participations, the same for every seed of a case.
 fn structure(
     modes: usize,
     outputs: usize,
@@ -288,7 +288,8 @@ fn case(
     }
 }
 
-/// One accelerometer, one force, five modes in the band and two outside.
+/// Returns a test with one accelerometer, one force, five modes in the band and two modes outside
+/// the band.
 pub fn one_by_one() -> Case {
     let mut case = case(
         "1x1, modes outside the band",
@@ -303,7 +304,7 @@ pub fn one_by_one() -> Case {
     case
 }
 
-/// Six modes, two of them 1 % apart, with two forces.
+/// Returns a test with two forces on a structure with six modes; two of these modes are 1 % apart.
 pub fn pair(outputs: usize) -> Case {
     case(
         if outputs == 8 { "8x2, pair 1 % apart" } else { "30x2, pair 1 % apart" },
@@ -314,7 +315,7 @@ pub fn pair(outputs: usize) -> Case {
     )
 }
 
-/// Three modes with little noise and a strong one 5 % above the band.
+/// Returns a test with little noise: three modes in the band, and a strong mode 5 % above the band.
 pub fn beyond_the_edge() -> Case {
     let mut case = case(
         "8x2, strong mode outside",
@@ -328,12 +329,12 @@ pub fn beyond_the_edge() -> Case {
     case
 }
 
-/// Two forces that act at accelerometers 0 and 3, on a structure with real shapes.
+/// Returns a test with two forces, at accelerometers 0 and 3, on a structure with real shapes.
 pub fn reciprocal() -> Case {
     let mut case = pair(8);
     case.name = "8x2, real and reciprocal";
     for (shape, participation) in case.shape.iter_mut().zip(&mut case.participation) {
-        // No force acts on a node.
+        // The participations are at least 0.5 in modulus, so no force acts at a node of a mode.
         for (point, value) in [0, 3].into_iter().zip(&*participation) {
             shape[point] = C::from(*value);
         }
@@ -341,7 +342,8 @@ pub fn reciprocal() -> Case {
     case
 }
 
-/// Structure with `modes` modes from 20 to 400 Hz, at random distances, and random forces.
+/// Returns a test with random forces on a structure that has `modes` modes at random distances in
+/// the band from 20 to 400 Hz.
 pub fn large([outputs, inputs]: [usize; 2], samples: usize, modes: usize) -> Case {
     let mut normal = Normal::new(5);
     let place = |k: usize, shift: f64| 25.0 * 15f64.powf((k as f64 + 0.4 * shift) / modes as f64);
@@ -363,7 +365,7 @@ pub fn hammer() -> Case {
     case
 }
 
-/// All cases of the study.
+/// Returns all cases of the study.
 pub fn cases() -> Vec<Case> {
     let with = |name, change: &dyn Fn(&mut Case)| {
         let mut case = pair(8);

@@ -1,5 +1,6 @@
-//! Measured records, public ones that are stored beside the project: a steel subframe with two
-//! shakers, the response of a cantilever, and the arm of a CD player under control.
+//! Measured records: a steel subframe with two shakers, the response of a cantilever, and the arm
+//! of a CD player under control. The data are public; they are stored in a folder beside the
+//! project.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -9,20 +10,21 @@ use mechid_signal::{Record, Sampling};
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix};
 
-/// Returns the rows of a file beside the project; `None`, with a message, if it is missing.
+/// Returns the rows of a data file in `../shared/data`, a folder outside the project. If the file
+/// is missing, the function prints a message and returns `None`.
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn rows(file: &str) -> Option<Vec<Vec<f64>>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let Ok(text) = std::fs::read_to_string(folder.join(file)) else {
-        eprintln!("skipped: {file} is not beside the project");
+        eprintln!("skipped: {file} is missing in ../shared/data");
         return None;
     };
     let numbers = |row: &str| row.split(',').map(|field| field.trim().parse().unwrap()).collect();
     Some(text.lines().skip(1).map(numbers).collect())
 }
 
-/// Returns the lines of a part of a record, whose first columns are the forces and whose other
-/// columns are the responses.
+/// Returns the spectral lines of a part of a record. The first `forces` columns of the record are
+/// forces, the other columns are responses.
 fn part(
     rows: &[Vec<f64>],
     [from, to]: [f64; 2],
@@ -66,7 +68,7 @@ fn modes_of_a_part_predict_the_rest() {
     for (output, share) in predicted(&estimate, &rest).into_iter().enumerate() {
         assert!(share > 0.99, "output {output}: {share}");
     }
-    // Known modes of this structure.
+    // Known natural frequencies of this structure, in Hz.
     for known in [62.2, 119.0, 154.7, 156.5] {
         let is_known =
             |mode: &IdentifiedMode| (mode.natural_frequency_hz.value - known).abs() < 0.15;
@@ -91,9 +93,10 @@ fn a_cantilever_has_one_mode_near_its_printed_frequency() {
     assert!(estimate.variance_explained()[0] > 0.99);
 }
 
-/// The arm is in a closed loop, which no sum of modes driven by its inputs describes: the fit
-/// explains nearly all of the part of the record that it was fitted to, and predicts little of the
-/// rest. The halves of the record do not have the modes of the whole record.
+/// The arm is in a closed loop, so a sum of modes driven by the inputs is a wrong model. The fit
+/// must explain more than 90 % of the response power in the part of the record to which it was
+/// fitted, but predict less than 50 % in the other part. The modes of the two halves of the record
+/// must not agree.
 #[test]
 fn modes_of_a_controlled_arm_do_not_predict_the_rest() {
     let Some(whole) = cd_arm([0.0, 1.0]) else { return };

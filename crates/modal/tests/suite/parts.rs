@@ -39,7 +39,8 @@ fn parts_of_an_unchanged_structure_agree() {
     }
 }
 
-/// The second mode is 0.2 % lower in the second half of the record; the others do not change.
+/// The frequency of the second mode is 0.2 % lower in the second half of the record; the other
+/// modes do not change. Only the intervals of the second mode must become wider.
 #[test]
 fn a_mode_that_changes_has_wider_intervals() {
     let case = pair(8);
@@ -72,8 +73,8 @@ fn a_mode_that_changes_has_wider_intervals() {
     let [error, scaled] =
         [&narrow, &wide.modes()[1]].map(|mode| mode.natural_frequency_hz.standard_error);
     assert!((scaled / error / scales[1] - 1.0).abs() < 1e-12, "{error} {scaled}");
-    // The frequency from the whole record is between those of the halves; only the wider interval
-    // contains the mean of both.
+    // The frequency from the whole record is between the frequencies of the two halves. Only the
+    // wider interval contains the mean of these two frequencies.
     let mean = 0.5 * (case.frequency_hz[1] + softer.frequency_hz[1]);
     let off = (narrow.natural_frequency_hz.value - mean).abs();
     assert!(off < 2.0 * scaled, "{off} {error} {scaled}");

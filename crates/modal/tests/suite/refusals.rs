@@ -70,7 +70,8 @@ fn settings_out_of_range_are_refused() {
     assert!(matches!(refused, Err(ModalError::Setting { setting: "modes", .. })));
 }
 
-/// Short records of noise with any numbers of channels: modes or a reason, but no panic.
+/// Short records of noise, with different numbers of lines and channels, must give modes or an
+/// error with a reason, but no panic.
 #[test]
 fn any_data_gives_modes_or_a_reason() {
     let mut normal = Normal::new(11);

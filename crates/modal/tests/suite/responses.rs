@@ -8,7 +8,8 @@ use nalgebra::{Complex, DVector};
 use crate::generator::{Case, pair};
 
 /// Returns the ratio of the squared errors to the stated variances, both summed over records and
-/// lines. The resonances dominate both sums, as they dominate the response to a force on all lines.
+/// lines. The lines at resonances dominate both sums, as they dominate the response to a force that
+/// acts on all lines.
 fn squared_ratio(case: &Case, seeds: std::ops::Range<u64>) -> f64 {
     let forces = [Complex::new(1.0, 0.0), Complex::new(0.3, -0.8)];
     let (mut squares, mut variances) = (0.0, 0.0);
@@ -28,10 +29,10 @@ fn squared_ratio(case: &Case, seeds: std::ops::Range<u64>) -> f64 {
     squares / variances
 }
 
-/// Reference: the modal sum of the true structure. The ratio is 1 on average; for three records it
-/// scatters by 40 %, because a few resonances dominate the errors. Errors of a pair 0.3 % apart
-/// nearly cancel in the sum of the two modes: if they counted as independent, they would give a
-/// ratio below 0.01.
+/// Reference: the modal sum of the true structure. The ratio of the squared errors to the stated
+/// variances is 1 on average; for three records it scatters by 40 %, because a few resonances
+/// dominate the errors. The errors of two modes 0.3 % apart nearly cancel in the sum of these
+/// modes: if these errors counted as independent, the ratio would be below 0.01.
 #[test]
 fn the_covariance_of_responses_is_that_of_their_errors() {
     let mut close = pair(8);

@@ -111,7 +111,7 @@ impl Score {
         score
     }
 
-    /// Pairs true modes with identified ones, the nearest first, within five half-widths.
+    /// Pairs true modes with identified modes, the nearest pair first, within five half-widths.
     fn pair(&self, case: &Case, modes: &[usize], all: &[IdentifiedMode]) -> Vec<(usize, usize)> {
         let mut distances = Vec::new();
         for (place, &truth) in modes.iter().enumerate() {
@@ -146,7 +146,8 @@ impl Score {
         let (f, z) = (mode.natural_frequency_hz, mode.damping_ratio);
         self.frequency.0[place].push((f.value - case.frequency_hz[truth], f.standard_error));
         self.damping.0[place].push((z.value - case.damping[truth], z.standard_error));
-        // The residue at the point is ψ²; the largest entry of the shape is scaled to 1.
+        // The true modal mass is φ²/ψ²: the residue at the driving point gives ψ², and φ is the
+        // entry of the shape there when the largest entry is 1.
         let is_largest = |value: &C| (value - 1.0).norm() < 1e-12;
         let largest = mode.shape.iter().position(is_largest).unwrap_or(0);
         let shape = &case.shape[truth];
@@ -159,7 +160,8 @@ impl Score {
             self.mass.0[place].push(relative);
         }
         if case.roving {
-            // The residues at the struck points are the shape.
+            // The shape of the single output is 1, so the participations are the residues at the
+            // struck points.
             let scale = C::new(0.0, 2.0 * case.poles()[truth].im);
             let residue = |participation: &f64| case.shape[truth][0] * *participation / scale;
             let s = case.poles()[truth];

@@ -1,5 +1,5 @@
-//! Data other than a record with forces: tables, free decays, roving hammers, and common properties
-//! of all.
+//! Data other than a record with forces: tables, free decays and roving hammers. Other tests check
+//! properties of all kinds of data.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,8 @@ fn largest_deviation(case: &Case, estimate: &ModalEstimate) -> f64 {
     estimate.modes().iter().zip(&modes).map(deviation).fold(0.0, f64::max)
 }
 
-// Twelve numbers: by chance, one exceeds 4.5 standard errors once in 12,000 records.
+// Each record gives twelve errors. By chance, one of them exceeds 4.5 standard errors once in
+// 12,000 records.
 const BOUND: f64 = 4.5;
 
 #[test]
@@ -33,7 +34,7 @@ fn table_of_frequency_responses() {
     let estimate = identify_modes(&data, &ModalSettings::default()).unwrap();
     let deviation = largest_deviation(&case, &estimate);
     assert!(deviation < BOUND, "{deviation}");
-    // The synthesised response has no noise and is far closer than the noise of 2 %.
+    // The synthesised response has no noise, and its error is far below the noise of 2 %.
     let omega = data.omega()[700];
     let (model, truth) = (estimate.response(omega), case.response(omega, &case.participation));
     assert!((&model - &truth).norm() < 0.01 * truth.norm());
@@ -48,7 +49,8 @@ fn free_decay_without_forces() {
     assert!(estimate.modes().iter().all(|mode| mode.driven_share.is_none()));
 }
 
-/// The modes outside the band are much stronger than the noise in the band.
+/// The modes outside the band are much stronger than the noise in the band. They must not bias the
+/// modes in the band.
 #[test]
 fn free_decays_in_a_band_have_residual_terms() {
     let pair = pair(4);
@@ -114,7 +116,8 @@ fn number_and_frequencies_can_be_stated() {
     let four = ModalSettings { modes: Some(4), ..ModalSettings::default() };
     let four = identify_modes(&data, &four).unwrap();
     assert_eq!(four.modes().len(), 4);
-    // The other two modes remain in the model, so that they do not bias the four.
+    // The two modes that are not requested remain in the model, so that they do not bias the four
+    // requested modes.
     for mode in four.modes() {
         let is_same = |other: &mechid_modal::IdentifiedMode| {
             let difference = mode.damping_ratio.value - other.damping_ratio.value;
@@ -129,8 +132,9 @@ fn number_and_frequencies_can_be_stated() {
     assert!((hz[0] - 87.0).abs() < 0.01 && (hz[1] - 305.0).abs() < 0.02, "{hz:?}");
 }
 
-/// Mains hum that the forces do not cause. If the model did not contain the hum, the standard error
-/// of the mode next to it would be fifty times as large.
+/// The record contains mains hum that the forces do not cause. The hum must not be reported as a
+/// mode. If the model did not contain the hum, the standard error of the mode next to it would be
+/// fifty times as large.
 #[test]
 fn hum_is_no_mode_and_does_not_widen_the_errors_of_modes() {
     let case = pair(8);
@@ -159,8 +163,8 @@ fn the_rest_of_a_record_is_predicted() {
     for output in 0..8 {
         let share = difference.column(output).norm_squared()
             / other.outputs().column(output).norm_squared();
-        // Noise of 2 % is 4e-4 of the power over all frequencies; coloured noise has more in the
-        // band.
+        // The noise of 2 % has 4e-4 of the power of the output over all frequencies. The fraction
+        // in the band is larger, because the noise is coloured.
         assert!(share < 1.5e-3, "output {output}: {share}");
     }
 }

@@ -14,9 +14,10 @@ use rayon::prelude::*;
 const LEN: usize = 1000;
 /// Time step, in s.
 const DT: f64 = 0.002;
-/// Minimum ratio of the amplitude of a mode, over all channels, to its standard error at the bound.
+/// Minimum ratio of the amplitude of a mode to its standard error at the Cramér–Rao bound, combined
+/// over all channels; responses with a weaker mode are not used.
 const VISIBLE: f64 = 10.0;
-/// Coefficient of coloured noise.
+/// Coefficient a of the coloured noise x_k = a x_{k−1} + e_k.
 const COLOUR: f64 = 0.9;
 
 /// Kind of experiment.
@@ -38,14 +39,14 @@ pub struct Outcome {
     pub runs: usize,
     pub too_few: usize,
     pub too_many: usize,
-    /// Errors divided by the standard deviation of the bound: of frequencies, then of damping
-    /// ratios.
+    /// Errors divided by the standard deviations of the Cramér–Rao bound: first of the frequencies,
+    /// then of the damping ratios.
     pub errors: [Vec<f64>; 2],
     /// Number of intervals that contain the true value, and number of all intervals: for
     /// frequencies, damping ratios, and the parts of shape entries.
     pub held: [[usize; 2]; 3],
-    /// Number of tested residuals. The field `alarms` counts those that are not white, and those
-    /// that are larger at the beginning, both with p < 0.01.
+    /// Number of tested residuals. The field `alarms` counts the residuals that are not white, and
+    /// the residuals that are larger at the beginning, both with p < 0.01.
     pub tested: usize,
     pub alarms: [usize; 2],
 }
@@ -127,7 +128,8 @@ impl Case {
     }
 
     /// Returns a response whose modes are all visible, its samples, the standard deviation of the
-    /// noise of each channel, and the bounds of frequency (Hz) and damping ratio of each mode.
+    /// noise of each channel, and the Cramér–Rao bounds of frequency (Hz) and damping ratio of each
+    /// mode.
     fn visible(&self, rng: &mut ChaCha8Rng) -> (Truth, DMatrix<f64>, Vec<f64>, Vec<[f64; 2]>) {
         loop {
             let truth = self.draw(rng);
@@ -183,8 +185,8 @@ impl Truth {
         })
     }
 
-    /// Returns the bounds of frequency and damping ratio of each mode; `None` if a mode is too weak
-    /// to be visible.
+    /// Returns the Cramér–Rao bounds of frequency and damping ratio of each mode; `None` if a mode
+    /// is too weak to be visible.
     ///
     /// The bounds follow from the information of all samples about the real parameters: σ and ω of
     /// each mode and, for each channel, the real and imaginary part of each amplitude and the
@@ -281,12 +283,12 @@ impl Truth {
     }
 }
 
-/// Half the width of a 95 % interval in standard errors, for many degrees of freedom.
+/// Returns half the width of a 95 % interval, in standard errors, for many degrees of freedom.
 fn student(degrees_of_freedom: usize) -> f64 {
     1.96 + 2.4 / degrees_of_freedom as f64
 }
 
-/// Noise of unit variance.
+/// Returns noise of unit variance.
 pub fn noise(rng: &mut ChaCha8Rng, coloured: bool) -> Vec<f64> {
     let mut normal = || {
         // Box & Muller.
@@ -302,7 +304,7 @@ pub fn noise(rng: &mut ChaCha8Rng, coloured: bool) -> Vec<f64> {
     x
 }
 
-/// Number of records of noise alone in which modes are identified.
+/// Returns the number of records of pure noise in which modes are identified by mistake.
 pub fn found_in_noise(channels: usize, coloured: bool, runs: u64) -> usize {
     let found = |seed: &u64| {
         let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
@@ -324,13 +326,13 @@ impl Outcome {
         self.held.map(|[held, all]| 100.0 * held as f64 / all as f64)
     }
 
-    /// Share of the residuals that are not white, and of those that are larger at the beginning, in
-    /// %.
+    /// Share of the residuals that are not white, and share of the residuals that are larger at the
+    /// beginning, in %.
     pub fn alarm_rates(&self) -> [f64; 2] {
         self.alarms.map(|alarms| 100.0 * alarms as f64 / self.tested as f64)
     }
 
-    /// Root mean square of the ratio of error to bound, for frequency and damping ratio.
+    /// Root mean square of the ratio of error to Cramér–Rao bound, for frequency and damping ratio.
     pub fn scatter(&self) -> [f64; 2] {
         let rms = |e: &Vec<f64>| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
         [rms(&self.errors[0]), rms(&self.errors[1])]
