@@ -139,7 +139,7 @@ pub enum IntegrateError {
     FactorsTooLarge {
         /// Degrees of freedom of the system.
         dof: usize,
-        /// Memory that factors without exchanges of rows take, in bytes; exchanges add to it.
+        /// Memory of the factors without row exchanges, in bytes; row exchanges need more memory.
         bytes: u64,
         /// Limit, in bytes.
         limit: u64,
@@ -283,7 +283,7 @@ pub enum IntegrateError {
         what: &'static str,
     },
     /// The system has more degrees of freedom than the scheme allows.
-    #[error("{scheme} is for at most {}, the system has {dof}", message::count(*most, "degree of freedom"))]
+    #[error("{scheme} allows at most {}, but the system has {dof}", message::count(*most, "degree of freedom"))]
     TooManyDof {
         /// Name of the scheme.
         scheme: &'static str,

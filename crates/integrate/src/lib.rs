@@ -31,15 +31,15 @@
 //! ```
 //!
 //! `mechid-model` has the systems and `mechid-signal` the forces: a program that uses this crate
-//! depends on them, too.
+//! also depends on these two crates.
 //!
 //! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`] does
 //! the work that depends on the system and the step once and returns a [`Stepper`], whose steps do
 //! not allocate. A [`System`] is dense or sparse; a [`SystemWithForces`] also has nonlinear forces.
 //! [`integrate()`] and [`integrate_periodic`] simulate a sampled force, [`integrate_function`] and
-//! [`integrate_periodic_function`] a function of time, [`integrate_selected`] some degrees of
-//! freedom of many. [`spectral_radius`], [`critical_step`] and [`accuracy()`] give the effect of a
-//! step on the motion.
+//! [`integrate_periodic_function`] a function of time, [`integrate_selected`] returns only some of
+//! the degrees of freedom. [`spectral_radius`], [`critical_step`] and [`accuracy()`] give the
+//! effect of the time step on the motion.
 
 mod error;
 mod limits;

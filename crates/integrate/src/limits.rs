@@ -7,16 +7,17 @@
 /// are.
 pub(crate) const DENSE_DOF: usize = 64;
 
-/// Fraction of non-zero entries below which the dense matrices of a larger system are converted to
-/// sparse matrices.
+/// Maximum fraction of non-zero entries for which the dense matrices of a system with more than
+/// [`DENSE_DOF`] degrees of freedom are converted to sparse matrices.
 pub(crate) const SPARSE_FRACTION: f64 = 0.1;
 
-/// Maximum number of diagonals of a matrix that is factored by band. At this width, solutions for a
-/// two-dimensional grid take about as long with a band as with other factors, and the band of
+/// Maximum number of diagonals of a matrix that is factored in band form. At this width, solutions
+/// for a two-dimensional grid take about as long with a band as with other factors, and the band of
 /// 100,000 degrees of freedom takes 0.4 GB.
 pub(crate) const BAND_DIAGONALS: usize = 256;
 
-/// Maximum number of diagonals of a band that is always factored by band: no other form is faster.
+/// Maximum number of diagonals of a matrix that is always factored in band form; no other form is
+/// faster.
 pub(crate) const NARROW_BAND_DIAGONALS: usize = 32;
 
 /// Smallest ratio of a diagonal entry to the largest entry of its column for which the diagonal
@@ -49,7 +50,8 @@ pub(crate) const SECANT_STEPS: usize = 12;
 /// the residual is mostly rounding.
 pub(crate) const SECANT_UPDATE: f64 = 1e3;
 
-/// Number of steps that the general stepper takes after an unsolved step of fixed size.
+/// Number of steps that the general stepper takes after the equation of a step of fixed size was
+/// not solved; then steps of fixed size are tried again.
 pub(crate) const GENERAL_STEPS: usize = 16;
 
 /// Number of computed values between two log messages about the progress.
@@ -61,8 +63,8 @@ pub(crate) const NUMBERS_PER_MESSAGE: usize = 1 << 20;
 /// ends.
 pub(crate) const STEP_RESIDUAL: f64 = 1e-12;
 
-/// Residual, relative to the largest acceleration, that is accepted if no Newton step reduces it: a
-/// small difference of large displacements has a rounding error.
+/// Largest residual, relative to the largest acceleration, that is accepted if no Newton step
+/// reduces it. It allows for the rounding error of a small difference of large displacements.
 pub(crate) const STEP_RESIDUAL_ROUNDING: f64 = 1e-9;
 
 /// Maximum number of Newton steps.
@@ -120,8 +122,8 @@ pub(crate) const ORBIT_GMRES_RESIDUAL: f64 = 1e-4;
 /// acceleration, at which Newton's method ends.
 pub(crate) const ORBIT_GAP: f64 = 1e-11;
 
-/// Change of the state over a period, relative as for [`ORBIT_GAP`], that is accepted if no Newton
-/// step reduces it.
+/// Largest change of the state over a period, relative as for [`ORBIT_GAP`], that is accepted if no
+/// Newton step reduces this change.
 pub(crate) const ORBIT_GAP_ROUNDING: f64 = 1e-8;
 
 /// Maximum number of Newton steps to a periodic orbit.
@@ -130,7 +132,8 @@ pub(crate) const ORBIT_NEWTON_STEPS: usize = 40;
 /// Smallest fraction of a Newton step that is tried before the search ends.
 pub(crate) const ORBIT_NEWTON_FRACTION: f64 = 1.0 / 64.0;
 
-/// Error of the Floquet multipliers of a derivative formed as a matrix, relative to the largest.
+/// Error of the Floquet multipliers, relative to the largest multiplier, if they are the
+/// eigenvalues of a derivative that is formed as a matrix.
 pub(crate) const MONODROMY_ERROR: f64 = 1e-9;
 
 /// Residual of the largest Floquet multiplier at which Arnoldi's iteration ends: relative to the
@@ -171,8 +174,9 @@ pub(crate) const EXCEEDED_LIMIT: f64 = 1.0 + 1e-8;
 /// Largest relative difference of two mirrored entries of a matrix that counts as symmetric.
 pub(crate) const ASYMMETRY: f64 = 1e-12;
 
-/// Negative eigenvalue of C or K, relative to the size of its rows, that counts as rounding. For K,
-/// the slowest motion may then grow at a rate of 3·10⁻⁷ of the highest natural frequency.
+/// Largest modulus of a negative eigenvalue of C or K, relative to the size of the rows of the
+/// matrix, that counts as rounding. For K, the slowest motion may then grow at a rate of 3·10⁻⁷ of
+/// the highest natural frequency.
 pub(crate) const SEMIDEFINITE_SHIFT: f64 = 1e-13;
 
 /// Maximum number of Lanczos steps to the highest frequency.
@@ -181,8 +185,8 @@ pub(crate) const LANCZOS_STEPS: usize = 100;
 /// Relative width to which the highest eigenvalue is enclosed by factorisations.
 pub(crate) const ENCLOSURE_WIDTH: f64 = 1e-4;
 
-/// First relative step of the upper end of the enclosure of the highest eigenvalue; each later step
-/// is twice as large.
+/// First relative increase of the upper bound of the highest eigenvalue; each later increase is
+/// twice the previous one.
 pub(crate) const ENCLOSURE_STEP: f64 = 0.01;
 
 /// Maximum number of factorisations for each end of the enclosure.
@@ -197,12 +201,12 @@ pub(crate) const GROWTH_VECTORS: usize = 40;
 /// Number of vectors between two evaluations of the growth.
 pub(crate) const GROWTH_CHECK_INTERVAL: usize = 5;
 
-/// Excess of a growth factor over 1 that counts as rounding, as for the double eigenvalue 1 of a
-/// free body.
+/// Largest excess of a growth factor over 1 that counts as rounding, for example of the double
+/// eigenvalue 1 of a free body.
 pub(crate) const GROWTH_ROUNDING: f64 = 1e-4;
 
-/// Norm after one period below which a motion has vanished; the square of this norm is still a
-/// normal number.
+/// Norm after one period below which a motion counts as vanished; the square of this norm is still
+/// a normal floating-point number.
 pub(crate) const VANISHED_MOTION: f64 = 1e-150;
 
 /// Number of periods over which a motion is followed if the search leaves its growth undecided.
@@ -224,8 +228,8 @@ pub(crate) const RIGID_BODY_MODES: usize = 6;
 /// Shift for a free structure, relative to the highest natural frequency.
 pub(crate) const FREE_SHIFT: f64 = 1e-3;
 
-/// Ratio of the frequencies searched for to the unit of the velocities (rad/s). Above it, the unit
-/// is changed.
+/// Maximum ratio of the frequency of the modes searched for to the scale of the velocities (both in
+/// rad/s); the search divides velocities by this scale. Above this ratio, the scale is changed.
 pub(crate) const VELOCITY_SCALE_RATIO: f64 = 10.0;
 
 /// Number of inverse iterations that estimate the lowest natural frequency.

@@ -20,7 +20,7 @@ pub trait System: Sync {
         &[]
     }
 
-    /// Memory that factors of its matrices may take, in bytes.
+    /// Maximum memory for the factors of the matrices of the system, in bytes.
     fn factor_limit(&self) -> u64 {
         match self.matrices() {
             Matrices::Dense(_) => SparseSystem::FACTOR_LIMIT,

@@ -46,7 +46,8 @@ pub(crate) fn phi_divided(k: usize, a: C, b: C) -> C {
     (phi_divided(k - 1, large, small) - phi(k, small)) / large
 }
 
-/// Returns Σ_j h_j(a, b) / (j + k + 1)! with h_j the sum of all products of j factors a or b.
+/// Returns Σ_j h_j(a, b) / (j + k + 1)! where h_j is the sum of all products of j factors, each of
+/// them a or b.
 fn series(k: usize, a: C, b: C) -> C {
     let mut sum = C::from(0.0);
     let (mut products, mut power) = (C::from(1.0), C::from(1.0));
@@ -78,8 +79,8 @@ mod tests {
 
     const PANELS: usize = 400;
 
-    /// φ_k[a, b] = ∫₀¹ φ_k′(b + s (a − b)) ds by Simpson's rule, with φ_k′ from its series
-    /// Σ (j + 1) z^j / (j + k + 1)! summed to the end.
+    /// Returns φ_k[a, b] = ∫₀¹ φ_k′(b + s (a − b)) ds by Simpson's rule; φ_k′(z) is the sum of 120
+    /// terms of its series Σ (j + 1) z^j / (j + k + 1)!.
     fn by_quadrature(k: usize, a: C, b: C) -> C {
         let derivative = |z: C| {
             let (mut sum, mut power, mut weight) =
@@ -127,13 +128,14 @@ mod tests {
             let a = C::new(re, im);
             let b = a + C::from_polar(10f64.powf(log_gap), angle);
             let (found, expected) = (phi_divided(k, a, b), by_quadrature(k, a, b));
-            // Simpson's remainder, with every derivative of φ_k below exp of the largest real
-            // part, and the rounding of a series with terms up to e⁹.
+            // The tolerance is the sum of two errors: the remainder of Simpson's rule (no
+            // derivative of φ_k exceeds exp of the largest real part) and the rounding of a series
+            // with terms up to e⁹.
             let size = a.re.max(b.re).max(0.0).exp();
             let simpson = ((a - b).norm() / PANELS as f64).powi(4) / 180.0 * size;
             let tolerance = simpson + 1e-11 * size;
             prop_assert!((found - expected).norm() < tolerance, "{} {}", found, expected);
-            // The neighbours must agree with each other to rounding.
+            // The values for two neighbouring b must agree to rounding.
             let step = phi_divided(k, a, b) - phi_divided(k, a, b * (1.0 + 1e-15));
             prop_assert!(step.norm() < 1e-13 * size);
         }

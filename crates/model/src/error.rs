@@ -14,11 +14,11 @@ pub enum ModelError {
     Shape {
         /// Matrix concerned.
         matrix: Matrix,
-        /// Number of its rows.
+        /// Number of rows of the matrix.
         rows: usize,
-        /// Number of its columns.
+        /// Number of columns of the matrix.
         columns: usize,
-        /// Degrees of freedom expected.
+        /// Expected number of degrees of freedom.
         dof: usize,
     },
     /// A matrix entry is NaN or infinite.
@@ -80,7 +80,7 @@ pub enum ModelError {
     StateLength {
         /// Number of entries found.
         got: usize,
-        /// Degrees of freedom expected.
+        /// Expected number of degrees of freedom.
         dof: usize,
     },
     /// An initial displacement or velocity is NaN or infinite.
@@ -121,7 +121,7 @@ pub enum ModelError {
         "M⁻¹K or M⁻¹C has an entry of size {largest:.1e}, too large for the computation of eigenvalues"
     )]
     StateMatrixOverflow {
-        /// Largest modulus of an entry, in 1/s or its square.
+        /// Largest modulus of an entry, in 1/s² for M⁻¹K or 1/s for M⁻¹C.
         largest: f64,
     },
     /// The eigenvalue or singular value iteration did not converge.
@@ -155,7 +155,7 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
-    /// No entry of M, C or K has this name.
+    /// No entry of M, C or K has the name of the requested parameter.
     #[error(
         "a system of {} has no parameter `{name}`: its parameters are {}",
         message::count(*dof, "degree of freedom"),
@@ -170,9 +170,9 @@ pub enum ModelError {
     /// A covariance does not have one row and column per parameter.
     #[error("the covariance is {rows}×{columns} for {}", message::count(*parameters, "parameter"))]
     CovarianceShape {
-        /// Number of its rows.
+        /// Number of rows of the matrix.
         rows: usize,
-        /// Number of its columns.
+        /// Number of columns of the matrix.
         columns: usize,
         /// Number of parameters named.
         parameters: usize,
@@ -212,7 +212,7 @@ pub enum ModelError {
     /// The number of coefficients differs from the number of nonlinear terms, or a coefficient is
     /// not finite.
     #[error(
-        "{} for {}: give one finite number for each",
+        "{} for {}: give one finite coefficient for each term",
         message::count(*got, "coefficient"), message::count(*terms, "nonlinear term")
     )]
     Coefficients {
@@ -237,7 +237,7 @@ pub enum ModelError {
     Numerics(#[from] mechid_numerics::NumericsError),
 }
 
-/// Returns the first and the last name of the entries for `dof` degrees of freedom.
+/// Returns the name of the first and of the last entry of a system with `dof` degrees of freedom.
 fn names(dof: usize) -> String {
     let last = dof.saturating_sub(1);
     let entry = |matrix, at| Parameter::new(matrix, at, at, dof).map(|entry| entry.to_string());

@@ -97,7 +97,7 @@ mod tests {
         }
         assert!(s.receptance(1.0 + 1e-9).is_ok());
         assert!(matches!(s.receptance(f64::NAN), Err(ModelError::Parameter { .. })));
-        // ω² overflows: refused, not returned as NaN.
+        // Here ω² overflows; the function must return an error instead of NaN.
         assert!(s.receptance(1e200).is_err());
     }
 }

@@ -172,7 +172,8 @@ mod tests {
 
     #[test]
     fn the_sign_of_kyx_moves_the_eigenvalues() {
-        // Five decimals are known: half a unit of the last.
+        // The reference values have five decimals, so the tolerance is half a unit of the fifth
+        // decimal.
         let modes = |sign| JournalBearing::new(14.8, FILM, sign).unwrap().system().modes().unwrap();
         let minus = modes(KyxSign::Minus);
         assert_eq!(minus.len(), 2);

@@ -47,13 +47,14 @@ pub(crate) const BACKBONE_ATTEMPTS: usize = 16;
 /// Change of a parameter for a numerical derivative, in standard errors.
 pub(crate) const PARAMETER_STEP: f64 = 0.1;
 
-/// Maximum real part of an eigenvalue, relative to its modulus, for which it counts as undamped.
+/// Maximum real part of an eigenvalue, relative to its modulus, for which the mode counts as
+/// undamped.
 pub(crate) const UNDAMPED: f64 = 1e-6;
 
 /// Maximum exponent of a power law; the backbone resolves its harmonics up to this exponent.
 pub(crate) const HIGHEST_EXPONENT: u32 = 9;
 
-// Machines of named elements
+// The following limits are for machines that consist of named elements.
 
 /// Maximum order of a matrix of an element: all entries are stored, 0.8 GB for this order.
 #[cfg(feature = "serde")]

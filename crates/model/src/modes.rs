@@ -175,7 +175,7 @@ impl SecondOrderSystem {
 
     fn decomposition(&self) -> Result<Decomposition, ModelError> {
         let mut a = self.state_matrix();
-        // Balancing squares the entries, and does not terminate if an entry is infinite.
+        // Balancing squares the entries, and does not terminate if a square overflows.
         let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
         if largest > 1e150 || a.iter().any(|v| v.is_nan()) {
             return Err(ModelError::StateMatrixOverflow { largest });
@@ -190,7 +190,7 @@ impl SecondOrderSystem {
     /// Returns the fastest growing free response; `None` if all free responses decay or keep their
     /// amplitude.
     ///
-    /// Growth within [`EIGENVALUE_ROUNDING`] of zero counts as rounding.
+    /// A growth rate of at most [`EIGENVALUE_ROUNDING`] times the largest |λ| counts as rounding.
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).
@@ -199,7 +199,8 @@ impl SecondOrderSystem {
         let largest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let fastest = eigenvalues.into_iter().max_by(|p, q| p.re.total_cmp(&q.re));
         let unstable = fastest.filter(|l| l.re > EIGENVALUE_ROUNDING * largest);
-        // The last eigenvalue may be either one of a conjugate pair.
+        // The search may return either eigenvalue of a conjugate pair; the result is the one with
+        // Im λ ≥ 0.
         Ok(unstable.map(|l| Instability { eigenvalue: Complex::new(l.re, l.im.abs()) }))
     }
 
@@ -387,7 +388,7 @@ mod tests {
 
     #[test]
     fn real_eigenvalues_are_modes_of_their_own() {
-        // s² + 5 s + 4.
+        // The equation s² + 5 s + 4 = 0 has the roots −1 and −4.
         let modes = system(dmatrix![1.0], dmatrix![5.0], dmatrix![4.0]).modes().unwrap();
         let found: Vec<f64> = modes.iter().map(|m| m.eigenvalue().re).collect();
         assert!((found[0] + 1.0).abs() < 1e-14 && (found[1] + 4.0).abs() < 1e-14, "{found:?}");

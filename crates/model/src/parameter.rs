@@ -28,7 +28,7 @@ impl Parameter {
     /// `dof`.
     ///
     /// # Errors
-    /// [`ModelError::NoSuchEntry`] if it is outside the matrix.
+    /// [`ModelError::NoSuchEntry`] if the entry is outside the matrix.
     pub fn new(matrix: Matrix, row: usize, column: usize, dof: usize) -> Result<Self, ModelError> {
         if row >= dof || column >= dof {
             let (row, column) = (row.saturating_add(1), column.saturating_add(1));

@@ -30,7 +30,7 @@ pub enum ResponseQuantity {
 }
 
 impl ResponseQuantity {
-    /// All three, in rising order of the derivative.
+    /// All three quantities, in ascending order of the derivative.
     pub const ALL: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
 
     /// Returns the order d of the time derivative of the displacement: 0, 1 or 2.

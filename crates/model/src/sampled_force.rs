@@ -5,7 +5,7 @@ use mechid_signal::Record;
 use crate::closed_form::{require_start, to_response};
 use crate::{ModelError, Response, Sdof};
 
-/// Exact response over one step to a force that is linear within it:
+/// Exact response over one time step to a force that is linear in this step:
 ///
 /// ```text
 /// ┌ x ┐      ┌ x ┐     ┌ g₁ ┐       ┌ g₂ ┐

@@ -48,8 +48,8 @@ mod tests {
 
     #[test]
     fn steps_of_the_dissertation() {
-        // Journal bearing, ωn = 1.799248 rad/s, 256 samples: printed 0.02728 s at NPI 2 and
-        // 0.08184 s at NPI 6, cut off after five decimals.
+        // For the journal bearing (ωn = 1.799248 rad/s, 256 samples) the dissertation prints the
+        // time steps 0.02728 s at NPI 2 and 0.08184 s at NPI 6, cut off after five decimals.
         for (npi, dt) in [(2.0, 0.02728), (6.0, 0.08184)] {
             let sampling = npi_sampling(npi, 256, 1.799248).unwrap();
             assert!((0.0..1e-5).contains(&(sampling.dt() - dt)), "{}", sampling.dt());

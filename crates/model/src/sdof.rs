@@ -32,7 +32,7 @@ impl Sdof {
     /// Creates an oscillator from m (kg, positive), c (N·s/m) and k (N/m, positive).
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] with the name of the one that is out of range.
+    /// [`ModelError::Parameter`] with the name of the parameter that is out of range.
     pub fn new(mass: f64, damping: f64, stiffness: f64) -> Result<Self, ModelError> {
         require("mass", mass, "positive and finite", mass > 0.0)?;
         require("damping", damping, "finite", true)?;
@@ -44,7 +44,7 @@ impl Sdof {
     /// c = 2 ζ m ωn, k = m ωn².
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] with the name of the one that is out of range.
+    /// [`ModelError::Parameter`] with the name of the parameter that is out of range.
     ///
     /// # Source
     /// Meirovitch (1975), viscous damping factor and undamped natural frequency.
@@ -134,7 +134,8 @@ impl From<Sdof> for SecondOrderSystem {
 mod tests {
     use super::*;
 
-    /// m = 2, k = 8: ωn = 2, critical damping 8.
+    /// Returns an oscillator with m = 2 kg, k = 8 N/m and the damping `c`: ωn = 2 rad/s, critical
+    /// damping 8 N·s/m.
     fn sdof(c: f64) -> Sdof {
         Sdof::new(2.0, c, 8.0).unwrap()
     }
@@ -144,10 +145,10 @@ mod tests {
         let z = Complex::new;
         for (c, poles) in [
             (0.0, [z(0.0, 2.0), z(0.0, -2.0)]),
-            // s² + 2.4 s + 4: −1.2 ± 1.6i.
+            // The roots of s² + 2.4 s + 4 = 0 are −1.2 ± 1.6i.
             (4.8, [z(-1.2, 1.6), z(-1.2, -1.6)]),
             (8.0, [z(-2.0, 0.0), z(-2.0, 0.0)]),
-            // s² + 5 s + 4: −4 and −1.
+            // The roots of s² + 5 s + 4 = 0 are −4 and −1.
             (10.0, [z(-4.0, 0.0), z(-1.0, 0.0)]),
             (-10.0, [z(4.0, 0.0), z(1.0, 0.0)]),
         ] {
@@ -162,7 +163,8 @@ mod tests {
 
     #[test]
     fn a_heavily_overdamped_slow_root_keeps_its_digits() {
-        // c = 1e9: slow root −k/c (1 + k m/c² + …) = −8e-9 to all digits.
+        // With c = 1e9, the slow root −k/c (1 + k m/c² + …) is −8e-9 to all digits of double
+        // precision.
         let slow = sdof(1e9).poles()[1].re;
         assert!((slow / -8e-9 - 1.0).abs() < 1e-15);
     }

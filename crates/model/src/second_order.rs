@@ -25,7 +25,7 @@ impl Matrix {
     /// Matrices M, C, K, in the order that covariances use.
     pub const ALL: [Self; 3] = [Self::Mass, Self::Damping, Self::Stiffness];
 
-    /// Returns the letter of its entries: `m`, `c` or `k`.
+    /// Returns the letter of the entries of this matrix: `m`, `c` or `k`.
     pub fn letter(self) -> char {
         match self {
             Matrix::Mass => 'm',
@@ -34,7 +34,7 @@ impl Matrix {
         }
     }
 
-    /// Returns the SI unit of its entries (translational degrees of freedom).
+    /// Returns the SI unit of the entries of this matrix (translational degrees of freedom).
     pub fn unit(self) -> &'static str {
         match self {
             Matrix::Mass => "kg",
@@ -210,7 +210,8 @@ mod tests {
 
     use super::*;
 
-    /// Masses from 1 to `least` on the diagonal, turned by a reflection.
+    /// Returns a mass matrix whose singular values are 1, except one that is `least`: a diagonal
+    /// matrix transformed by a reflection.
     fn spread(n: usize, least: f64) -> DMatrix<f64> {
         let v = DVector::from_fn(n, |i, _| (1.0 + i as f64).sin()).normalize();
         let turn = DMatrix::identity(n, n) - 2.0 * &v * v.transpose();

@@ -159,8 +159,8 @@ fn check_finite(
     }
 }
 
-/// Returns the ratio of the smallest to the largest entry of a diagonal M. For any other M it is 0
-/// if a row or column is empty, and otherwise 1.
+/// Returns 0 if M has an empty row or column. Otherwise returns the ratio of the smallest to the
+/// largest magnitude of the entries of a diagonal M, and 1 for any other M.
 fn mass_spread(mass: &CsrMatrix<f64>) -> f64 {
     let dof = mass.nrows();
     let (mut rows, mut columns) = (vec![0.0_f64; dof], vec![0.0_f64; dof]);

@@ -6,7 +6,7 @@ use crate::{ModelError, SecondOrderSystem};
 use mechid_numerics::linear_algebra::exponential;
 
 /// Transition of the state z over one step Δt: z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)). The
-/// last part applies only to an input u that is linear between samples.
+/// last term applies only to an input u that is linear between samples.
 ///
 /// In step units the state is z = \[x; Δt ẋ\] and time is τ = t/Δt, so that no entry is large
 /// unless the step is long for the system:
@@ -135,7 +135,8 @@ mod tests {
     use super::*;
     use crate::Sdof;
 
-    /// Reference: the closed form of one degree of freedom.
+    /// A step gives the response of the closed form of one degree of freedom, for a held and for a
+    /// linear force.
     #[test]
     fn a_step_is_the_closed_form() {
         let (sdof, dt, force) = (Sdof::new(3.0, 0.8, 50.0).unwrap(), 0.13, [4.0, -7.0]);

@@ -40,7 +40,7 @@ impl UncertainSystem {
     /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,
     /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
     /// [`ModelError::RepeatedParameter`] if a parameter is named twice,
-    /// [`ModelError::NoSuchParameter`] if it belongs to a system of another size.
+    /// [`ModelError::NoSuchParameter`] if a parameter belongs to a system of another size.
     pub fn new(
         system: SecondOrderSystem,
         parameters: Vec<Parameter>,

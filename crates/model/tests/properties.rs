@@ -5,7 +5,8 @@ use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::{Complex, DMatrix, DVector};
 use proptest::prelude::*;
 
-/// Any M = L Lᵀ with a diagonal of L in 1 … 2, any C and K: stable or not, symmetric or not.
+/// Returns random systems, stable or unstable, symmetric or not. M is L Lᵀ, where the diagonal of L
+/// is between 1 and 2; C and K are arbitrary.
 fn systems() -> impl Strategy<Value = SecondOrderSystem> {
     (1usize..=5).prop_flat_map(|n| {
         let square = |range: std::ops::Range<f64>| prop::collection::vec(range, n * n);
@@ -21,7 +22,8 @@ fn systems() -> impl Strategy<Value = SecondOrderSystem> {
     })
 }
 
-/// An invertible change of coordinates: unit diagonal, small couplings.
+/// Returns the matrix of an invertible change of coordinates, with ones on the diagonal and small
+/// couplings.
 fn coordinates(n: usize, seed: u64) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |i, j| {
         let wild = ((seed as f64 + 1.0) * (1.0 + i as f64) * (2.0 + j as f64)).sin();
@@ -29,7 +31,7 @@ fn coordinates(n: usize, seed: u64) -> DMatrix<f64> {
     })
 }
 
-/// (λ²M + λC + K) φ relative to the size of its terms.
+/// Returns the norm of (λ²M + λC + K) φ relative to the size of its terms.
 fn residual(s: &SecondOrderSystem, mode: &Mode) -> f64 {
     let l = mode.eigenvalue();
     let terms = [(s.mass(), l * l), (s.damping(), l), (s.stiffness(), Complex::from(1.0))];
@@ -39,7 +41,8 @@ fn residual(s: &SecondOrderSystem, mode: &Mode) -> f64 {
     sum.norm() / (size * mode.shape().norm())
 }
 
-/// Distance from each eigenvalue of `p` to the nearest of `q`, relative to the largest.
+/// Returns the largest distance from an eigenvalue of `p` to the nearest eigenvalue of `q`,
+/// relative to the largest modulus in `p`.
 fn spectrum_gap(p: &[Complex<f64>], q: &[Complex<f64>]) -> f64 {
     let largest = p.iter().map(|l| l.norm()).fold(f64::MIN_POSITIVE, f64::max);
     let nearest = |l: &Complex<f64>| q.iter().map(|r| (l - r).norm()).fold(f64::MAX, f64::min);
@@ -176,7 +179,8 @@ fn a_long_chain_has_its_known_frequencies() {
 
 #[test]
 fn fully_degenerate_systems_converge() {
-    // n equal uncoupled oscillators, undamped; and a ring, with every frequency but two double.
+    // Two undamped systems are tested: n equal uncoupled oscillators, and a ring in which all
+    // natural frequencies but one or two are double.
     for n in [2, 3, 4, 8, 16] {
         let one = DMatrix::identity(n, n);
         let equal = SecondOrderSystem::new(one.clone(), one.clone() * 0.0, &one * 9.0).unwrap();
@@ -204,8 +208,8 @@ fn fully_degenerate_systems_converge() {
 
 #[test]
 fn an_unsupported_chain_moves_as_one_body() {
-    // Free-free: the defective zero eigenvalue appears as a few √ε of the fastest rate, its shape
-    // is the same displacement everywhere.
+    // The chain is free at both ends. Rounding moves its defective zero eigenvalue to a few √ε of
+    // the fastest rate; the mode shape is the same displacement everywhere.
     for n in [2, 5, 20] {
         let chain = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
             0 if i == 0 || i == n - 1 => 1.0,
@@ -217,7 +221,7 @@ fn an_unsupported_chain_moves_as_one_body() {
         let modes = s.unwrap().modes().unwrap();
         assert!(modes[0].natural_frequency() < 20.0 * 1e-7);
         assert!(modes[0].shape().iter().all(|z| (z - 1.0).norm() < 1e-6));
-        // The first bending-like mode: 2·10·sin(π/2n).
+        // The first elastic mode has the natural frequency 2·10·sin(π/2n).
         let omega = 20.0 * (std::f64::consts::PI / (2 * n) as f64).sin();
         let first = modes.iter().find(|m| m.natural_frequency() > 1e-3).unwrap();
         assert!((first.natural_frequency() / omega - 1.0).abs() < 1e-11);

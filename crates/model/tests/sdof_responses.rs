@@ -1,12 +1,13 @@
-//! Closed forms of one degree of freedom: against numbers worked by hand, the textbook's three
-//! regimes, the equation of motion, and one closed form against another.
+//! Closed forms of one degree of freedom, compared with numbers computed by hand, with the three
+//! cases of damping in textbooks, with the equation of motion, and with one another.
 
 use mechid_model::{ModelError, Response, Sdof};
 use mechid_signal::{Record, Sampling};
 use nalgebra::Complex;
 use proptest::prelude::*;
 
-/// m = 2, k = 8: ωn = 2, critical damping 8.
+/// Returns an oscillator with m = 2 kg, k = 8 N/m and the damping `c`: ωn = 2 rad/s, critical
+/// damping 8 N·s/m.
 fn sdof(c: f64) -> Sdof {
     Sdof::new(2.0, c, 8.0).unwrap()
 }
@@ -29,7 +30,8 @@ fn gap(p: &Response, q: &Response) -> f64 {
 
 #[test]
 fn free_motion_by_hand() {
-    // x0 = 0.3, v0 = −1.1, at t = 0.75, worked with 50 digits from the textbook's three forms.
+    // The expected values at t = 0.75 for x0 = 0.3 and v0 = −1.1 were computed with 50 digits from
+    // the three textbook formulas.
     let cases = [
         (0.0, [-0.527_401_082_131_919, -0.676_307_913_796_905_9, 2.109_604_328_527_676]),
         (4.8, [-0.131_062_100_813_983_7, -0.133_635_624_782_646_04, 0.844_973_902_734_285_3]),
@@ -48,7 +50,7 @@ fn free_motion_by_hand() {
 
 #[test]
 fn step_by_hand() {
-    // 5 N on c = 4.8, at t = 0.75.
+    // The response at t = 0.75 s to a step of 5 N, with c = 4.8 N·s/m, is compared.
     let step = sdof(4.8).step_response(Sampling::new(0.75, 2).unwrap(), 5.0, 0.0, 0.0).unwrap();
     let (x, v) = (0.355_295_137_826_922_5, 0.592_091_896_947_866);
     assert_close(sample(&step, 1), [x, v, (5.0 - 4.8 * v - 8.0 * x) / 2.0], 2e-15);
@@ -64,8 +66,8 @@ fn the_regimes_meet_without_a_seam() {
             let force = Record::from_channel(sampling, (0..1000).map(|k| (k % 7) as f64).collect());
             let force = force.unwrap();
             let near = sdof(c);
-            // The motion depends smoothly on c, with a relative change of about the same size. The
-            // recurrence accumulates about 50 steps of rounding.
+            // The motion depends smoothly on c: its relative change is about as large as the
+            // relative change of c. The recurrence accumulates the rounding of about 50 steps.
             let tolerance = off + 1e-13;
             let free = |s: &Sdof| s.free_response(sampling, 1.0, 3.0).unwrap();
             assert!(gap(&free(&near), &free(&critical)) < tolerance, "{c}");
@@ -77,11 +79,12 @@ fn the_regimes_meet_without_a_seam() {
 
 #[test]
 fn small_steps_keep_their_digits() {
-    // After 1e-6 of a natural period a step has moved ½ (F/m) t² (1 − 2ζωn t/3 − …).
+    // For t = 1e-6 s, far below the natural period, the step response is ½ (F/m) t² (1 − 2ζωn t/3 −
+    // …).
     let t = 1e-6;
     let step = sdof(4.8).step_response(Sampling::new(t, 2).unwrap(), 4.0, 0.0, 0.0).unwrap();
     let expected = 0.5 * (4.0 / 2.0) * t * t * (1.0 - 2.4 * t / 3.0);
-    // The next term is of relative size (ωn t)² / 12 < 1e-12.
+    // The next term of the series has the relative size (ωn t)² / 12 < 1e-12.
     assert!((sample(&step, 1)[0] / expected - 1.0).abs() < 1e-12);
 }
 
@@ -103,7 +106,7 @@ fn undamped_resonance_grows_linearly() {
     let largest = 3.0 * sampling.duration() / 8.0;
     for (k, t) in sampling.times().enumerate() {
         let expected = 3.0 * t * (2.0 * t).sin() / 8.0;
-        // The phase 2t ≤ 148 is known to 148 ε.
+        // The phase 2t is at most 148 rad; its rounding error is at most 148 ε.
         assert!((sample(&r, k)[0] - expected).abs() < 1e-13 * largest);
     }
     assert!(matches!(
@@ -114,7 +117,8 @@ fn undamped_resonance_grows_linearly() {
 
 #[test]
 fn the_harmonic_transient_dies_into_the_steady_state() {
-    // Slowest root: −0.5 (c = 2) or −0.53 (c = 16): e^{−0.5·80} = 4e-18.
+    // The slowest root is −0.5 1/s (c = 2) or −0.53 1/s (c = 16). After 80 s the transient is
+    // e^{−0.5·80} = 4e-18 of its initial size.
     let sampling = Sampling::new(0.05, 1640).unwrap();
     for c in [2.0, 8.0, 16.0] {
         let force = Complex::from_polar(5.0, 0.7);
@@ -134,8 +138,8 @@ fn the_harmonic_transient_dies_into_the_steady_state() {
     }
 }
 
-/// Returns the sum of step responses, one for each jump of the force, from the sample of the jump
-/// on: O(N²), without a recurrence.
+/// Returns the sum of step responses: each jump of the force adds one step response that begins at
+/// the sample of the jump. The sum needs O(N²) operations, and no recurrence.
 fn sum_of_steps(s: &Sdof, force: &[f64], dt: f64) -> Vec<f64> {
     let unit = s.step_response(Sampling::new(dt, force.len()).unwrap(), 1.0, 0.0, 0.0).unwrap();
     let unit = unit.displacement().channel(0).to_vec();
@@ -165,9 +169,9 @@ fn a_held_force_is_a_sum_of_steps() {
 
 #[test]
 fn a_linear_force_is_the_limit_of_finer_and_finer_held_ones() {
-    // A force that is held at the midpoint value of each of r parts gives a response with an error
-    // of O(1/r²) for a straight line; in Richardson's combination of r and 2r, the error is
-    // O(1/r⁴).
+    // Each sampling interval of a linear force is divided into r parts, and the force is held at
+    // the midpoint value of each part. The error of the response is then O(1/r²); Richardson's
+    // combination of r and 2r has an error of O(1/r⁴).
     let dt = 0.2;
     let force = forces(60);
     let refined = |c: f64, r: usize| -> Vec<f64> {
@@ -215,7 +219,7 @@ fn bad_input_is_named() {
         named(sdof(1.0).harmonic_response(sampling, 1.0.into(), omega, 0.0, 0.0)),
         "angular frequency"
     );
-    // An unstable motion overflows, which is an error, not a result.
+    // The response of an unstable system overflows here; the function must return an error.
     let far = Sampling::new(100.0, 4).unwrap();
     assert!(matches!(sdof(-30.0).free_response(far, 1.0, 0.0), Err(ModelError::Signal(_))));
 }
@@ -238,7 +242,8 @@ proptest! {
             (y[k - 2] - 8.0 * y[k - 1] + 8.0 * y[k + 1] - y[k + 2]) / (12.0 * h)
         };
         let [x, v, a] = [r.displacement(), r.velocity(), r.acceleration()].map(|q| q.channel(0));
-        // Remainder h⁴/30 times a fifth derivative below (fastest rate)⁵ × size; rates ≤ 30.
+        // The error of the difference formula is h⁴/30 times the fifth derivative, which is below
+        // (fastest rate)⁵ times the size of the motion. The rates are at most 30 1/s.
         let fastest = s.poles()[0].norm().max(omega).max(1.0);
         let tolerance = (h * fastest).powi(4) * fastest * 3.0 * (1.0 + fastest) + 1e-10;
         for k in 2..398 {
@@ -247,7 +252,8 @@ proptest! {
         }
     }
 
-    /// A change of the units of time and force changes only the numbers.
+    /// A change of the units of time and force changes the numbers of a response, but not the
+    /// response.
     #[test]
     fn responses_are_invariant_to_units(
         zeta in 0.0..3.0f64, second in 0.01..100.0f64, newton in 0.01..100.0f64,

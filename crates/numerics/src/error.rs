@@ -85,7 +85,7 @@ pub enum NumericsError {
     NotConverged {
         /// Number of rows of the matrix.
         rows: usize,
-        /// Number of its columns.
+        /// Number of columns of the matrix.
         columns: usize,
     },
     /// A matrix that must be square is not square.
@@ -93,7 +93,7 @@ pub enum NumericsError {
     NotSquare {
         /// Number of rows of the matrix.
         rows: usize,
-        /// Number of its columns.
+        /// Number of columns of the matrix.
         columns: usize,
     },
     /// An entry of a matrix to be decomposed is NaN or infinite.
@@ -119,7 +119,7 @@ pub enum NumericsError {
     /// A confidence level is outside (0, 1).
     #[error("a confidence level must be between 0 and 1, got {level}")]
     Level {
-        /// Given level, a probability.
+        /// The level that was given, a probability.
         level: f64,
     },
 }

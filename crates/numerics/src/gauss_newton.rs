@@ -34,7 +34,7 @@ pub trait Linearisation {
     /// Returns the gradient Jᵀr.
     fn gradient(&self) -> &DVector<f64>;
 
-    /// Returns the factor of JᵀJ + `damping`·I; `None` if that is numerically singular.
+    /// Returns the factor of JᵀJ + `damping`·I; `None` if this matrix is numerically singular.
     fn factor(&self, damping: f64) -> Option<Self::Factor>;
 
     /// Returns (JᵀJ + λI)⁻¹ `right`, with the factor of JᵀJ + λI.
@@ -60,8 +60,8 @@ pub trait SumOfSquares {
     /// Linearisation of the residuals.
     type Linearisation: Linearisation;
 
-    /// Returns the sum at `parameters`; `None` if it does not exist there. The parameters are a
-    /// list in any units; the sum is in the square of the unit of the residuals.
+    /// Returns the sum of squares at `parameters`; `None` if the residuals do not exist there. The
+    /// parameters are a list in any units; the sum is in the square of the unit of the residuals.
     fn try_at(&mut self, parameters: &DVector<f64>) -> Option<f64>;
 
     /// Accepts the most recently tried parameters, to which linearisation and curvature then refer.
@@ -93,7 +93,7 @@ pub struct Minimum {
     /// Number of steps taken.
     pub steps: usize,
     /// `true` if a minimum was reached up to rounding; `false` if the number of steps was exhausted
-    /// or the time limit was over.
+    /// or the time limit was reached.
     pub converged: bool,
 }
 
@@ -295,7 +295,7 @@ mod tests {
             let limit = Some(TimeLimit::from_polls(polls));
             let from = dvector![-1.2, 1.0];
             let minimum = within(limit, || minimise(&mut valley, from, 40)).unwrap();
-            // The problem is at the returned parameters.
+            // The problem holds the returned parameters, not those of a later trial.
             assert_eq!(valley.at.as_slice(), minimum.parameters.as_slice());
             let cost = valley.try_at(&minimum.parameters);
             assert_eq!(cost, Some(minimum.cost));

@@ -46,8 +46,9 @@ pub fn gram(
     } else {
         add_wide(regressors, weights, dof, &mut sums);
     }
-    // For i < j, the product for H_ij is the sum of the sums for the real and the imaginary part of
-    // H_ij, and the product for H_ji is their difference.
+    // For i < j, there is one sum for the real part and one for the imaginary part of H_ij. The
+    // product for H_ij is the first sum plus the second; the product for H_ji is the first sum
+    // minus the second.
     let mut products = sums.clone();
     for j in 0..dof {
         for i in 0..=j {
@@ -89,8 +90,8 @@ enum Part {
 }
 
 impl Part {
-    /// Returns the columns of the weights that have this part of H: the first column and the number
-    /// of columns.
+    /// Returns the first column and the number of columns of the weights that contain this part
+    /// (real or imaginary) of H.
     fn columns(self, dof: usize) -> (usize, usize) {
         let real = real_part(0, dof);
         match self {
@@ -110,13 +111,13 @@ impl Part {
     }
 }
 
-/// Arguments of the sums for few degrees of freedom, which `pulp` compiles for each width of vector
-/// registers: dot products over the lines.
+/// Arguments of the sums for few degrees of freedom. The sums are dot products over the lines;
+/// `pulp` compiles them for each width of vector registers.
 struct Narrow<'a> {
     regressors: DMatrixView<'a, f64>,
     weights: DMatrixView<'a, f64>,
     dof: usize,
-    /// One part of 2 φ̄_a φ_b on every line.
+    /// Real or imaginary part of 2 φ̄_a φ_b on every line.
     pair: Vec<f64>,
     sums: &'a mut DMatrix<f64>,
 }
@@ -152,14 +153,15 @@ impl WithSimd for Narrow<'_> {
     }
 }
 
-/// Adds the sums for many degrees of freedom: products of a matrix of all pairs.
+/// Adds the sums for many degrees of freedom by a matrix product: the matrix of all pairs (pairs ×
+/// lines) times the weights.
 fn add_wide(
     regressors: DMatrixView<'_, f64>,
     weights: DMatrixView<'_, f64>,
     dof: usize,
     sums: &mut DMatrix<f64>,
 ) {
-    // The regressors of one line are contiguous.
+    // After the transposition, the regressors of one line are contiguous.
     let transposed = regressors.transpose();
     let mut pairs = DMatrix::zeros(sums.nrows(), weights.nrows());
     for part in [Part::Real, Part::Imaginary] {
@@ -169,7 +171,8 @@ fn add_wide(
     }
 }
 
-/// Arguments of the function that writes one part of 2 φ̄_a φ_b, pairs × lines.
+/// Arguments of the function that writes the real or the imaginary part of 2 φ̄_a φ_b into `pairs`
+/// (pairs × lines).
 struct Pairs<'a> {
     transposed: &'a DMatrix<f64>,
     part: Part,

@@ -9,13 +9,15 @@ pub(crate) const COST_TOLERANCE: f64 = 1e-12;
 /// the search.
 pub(crate) const STEP_TOLERANCE: f64 = 1e-12;
 
-/// Initial damping after a step that does not descend, relative to a Gram matrix of unit diagonal.
+/// Initial damping after a step that does not reduce the sum of squares, relative to a Gram matrix
+/// with a unit diagonal.
 pub(crate) const FIRST_DAMPING: f64 = 1e-8;
 
 /// Minimum damping; a smaller one is replaced by zero.
 pub(crate) const SMALLEST_DAMPING: f64 = 1e-13;
 
-/// Maximum damping; above it rounding determines whether a step descends, so the search ends.
+/// Maximum damping; above it, rounding determines whether a step reduces the sum of squares, so the
+/// search ends.
 pub(crate) const LARGEST_DAMPING: f64 = 1e12;
 
 /// Maximum length of the curvature correction of a step, relative to the step; if the correction is

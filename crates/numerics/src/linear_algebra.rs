@@ -98,8 +98,8 @@ pub fn hermitian_eigen<T: ComplexField<RealField = f64>>(
 ///
 /// # Errors
 /// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`];
-/// [`NumericsError::ExponentialOverflow`] if the 1-norm of the matrix exceeds 1e11 or its
-/// exponential the largest number.
+/// [`NumericsError::ExponentialOverflow`] if the 1-norm of the matrix exceeds 1e11, or if its
+/// exponential exceeds the largest number of type `f64`.
 ///
 /// # Source
 /// Al-Mohy & Higham (2009), SIAM J. Matrix Anal. Appl. 31, 970–989 (scaling and squaring).
@@ -214,8 +214,8 @@ mod tests {
         let expected = NumericsError::EntryNotFinite { row: 1, column: 1 };
         assert_eq!(svd(infinite.clone()).unwrap_err(), expected);
         assert_eq!(exponential(&infinite).unwrap_err(), expected);
-        // The matrix is nilpotent, but the matrix of its moduli is not, so that the bound on the
-        // truncation error overflows.
+        // The matrix is nilpotent, but the matrix of the absolute values of its entries is not, so
+        // that the bound on the truncation error overflows.
         for large in [1e12, 1e40, 1e300] {
             let refused = exponential(&(dmatrix![1.0, 1.0; -1.0, -1.0] * large));
             assert_eq!(refused, Err(NumericsError::ExponentialOverflow { norm: 2.0 * large }));

@@ -38,9 +38,9 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
 /// Returns the principal logarithm of a square matrix of pure numbers: exp(log A) = A with the
 /// imaginary parts of all eigenvalues of log A within ±π.
 ///
-/// It uses the real Schur form and square roots until the matrix is close to I, then a Padé
-/// approximant. All steps use the difference to I, so that a matrix close to I keeps its relative
-/// accuracy.
+/// The function takes square roots of the real Schur form until the matrix is close to I, then uses
+/// a Padé approximant. All steps work with the difference between the matrix and I, so that the
+/// logarithm of a matrix close to I is accurate relative to this difference.
 ///
 /// ```
 /// use mechid_numerics::logarithm::logarithm;
@@ -53,9 +53,9 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
 /// ```
 ///
 /// # Errors
-/// [`NumericsError::NoLogarithm`] if an eigenvalue is real and not positive (or, up to rounding, a
-/// pair of eigenvalues is), [`NumericsError::Size`] if `a` is not square,
-/// [`NumericsError::NotFinite`], [`NumericsError::Eigenvalues`].
+/// [`NumericsError::NoLogarithm`] if an eigenvalue is real and not positive, or if a pair of
+/// eigenvalues is real and not positive up to rounding, [`NumericsError::Size`] if `a` is not
+/// square, [`NumericsError::NotFinite`], [`NumericsError::Eigenvalues`].
 ///
 /// # Source
 /// Higham, *Functions of Matrices* (2008), chapter 11 (inverse scaling and squaring, algorithm
@@ -79,7 +79,7 @@ pub struct Generator {
     /// Square roots (I + U)^(1/2^l) − I for l = 1, 2, …, with U the Schur form of \[Φ − I, Γ; 0,
     /// 0\].
     roots: Vec<DMatrix<f64>>,
-    /// Last of these roots, or U itself if there is none.
+    /// Last of the `roots`, or U itself if `roots` is empty.
     x: DMatrix<f64>,
     /// Factor that scaled Γ to the magnitude of Φ − I.
     input_scale: f64,
@@ -217,8 +217,8 @@ mod tests {
 
     use super::*;
 
-    /// Reference: difference quotients, for states with complex, real and unit eigenvalues (a free
-    /// body) and two inputs.
+    /// The derivative must equal difference quotients, for states with complex, real and unit
+    /// eigenvalues (a free body) and for two inputs.
     #[test]
     fn the_derivative_is_that_of_the_logarithm() {
         let free = dmatrix![1.0, 0.3; 0.0, 1.0] - DMatrix::identity(2, 2);
@@ -249,7 +249,8 @@ mod tests {
         }
     }
 
-    /// For a held force and one state, the integral of the exponential is known.
+    /// For one state and a held force, Φ and Γ have closed forms; `Generator::new` must return the
+    /// original A and B.
     #[test]
     fn the_inputs_are_integrated() {
         let (a, b) = (-0.8f64, 3.0);

@@ -151,8 +151,8 @@ fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, 
     }
 }
 
-/// Returns the unit normal of the reflection that maps `v` to the first axis; `None` if `v` is on
-/// it already.
+/// Returns the unit normal of the reflection that maps `v` to the first axis; `None` if `v` is zero
+/// or already on this axis.
 fn mirror_axis(v: Vector3<f64>) -> Option<Vector3<f64>> {
     let largest = v.amax();
     if largest == 0.0 || (v.y == 0.0 && v.z == 0.0) {

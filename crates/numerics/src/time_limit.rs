@@ -31,14 +31,14 @@ pub struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// Creates a limit of some seconds from the call of [`within`]; `None` if the number is
-    /// negative or not finite. With 0 s, every search ends before its first step.
+    /// Creates a limit of this number of seconds, counted from the call of [`within`]; `None` if
+    /// the number is negative or not finite. With 0 s, every search ends before its first step.
     pub fn from_seconds(seconds: f64) -> Option<Self> {
         (seconds >= 0.0 && seconds.is_finite()).then_some(Self { seconds, polls: None })
     }
 
     /// Creates a limit that ends after a number of calls of [`is_over`], without a clock: the same
-    /// work then always ends at the same step. Its time in [`ended`] is 0 s.
+    /// work then always ends at the same step. For such a limit, [`ended`] returns 0 s.
     pub fn from_polls(polls: u64) -> Self {
         Self { seconds: 0.0, polls: Some(polls) }
     }
@@ -48,9 +48,10 @@ impl TimeLimit {
 #[derive(Debug)]
 struct Active {
     seconds: f64,
-    /// End of the limit; `None` if it is beyond the range of the clock, or if polls are counted.
+    /// End of the limit; `None` if it is beyond the range of the clock, or if the limit is a number
+    /// of calls of [`is_over`].
     deadline: Option<Instant>,
-    /// Number of further polls before the end, if polls are counted.
+    /// Number of further calls of [`is_over`] before the limit ends; `None` for a limit in seconds.
     polls: Option<Cell<u64>>,
     has_ended: Cell<bool>,
 }
@@ -117,7 +118,8 @@ pub fn join<A: Send, B: Send>(
 }
 
 /// Returns whether the limit of the work on this thread is over; `false` without a limit. A search
-/// that calls this must stop if the answer is `true`, because the answer is recorded for [`ended`].
+/// must stop if the answer is `true`, because [`ended`] reports after this answer that a search was
+/// ended early.
 pub fn is_over() -> bool {
     ACTIVE.with_borrow(|active| active.as_ref().is_some_and(|active| active.is_over()))
 }
@@ -142,7 +144,8 @@ mod tests {
         let limit = TimeLimit::from_seconds(0.0);
         within(limit, || {
             assert_eq!(ended(), None);
-            // Other work has no limit, and does not use up the limit of this work.
+            // Work inside `within(None, …)` has no limit, and does not change the state of the
+            // outer limit.
             within(None, || assert!(!is_over() && ended().is_none()));
             assert_eq!(ended(), None);
             assert!(is_over());

@@ -32,7 +32,8 @@ pub struct TriangularFactor {
     r: DMatrix<f64>,
     /// Entries of one block of rows, stored column by column.
     block: Vec<f64>,
-    /// `true` for columns with a value other than 0 if the squares of all their values underflow.
+    /// `true` for each column that contains a value other than 0, although the squares of all its
+    /// values underflow to 0.
     vanished: Vec<bool>,
 }
 
@@ -42,7 +43,8 @@ impl TriangularFactor {
         Self { columns, rows: 0, r: DMatrix::zeros(0, 0), block: Vec::new(), vanished: Vec::new() }
     }
 
-    /// Allocates memory when the first rows arrive, which are known to have this many columns.
+    /// Allocates memory when the first rows are added; the caller has checked that these rows have
+    /// `self.columns` columns.
     fn allocate(&mut self) {
         if self.r.ncols() != self.columns {
             self.r = DMatrix::zeros(self.columns, self.columns);
@@ -92,7 +94,8 @@ impl TriangularFactor {
             }
             self.absorb(len);
         }
-        // NaN and infinity persist in sums of squares, so R shows them; it also shows overflow.
+        // NaN and infinity persist in sums of squares, so R is not finite if a value is not finite;
+        // an overflow has the same effect.
         if !self.r.iter().all(|v| v.is_finite()) {
             self.r = before;
             return false;
@@ -279,8 +282,8 @@ mod tests {
     }
 
     proptest! {
-        /// Reference: the Gram matrix, formed explicitly. The factor is unique except for the signs
-        /// of its rows.
+        /// RᵀR must equal AᵀA, formed explicitly, and R must be upper triangular: these two
+        /// properties determine R except for the signs of its rows.
         #[test]
         fn the_factor_has_the_gram_matrix_of_the_rows(
             (cut, a) in (1usize..700).prop_flat_map(|rows| (0..rows, matrix(rows, 5)))

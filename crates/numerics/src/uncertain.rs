@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn intervals_are_those_of_the_table_of_student() {
-        // Two-sided 95 % quantiles of a printed table, to its three digits.
+        // The expected two-sided 95 % quantiles are from a printed table with three decimal places.
         for (degrees_of_freedom, quantile) in [(1, 12.706), (4, 2.776), (10, 2.228), (120, 1.980)] {
             let [low, high] = student_interval(3.0, 2.0, degrees_of_freedom, 0.95).unwrap();
             assert!((0.5 * (high - 3.0) - quantile).abs() < 5e-4, "{degrees_of_freedom}");

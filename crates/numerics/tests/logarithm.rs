@@ -1,4 +1,4 @@
-//! The matrix logarithm alone, judged by the exponential and by closed forms.
+//! Tests of the matrix logarithm against the exponential and against closed forms.
 
 use mechid_numerics::NumericsError;
 use mechid_numerics::logarithm::logarithm;
@@ -12,12 +12,13 @@ fn random(size: usize, seed: u64) -> DMatrix<f64> {
     DMatrix::from_fn(size, size, |_, _| source.random_range(-1.0..1.0))
 }
 
-/// Returns the exponential by the series of the matrix after many halvings: a slow but simple
-/// reference.
+/// Returns the exponential as a slow but simple reference: the matrix is halved many times, its
+/// power series is summed, and the result is squared as many times.
 fn exponential(a: &DMatrix<f64>) -> DMatrix<f64> {
     let halvings = (a.norm().log2().ceil().max(0.0) as i32) + 4;
     let small = a / 2f64.powi(halvings);
-    // The series is that of exp − I, so that no digits are lost against I: (I + E)² − I = 2 E + E².
+    // The series of E = exp − I is summed, because adding I before the squarings would lose digits
+    // of E. A squaring of I + E changes E to 2 E + E².
     let mut term = small.clone();
     let mut sum = small.clone();
     for k in 2..=20 {
@@ -87,9 +88,10 @@ fn nearly_defective_matrices_are_as_accurate_as_their_conditioning_allows() {
             0.9f64.ln(), (actual_gap / 0.9).ln_1p() / actual_gap; 0.0, (0.9 + gap).ln()
         ];
         assert!(error(&log, &expected) < 1e-14, "gap {gap}: {log} {expected}");
-        // In rotated coordinates the same matrix is not triangular. The Schur form has the gap only
-        // to √ε, but the logarithm is not sensitive to the gap (its condition number here is below
-        // 10).
+        // In rotated coordinates the same matrix is not triangular. The Schur form gives the
+        // difference of the two eigenvalues only with an error of about √ε, but the logarithm is
+        // not sensitive to this difference (the condition number of the logarithm is below 10
+        // here).
         let q = random(2, 3).qr().q();
         let turned = &q * &a * q.transpose();
         let expected = &q * expected * q.transpose();
@@ -102,7 +104,7 @@ fn matrices_close_to_the_identity_keep_their_relative_accuracy() {
     for size in [1e-3, 1e-6, 1e-10] {
         let step = random(4, 9) * size;
         let a = DMatrix::identity(4, 4) + &step;
-        // This is the step after `a` was rounded to doubles.
+        // Because `a` is rounded to double precision, `x` differs slightly from `step`.
         let x = &a - DMatrix::identity(4, 4);
         let series = &x - &x * &x / 2.0 + &x * &x * &x / 3.0 - &x * &x * &x * &x / 4.0;
         // The first omitted term of the series is x⁵/5, about size⁴ times the first term.

@@ -1,13 +1,15 @@
-//! The loops a programmer would write for one system, as fast as plain code gets.
+//! Time loops that a programmer would write for one system, as fast as plain code allows.
 
 use mechid_model::SecondOrderSystem;
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector4};
 
-/// A loop from rest under a force; it returns x, ẋ, ẍ, or x and two empty vectors.
+/// A time loop that starts from rest under a force. It returns x, ẋ and ẍ, or x and two empty
+/// vectors.
 pub type Loop = fn(&SecondOrderSystem, &Record) -> [Vec<f64>; 3];
 
-/// Returns the loops for `dof` degrees of freedom that store `ALL` of x, ẋ, ẍ, or only x.
+/// Returns the loops for `dof` degrees of freedom. They store x, ẋ and ẍ if `ALL`, otherwise only
+/// x.
 pub fn loops<const ALL: bool>(dof: usize) -> Vec<(&'static str, Loop)> {
     match dof {
         1 if ALL => vec![

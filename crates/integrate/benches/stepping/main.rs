@@ -40,8 +40,8 @@ fn schemes() -> Vec<(&'static str, Box<dyn Scheme>)> {
     ]
 }
 
-/// A lightly damped chain of `dof` masses; every mass is coupled to all others, and |λ| is at most
-/// about 60 rad/s.
+/// A lightly damped chain of `dof` masses; every mass is coupled to all others, and the natural
+/// frequencies are at most about 60 rad/s.
 fn chain(dof: usize) -> SecondOrderSystem {
     let stiffness = DMatrix::from_fn(dof, dof, |i, j| match i.abs_diff(j) {
         0 => 2000.0,
@@ -92,7 +92,7 @@ fn ns_per_step(steps: usize, seconds: f64, jobs: &mut [Timed<'_>]) -> Vec<f64> {
     fastest.into_iter().map(|seconds| seconds * 1e9 / steps as f64).collect()
 }
 
-/// One line of the last table.
+/// One row of the last table.
 struct Ratio {
     dof: usize,
     kept: &'static str,
@@ -100,11 +100,11 @@ struct Ratio {
     ratio: f64,
 }
 
-/// Times systems of `dof` degrees of freedom that store x, ẋ, ẍ or only x, and appends the ratios
-/// of Newmark and Runge–Kutta.
+/// Measures the time of a step for systems of `dof` degrees of freedom that store x, ẋ and ẍ
+/// (`ALL`) or only x. Appends the ratios of Newmark and Runge–Kutta to `ratios`.
 fn steps<const ALL: bool>(dof: usize, ratios: &mut Vec<Ratio>) {
     let kept = if ALL { "x, ẋ, ẍ" } else { "x alone" };
-    // There are enough samples that the factorisations do not matter.
+    // The number of samples is so large that the time of the factorisations does not matter.
     let samples = if dof <= 2 { SAMPLES } else { (2_000_000 / (dof * dof)).max(4000) };
     let samples = if is_tried_only() { samples / 100 } else { samples };
     let (system, force, middle) = (chain(dof), noise(samples, dof), noise(samples, dof));

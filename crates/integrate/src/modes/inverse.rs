@@ -17,8 +17,8 @@ use crate::sparse::{GeneralLu, NotFactored, SparseLu, combination};
 pub(super) struct Inverse<'a> {
     system: &'a SparseSystem,
     pub(super) shift: Complex<f64>,
-    /// Frequency s (rad/s) near the modes searched for: both halves of z then have comparable
-    /// sizes.
+    /// Frequency s (rad/s) near the modes searched for, so that the halves φ and λφ / s of z have
+    /// comparable sizes.
     pub(super) scale: f64,
     factors: Factors,
 }
@@ -89,10 +89,11 @@ impl<'a> Inverse<'a> {
         Ok(Self { system, shift, scale: shift.norm(), factors })
     }
 
-    /// Sets the unit of velocities to `omega` (rad/s), if the shift of the operator is zero and the
-    /// present unit is far smaller; returns whether the unit was changed.
+    /// Sets the scale of the velocities (their divisor) to `omega` (rad/s), if the shift of the
+    /// operator is zero and the present scale is far smaller; returns whether the scale was
+    /// changed.
     ///
-    /// For modes far above the unit, the numerical range of the operator has a size of 1/unit
+    /// For modes far above the scale, the numerical range of the operator has a size of 1/scale
     /// around zero. Until these modes converge, the estimates of their eigenvalues lie anywhere in
     /// this range.
     pub(super) fn rescale_if_far(&mut self, omega: f64) -> bool {

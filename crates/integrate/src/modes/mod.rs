@@ -27,7 +27,7 @@ pub enum ModeSearch {
 pub struct SparseMode {
     /// The mode.
     pub mode: Mode,
-    /// ‖(λ²M + λC + K) φ‖ / (|λ|²‖M‖ + |λ|‖C‖ + ‖K‖)‖φ‖ in the norm of the largest entry (pure
+    /// Relative residual ‖(λ²M + λC + K) φ‖ / (|λ|²‖M‖ + |λ|‖C‖ + ‖K‖)‖φ‖ in the maximum norm (pure
     /// number).
     pub residual: f64,
     /// `true` for a motion without restoring force: the eigenvalue is zero to rounding.
@@ -110,7 +110,7 @@ pub fn sparse_modes(
 }
 
 /// Returns the modes nearest to iω if the modes of the lowest frequencies certainly contain them:
-/// |λ − iω| < R − ω implies |λ| < R.
+/// |λ − iω| < R − ω implies |λ| < R, where R is the largest of these lowest frequencies.
 fn nearest_of_lowest(
     system: &SparseSystem,
     omega: f64,
@@ -175,7 +175,7 @@ fn search_modes(
             }
             // The search continues from another shift in two cases: fewer than a quarter of the
             // requested modes have converged when the space has half of its largest size, or all
-            // modes of the space have converged but are too far away.
+            // modes of the space have converged, but requested modes may be missing.
             let stalled = most < len && 2 * target >= most && 4 * usable < count;
             if target == most || stalled || exhausted {
                 break (modes, reach, usable);

@@ -39,8 +39,8 @@ impl Reach {
         modes.iter().map(Candidate::value).find(within)
     }
 
-    /// Returns whether the first of the modes in the order of the search is well inside the radius;
-    /// outside the radius, unknown modes may precede it.
+    /// Returns whether the first mode in the order of the search is well inside the radius. If it
+    /// is not, an unknown mode outside the radius may precede this first mode.
     pub(super) fn covers(&self, modes: &[Candidate], search: ModeSearch) -> bool {
         let (Some(first), Some(last)) = (self.first(modes), modes.last()) else { return true };
         let last = last.value();
@@ -81,8 +81,8 @@ pub(super) fn merge(
 }
 
 /// Returns the next shift. If not all wanted modes have converged, the shift is near a mode that
-/// has not. If all have converged (`all_converged`) but the radius is too small, the shift follows
-/// from the first mode.
+/// has not converged. If all have converged (`all_converged`) but the radius is too small, the
+/// shift follows from the first mode.
 pub(super) fn next_shift(
     found: &[Candidate],
     reach: &Reach,
@@ -98,7 +98,7 @@ pub(super) fn next_shift(
     }
     let first = reach.first(found)?;
     match search {
-        // The first mode may be far above the lower end of the band.
+        // Modes may exist far below the first mode found, so the shift moves far below this mode.
         ModeSearch::Lowest => Some(first + (first - reach.shift) * 3.0),
         ModeSearch::NearOmega(_) => Some(first * (1.0 - limits::SHIFT_OFFSET)),
     }

@@ -11,14 +11,14 @@ use crate::limits;
 use crate::modes::inverse::{Inverse, largest_row};
 use crate::modes::{Candidate, SparseMode};
 
-/// An orthonormal basis of the vectors reached so far, and the operator in it.
+/// An orthonormal basis of the vectors computed so far, and the operator in this basis.
 pub(super) struct Space {
     basis: Vec<DVector<f64>>,
     /// Column j: products of the basis vectors with the image of basis vector j under the operator.
     columns: Vec<Vec<f64>>,
     /// Number of basis vectors to which the operator was applied.
     pub(super) products: usize,
-    /// Number of pseudo-random vectors that were added.
+    /// Number of pseudo-random vectors that were created for the basis.
     added: usize,
 }
 
@@ -127,8 +127,9 @@ impl Space {
         let mut value = inverse.eigenvalue(theta, about);
         let mut residual = residual_of(system, value, &shape);
         if missed <= limits::RITZ_RESIDUAL && residual > limits::MODE_RESIDUAL {
-            // The rounding errors of the basis are relative to its largest θ. One more product with
-            // the operator reduces their share in the directions of smaller θ.
+            // The rounding errors of the basis are relative to the largest eigenvalue of the
+            // operator. One more product with the operator reduces the errors in the directions of
+            // its smaller eigenvalues.
             let [re, im] = [z.map(|z| z.re), z.map(|z| z.im)].map(|part| inverse.apply(&part));
             shape = re.rows(0, n).zip_map(&im.rows(0, n), Complex::new);
             value -= newton_step(system, value, &shape);
@@ -156,8 +157,8 @@ fn largest_eigenvalues(
     Ok(thetas)
 }
 
-/// Returns an eigenvector for `theta`. For a multiple eigenvalue it is independent of the `known`
-/// eigenvectors, if there is another one; `None` if numbers overflow.
+/// Returns an eigenvector for `theta`. For a multiple eigenvalue, the vector is independent of the
+/// `known` eigenvectors, if such a vector exists; `None` if numbers overflow.
 fn next_eigenvector(
     square: &DMatrix<f64>,
     below: usize,

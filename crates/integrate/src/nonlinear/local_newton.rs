@@ -11,7 +11,7 @@ use crate::nonlinear::force::{NonlinearForce, Tangents};
 /// The nonlinear forces of a system at their p degrees of freedom.
 #[derive(Debug, Clone)]
 pub(crate) struct LocalForces {
-    /// The degrees of freedom.
+    /// Degrees of freedom of all forces, counted from 0, in ascending order.
     dofs: Vec<usize>,
     forces: Vec<Member>,
 }
@@ -56,7 +56,7 @@ impl LocalForces {
         &self.dofs
     }
 
-    /// Writes the sum of the forces.
+    /// Writes the sum of the forces into `g`.
     fn force(&mut self, time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
         g.fill(0.0);
         for member in &mut self.forces {
@@ -137,9 +137,9 @@ pub(crate) struct LocalNewton {
     gamma_hat: f64,
     /// W, n×p.
     influence: DMatrix<f64>,
-    /// The rows of W at the nonlinear forces, p×p.
+    /// The rows of the influence matrix W at the degrees of freedom of the nonlinear forces, p×p.
     local: DMatrix<f64>,
-    /// The last solution, the initial estimate of the next.
+    /// The last solution, which is the initial estimate of the next solution.
     a: DVector<f64>,
     linear: DVector<f64>,
     x_hat: DVector<f64>,
@@ -207,7 +207,7 @@ impl LocalNewton {
         Ok(())
     }
 
-    /// Solves for the accelerations and g.
+    /// Solves for the accelerations a and the nonlinear forces g.
     fn solve(&mut self, time: f64) -> Result<(), IntegrateError> {
         let implicit = self.beta_hat != 0.0 || self.gamma_hat != 0.0;
         if !implicit {

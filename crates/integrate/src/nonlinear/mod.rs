@@ -1,4 +1,4 @@
-//! Nonlinear forces, and the equation of a step that has them.
+//! Nonlinear forces, and the equation of a step with nonlinear forces.
 
 pub(crate) mod force;
 pub(crate) mod local_newton;

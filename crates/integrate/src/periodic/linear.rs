@@ -163,7 +163,7 @@ fn by_products(
         })?;
         products += solution.products;
         log::debug!(
-            "after {} products {:.1e} of the gap remains",
+            "after {} products, the relative residual of the periodic state is {:.1e}",
             solution.products,
             solution.residual
         );
@@ -217,7 +217,8 @@ mod tests {
     use super::*;
     use crate::*;
 
-    /// A chain whose masses move between walls and through oil.
+    /// Returns a chain of masses of 1 kg between walls. Each mass also has a spring and a damper to
+    /// ground, and C is not symmetric.
     fn chain(dof: usize, damping: f64) -> SparseSystem {
         let stiffness = band(dof, &[(-1, -900.0), (0, 1900.0), (1, -900.0)]);
         let mass = band(dof, &[(0, 1.0)]);
@@ -242,9 +243,9 @@ mod tests {
         Multisine::flat(1..=9, 1.0, Phases::SchroederBinary).unwrap().sample(sampling).unwrap()
     }
 
-    /// Reference: the map of every scheme, formed as a matrix. With the weaker damping, nearly half
-    /// of the 140 modes still have a tenth of their motion after a period, so that (I − Φ)⁻¹
-    /// amplifies rounding errors.
+    /// The response found in a Krylov space is compared with the response from the map formed as a
+    /// matrix, for every scheme. With the weaker damping, nearly half of the 140 modes still have a
+    /// tenth of their motion after a period, so that (I − Φ)⁻¹ amplifies rounding errors.
     #[test]
     fn a_search_finds_what_the_whole_map_gives() {
         let force = record(160);
@@ -276,8 +277,8 @@ mod tests {
         }
     }
 
-    /// A free chain: a constant displacement repeats in every period, so that the periodic response
-    /// is not unique.
+    /// The periodic response of a free chain is refused: a constant displacement repeats in every
+    /// period, so that the response is not unique.
     #[test]
     fn what_does_not_repeat_is_refused_at_any_size() {
         let mut stiffness = band(400, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);

@@ -40,10 +40,10 @@ impl PeriodicOrbit {
         &self.multipliers
     }
 
-    /// Returns the error of the largest multiplier of the steps of the scheme (pure number). It
-    /// does not include the error due to the time step, [`scheme_error`](Self::scheme_error). For
-    /// more than 64 degrees of freedom it is the norm of the residual of this multiplier, which is
-    /// large if many multipliers have about the same modulus.
+    /// Returns the numerical error of the largest multiplier (pure number). The error due to the
+    /// time step is not included; [`scheme_error`](Self::scheme_error) returns that error. For more
+    /// than 64 degrees of freedom, the numerical error is the norm of the residual of this
+    /// multiplier; it is large if many multipliers have about the same modulus.
     pub fn multiplier_error(&self) -> f64 {
         self.multiplier_error
     }
@@ -77,7 +77,8 @@ impl PeriodicOrbit {
 /// must repeat with the force.
 ///
 /// If the number of samples is even, the orbit is found again with twice the step. The difference
-/// shows the error of the multipliers due to the time step; this takes half as long again.
+/// shows the error of the multipliers due to the time step; the second search increases the time by
+/// half.
 ///
 /// Up to 64 degrees of freedom a Newton step costs two passes over the period for each number of
 /// the state. For more degrees of freedom, the derivative of the state over a period is not formed.
@@ -154,7 +155,8 @@ pub fn periodic_orbit_selected<'a>(
     })
 }
 
-/// Finds an orbit, and its largest multiplier again with twice the step.
+/// Finds an orbit, and estimates the error of its largest multiplier from a second search with
+/// twice the step.
 fn with_scheme_error(
     force: SampledForce<'_>,
     find: impl Fn(SampledForce<'_>) -> Result<PeriodicOrbit, IntegrateError>,
@@ -291,7 +293,8 @@ fn nearer(
     Ok(None)
 }
 
-/// Returns the periodic state near `state`, without forming the derivative.
+/// Returns the periodic state near `state`, without forming the matrix of the derivative of the
+/// state over a period.
 fn by_products(
     shooting: &mut Shooting<'_>,
     mut state: DVector<f64>,
@@ -365,7 +368,8 @@ mod tests {
     use crate::schemes::newmark::Newmark;
     use crate::schemes::runge_kutta::RungeKutta4;
 
-    /// Reference: the derivative formed as a matrix, for the state and the largest multiplier.
+    /// The state and the largest multiplier that are found from products are compared with those
+    /// from the derivative formed as a matrix.
     #[test]
     fn products_lead_to_the_orbit_of_the_whole_derivative() {
         let dof = 12;

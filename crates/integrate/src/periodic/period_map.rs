@@ -10,12 +10,12 @@ use crate::stepping::transition::Transition;
 ///
 /// The change of the state in a step is D times the state, with the blocks D_yy and D_ya for y and
 /// the accelerations ẍ. After a free step most schemes satisfy M ẍ + C ẋ + K x = 0, so that ẍ = G y
-/// follows from y, and the next y is y + (D_yy + D_ya G) y. With forces ẍ = G y + e, where e
-/// depends only on the forces of the last step and is the same at both ends of the period.
+/// follows from y, and the next y is y + (D_yy + D_ya G) y. If forces act, ẍ is G y + e; the vector
+/// e depends only on the forces of the last step and is the same at both ends of the period.
 pub(crate) struct PeriodMap {
-    /// I − Φ on y, or on the whole state.
+    /// Factors of I − Φ for the independent part y of the state, or for the whole state.
     factored: LU<f64, Dyn, Dyn>,
-    /// G, if the accelerations follow from y.
+    /// Matrix G of ẍ = G y, if the accelerations follow from the independent part y of the state.
     following: Option<DMatrix<f64>>,
     /// Scales s of z = s ∘ (balanced z), which make the numbers comparable in any units.
     scales: DVector<f64>,
@@ -60,7 +60,8 @@ impl PeriodMap {
         Ok(Self { factored, following, scales })
     }
 
-    /// Returns `state` with y = 0 and with the accelerations that the forces alone cause.
+    /// Returns `state` with the independent part y = 0 and with the accelerations that the forces
+    /// alone cause.
     pub(crate) fn at_rest(&self, state: &[f64]) -> Vec<f64> {
         self.map(state, |rest| rest.fill(0.0))
     }
@@ -73,7 +74,8 @@ impl PeriodMap {
         })
     }
 
-    /// Returns `state` with its y changed and, where ẍ follows from y, with the new ẍ.
+    /// Returns `state` after the function `change` is applied to its independent part y. If the
+    /// accelerations ẍ follow from y, they are updated, too.
     fn map(&self, state: &[f64], change: impl FnOnce(&mut DVector<f64>)) -> Vec<f64> {
         let mut balanced = DVector::from_column_slice(state).component_div(&self.scales);
         match &self.following {

@@ -1,4 +1,4 @@
-//! The map of a scheme over one period of the force, by its steps.
+//! The map of a scheme over one period of the force, computed step by step.
 
 use mechid_model::{InitialState, Response};
 use nalgebra::DVector;
@@ -46,8 +46,8 @@ impl<'a> Shooting<'a> {
         (limits::SEARCH_BYTES / bytes).clamp(2, limits::SEARCH_VECTORS)
     }
 
-    /// Returns the state after the start from `guess` and `settling` periods; one more pass sets
-    /// the scales.
+    /// Starts from `guess`, simulates `settling` periods, and returns the state after them; one
+    /// more pass sets the scales.
     pub(crate) fn settle(
         &mut self,
         guess: &InitialState,
@@ -57,7 +57,7 @@ impl<'a> Shooting<'a> {
         let mut motions = vec![vec![0.0; 3 * self.dof]; first + 1];
         self.simulation.start(guess, &self.table.early(first), &mut motions)?;
         let mut state = DVector::from_column_slice(&self.simulation.state);
-        // The rest of the first period leads to the first sample of the next.
+        // The remaining steps of the first period lead to the first sample of the next period.
         if first > 0 {
             state = self.pass(&state, first % self.samples())?;
         }
@@ -98,7 +98,8 @@ impl<'a> Shooting<'a> {
         Ok(DVector::from_column_slice(&self.simulation.state))
     }
 
-    /// Returns the state at the end of the last step of a period that begins at rest.
+    /// Takes only the last step of a period, from a state of zero, and returns the state after this
+    /// step.
     pub(crate) fn last_step(&mut self) -> Result<DVector<f64>, IntegrateError> {
         self.simulation.step(&self.table, self.samples() - 1)?;
         Ok(DVector::from_column_slice(&self.simulation.state))
@@ -116,8 +117,8 @@ impl<'a> Shooting<'a> {
         gap.iter().fold(0.0, |most, r| if r.abs() <= most { most } else { r.abs() })
     }
 
-    /// Returns the derivative of the state at the end of the period in a direction of the state at
-    /// the beginning, both relative to the scales.
+    /// Writes the derivative of the state at the end of the period in a direction of the state at
+    /// the beginning into `derivative`; both states are relative to the scales.
     pub(crate) fn derivative(
         &mut self,
         state: &DVector<f64>,
@@ -134,8 +135,9 @@ impl<'a> Shooting<'a> {
         Ok(())
     }
 
-    /// Returns the state at the end of a period without force that begins in `state`, both relative
-    /// to the scales. For a linear system this is the derivative under any force.
+    /// Writes the state at the end of a period without force into `end`; `state` is the state at
+    /// the beginning, and both are relative to the scales. For a linear system, this map is also
+    /// the derivative of the state over a period under any force.
     pub(crate) fn free(&mut self, state: &[f64], end: &mut [f64]) -> Result<(), IntegrateError> {
         let begin = DVector::from_column_slice(state).component_mul(&self.scales);
         self.simulation.restart(begin.as_slice());

@@ -16,7 +16,8 @@ pub enum SubStepForce {
     /// Linear from F(t) to F(t+Δt).
     #[default]
     Linear,
-    /// The force itself, from a function of time or from samples at this instant.
+    /// The force itself at the end of the first sub-step, from a function of time or from samples
+    /// at this instant.
     Supplied,
 }
 
@@ -135,7 +136,7 @@ impl Scheme for Bathe {
     }
 }
 
-/// Bathe's scheme prepared: state `[x, ẋ, ẍ]`.
+/// A prepared step of Bathe's scheme, with the state `[x, ẋ, ẍ]`.
 #[derive(Debug)]
 struct BatheStepper {
     first: EffectiveMatrix,

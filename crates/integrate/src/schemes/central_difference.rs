@@ -78,7 +78,7 @@ impl Scheme for CentralDifference {
     }
 }
 
-/// Central difference prepared: state `[x, ẋ, ẍ]`.
+/// A prepared step of central difference, with the state `[x, ẋ, ẍ]`.
 ///
 /// The velocity half a step later is h = ẋ + ½Δt ẍ, and x(t+Δt) = x + Δt h. Equilibrium at t + Δt
 /// with ẋ(t+Δt) = h + ½Δt ẍ(t+Δt) gives the new acceleration: this is Newmark's step for β = 0.

@@ -76,8 +76,8 @@ impl GeneralisedAlpha {
         Ok(Self::from_parameters(Member::Generalised, rho, alpha_m, alpha_f))
     }
 
-    /// Returns HHT-α, which has the inertia force at t + Δt; ρ∞ is a pure number between ½ and 1,
-    /// and its α is (ρ∞ − 1)/(ρ∞ + 1), between −⅓ and 0.
+    /// Returns HHT-α, which evaluates the inertia force at t + Δt; ρ∞ is a pure number between ½
+    /// and 1, and the α of the method is (ρ∞ − 1)/(ρ∞ + 1), between −⅓ and 0.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].
@@ -86,8 +86,8 @@ impl GeneralisedAlpha {
         Ok(Self::from_parameters(Member::HilberHughesTaylor, rho, 0.0, (1.0 - rho) / (1.0 + rho)))
     }
 
-    /// Returns WBZ-α, which has all forces except inertia at t + Δt; ρ∞ is a pure number between 0
-    /// and 1, and its α is (ρ∞ − 1)/(ρ∞ + 1).
+    /// Returns WBZ-α, which evaluates all forces except the inertia force at t + Δt; ρ∞ is a pure
+    /// number between 0 and 1, and the α of the method is (ρ∞ − 1)/(ρ∞ + 1).
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].
@@ -183,8 +183,8 @@ impl Scheme for GeneralisedAlpha {
     }
 }
 
-/// The generalised-α method prepared: state `[x, ẋ, ẍ, a]`, or `[x, ẋ, a]` if the carried
-/// acceleration a is the one returned.
+/// A prepared step of the generalised-α method. The state is `[x, ẋ, ẍ, a]`, or `[x, ẋ, a]` if the
+/// method returns the carried acceleration a.
 ///
 /// The unknown is a_m: with κ = 1/(1 − α_m) the new a is κ (a_m − α_m a).
 #[derive(Debug)]

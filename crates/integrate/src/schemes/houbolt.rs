@@ -14,10 +14,10 @@ use crate::system::System;
 /// Source of the motion at Δt and 2Δt for Houbolt's scheme.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum HouboltStart {
-    /// Two steps of Newmark's average acceleration.
+    /// Motion from two steps of Newmark's average acceleration.
     #[default]
     AverageAcceleration,
-    /// Two steps of central difference, itself started by the Taylor step.
+    /// Motion from two steps of central difference, which starts with the Taylor step.
     CentralDifference,
     /// Displacements given by the caller, in m. The velocities at these instants are differences of
     /// second order over x(0), x(Δt), x(2Δt); the accelerations follow from the equation of motion.
@@ -102,7 +102,7 @@ impl Scheme for Houbolt {
     }
 }
 
-/// Houbolt's scheme prepared: state `[x, ẋ, ẍ, s]` with s = ∇³x/Δt².
+/// A prepared step of Houbolt's scheme, with the state `[x, ẋ, ẍ, s]`, where s = ∇³x/Δt².
 ///
 /// With u = ∇x/Δt and w = ∇²x/Δt², Houbolt's formulas are ẍ = w + s and ẋ = u + ½Δt w + ⅓Δt s, so
 /// that x, ẋ, ẍ, s are equivalent to four displacements. In one step
@@ -199,8 +199,8 @@ impl Stepper for HouboltStepper {
         if let HouboltStart::Given { .. } = self.start {
             self.finish_given(&begin[0], early, rest)?;
         }
-        // The values u and w come from the steps themselves, not from differences of the
-        // displacements.
+        // The values u = ∇x/Δt and w = ∇²x/Δt² come from the steps themselves, not from differences
+        // of the displacements.
         let (x, _, a) = motion(&rest[1], n);
         for i in 0..n {
             let u = changes[1][i] / self.dt;
@@ -216,7 +216,8 @@ impl Stepper for HouboltStepper {
 }
 
 impl HouboltStepper {
-    /// Returns the change from sample `k` to `k + 1` of the starting procedure.
+    /// Writes the change of the motion from sample `k` to `k + 1` of the starting procedure into
+    /// `change`.
     fn lead_step(
         &mut self,
         k: usize,

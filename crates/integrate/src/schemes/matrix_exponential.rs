@@ -126,12 +126,12 @@ fn exponentials(
     Ok(if linear { [state, held - &ramp, ramp] } else { [state, held, ramp] })
 }
 
-/// The matrix exponential prepared: state `[x, ẋ, ẍ]`.
+/// A prepared step of the matrix exponential, with the state `[x, ẋ, ẍ]`.
 #[derive(Debug)]
 struct ExponentialStepper {
-    /// Matrix e^{SΔt} − I.
+    /// Matrix e^{SΔt} − I, where S is the matrix of the first-order form.
     change: DMatrix<f64>,
-    /// Matrices Γ₀ and Γ₁.
+    /// Matrices Γ₀ and Γ₁, which multiply the forces at t and t + Δt.
     now: DMatrix<f64>,
     next: DMatrix<f64>,
     mass: EffectiveMatrix,

@@ -104,7 +104,7 @@ impl Scheme for Newmark {
     }
 }
 
-/// Newmark's scheme prepared: state `[x, ẋ, ẍ]`.
+/// A prepared step of Newmark's scheme, with the state `[x, ẋ, ẍ]`.
 #[derive(Debug)]
 pub(crate) struct NewmarkStepper {
     pub(crate) effective: EffectiveMatrix,

@@ -90,7 +90,8 @@ impl Scheme for RungeKutta4 {
     }
 }
 
-/// Runge–Kutta prepared: state `[x, ẋ, ẍ]`; the acceleration is the slope of the first stage.
+/// A prepared step of the Runge–Kutta scheme, with the state `[x, ẋ, ẍ]`; the acceleration is the
+/// slope of the first stage.
 #[derive(Debug)]
 struct RungeKuttaStepper {
     mass: EffectiveMatrix,
@@ -122,7 +123,7 @@ impl RungeKuttaStepper {
         self.mass.solve(time, &self.v, &self.x, &mut self.a)
     }
 
-    /// Adds `weight` times the present slopes.
+    /// Adds `weight` times the slopes of the present stage to `dx` and `dv`.
     fn add(&self, weight: f64, dx: &mut [f64], dv: &mut [f64]) {
         for i in 0..dx.len() {
             dx[i] += weight * self.v[i];

@@ -13,13 +13,13 @@ use crate::system::System;
 pub struct Convention {
     /// Name of the choice.
     pub what: &'static str,
-    /// The choice in force.
+    /// The choice that the scheme uses.
     pub choice: &'static str,
 }
 
 /// Integration scheme with its parameters and conventions.
 ///
-/// It is object-safe: code that compares schemes loops over `[&dyn Scheme]`.
+/// The trait is object-safe: code that compares schemes loops over `[&dyn Scheme]`.
 pub trait Scheme: fmt::Debug + Send + Sync {
     /// Returns the scheme and its parameters, such as `Newmark (β = 0.25, γ = 0.5)`.
     fn name(&self) -> String;
@@ -40,7 +40,8 @@ pub trait Scheme: fmt::Debug + Send + Sync {
         StableSteps::Unknown
     }
 
-    /// Prepares a step of `dt` seconds for a system, stable or not: all work that is done once.
+    /// Prepares a step of `dt` seconds for a system, even if the step is unstable. All work that is
+    /// needed only once is done here.
     ///
     /// # Errors
     /// [`IntegrateError::TimeStep`], [`IntegrateError::SingularMass`],

@@ -106,7 +106,7 @@ impl Scheme for WilsonTheta {
     }
 }
 
-/// Wilson's scheme prepared: state `[x, ẋ, ẍ]`.
+/// A prepared step of Wilson's scheme, with the state `[x, ẋ, ẍ]`.
 #[derive(Debug)]
 struct WilsonStepper {
     effective: EffectiveMatrix,

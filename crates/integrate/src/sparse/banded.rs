@@ -85,7 +85,8 @@ impl Band {
         }
     }
 
-    /// Eliminates the entries below the diagonal of column `j` from the columns up to `last`.
+    /// Eliminates the entries of column `j` below the diagonal, and updates the columns up to
+    /// `last`.
     fn eliminate(&mut self, j: usize, last: usize) {
         let (top, below) = (self.at(j, j), self.below(j));
         let reciprocal = self.entries[top].recip();

@@ -8,7 +8,8 @@ use crate::sparse::ordering::Graph;
 /// `old[new]` without exchanges of rows: two Cholesky factors of the pattern of A + Aᵀ. Exchanges
 /// of rows would add entries.
 ///
-/// Row i of the factor has the nodes on the paths from its entries up the elimination tree.
+/// Row i of the factor L has an entry for each node on the paths that lead from the entries of row
+/// i of the matrix up the elimination tree.
 ///
 /// # Source
 /// Davis, *Direct Methods for Sparse Linear Systems* (2006), sections 4.1 and 4.2.

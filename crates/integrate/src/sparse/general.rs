@@ -70,7 +70,7 @@ where
         }
     }
 
-    /// Solves for `b`, in place.
+    /// Replaces the right-hand side `b` by the solution.
     pub(crate) fn solve(&mut self, b: &mut [T]) {
         b.iter_mut().zip(&self.scales).for_each(|(b, scale)| *b *= T::from_real(*scale));
         self.solve_scaled(b);

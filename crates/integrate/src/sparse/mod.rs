@@ -1,7 +1,7 @@
-//! Sparse matrices: products and factorisations. Narrow bands are factored by band; otherwise
-//! `faer` factors symmetric positive definite matrices by Cholesky, and all other matrices by LU.
-//! The LU factorisation exchanges no rows if the pattern is nearly symmetric and the pivots are
-//! large enough.
+//! Sparse matrices: products and factorisations. Matrices with a narrow band are factored in band
+//! form; otherwise `faer` factors symmetric positive definite matrices by Cholesky, and all other
+//! matrices by LU. The LU factorisation exchanges no rows if the pattern is nearly symmetric and
+//! the pivots are large enough.
 
 mod banded;
 mod fill;
@@ -28,8 +28,8 @@ use unsymmetric::{UnsymmetricFactors, UnsymmetricPlan};
 /// Reason why a matrix was not factored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum NotFactored {
-    /// The smallest pivot, relative to the terms of its row, or the reciprocal condition is only
-    /// rounding.
+    /// The matrix is singular to rounding; the number is the smallest pivot, relative to the terms
+    /// of its row, or the reciprocal condition.
     Singular(f64),
     /// The factors need at least this many bytes, more than the limit.
     TooLarge { bytes: u64, limit: u64 },
@@ -56,16 +56,16 @@ impl NotFactored {
 pub(crate) enum SparseLu {
     /// Factors after reordering to a narrow band.
     Banded {
-        /// The order of that band.
+        /// Order of rows and columns that gives the narrow band.
         ordering: Ordering,
-        /// Factors in that order.
+        /// Factors of the reordered matrix.
         factors: BandedLu,
-        /// The right-hand side in that order.
+        /// The right-hand side in the order of the factors.
         scratch: Vec<f64>,
     },
     /// Factors of a matrix that is symmetric and positive definite.
     Symmetric(Box<CholeskyFactors>),
-    /// Factors without exchanges of rows of a matrix with a nearly symmetric pattern.
+    /// LU factors, without exchanges of rows, of a matrix with a nearly symmetric pattern.
     Unsymmetric(Box<UnsymmetricFactors>),
     /// Factors of a matrix of any pattern.
     General(Box<GeneralLu<f64>>),
@@ -107,7 +107,7 @@ impl SparseLu {
         Ok(Self::Banded { ordering, factors, scratch: vec![0.0; matrix.nrows()] })
     }
 
-    /// Solves for `b`, in place.
+    /// Replaces the right-hand side `b` by the solution.
     pub(crate) fn solve(&mut self, b: &mut [f64]) {
         match self {
             Self::Symmetric(factors) => factors.solve(b),

@@ -42,7 +42,7 @@ impl Ordering {
         new_indices
     }
 
-    /// Copies `from` in the old order to `to` in the new one.
+    /// Copies `from`, in the old order, to `to`, in the new order.
     pub(crate) fn gather(&self, from: &[f64], to: &mut [f64]) {
         match &self.old {
             None => to.copy_from_slice(from),
@@ -50,7 +50,7 @@ impl Ordering {
         }
     }
 
-    /// Copies `from` in the new order to `to` in the old one.
+    /// Copies `from`, in the new order, to `to`, in the old order.
     pub(crate) fn scatter(&self, from: &[f64], to: &mut [f64]) {
         match &self.old {
             None => to.copy_from_slice(from),
@@ -127,7 +127,7 @@ impl Graph {
     /// component is nearly the largest possible one.
     fn peripheral(&self, mut node: u32) -> u32 {
         let mut depth = 0;
-        // Each round but the last increases the depth; a few rounds are enough.
+        // Each round except the last increases the depth; a few rounds are enough.
         for _ in 0..8 {
             let (mut order, mut seen) = (Vec::new(), vec![false; self.starts.len() - 1]);
             let levels = self.breadth_first(node, &mut order, &mut seen);

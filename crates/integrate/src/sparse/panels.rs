@@ -18,10 +18,10 @@ const WIDTHS: [usize; 4] = [8, 4, 2, 1];
 #[derive(Debug)]
 pub(super) struct Panels {
     panels: Vec<Panel>,
-    /// Rows below each panel, panel by panel.
+    /// Indices of the rows below the triangle of each panel, panel by panel.
     rows: Vec<u32>,
-    /// Entries of each panel: the triangle, row by row with 1 / the diagonal, and the rows below
-    /// it.
+    /// Entries of each panel: the triangle, row by row, with the reciprocals of the diagonal
+    /// entries; then the rows below the triangle.
     values: Vec<f64>,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Panels {
 struct Panel {
     first: u32,
     width: u32,
-    /// Number of its rows below the triangle.
+    /// Number of rows of the panel below its triangle.
     below: u32,
 }
 
@@ -203,10 +203,10 @@ fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
     possible.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1)
 }
 
-/// Cost of each row of a panel, in entries.
+/// Time for each row of a panel, in units of the time for one entry.
 const PER_ROW: usize = 3;
 
-/// Cost of each panel, in entries.
+/// Time for each panel, in units of the time for one entry.
 const PER_PANEL: usize = 12;
 
 /// Solves one panel of L x = b.

@@ -113,7 +113,7 @@ fn subtract_three(diagonals: &[Diagonal; 3], x: &[f64], first: usize, y: &mut [f
 }
 
 impl Diagonal {
-    /// Returns the rows among `of` with an entry of the diagonal.
+    /// Returns the rows in `of` that have an entry on this diagonal.
     fn rows(&self, of: &Range<usize>) -> Range<usize> {
         of.start.max(self.row)..of.end.min(self.row + self.values.len())
     }

@@ -14,19 +14,20 @@ use crate::sparse::NotFactored;
 use crate::sparse::general::{pattern, reciprocal_condition};
 use crate::sparse::panels::{Columns, Panels};
 
-/// Factors of a matrix in an order of minimum degree, with rows and columns scaled by the sizes of
-/// their terms. These factors have far fewer entries than a band, or than LU factors with exchanges
-/// of rows.
+/// Factors of a matrix in minimum-degree order. Rows and columns are scaled by the sizes of their
+/// terms. These factors have far fewer entries than a band, or than LU factors with exchanges of
+/// rows.
 #[derive(Debug)]
 pub(crate) struct CholeskyFactors {
     panels: Panels,
-    /// Row of the matrix for each row of the factors, and 1 / √(size of its terms).
+    /// Row of the matrix that corresponds to each row of the factors, and the scale of this row of
+    /// the matrix: 1 / √(size of its terms).
     order: Vec<(u32, f64)>,
-    /// The right-hand side in that order.
+    /// The right-hand side in the order of the factors.
     scratch: Vec<f64>,
 }
 
-/// The order of a symmetric matrix, before it is factored.
+/// The elimination order of a symmetric matrix, found before the factorisation.
 pub(crate) struct CholeskyPlan {
     matrix: CscMatrix<f64>,
     symbolic: SymbolicCholesky<usize>,
@@ -34,8 +35,8 @@ pub(crate) struct CholeskyPlan {
 }
 
 impl CholeskyPlan {
-    /// Returns the order of `matrix` if it is symmetric. `sizes` has, for each row, the sum of the
-    /// moduli of the terms of its entries.
+    /// Returns the elimination order of `matrix` if the matrix is symmetric. `sizes` has, for each
+    /// row, the sum of the moduli of the terms of its entries.
     pub(crate) fn new(matrix: &CsrMatrix<f64>, sizes: &[f64]) -> Option<Self> {
         let columns = CscMatrix::from(matrix);
         // The columns of a symmetric matrix are its rows.
@@ -101,7 +102,7 @@ impl CholeskyPlan {
 }
 
 impl CholeskyFactors {
-    /// Solves for `b`, in place.
+    /// Replaces the right-hand side `b` by the solution.
     pub(crate) fn solve(&mut self, b: &mut [f64]) {
         for (scaled, (row, scale)) in self.scratch.iter_mut().zip(&self.order) {
             *scaled = b[*row as usize] * scale;
@@ -145,7 +146,8 @@ mod tests {
         matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
     }
 
-    /// The columns of flat grids are factored one by one, the columns of cubes in groups.
+    /// The columns of flat grids are factored one by one, the columns of cubes in groups; both
+    /// factorisations give the solution.
     #[test]
     fn grids_are_solved() {
         for (side, layers, joint) in [(24, 1, false), (20, 20, true)] {
@@ -164,7 +166,7 @@ mod tests {
 
     #[test]
     fn what_is_not_definite_is_factored_otherwise() {
-        // The shift lies in the middle of the eigenvalues.
+        // With this diagonal, the matrix has positive and negative eigenvalues.
         let matrix = grid(24, 1, 2.1);
         let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
         assert!(!matches!(factors, SparseLu::Symmetric(_)));

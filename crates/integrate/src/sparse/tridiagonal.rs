@@ -13,11 +13,11 @@ use crate::sparse::ordering::Ordering;
 /// Computing 5, 45–54.
 #[derive(Debug)]
 pub(super) struct Tridiagonal {
-    /// For each row, the multiple of its neighbouring row towards the nearer end that is
-    /// subtracted.
+    /// Multiplier of each row: the neighbouring row on the side of the nearer end, times this
+    /// number, is subtracted from the row.
     multipliers: Vec<f64>,
-    /// For each row, the entry towards the middle divided by the pivot; for the first row of the
-    /// lower half, the multiplier of the last step.
+    /// For each row, the off-diagonal entry on the side of the middle, divided by the pivot; for
+    /// the first row of the lower half, the multiplier of the last elimination step.
     inward: Vec<f64>,
     /// Reciprocals of the pivots.
     reciprocals: Vec<f64>,

@@ -16,9 +16,9 @@ use crate::sparse::general::{pattern, reciprocal_condition};
 use crate::sparse::panels::{Columns, Panels};
 use crate::sparse::{NotFactored, combination};
 
-/// Factors L U of a matrix in an order of minimum degree of the pattern of A + Aᵀ, with rows and
-/// columns scaled by the sizes of their terms. L and U have the pattern of a Cholesky factor, with
-/// far fewer entries than a band, or than factors with exchanges of rows.
+/// Factors L U of a matrix A in the minimum-degree order for the pattern of A + Aᵀ. Rows and
+/// columns are scaled by the sizes of their terms. L and U have the pattern of a Cholesky factor,
+/// with far fewer entries than a band, or than factors with exchanges of rows.
 ///
 /// # Source
 /// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 5
@@ -26,23 +26,23 @@ use crate::sparse::{NotFactored, combination};
 /// ed. (2013), section 4.3.4, on LU without exchanges where the symmetric part is definite.
 #[derive(Debug)]
 pub(crate) struct UnsymmetricFactors {
-    /// L, with the pivots on its diagonal; `upper` is Uᵀ, with a diagonal of 1.
+    /// Factor L, with the pivots on its diagonal; `upper` is Uᵀ, with a diagonal of 1.
     lower: Panels,
     upper: Panels,
     /// Row of the matrix for each row of the factors, and 1 / √(size of its terms).
     order: Vec<(u32, f64)>,
-    /// The right-hand side in that order.
+    /// The right-hand side in the order of the factors.
     scratch: Vec<f64>,
 }
 
-/// The order of a matrix by its pattern, before the factorisation.
+/// The elimination order of a matrix, found from its pattern before the factorisation.
 pub(crate) struct UnsymmetricPlan {
     symbolic: SymbolicCholesky<usize>,
 }
 
 impl UnsymmetricPlan {
-    /// Returns the order of `matrix`; `None` if a factorisation column by column would take too
-    /// long.
+    /// Returns the elimination order of `matrix`; `None` if a factorisation column by column would
+    /// take too long.
     pub(crate) fn new(matrix: &CsrMatrix<f64>) -> Option<Self> {
         let both = combination(&[(1.0, matrix), (1.0, &matrix.transpose())]).0;
         let columns = CscMatrix::from(&both);
@@ -207,7 +207,7 @@ impl Scaled<'_> {
 }
 
 impl UnsymmetricFactors {
-    /// Solves for `b`, in place.
+    /// Replaces the right-hand side `b` by the solution.
     pub(crate) fn solve(&mut self, b: &mut [f64]) {
         for (scaled, (row, scale)) in self.scratch.iter_mut().zip(&self.order) {
             *scaled = b[*row as usize] * scale;
@@ -219,8 +219,8 @@ impl UnsymmetricFactors {
         }
     }
 
-    /// Returns the largest residual of one solution, relative to the size of its row and the
-    /// largest entry of the solution.
+    /// Returns the largest residual of one solution, relative to the size of the row of the matrix
+    /// and to the largest entry of the solution.
     fn backward_error(&mut self, matrix: &CsrMatrix<f64>, sizes: &[f64]) -> f64 {
         let b: Vec<f64> = pseudo_random(1)
             .zip(sizes)

@@ -35,8 +35,9 @@ impl<'a> Fastest<'a> {
         Ok(*self.rate.get_or_init(|| rate))
     }
 
-    /// Returns two systems that move only along the stiffest and only along the most damped motion;
-    /// each is at least as fast as this motion. `None` if the system is not passive.
+    /// Returns two systems: the first moves only along the stiffest motion, the second only along
+    /// the most damped motion. Each returned system is at least as fast as the motion along which
+    /// it moves. `None` if the system is not passive.
     pub(super) fn motions(&self) -> Result<Option<&[SecondOrderSystem; 2]>, IntegrateError> {
         if let Some(motions) = self.passive.get() {
             return Ok(motions.as_ref());
@@ -75,8 +76,8 @@ pub(super) fn reduced(
     Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
 }
 
-/// Returns the system along the fastest motion of a passive system; the eigenvalue of M⁻¹A (A is
-/// one of the matrices) is increased to `value`.
+/// Returns the system that moves only along `top`, the stiffest or the most damped motion of a
+/// passive system. The eigenvalue of M⁻¹A, where A is the matrix `which`, is increased to `value`.
 pub(super) fn reduced_to(
     equations: &Equations,
     top: &passive::Top,

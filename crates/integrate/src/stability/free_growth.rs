@@ -1,4 +1,4 @@
-//! Growth of the free motion of a linear system of any size, by steps.
+//! Growth of the free motion of a linear system of any size, found from time steps.
 
 use mechid_numerics::krylov::arnoldi::Arnoldi;
 use mechid_numerics::krylov::start_vector::numbered_start_vector;
@@ -87,8 +87,8 @@ pub fn growth_per_period(
     }
 }
 
-/// Returns the growth factor of a motion per period, if its energy is larger in the second half of
-/// the followed periods than in the first half.
+/// Returns the growth factor of a motion per period, if the energy of the motion in the second half
+/// of the followed periods is more than [`limits::FOLLOWED_GROWTH`] times that in the first half.
 fn followed(
     shooting: &mut Shooting<'_>,
     mut motion: DVector<f64>,
@@ -130,7 +130,7 @@ mod tests {
         SparseSystem::new(band(n, &[(0, 1.0)]), c, k).unwrap()
     }
 
-    /// Reference: the largest real part of all eigenvalues.
+    /// Returns the largest real part of all eigenvalues, in 1/s, as the reference.
     fn rightmost(system: &SparseSystem) -> f64 {
         let [m, c, k] =
             mechid_model::Matrix::ALL.map(|w| nalgebra::DMatrix::from(system.matrix(w)));
@@ -157,8 +157,9 @@ mod tests {
             let logarithm = rightmost(&system) * sampling.duration();
             assert_eq!(logarithm > 0.0, grows, "{damping} {at_one} {follower}");
             match growth_per_period(&system, sampling).unwrap() {
-                // The growth found is not exact: the frequency of the steps is a little low, and if
-                // many motions grow alike, the followed motion also has parts that decay.
+                // The growth found is not exact: the time steps make the frequencies a little too
+                // low, and if many motions grow at about the same rate, the followed motion also
+                // has parts that decay.
                 Some(found) => {
                     assert!(grows && (found.ln() - logarithm).abs() < 0.1 * logarithm, "{found}");
                 }
@@ -167,8 +168,8 @@ mod tests {
         }
     }
 
-    /// A motion decreases to a fifteenth in a step, and below the smallest positive number in a
-    /// period.
+    /// The motion decreases to a fifteenth in each step, and in a period below the smallest
+    /// positive number. The test expects that no growth is found.
     #[test]
     fn a_motion_of_which_nothing_is_left_does_not_grow() {
         let n = 100;

@@ -96,9 +96,9 @@ impl Symmetric {
         shifted.is_definite()
     }
 
-    /// Returns whether the diagonal entries are positive (or zero) and larger than (or equal to)
-    /// the sum of the moduli of the other entries of their rows. The matrix is then positive
-    /// definite (or semidefinite).
+    /// Returns whether every diagonal entry is at least the sum of the moduli of the other entries
+    /// of its row, or larger if `strictly`. The matrix is then positive semidefinite, or positive
+    /// definite if `strictly`.
     fn is_dominant(&self, strictly: bool) -> bool {
         let sums = self.row_sums();
         let diagonal = |i: usize| match self {
@@ -139,7 +139,7 @@ pub(super) struct Top {
     pub(super) vector: DVector<f64>,
     /// Rayleigh quotient of the vector, in 1/s² or 1/s: at most the largest eigenvalue.
     pub(super) value: f64,
-    /// Distance from this value within which there is an eigenvalue.
+    /// Distance from `value`, in the same unit, within which there is an eigenvalue.
     residual: f64,
 }
 

@@ -24,7 +24,7 @@ pub(crate) struct Examined<'a> {
 /// Function of a scheme that prepares a step of a given size for a system.
 type Prepare<'a> = dyn Fn(&dyn System, f64) -> Result<Box<dyn Stepper>, IntegrateError> + 'a;
 
-/// The system, if it is small enough for its whole amplification matrix.
+/// Returns the dense system, if it is small enough for its whole amplification matrix.
 fn small_dense(system: &dyn System) -> Option<&SecondOrderSystem> {
     match system.matrices() {
         Matrices::Dense(dense) if dense.dof() <= limits::AMPLIFICATION_DOF => Some(dense),
@@ -111,8 +111,8 @@ impl Examined<'_> {
         (!passive::is_below(system, which, limit)).then_some(limit * limits::EXCEEDED_LIMIT)
     }
 
-    /// Returns the modulus of an eigenvalue of the amplification matrix whose motion grows more
-    /// than in the system, if Arnoldi's iteration finds one.
+    /// Returns the modulus of an eigenvalue of the amplification matrix, if Arnoldi's iteration
+    /// finds an eigenvalue whose motion grows faster in the steps than in the system itself.
     fn growth_found(
         &self,
         equations: &Equations,

@@ -24,7 +24,7 @@ use crate::system::System;
 /// Largest number of collocations of a step.
 const MOST: usize = 4;
 
-/// The maps of a step, and the forces.
+/// The maps of a step with its collocations, and the nonlinear forces.
 #[derive(Debug)]
 pub(crate) struct Collocations {
     transition: Transition,
@@ -38,11 +38,12 @@ pub(crate) struct Collocations {
 /// One collocation: an instant of a step at which the nonlinear force is evaluated.
 #[derive(Debug)]
 struct Collocation {
-    /// Instant, from the beginning of the step, in s.
+    /// Time from the beginning of the step to this collocation, in s.
     after: f64,
-    /// Displacement and velocity at this instant, for each number of the state and each load.
+    /// Displacement and velocity at this collocation per unit of each number of the state and of
+    /// each load.
     motion_map: [Vec<f64>; 2],
-    /// Displacement and velocity at every collocation due to a force of 1 N at this one.
+    /// Displacement and velocity at every collocation due to a force of 1 N at this collocation.
     moves: [[f64; MOST]; 2],
     /// Change E of the state due to a force of 1 N at this collocation.
     change: Vec<f64>,
@@ -50,7 +51,8 @@ struct Collocation {
     per_acceleration: f64,
 }
 
-/// Forces at a collocation in the previous steps, and the effect of a correction there.
+/// Forces at a collocation in the previous steps, and the ratio of the last correction of the force
+/// to the residual.
 #[derive(Debug, Clone, Copy)]
 struct Before {
     /// The forces, latest first, in N.
@@ -246,11 +248,12 @@ struct FixedCollocation<const S: usize, const Q: usize> {
     after: f64,
     /// Displacement and velocity at this collocation due to a force of 1 N.
     own: [f64; 2],
-    /// Displacement and velocity at every collocation due to a force of 1 N at this one.
+    /// Displacement and velocity at every collocation due to a force of 1 N at this collocation.
     moves: [[f64; Q]; 2],
     change: [f64; S],
     is_explicit: bool,
-    /// Tolerance of the equation as a force, from the tolerance of an acceleration.
+    /// Tolerance of the nonlinear force, in N per m/s² of acceleration; it follows from the
+    /// relative tolerance of the accelerations.
     tolerance: f64,
     before: Before,
 }
@@ -284,7 +287,8 @@ impl<const S: usize, const W: usize, const R: usize> Rows<S, W, R> {
         }
     }
 
-    /// Computes two independent sums at the same time, which takes half the time of a single sum.
+    /// Returns the product of these rows with `z` and `w`. Two independent sums, computed at the
+    /// same time, take half the time of a single sum.
     fn times(&self, z: &[f64; S], w: &[f64; W]) -> [f64; R] {
         let [mut even, mut odd] = [[0.0; R]; 2];
         for j in (0..S).step_by(2) {
@@ -309,7 +313,7 @@ struct Probe {
 
 #[derive(Debug, Default)]
 struct ProbeState {
-    /// Collocation at which the force is 1 N; at all others the force is 0.
+    /// Collocation at which the force is 1 N; at all other collocations the force is 0.
     unit: Option<usize>,
     asked: Vec<Asked>,
     /// True while Newton's method continues at the last collocation.

@@ -96,7 +96,7 @@ impl Equations {
         Ok(EffectiveMatrix { linear: self.linear.clone(), factored, newton })
     }
 
-    /// Factors M alone: the equation of motion solved for the acceleration.
+    /// Factors M only, to solve the equation of motion for the acceleration.
     pub(crate) fn mass_only(
         &self,
         scheme: &'static str,
@@ -185,8 +185,8 @@ impl EffectiveMatrix {
     }
 }
 
-/// Returns the factors of M + `gamma_hat` C + `beta_hat` K, or its smallest pivot if that is only
-/// rounding.
+/// Returns the factors of M + `gamma_hat` C + `beta_hat` K, or, as an error, the smallest pivot if
+/// this pivot is zero to rounding.
 fn factor_dense(
     system: &SecondOrderSystem,
     gamma_hat: f64,

@@ -165,7 +165,8 @@ fn singles<const S: usize, const W: usize, const O: usize>(
     }
 }
 
-/// Takes an even number of steps, two at a time; returns whether the states between are finite.
+/// Takes an even number of steps, two at a time; returns whether the intermediate states are
+/// finite.
 fn pairs<const S: usize, const W: usize, const O: usize>(
     one: &Transition,
     two: &Transition,

@@ -9,8 +9,8 @@ use crate::stepping::stepper::Instant;
 
 /// A sampled force, one channel per degree of freedom, in N.
 ///
-/// A `&Record` converts into one; [`with_mid_step`](Self::with_mid_step) adds the force within the
-/// steps for schemes that need it.
+/// A `&Record` converts into a `SampledForce`; [`with_mid_step`](Self::with_mid_step) adds the
+/// force within the steps for schemes that need it.
 #[derive(Debug, Clone, Copy)]
 pub struct SampledForce<'a> {
     samples: &'a Record,
@@ -25,8 +25,8 @@ impl<'a> From<&'a Record> for SampledForce<'a> {
 
 impl<'a> SampledForce<'a> {
     /// Creates a force from samples and the forces within the steps: sample k of `mid_step` is the
-    /// force at t = (k + ½) Δt. It has the length of `samples` (the last one is used only in
-    /// periodic simulations).
+    /// force at t = (k + ½) Δt. `mid_step` has as many samples as `samples`; the last sample of
+    /// `mid_step` is used only in periodic simulations.
     pub fn with_mid_step(samples: &'a Record, mid_step: &'a Record) -> Self {
         Self { samples, mid_step: Some(mid_step) }
     }
@@ -52,7 +52,7 @@ impl<'a> SampledForce<'a> {
 pub(crate) struct ForceTable<'a> {
     samples: &'a Record,
     mid_step: Option<&'a Record>,
-    /// The two rows that follow the last sample.
+    /// Forces at the two instants after the last sample.
     after: [Vec<f64>; 2],
     /// Degree of freedom of each channel; `None` if channel i acts on degree of freedom i.
     forced: Option<&'a [usize]>,

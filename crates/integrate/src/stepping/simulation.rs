@@ -1,5 +1,5 @@
-//! The simulation: the prepared stepper itself, or its transition at fixed size for few degrees of
-//! freedom.
+//! The simulation: the prepared stepper itself, or its transition in matrices of fixed size for few
+//! degrees of freedom.
 
 use mechid_model::{InitialState, Response};
 use mechid_signal::{Record, SignalError};
@@ -70,8 +70,8 @@ impl<'a> Motion<'a> {
         self.parts.iter().all(|part| part.rows(0, rows).iter().all(|value| value.is_finite()))
     }
 
-    /// Returns samples `from .. from + len` of every column: n of x, then n of ẋ and n of ẍ, if
-    /// stored.
+    /// Returns samples `from .. from + len` of every column: n columns of x, then n columns of ẋ
+    /// and n columns of ẍ, if they are stored.
     fn columns(&mut self, from: usize, len: usize) -> Vec<&mut [f64]> {
         let rows = self.parts[0].nrows();
         let columns = self.parts.iter_mut().flat_map(|p| p.as_mut_slice().chunks_exact_mut(rows));
@@ -210,7 +210,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Takes one step through the stepper itself, from sample `k`.
+    /// Takes one step from sample `k` by a call of the stepper, not by matrices of fixed size.
     pub(crate) fn step(&mut self, table: &ForceTable<'_>, k: usize) -> Result<(), IntegrateError> {
         for &instant in self.stepper.instants() {
             table.load(instant, k, &mut self.rows[instant as usize]);
@@ -220,7 +220,7 @@ impl Simulation {
         self.stepper.step(&mut self.state, &mut self.rounding_errors, &loads, &mut self.change)
     }
 
-    /// Takes one step without force through the stepper itself.
+    /// Takes one step without force by a call of the stepper, not by matrices of fixed size.
     pub(crate) fn free_step(&mut self) -> Result<(), IntegrateError> {
         let loads = Loads::none(&self.none);
         self.stepper.step(&mut self.state, &mut self.rounding_errors, &loads, &mut self.change)

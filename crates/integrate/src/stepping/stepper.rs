@@ -9,8 +9,8 @@ use crate::error::IntegrateError;
 pub enum Instant {
     /// Beginning of the step, t.
     Now,
-    /// Middle of the step, t + Δt/2, or another instant within the step:
-    /// [`Scheme::inner_instant`](crate::Scheme::inner_instant).
+    /// Middle of the step, t + Δt/2, or another instant within the step, which
+    /// [`Scheme::inner_instant`](crate::Scheme::inner_instant) returns.
     Middle,
     /// End of the step, t + Δt.
     Next,
@@ -37,7 +37,8 @@ pub struct Loads<'a> {
 }
 
 impl<'a> Loads<'a> {
-    /// Returns loads without force at t = 0; `zeros` has one zero per degree of freedom.
+    /// Returns loads of zero for a step that begins at t = 0; `zeros` has one zero per degree of
+    /// freedom.
     pub(crate) fn none(zeros: &'a [f64]) -> Self {
         Self { time: 0.0, now: zeros, middle: zeros, next: zeros, beyond: zeros }
     }
@@ -129,8 +130,8 @@ pub trait Stepper: Send {
     ) -> Result<(), IntegrateError>;
 }
 
-/// Adds `dz` and the error `owed` so far to `z`, and stores the rounding error of the sum in
-/// `owed`.
+/// Adds `dz` and the rounding error `owed` of the previous sum to `z`, and stores the rounding
+/// error of the new sum in `owed`.
 #[inline(always)]
 pub(crate) fn add(z: &mut f64, owed: &mut f64, dz: f64) {
     let more = dz + *owed;

@@ -204,9 +204,9 @@ fn principal_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
     [w / root.arg() - 1.0, 1.0 - (TAU * root.norm().ln() / root.arg()).exp()]
 }
 
-/// Curves of period elongation and amplitude decay over Δt/T, such as those of Bathe & Wilson
-/// (1973), Earthquake Eng. Struct. Dyn. 1, 283–291, show the eigenvalues of the amplification
-/// matrices. A curve cannot be read precisely, so the points are computed from the matrices;
+/// The period elongation and the amplitude decay agree with those from the eigenvalues of the
+/// printed amplification matrices, at many values of Δt/T. The printed curves, such as those of
+/// Bathe & Wilson (1973), Earthquake Eng. Struct. Dyn. 1, 283–291, cannot be read precisely enough.
 /// Houbolt's matrix is the companion matrix of (2 + Ω²) λ³ − 5 λ² + 4 λ − 1.
 #[test]
 fn charts_follow_the_printed_matrices() {
@@ -277,8 +277,8 @@ fn the_spectral_radius_at_large_steps_is_the_parameter() {
     assert!(far(&Bathe::HALVES) < 1e-5);
 }
 
-/// Without damping, at Δt/T = 0.1: amplitude decay and period elongation from the characteristic
-/// polynomials, computed independently of this crate.
+/// The period elongation and the amplitude decay without damping, at Δt/T = 0.1, agree with values
+/// from the characteristic polynomials, which were computed independently of this crate.
 #[test]
 fn anchors_of_the_schemes_with_numerical_damping() {
     for (scheme, elongation, decay) in anchors() {
@@ -292,7 +292,7 @@ fn anchors_of_the_schemes_with_numerical_damping() {
     assert!(exact.amplitude_decay.unwrap().abs() < 1e-13);
 }
 
-/// Period elongation and amplitude decay at Δt/T = 0.1.
+/// Returns schemes with their period elongation and amplitude decay at Δt/T = 0.1.
 fn anchors() -> Vec<(Box<dyn Scheme>, f64, f64)> {
     vec![
         (Box::new(GeneralisedAlpha::new(0.8).unwrap()), 0.033828405968, 0.000987678193),

@@ -39,8 +39,8 @@ pub fn terms(text: &str, coefficients: &[f64]) -> TermForces {
     TermForces::new(&text.parse().unwrap(), coefficients).unwrap()
 }
 
-/// A force that is not zero at t = 0, on every channel: two harmonics and a constant, with other
-/// phases on each channel.
+/// A force that is not zero at t = 0, on every channel: two harmonics and a constant, with
+/// different phases on each channel.
 pub fn force_at(t: f64, f: &mut [f64]) {
     for (c, f) in f.iter_mut().enumerate() {
         let c = c as f64;

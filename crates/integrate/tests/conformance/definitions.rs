@@ -11,8 +11,8 @@ const SIZES: [usize; 7] = [1, 2, 3, 5, 10, 20, 50];
 const DT: f64 = 0.004;
 const LEN: usize = 24;
 
-/// Returns a stable system without symmetry, its force and its response; if `start`, from a moving
-/// initial state, otherwise from rest.
+/// Returns a stable system without symmetry, its force and its response. The response begins in a
+/// moving initial state if `start` is true, otherwise at rest.
 fn run(scheme: &dyn Scheme, dof: usize, start: bool) -> (SecondOrderSystem, Record, Response) {
     let system = mechid_problems::random_stable(dof, 11);
     let force = force(Sampling::new(DT, LEN).unwrap(), dof);
@@ -210,8 +210,8 @@ fn generalised_alpha_is_in_equilibrium_between_the_samples() {
     }
 }
 
-/// Parameters that Chung & Hulbert (1993) print for ρ∞ = 0 and ρ∞ = 1, and those of HHT with α =
-/// −0.1.
+/// The parameters must be those that Chung & Hulbert (1993) print for ρ∞ = 0 and ρ∞ = 1, and those
+/// of HHT with α = −0.1.
 #[test]
 fn generalised_alpha_has_the_printed_parameters() {
     let of = |s: GeneralisedAlpha| [s.alpha_m(), s.alpha_f(), s.beta(), s.gamma()];
@@ -226,8 +226,9 @@ fn generalised_alpha_has_the_printed_parameters() {
     assert!(gap(found, [0.0, 0.1, 0.3025, 0.6]) < 1e-15, "{found:?}");
 }
 
-/// The scheme of 2005 as it is printed: the trapezoidal rule over half a step, then
-/// ẋ' = (x − 4 x½ + 3 x')/Δt and ẍ' likewise, with equilibrium at both.
+/// The response is compared with the scheme of 2005 as it is printed: the trapezoidal rule over
+/// half a step, then ẋ' = (x − 4 x½ + 3 x')/Δt and ẍ' likewise, with equilibrium at the end of both
+/// sub-steps.
 #[test]
 fn bathe_is_the_printed_composite() {
     for dof in SIZES {
@@ -243,7 +244,7 @@ fn bathe_is_the_printed_composite() {
             let am =
                 half.solve(&(middle - system.damping() * &vh - system.stiffness() * &xh)).unwrap();
             let (xm, vm) = (xh + q * q * &am, vh + q * &am);
-            // The two differences give x' and ẋ' as functions of the unknown ẍ'.
+            // The printed differences for ẋ' and ẍ' give x' and ẋ' as functions of the unknown ẍ'.
             let q = DT / 3.0;
             let vh = (4.0 * &vm - &v) / 3.0;
             let xh = (4.0 * &xm - &x) / 3.0 + q * &vh;
@@ -325,8 +326,8 @@ fn every_size_from_1_to_50_follows_its_transition() {
             let transition = Transition::from_stepper(stepper.as_mut());
             let start = moving(dof);
             let response = integrate(scheme.as_ref(), &system, &force, &start).unwrap();
-            // The explicit matrices repeat the last step from the stored motion. Schemes whose
-            // state has more than the motion, such as Houbolt's, are skipped.
+            // The last step is repeated with the matrices of the transition, from the stored
+            // motion. Schemes whose state has more than the motion, such as Houbolt's, are skipped.
             if transition.change.nrows() > 3 * dof {
                 continue;
             }

@@ -112,7 +112,8 @@ fn a_rotated_period_gives_the_rotated_response() {
 
 #[test]
 fn units_do_not_matter() {
-    // With factors that are powers of two, all digits must stay the same.
+    // If the units change by factors that are powers of two, all digits of the response must stay
+    // the same.
     let (mass, length, time) = (2f64.powi(-7), 2f64.powi(10), 2f64.powi(-9));
     for dof in [1, 2, 3, 6] {
         let s = mechid_problems::random_stable(dof, 4);

@@ -18,7 +18,8 @@ fn chain(n: usize, fixed: bool) -> SparseSystem {
     SparseSystem::new(band(n, &[(0, 2.0)]), band(n, &[]), stiffness).unwrap()
 }
 
-/// Reference: ω = 2 √(k/m) sin(r π / 2(n + 1)), shape sin(r π i / (n + 1)).
+/// The computed modes are compared with ω = 2 √(k/m) sin(r π / 2(n + 1)) and the shapes sin(r π i /
+/// (n + 1)).
 #[test]
 fn a_chain_has_the_frequencies_of_its_closed_form() {
     let n = 2000;
@@ -84,7 +85,8 @@ fn assert_same(found: &[SparseMode], expected: &[&Mode]) {
     }
 }
 
-/// Reference: all modes by the dense QR iteration.
+/// The modes of the sparse system are compared with all modes of its dense form, found by QR
+/// iteration.
 #[test]
 fn a_gyroscopic_system_has_the_modes_of_its_dense_form() {
     let dense = rotor(30);
@@ -105,7 +107,8 @@ fn a_gyroscopic_system_has_the_modes_of_its_dense_form() {
     assert_same(&found, &all.iter().collect::<Vec<_>>());
 }
 
-/// The same chain in two planes without coupling: every frequency occurs twice.
+/// A chain has the same stiffness in two planes without coupling, so that every frequency occurs
+/// twice. The two shapes of each frequency must be independent.
 #[test]
 fn repeated_frequencies_have_independent_shapes() {
     let n = 200;
@@ -124,7 +127,8 @@ fn repeated_frequencies_have_independent_shapes() {
     }
 }
 
-/// Reference: ω = 2 √(k/m) sin(r π / 2n), where r = 0 is the rigid-body motion.
+/// The computed modes are compared with ω = 2 √(k/m) sin(r π / 2n), where r = 0 is the rigid-body
+/// motion.
 #[test]
 fn a_free_chain_drifts_and_oscillates() {
     let n = 300;
@@ -140,7 +144,8 @@ fn a_free_chain_drifts_and_oscillates() {
     }
 }
 
-/// Reference: the closed form. The highest of the frequencies is about sixty times the lowest.
+/// The computed frequencies are compared with their closed form; the highest of them is about sixty
+/// times the lowest.
 #[test]
 fn many_modes_of_a_chain_are_found_from_one_shift() {
     let n = 150;
@@ -250,8 +255,8 @@ fn grounded_grid(width: usize, height: usize, ground: f64, proportion: f64) -> S
     SparseSystem::new(band(n, &[(0, 1.0)]), damping, stiffness).unwrap()
 }
 
-/// Returns ω² of such a grid, in ascending order: k_g + 4 k sin²(r π / 2(w + 1)) + 4 k sin²(s π /
-/// 2(h + 1)).
+/// Returns ω² of a grid with springs to ground, in ascending order: k_g + 4 k sin²(r π / 2(w + 1))
+/// + 4 k sin²(s π / 2(h + 1)).
 fn grounded_squares(width: usize, height: usize, ground: f64) -> Vec<f64> {
     let part = |r: usize, n: usize| {
         if n == 1 { 0.0 } else { 3600.0 * (r as f64 * PI / (2 * (n + 1)) as f64).sin().powi(2) }
@@ -263,7 +268,8 @@ fn grounded_squares(width: usize, height: usize, ground: f64) -> Vec<f64> {
     squares
 }
 
-/// Springs to ground give the spectrum a floor, above which the modes lie close together.
+/// The lowest modes agree with their closed form. Springs to ground set a lowest frequency, and the
+/// modes just above this frequency lie close together.
 #[test]
 fn grounded_machines_have_the_lowest_modes_of_their_closed_form() {
     // The chain, and the grid with the stiffest springs to ground, have no mode near the first
@@ -285,8 +291,8 @@ fn grounded_machines_have_the_lowest_modes_of_their_closed_form() {
     }
 }
 
-/// The distance of these modes from the imaginary axis is larger than their distance from one
-/// another.
+/// The modes at the lowest frequencies of a grounded chain are farther from the imaginary axis than
+/// from one another. The search must still find the modes nearest to iω.
 #[test]
 fn modes_near_a_frequency_are_found_beside_the_floor() {
     let n = 10_000;

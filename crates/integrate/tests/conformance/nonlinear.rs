@@ -103,8 +103,8 @@ fn duffings_oscillator_converges_with_the_order_of_each_scheme() {
             let expected = match () {
                 () if name.starts_with("Newmark (β = 0.3025") || is_at_rest(scheme) => 1.0,
                 () if name.starts_with("Runge") => 4.0,
-                // Without damping this is Numerov's method, of fourth order except for the
-                // velocity.
+                // Without damping, the Fox–Goodwin scheme is Numerov's method, of fourth order
+                // except for the velocity.
                 () if name.contains("Fox") && i != 1 => 4.0,
                 () if i == 2 && has("carried") => 1.0,
                 () => 2.0,
@@ -129,9 +129,9 @@ fn backbone(k: f64, cubic: f64, amplitude: f64) -> f64 {
     square.sqrt() * a
 }
 
-/// Reference: a force equal to the damping force sustains the undamped free motion, at the
-/// frequency of the backbone. Harmonic balance with one harmonic gives this frequency within 2.2 %
-/// at any amplitude.
+/// A force equal to the damping force sustains the undamped free motion at the frequency of the
+/// backbone curve; this motion is the reference for the orbit. Harmonic balance with one harmonic
+/// gives this frequency within 2.2 % at any amplitude.
 ///
 /// # Source
 /// Nayfeh & Mook, *Nonlinear Oscillations* (1979), section 4.1.
@@ -221,7 +221,8 @@ fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
 }
 
 /// The same force is given as terms with tangents, as a function without tangents, and as a
-/// function of more degrees of freedom than necessary, with dense and with sparse matrices.
+/// function of more degrees of freedom than necessary, with dense and with sparse matrices. The
+/// response must not change.
 #[test]
 fn reduction_and_tangents_do_not_change_the_response() {
     let n = 30;
@@ -272,8 +273,9 @@ fn reduction_and_tangents_do_not_change_the_response() {
     }
 }
 
-/// One or two degrees of freedom have steps of fixed size; a simulation of selected degrees of
-/// freedom uses the steps of the scheme itself.
+/// Systems with one or two degrees of freedom are simulated in steps of fixed size; a simulation of
+/// selected degrees of freedom uses the steps of the scheme itself. Both must give the same
+/// response.
 #[test]
 fn steps_of_fixed_size_are_those_of_the_scheme() {
     let one = oscillator(1.0, 0.4, 400.0);
@@ -373,8 +375,8 @@ fn a_mass_between_stops_comes_back_in_time() {
     }
 }
 
-/// With friction, ẍ = −(μ/m) tanh(ẋ/w), sinh(ẋ/w) decreases as e^{−μt/mw}. With drag, ẍ = −(c/m) ẋ²
-/// for ẋ > 0, 1/ẋ increases as ct/m.
+/// The velocity is compared with two closed forms. Friction, ẍ = −(μ/m) tanh(ẋ/w), makes sinh(ẋ/w)
+/// decrease as e^{−μt/mw}. Drag, ẍ = −(c/m) ẋ² for ẋ > 0, makes 1/ẋ increase as ct/m.
 #[test]
 fn friction_and_drag_slow_a_mass_as_they_should() {
     let free = oscillator(2.0, 0.0, 0.0);

@@ -72,8 +72,8 @@ fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
             let found = (coarse / fine).log2();
             assert!((found - order).abs() < 0.3, "{name}: {found} {coarse:e} {fine:e}");
         }
-        // The numerical damping of a scheme changes the product; the change is of third order, or
-        // of first order.
+        // The numerical damping of a scheme changes the product of the multipliers. The change is
+        // of first order in the step for schemes of first order, otherwise of third order.
         assert!(fine[2] < if order == 1.0 { 0.2 } else { 0.01 }, "{name}: {:e}", fine[2]);
     }
 }

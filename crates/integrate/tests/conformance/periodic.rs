@@ -260,7 +260,8 @@ fn two_passes_do() {
             let steps = Arc::new(AtomicUsize::new(0));
             let counted = Counted(scheme.as_ref(), Arc::clone(&steps));
             integrate_periodic(&AllowUnstable(&counted), &system, &force).unwrap();
-            // A few more steps than two passes read the matrices of the scheme from unit states.
+            // In addition to two passes, a few steps are taken from unit states to read the
+            // matrices of the scheme.
             let passes = steps.load(Ordering::Relaxed) as f64 / len as f64;
             assert!(passes < 2.1, "{} ζ {zeta}: {passes} passes", scheme.name());
         }

@@ -22,8 +22,8 @@ fn dense(sparse: &SparseSystem) -> SecondOrderSystem {
     SecondOrderSystem::new(m, c, k).unwrap()
 }
 
-/// Stable systems of every storage and symmetry, all of at most 64 degrees of freedom, so that the
-/// dense ones are stepped with dense matrices.
+/// Stable systems with every kind of sparsity and symmetry. All have at most 64 degrees of freedom,
+/// so that their dense forms are simulated with dense matrices.
 fn systems() -> Vec<(&'static str, SparseSystem)> {
     let n = 40;
     let chain = band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]);
@@ -104,8 +104,8 @@ fn selected_degrees_of_freedom_are_those_of_the_whole() {
             }
         }
     }
-    // The same holds for one degree of freedom, where the whole response is computed with steps of
-    // fixed size.
+    // The selected response also equals the whole response for one degree of freedom, where the
+    // whole response is computed with steps of fixed size.
     let one = mechid_model::Sdof::new(1.0, 0.1, 40.0).unwrap().system();
     let alone = force(sampling, 1);
     let selected = SelectedDofs { forced: &[0], observed: &[0] };
@@ -154,7 +154,7 @@ fn selections_that_do_not_fit_are_refused() {
     );
 }
 
-/// Reference: the receptance of the dense form, line by line.
+/// The steady state is compared with the receptance of the dense form, line by line.
 #[test]
 fn the_steady_state_of_a_sparse_system_is_that_of_its_receptance() {
     let n = 30;

@@ -1,4 +1,5 @@
-//! Steps that `prepare` refuses for systems too large for their whole amplification matrix.
+//! Tests which steps `prepare` refuses for large systems, whose whole amplification matrix is not
+//! computed.
 
 use mechid_integrate::*;
 use mechid_model::{Sdof, SecondOrderSystem, SparseSystem, band, lumped, triplets};
@@ -99,8 +100,9 @@ fn a_long_chain_is_refused_just_beyond_the_limit() {
     }
 }
 
-/// C and K are full and not symmetric: the exact spectral radius is the reference, below and above
-/// the limit of the schemes that have one.
+/// The matrices C and K are full and not symmetric. A step must be accepted if the exact spectral
+/// radius is at most 1 to rounding, and refused otherwise. For schemes with a limit, the steps are
+/// below and above this limit.
 #[test]
 fn full_systems_without_symmetry_are_judged_by_their_eigenvalues() {
     let wilson = WilsonTheta::new(1.4).unwrap();
@@ -165,9 +167,11 @@ fn the_spectral_radius_of_a_long_chain_is_that_of_its_fastest_mode() {
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
 }
 
-/// Reference: the number of eigenvalues of a tridiagonal pencil above a value, by the signs of its
-/// pivots (Sturm's sequence). With unequal masses only a few masses take part in the fastest
-/// motion, and iterations converge to this motion slowly.
+/// `prepare` accepts a step just below the limit of the central difference and refuses a step just
+/// above it. With unequal masses only a few masses take part in the fastest motion, and iterations
+/// converge to this motion slowly. The reference limit is found by bisection: the signs of the
+/// pivots of a tridiagonal pencil show whether the pencil has eigenvalues above a value (Sturm's
+/// sequence).
 #[test]
 fn a_chain_of_unequal_masses_is_refused_just_beyond_the_limit() {
     let n = 4000;

@@ -15,9 +15,9 @@ pub struct MachineParameter {
     pub unit: &'static str,
     /// Initial value of the search, in the unit of the parameter.
     pub start: f64,
-    /// Lower bound, in the unit of the parameter; −∞ without one.
+    /// Lower bound, in the unit of the parameter; −∞ if there is no lower bound.
     pub min: f64,
-    /// Upper bound, in the unit of the parameter; ∞ without one.
+    /// Upper bound, in the unit of the parameter; ∞ if there is no upper bound.
     pub max: f64,
     /// Prior knowledge.
     pub prior: Option<Prior>,
@@ -61,8 +61,8 @@ impl Assembly {
     /// elements: entries of M, C and K.
     ///
     /// # Errors
-    /// [`ModelError::EntryOutside`] for a degree of freedom or a parameter that does not exist,
-    /// counted from 1.
+    /// [`ModelError::EntryOutside`] for a degree of freedom or a parameter that does not exist; in
+    /// the error it is counted from 1.
     pub fn from_terms(
         dofs: Vec<String>,
         terms: Vec<Term>,
@@ -138,7 +138,7 @@ impl Assembly {
         self.speed
     }
 
-    /// Returns the degrees of freedom of the part whose receptance was measured.
+    /// Returns the indices of the degrees of freedom of the part whose receptance was measured.
     pub fn measured(&self) -> &[usize] {
         &self.measured
     }

@@ -70,7 +70,7 @@ fn check_names(machine: &Machine, instruments: &Instruments) -> Result<(), Machi
     Ok(())
 }
 
-/// Returns the names separated by commas; if there are many, the first ones.
+/// Returns the names separated by commas; if there are many, only the first names and an ellipsis.
 fn listed(names: &[String]) -> String {
     match names.get(..LISTED_NAMES) {
         Some(first) if names.len() > LISTED_NAMES => format!("{} …", first.join(", ")),

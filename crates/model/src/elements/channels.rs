@@ -6,8 +6,8 @@ use super::build::{Builder, Factor};
 use super::{Input, MachineError, Sensor, Speed};
 use crate::ResponseQuantity;
 
-/// Reading of a sensor: a weighted sum of the motions of degrees of freedom; index n is the
-/// support.
+/// Reading of a sensor: a weighted sum of the motions of degrees of freedom. Index n, the number of
+/// degrees of freedom, is the support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorRow {
     /// Name of the channel.

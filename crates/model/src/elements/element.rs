@@ -17,7 +17,8 @@ pub enum Element {
         /// Mass.
         mass: Coefficient,
     },
-    /// Spring, damper or both between two degrees of freedom, or one and the support.
+    /// Spring, damper or both between two degrees of freedom, or between a degree of freedom and
+    /// the support.
     Link {
         /// Degrees of freedom at the two ends.
         between: [String; 2],
@@ -35,11 +36,11 @@ pub enum Element {
     Matrices(Box<MatrixElement>),
     /// Unknown residual unbalance, m e, of a rotor at speed Ω: the force Ω² U in x and −iΩ² U in y.
     Unbalance {
-        /// Degrees of freedom of x and y; the rotor turns from x to y.
+        /// Degrees of freedom in the directions x and y; the rotor turns from x to y.
         at: [String; 2],
-        /// Real part of U, in kg·m.
+        /// Real part of the unbalance U, in kg·m.
         real: Coefficient,
-        /// Imaginary part of U, in kg·m.
+        /// Imaginary part of the unbalance U, in kg·m.
         imaginary: Coefficient,
     },
 }
@@ -47,9 +48,10 @@ pub enum Element {
 /// Coefficients of a bearing or of any other 2 × 2 block, in the order xx, xy, yx, yy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bearing {
-    /// Degrees of freedom of x and y.
+    /// Degrees of freedom in the directions x and y.
     pub at: [String; 2],
-    /// Degrees of freedom of x and y of the housing; `None` if the bearing ends at the support.
+    /// Degrees of freedom of the housing in the directions x and y; `None` if the bearing ends at
+    /// the support.
     pub to: Option<[String; 2]>,
     /// Stiffness k, in N/m.
     pub stiffness: [Coefficient; 4],
@@ -64,13 +66,14 @@ pub struct Bearing {
 pub struct MatrixElement {
     /// Degrees of freedom of the rows and columns.
     pub dofs: Vec<String>,
-    /// M, d × d, in kg, and its factor.
+    /// Mass matrix M, d × d, in kg, and the coefficient that multiplies it.
     pub mass: Option<(DMatrix<f64>, Coefficient)>,
-    /// C, d × d, in N·s/m, and its factor.
+    /// Damping matrix C, d × d, in N·s/m, and the coefficient that multiplies it.
     pub damping: Option<(DMatrix<f64>, Coefficient)>,
-    /// K, d × d, in N/m, and its factor.
+    /// Stiffness matrix K, d × d, in N/m, and the coefficient that multiplies it.
     pub stiffness: Option<(DMatrix<f64>, Coefficient)>,
-    /// G of the gyroscopic force Ω G ẋ, d × d, in kg·m² (kg for translations), and its factor.
+    /// Matrix G of the gyroscopic force Ω G ẋ, d × d, in kg·m² (kg for translations), and the
+    /// coefficient that multiplies G.
     pub gyroscopic: Option<(DMatrix<f64>, Coefficient)>,
 }
 

@@ -15,7 +15,7 @@ pub enum MachineError {
     /// A name appears twice.
     #[error("the {what} {name:?} appears twice")]
     Repeated {
-        /// Kind of item with this name.
+        /// Kind of item whose name appears twice.
         what: &'static str,
         /// Name concerned.
         name: String,
@@ -30,7 +30,7 @@ pub enum MachineError {
         what: &'static str,
         /// Name of the element, the sensor or the input.
         name: String,
-        /// Degree of freedom that it names.
+        /// Name that no degree of freedom of the machine has.
         dof: String,
         /// Degrees of freedom of the machine.
         known: String,
@@ -60,7 +60,7 @@ pub enum MachineError {
     UnknownParameter {
         /// Name of the coefficient.
         name: String,
-        /// Parameter that it names.
+        /// Name of the parameter that is not described.
         parameter: String,
     },
     /// No coefficient and no sensor uses the parameter.
@@ -109,7 +109,10 @@ pub enum MachineError {
         max: f64,
     },
     /// An unknown has no initial value for the search.
-    #[error("{name:?} is unknown: give \"start\", both \"min\" and \"max\", or \"prior\"")]
+    #[error(
+        "{name:?} is an unknown coefficient without an initial value: give \"start\", \
+         both \"min\" and \"max\", or \"prior\""
+    )]
     NoStart {
         /// Name of the coefficient.
         name: String,

@@ -44,7 +44,7 @@ pub struct InstrumentedMachine {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct Candidates {
-    /// Sensors; each has the noise level of the present sensors of the same quantity.
+    /// Additional sensors; each has the noise level of the existing sensors of the same quantity.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub sensors: Vec<super::Sensor>,
     /// Forces of a second test; each has the level of the forces of the first test.

@@ -58,7 +58,7 @@ pub enum Input {
     Unbalance {
         /// Name of the input and its channel.
         name: String,
-        /// Degrees of freedom of x and y; the rotor turns from x to y.
+        /// Degrees of freedom in the directions x and y; the rotor turns from x to y.
         at: [String; 2],
     },
 }

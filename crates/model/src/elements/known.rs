@@ -3,8 +3,9 @@
 use super::{Coefficient, Element, FreeCoefficient, Machine};
 
 impl Machine {
-    /// Returns the machine once for each known coefficient of its elements that is not 0, with this
-    /// coefficient unknown: the search begins at the known value and keeps its sign.
+    /// Returns one machine for each known, non-zero coefficient of the elements. In this machine
+    /// the coefficient is unknown: the search begins at the known value, and a bound at 0 keeps the
+    /// sign of this value.
     pub fn with_each_known_free(&self) -> Vec<Self> {
         let mut machines = Vec::new();
         for (at, (_, element)) in self.elements.iter().enumerate() {

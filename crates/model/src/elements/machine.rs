@@ -50,7 +50,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Creates a machine with these names of the degrees of freedom, and without elements.
+    /// Creates a machine without elements; `dofs` are the names of its degrees of freedom.
     pub fn new<S: Into<String>>(dofs: impl IntoIterator<Item = S>) -> Self {
         Self { dofs: dofs.into_iter().map(Into::into).collect(), ..Self::default() }
     }

@@ -49,14 +49,14 @@ pub(super) enum Places {
 #[derive(Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "a matrix is a list of rows, or the size, rows, columns and values of a sparse one"
+    expecting = "a matrix is a list of rows; a sparse matrix has size, rows, columns and values"
 )]
 pub(super) enum MatrixForm {
     Dense(Vec<Vec<f64>>),
     Sparse { size: usize, rows: Vec<usize>, columns: Vec<usize>, values: Vec<f64> },
 }
 
-/// Any element; fields of other kinds are absent.
+/// Element of any kind; the fields that only other kinds have are absent.
 #[derive(Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ElementForm {

@@ -128,7 +128,8 @@ mod tests {
         let assembly = machine.assembly(&instruments).unwrap();
         let names: Vec<&str> = assembly.parameters().iter().map(|p| p.name.as_str()).collect();
         assert_eq!(names, ["rotor mass", "film.kxx", "film.kyy", "seal.c"]);
-        // The shared mass is in two terms, and the damper starts at the mean of its bounds.
+        // The shared mass is one parameter, although two elements use it. The initial value of the
+        // damper is the geometric mean of its bounds.
         assert_eq!(assembly.start(), [12.0, 1e6, 2e6, 10.0]);
         let system = assembly.system(&assembly.start(), 300.0).unwrap();
         assert_eq!((system.mass()[(0, 0)], system.mass()[(1, 1)]), (12.0, 12.0));

@@ -18,7 +18,8 @@ pub enum Power {
 }
 
 impl Power {
-    /// Returns the factor at `omega` and the rotor speed `speed`, both in rad/s.
+    /// Returns the frequency factor of a term at `omega` and the rotor speed `speed`, both in
+    /// rad/s.
     pub fn factor(self, omega: f64, speed: f64) -> Complex<f64> {
         match self {
             Self::Stiffness => Complex::new(1.0, 0.0),
@@ -29,7 +30,8 @@ impl Power {
         }
     }
 
-    /// Returns the factor at an eigenvalue `s` and the rotor speed `speed`, both in rad/s.
+    /// Returns the frequency factor of a term at an eigenvalue `s` and the rotor speed `speed`,
+    /// both in rad/s.
     pub fn at_eigenvalue(self, s: Complex<f64>, speed: f64) -> Complex<f64> {
         match self {
             Self::Stiffness => Complex::new(1.0, 0.0),
@@ -41,15 +43,15 @@ impl Power {
     }
 }
 
-/// Entries of the dynamic stiffness to which a term contributes. Index n, one beyond the degrees of
+/// Entries of the dynamic stiffness to which a term contributes. Index n, the number of degrees of
 /// freedom, is the support, whose motion is prescribed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Pattern {
     /// Matrix a bᵀ, given by the non-zero entries of a and b.
     Dyad {
-        /// Entries of a, pure numbers.
+        /// Non-zero entries of the vector `a`, pure numbers, each with its index.
         left: Vec<(usize, f64)>,
-        /// Entries of b, pure numbers.
+        /// Non-zero entries of the vector `b`, pure numbers, each with its index.
         right: Vec<(usize, f64)>,
     },
     /// A d × d matrix over some degrees of freedom.
@@ -58,7 +60,7 @@ pub enum Pattern {
         dofs: Vec<usize>,
         /// Entries of the matrix, row by row.
         matrix: DMatrix<f64>,
-        /// Column of the support, d entries.
+        /// Matrix column that belongs to the motion of the support, d entries.
         support: Vec<f64>,
     },
 }
@@ -77,7 +79,7 @@ pub struct Term {
 }
 
 impl Term {
-    /// Returns scale × product of parameters, which are in their own units.
+    /// Returns scale × product of parameters; each parameter is in its own unit.
     pub fn value(&self, parameters: &[f64]) -> f64 {
         self.parameters.iter().fold(self.scale, |product, at| product * parameters[*at])
     }
@@ -103,8 +105,9 @@ impl Term {
         self.parameters.is_empty()
     }
 
-    /// Calls `add` with every entry (row, column, value) of the pattern. Column n belongs to the
-    /// support; rows of the support are omitted, because its motion is prescribed.
+    /// Calls `add` with every entry (row, column, value) of the pattern. Column `dof`, the number
+    /// of degrees of freedom, belongs to the support. Rows of the support are omitted, because the
+    /// motion of the support is prescribed.
     pub fn for_each_entry(&self, dof: usize, mut add: impl FnMut(usize, usize, f64)) {
         match &self.pattern {
             Pattern::Dyad { left, right } => {

@@ -107,7 +107,7 @@ impl UncertainNonlinearSystem {
 /// Motion x(t) = Σ a_h cos hωt, with the harmonics h from 0.
 #[derive(Clone)]
 struct Motion {
-    /// Amplitudes a_h, degrees of freedom × (harmonics + 1), in m.
+    /// Amplitudes a_h of the harmonics, degrees of freedom × (harmonics + 1), in m.
     cosines: DMatrix<f64>,
     /// Frequency (rad/s).
     omega: f64,
@@ -278,8 +278,8 @@ mod tests {
         FRAC_PI_2 / a
     }
 
-    /// Frequency, and amplitude of the fundamental, of ẍ + k x + k₃ x³ = 0 released at rest at
-    /// `peak`: x = peak cn(Ωt), Ω² = k + k₃ peak².
+    /// Returns the frequency and the amplitude of the fundamental of the motion ẍ + k x + k₃ x³ = 0
+    /// that starts at rest from x = `peak`. The solution is x = peak cn(Ωt) with Ω² = k + k₃ peak².
     fn duffing(k: f64, cubic: f64, peak: f64) -> (f64, f64) {
         let square = k + cubic * peak * peak;
         let parameter = cubic * peak * peak / (2.0 * square);

@@ -49,7 +49,7 @@ pub struct Constant {
     pub name: &'static str,
     /// SI unit.
     pub unit: &'static str,
-    /// The value, in this unit.
+    /// Value of the constant, in `unit`.
     pub value: f64,
 }
 
@@ -136,8 +136,8 @@ impl Law for QuadraticDamping {
     }
 }
 
-/// Law q̇³ / (1 + (q̇/b)²): cubic damping for small velocities that becomes linear above b, so that
-/// it remains moderate beyond the amplitudes of the data.
+/// Law q̇³ / (1 + (q̇/b)²). The damping is cubic at velocities far below b, and linear far above b,
+/// so that the force remains moderate outside the range of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SaturatingDamping {
     velocity: f64,
@@ -183,8 +183,8 @@ impl Law for SaturatingDamping {
     }
 }
 
-/// Spring behind a clearance a on either side: gap(q, a) is q − a above a, q + a below −a and zero
-/// between; its coefficient is the stiffness of the spring.
+/// Spring behind a clearance a on either side: gap(q, a) is q − a above a, q + a below −a, and zero
+/// from −a to a. The coefficient of this law is the stiffness of the spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     clearance: f64,
@@ -236,7 +236,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// Creates a friction law with the velocity b (m/s) above which it slides.
+    /// Creates a friction law with the velocity b (m/s) above which the contact slides.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] unless b is positive and finite.
@@ -298,7 +298,8 @@ mod tests {
                     (law.value(q, v + h) - law.value(q, v - h)) / (2.0 * h),
                 ];
                 for (exact, difference) in law.slopes(q, v).into_iter().zip(central) {
-                    // Error of the difference: third derivatives times h², and rounding over h.
+                    // The error of the difference is in proportion to h² times the third
+                    // derivative, plus rounding divided by h.
                     assert!((exact - difference).abs() < 1e-5, "{law:?} at {q}, {v}");
                 }
             }

@@ -64,8 +64,8 @@ impl NonlinearSystem {
         Ok(Self { linear, terms, coefficients })
     }
 
-    /// Returns M, C and K. They describe the system at small amplitudes, if every term has a slope
-    /// of zero at zero.
+    /// Returns M, C and K. They describe the system at small amplitudes if the slope of every term
+    /// is zero at rest.
     pub fn linear(&self) -> &SecondOrderSystem {
         &self.linear
     }
@@ -86,10 +86,11 @@ impl NonlinearSystem {
     }
 
     /// Computes C ẋ + K x + Σ θ f(q, q̇), in N, from displacements (m) and velocities (m/s), and
-    /// writes it into `force`. All three have one entry per degree of freedom.
+    /// writes it into `force`. `displacement`, `velocity` and `force` have one entry per degree of
+    /// freedom.
     ///
     /// # Panics
-    /// If one of the three has another length.
+    /// If `displacement`, `velocity` or `force` has another length.
     pub fn restoring_force(&self, displacement: &[f64], velocity: &[f64], force: &mut [f64]) {
         let n = self.dof();
         for (row, force) in force.iter_mut().enumerate() {
@@ -112,7 +113,7 @@ impl NonlinearSystem {
     /// about a displacement (m) and velocity (m/s), n × n, in N/m and N·s/m.
     ///
     /// # Panics
-    /// If one of the two has fewer than n entries.
+    /// If `displacement` or `velocity` has fewer than n entries.
     pub fn tangents(&self, displacement: &[f64], velocity: &[f64]) -> [DMatrix<f64>; 2] {
         let mut tangents = [self.linear.stiffness().clone(), self.linear.damping().clone()];
         for (term, coefficient) in self.terms.iter().zip(&self.coefficients) {
@@ -215,7 +216,8 @@ mod tests {
             let by_x = [force(&moved(x, h), &v), force(&moved(x, -h), &v)];
             let by_v = [force(&x, &moved(v, h)), force(&x, &moved(v, -h))];
             for row in 0..2 {
-                // The error of a central difference: third derivatives times h²/6, and rounding.
+                // The error of a central difference is h²/6 times the third derivative, plus
+                // rounding.
                 let of = |[up, down]: [[f64; 2]; 2]| (up[row] - down[row]) / (2.0 * h);
                 assert!((of(by_x) - stiffness[(row, column)]).abs() < 1e-8);
                 assert!((of(by_v) - damping[(row, column)]).abs() < 1e-8);

@@ -14,7 +14,7 @@ type Factor = (Coordinate, Arc<dyn Law>);
 impl FromStr for Terms {
     type Err = ModelError;
 
-    /// Parses terms such as `k2: x1^2, c2: |v1| v1`; an empty text has none.
+    /// Parses terms such as `k2: x1^2, c2: |v1| v1`; an empty text gives an empty list.
     ///
     /// # Errors
     /// [`ModelError::Term`] for a text that is not a term, [`ModelError::RepeatedTerm`].
@@ -144,7 +144,8 @@ impl Parser {
         self.take(')').then_some((coordinate, text))
     }
 
-    /// Returns the text before the next closing parenthesis, or to the end.
+    /// Returns the text before the next closing parenthesis, or all remaining text if there is
+    /// none.
     fn until_closed(&mut self) -> String {
         let start = self.at;
         while self.peek().is_some_and(|c| c != ')') {

@@ -229,10 +229,10 @@ impl Terms {
         self.0.is_empty()
     }
 
-    /// Adds one more term.
+    /// Returns the list with one more term.
     ///
     /// # Errors
-    /// [`ModelError::RepeatedTerm`] if its name is taken.
+    /// [`ModelError::RepeatedTerm`] if the list already has a term of this name.
     pub fn and(&self, term: Term) -> Result<Self, ModelError> {
         let mut terms = self.0.clone();
         terms.push(term);

@@ -82,7 +82,7 @@ impl NonlinearSystem {
                 *values.get_mut(constant).ok_or_else(|| self.no_term(at))? += by;
                 let refused = || ModelError::Term {
                     text: term.to_string(),
-                    reason: format!("its constant cannot be changed by {by}"),
+                    reason: format!("the sum of its constant and {by} is out of range"),
                 };
                 *term = term.with_constants(&values).ok_or_else(refused)?;
                 changed.terms = Terms::new(terms)?;
@@ -124,7 +124,7 @@ impl UncertainNonlinearSystem {
     /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,
     /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
     /// [`ModelError::RepeatedParameter`] if a parameter is named twice, and the errors of
-    /// [`NonlinearSystem::changed`] if the system does not have a parameter.
+    /// [`NonlinearSystem::changed`] if the system does not have one of the parameters.
     pub fn new(
         system: NonlinearSystem,
         parameters: Vec<NonlinearParameter>,

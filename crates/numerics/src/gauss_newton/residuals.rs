@@ -64,8 +64,8 @@ impl<R: Residuals> SumOfSquares for Buffered<'_, R> {
         std::mem::swap(&mut self.accepted, &mut self.tried);
     }
 
-    /// A linearisation always follows an accepted trial, so the most recent evaluation is the
-    /// accepted one.
+    /// Linearises the residuals at the accepted parameters. A linearisation always follows an
+    /// accepted trial, so the residuals were last evaluated at these parameters.
     fn linearise(&mut self) -> Option<Triangle> {
         self.residuals.jacobian(&mut self.jacobian);
         Some(Triangle::new(&self.jacobian, &self.accepted))

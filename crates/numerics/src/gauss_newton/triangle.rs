@@ -33,7 +33,8 @@ impl Triangle {
         let columns = jacobian.ncols();
         let mut factor = TriangularFactor::new(columns + 1);
         let is_finite = factor.push(&[jacobian.as_view(), residual.as_view()]);
-        // If a value is not finite, the factor has no rows and no triangle.
+        // If a value is not finite, the factor has no rows; a matrix of NaN is then used as its
+        // triangle.
         let none = || DMatrix::from_element(columns + 1, columns + 1, f64::NAN);
         let mut upper = if is_finite { factor.r().clone() } else { none() };
         let mut scale = DVector::from_element(columns, 1.0);
@@ -108,8 +109,8 @@ impl Linearisation for Triangle {
 mod tests {
     use super::*;
 
-    /// A search may reach parameters at which the response overflows: it has no step there, for any
-    /// number of rows.
+    /// A search may reach parameters at which the response overflows. The linearisation at these
+    /// parameters must have no step, for any number of rows.
     #[test]
     fn a_jacobian_that_is_not_finite_has_no_step() {
         for rows in [1, 100, 40_000] {

@@ -40,7 +40,8 @@ struct HessenbergFactors {
     below: usize,
     /// Rows of U from the diagonal on.
     upper: Vec<Vec<Complex<f64>>>,
-    /// For each column, the row with which it was exchanged, and the multipliers of the rows below.
+    /// For each column: the offset from the diagonal to the pivot row that was exchanged, and the
+    /// multipliers of the rows below the diagonal.
     steps: Vec<(usize, Vec<Complex<f64>>)>,
 }
 
@@ -100,7 +101,8 @@ impl HessenbergFactors {
 mod tests {
     use super::*;
 
-    /// Reference: the matrix itself, and the dense factors of nalgebra.
+    /// The factors of a matrix with few diagonals below the main diagonal give the same solution as
+    /// the dense factors of nalgebra, and this solution satisfies the equations.
     #[test]
     fn factors_of_few_diagonals_solve_as_dense_ones_do() {
         for (size, below) in [(1, 0), (1, 3), (3, 1), (4, 4), (9, 0), (9, 1), (12, 4)] {

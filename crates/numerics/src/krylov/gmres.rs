@@ -9,7 +9,7 @@ use crate::linear_algebra::singular_values;
 /// Solution of (I − Φ) y = b in a Krylov space.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// y, n entries, in the unit of b.
+    /// The solution y, n entries, in the unit of b.
     pub vector: DVector<f64>,
     /// ‖b − (I − Φ) y‖ / ‖b‖, a pure number.
     pub residual: f64,
