@@ -39,16 +39,17 @@ impl Equilibrium {
     }
 }
 
-/// Eight coefficients of a film, dimensionless. A stiffness k (N/m) is k c / W, a damping b (N·s/m)
-/// is b Ω c / W, with the clearance c, the load W and the speed of rotation Ω.
+/// Eight coefficients of a film, dimensionless. The coefficient of a stiffness k (N/m) is k c / W,
+/// and that of a damping b (N·s/m) is b Ω c / W, with the clearance c, the load W and the speed of
+/// rotation Ω.
 ///
 /// Index 0 is along the load, 1 across it in the direction of rotation; the first index belongs to
 /// the force, the second to the motion. [`Conditions`](crate::Conditions) converts them to SI
 /// units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients {
-    /// Stiffness, 2×2, a ratio each.
+    /// Stiffness coefficients, a 2×2 matrix, dimensionless.
     pub stiffness: [[f64; 2]; 2],
-    /// Damping, 2×2, a ratio each.
+    /// Damping coefficients, a 2×2 matrix, dimensionless.
     pub damping: [[f64; 2]; 2],
 }

@@ -3,7 +3,7 @@
 /// Maximum number of Newton steps on each mesh, for the journal and for the fronts of a film.
 pub(crate) const NEWTON_STEPS: usize = 60;
 
-/// Longest step of the journal, in clearances; Newton's method may diverge with longer ones.
+/// Longest step of the journal, in clearances; with longer steps, Newton's method may diverge.
 pub(crate) const JOURNAL_STEP: f64 = 0.1;
 
 /// Smallest ratio of the minimum film thickness after a step of the journal to that before the
@@ -25,6 +25,6 @@ pub(crate) const FRONT_STEP: f64 = 0.3;
 /// Smallest fraction of the converging arc that a film covers; a smaller film could vanish.
 pub(crate) const FILM_FRACTION: f64 = 0.6;
 
-/// Change of a front (rad) above which the pressure is computed again; after a smaller change, it
-/// is corrected to first order.
+/// Change of a front (rad) above which the pressure is computed again; after a smaller change, the
+/// pressure is corrected to first order.
 pub(crate) const PRESSURE_UPDATE: f64 = 0.02;

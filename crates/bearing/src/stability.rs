@@ -54,13 +54,13 @@ pub struct ThresholdErrors {
     pub equivalent_stiffness: f64,
     /// Standard error of the whirl frequency ratio, a ratio; `None` if there is no whirl.
     pub whirl_frequency_ratio: Option<f64>,
-    /// Standard error of the critical mass, in kg; `None` if there is none.
+    /// Standard error of the critical mass, in kg; `None` if there is no critical mass.
     pub critical_mass: Option<f64>,
 }
 
 impl Threshold {
-    /// Returns the threshold of a film (N/m, N·s/m, kyx an entry of the stiffness matrix) at a
-    /// speed of rotation (rad/s).
+    /// Returns the threshold of a film at a speed of rotation (rad/s). The coefficients of the film
+    /// are entries of the stiffness matrix (N/m) and of the damping matrix (N·s/m).
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the speed is not positive, a coefficient is not finite, or
@@ -82,7 +82,8 @@ impl Threshold {
         let whirl_squared = (x * y - kxy * kyx) / determinant;
 
         let by_equivalent = SVector::from([cyy, -cyx, -cxy, cxx, -y, -kyx, -kxy, -x]) / trace;
-        // The entries are the derivatives of x y − kxy kyx − ω_w² det C for constant k_eq and ω_w.
+        // The entries are the derivatives of x y − kxy kyx − ω_w² det C, with x = k_eq − kxx and y
+        // = k_eq − kyy, for constant k_eq and ω_w.
         let explicit_derivatives = SVector::from([
             -y,
             -kyx,
@@ -100,8 +101,8 @@ impl Threshold {
         Ok(Self { omega, equivalent_stiffness: equivalent, whirl_squared, gradient })
     }
 
-    /// Returns the threshold in dimensionless form: stiffness over W / c, mass over W / (c Ω²), so
-    /// that the critical mass is c Ω² m / W.
+    /// Returns the threshold in dimensionless form. The stiffness is divided by W / c and the mass
+    /// by W / (c Ω²): the critical mass is given as c Ω² m / W.
     ///
     /// # Errors
     /// The errors of [`Threshold::new`].
@@ -116,8 +117,8 @@ impl Threshold {
         self.equivalent_stiffness
     }
 
-    /// Square of the whirl frequency ratio, (ω_w / Ω)², a ratio; negative if no rotor whirls
-    /// without decaying.
+    /// Square of the whirl frequency ratio, (ω_w / Ω)², a ratio; negative if no rotor can whirl
+    /// with constant amplitude.
     pub fn whirl_frequency_ratio_squared(&self) -> f64 {
         self.whirl_squared / (self.omega * self.omega)
     }

@@ -11,7 +11,7 @@ use nalgebra::Complex;
 /// system. It affects the fit of a nonlinear system, because the nonlinear forces depend on the
 /// response before the filter. The measured lines at frequency f are the true lines times e^(−iφ),
 /// with φ = p₃ z³ + p₅ z⁵ and z = f/(f_s/2). A common delay, the term in z, has no effect. The
-/// force acts on the system later, by `delay`, than its channel shows.
+/// force acts on the system later than its channel shows; the difference is `delay`.
 ///
 /// # Source
 /// Ours. The odd polynomial is the series of any filter's phase about zero frequency.

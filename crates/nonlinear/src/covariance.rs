@@ -1,4 +1,4 @@
-//! Standard errors that are valid for a residual of any spectrum, also if the variance of the
+//! Standard errors that are valid for a residual of any spectrum, even if the variance of the
 //! residual changes with the response.
 
 use nalgebra::{Complex, DMatrix, DVector};

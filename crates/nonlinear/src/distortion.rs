@@ -22,8 +22,8 @@ use crate::limits::{DISTORTION_DRIVEN, DISTORTION_SIGNIFICANT};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Level {
-    /// Ratio of the RMS value on the lines without force, after subtraction of the noise power, to
-    /// the RMS value on the driven lines, in dB; −∞ if there is only noise.
+    /// Ratio of the RMS value of the response on the lines without force, after subtraction of the
+    /// noise power, to the RMS value on the driven lines, in dB; −∞ if there is only noise.
     pub db: f64,
     /// Number of lines.
     pub lines: usize,
@@ -39,7 +39,7 @@ pub struct Kind {
     pub term: Term,
     /// Name in words, such as `cubic stiffness of x1`.
     pub name: String,
-    /// Coefficient, in the unit of the coefficient of the term, if it is the only nonlinear term.
+    /// Coefficient of the term, in its SI unit, in a fit in which it is the only nonlinear term.
     pub coefficient: f64,
     /// Fraction of the squared equation error of a linear model that the term explains.
     pub explained: f64,
@@ -50,14 +50,14 @@ pub struct Kind {
 /// Evidence against a linear system in steady periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distortion {
-    /// Level on even lines if only odd lines are driven: even nonlinearities, such as x².
+    /// Level on even lines if only odd lines are driven; it shows even nonlinearities, such as x².
     pub even: Option<Level>,
-    /// Level on odd lines that are not driven: odd nonlinearities, such as x³.
+    /// Level on odd lines that are not driven; it shows odd nonlinearities, such as x³.
     pub odd: Option<Level>,
     /// Fraction (RMS) of the force that a linear model does not explain, on the lines of the band.
     /// Each line is weighted by the receptance of the linear model.
     pub linear_unexplained: f64,
-    /// Kinds of terms, by decreasing explained fraction.
+    /// Kinds of terms, in descending order of the explained fraction.
     pub kinds: Vec<Kind>,
 }
 
@@ -65,8 +65,9 @@ pub struct Distortion {
 /// a linear model. The data are whole periods of force (N) and response of one or several
 /// experiments, on the lines of a band.
 ///
-/// All experiments have the same linear model; they must determine it together, not one by one. The
-/// levels are those of the experiment with the largest level.
+/// All experiments have the same linear model. It is sufficient that all experiments together
+/// determine this model; a single experiment need not. The levels are those of the experiment with
+/// the largest level.
 ///
 /// A nonlinear system responds at sums and differences of the driven lines: if odd lines are
 /// driven, an even power responds at even lines and an odd power at odd lines. If all odd lines are
@@ -104,8 +105,8 @@ pub fn distortion(
     Ok(Distortion { even, odd, linear_unexplained, kinds })
 }
 
-/// Returns the levels on the lines without force, first for even lines, then for odd lines, if only
-/// odd lines are driven.
+/// Returns the level on even lines without force and the level on odd lines without force. Both are
+/// `None` unless only odd lines are driven.
 fn levels(
     lines: &Lines,
     force: &Record,
@@ -169,7 +170,7 @@ fn level(
 }
 
 /// Returns the fraction of the force that a linear model does not explain, and the kinds of terms
-/// by decreasing explained fraction.
+/// in descending order of the fraction that each of them explains.
 fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind>), EstimateError> {
     let (terms, names) = tested_kinds(data.dof())?;
     // The explained share is computed with the weighting `Response`, its p-value with the most
@@ -195,13 +196,15 @@ fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind
 
 /// Linear fit to which one term at a time is added.
 struct OneByOne {
-    /// \[A | b\] of the linear columns, the terms and the force.
+    /// Least-squares rows \[A | b\]: A has the linear columns and one column for each term, b is
+    /// the force.
     rows: LeastSquares,
     linear: Vec<usize>,
-    /// Sums of the weighted squares of the force, and of the residual of the linear columns.
+    /// Sum of the weighted squares of the force (`total`), and of the residual of the linear fit
+    /// (`without`).
     total: f64,
     without: f64,
-    /// Number of equations minus parameters of a fit with one term.
+    /// Number of equations minus number of parameters, in a fit with one term.
     residual_freedom: usize,
 }
 
@@ -216,8 +219,8 @@ impl OneByOne {
         let none = Shape::new(&Terms::none(), ShapeConstants::default());
         let fit = weighted(&base, &none, weighting, None)?;
         let row_weights = match weighting {
-            // The weights also relate different equations of motion: a term acts in one of them, or
-            // in two.
+            // The weights of this kind also scale the equations of motion relative to one another.
+            // This is necessary because a term can act in two equations.
             Weighting::Response => as_response(&base, &fit.coefficients),
             _ => None,
         };

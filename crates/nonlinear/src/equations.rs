@@ -59,7 +59,8 @@ impl<'a> Equations<'a> {
         let mean = with_mean.contains(&true).then_some(0);
         let rows: Vec<usize> = mean.into_iter().chain(data.lines().iter().copied()).collect();
         let unit = DMatrix::from_fn(rows.len(), data.dof(), |at, dof| match rows[at] {
-            // A mean is real, and has half the variance of each part of a line.
+            // The mean (line 0) is real. Its variance is half the variance of the real part, or of
+            // the imaginary part, of another line.
             0 if with_mean[dof] => std::f64::consts::SQRT_2,
             0 => 0.0,
             _ => 1.0,
@@ -134,8 +135,9 @@ impl<'a> Equations<'a> {
         columns.iter().map(residual).collect()
     }
 
-    /// Solves for the coefficients. The right-hand sides are the force and the columns of `extra`,
-    /// which has a number of matrices (rows × degrees of freedom) for each experiment.
+    /// Solves for the coefficients. The first right-hand side is the force. Each matrix in `extra`
+    /// (rows × degrees of freedom) is a further right-hand side; every experiment has the same
+    /// number of these matrices.
     pub(super) fn solve(
         &self,
         columns: &[Columns],
@@ -223,8 +225,8 @@ impl<'a> Equations<'a> {
         !self.coefficients[dof].is_empty()
     }
 
-    /// Returns an error for an equation that has no force and no known entry, because it determines
-    /// only ratios.
+    /// Returns an error for an equation that has no force and no known entry, because such an
+    /// equation determines only the ratios of its coefficients.
     pub(super) fn check_forces(&self, columns: &[Columns]) -> Result<(), EstimateError> {
         for dof in 0..self.data.dof() {
             let without_force = |columns: &Columns| {

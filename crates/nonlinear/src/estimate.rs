@@ -17,24 +17,25 @@ pub struct NamedParameter {
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Value and standard error, in this unit.
+    /// Value and standard error, in `unit`.
     pub estimate: Uncertain,
 }
 
 /// Origin of the standard errors of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StandardErrors {
-    /// Noise of force and response, from this number of periods of all records. The standard errors
-    /// are valid for noise of any spectrum, if the residual does not exceed this noise.
+    /// Noise of force and response, estimated from the scatter of the periods; the number is the
+    /// total of the periods of all records. The standard errors are valid for noise of any
+    /// spectrum, if the residual does not exceed this noise.
     Periods(usize),
     /// Scatter of the scores over this number of blocks of time. The standard errors are valid for
-    /// a residual of any spectrum, also if the model does not explain a part of the response.
+    /// a residual of any spectrum, even if the model does not explain a part of the response.
     Blocks(usize),
     /// White noise on the samples of force and response; its variances are estimated from the
     /// residual. The standard errors are valid if the residual is consistent with this noise.
     Noise,
-    /// Size of the weighted residual, which is assumed to be white, because the record is too short
-    /// for blocks.
+    /// Size of the weighted residual. The residual is assumed to be white, because the record is
+    /// too short for blocks.
     White,
 }
 
@@ -115,8 +116,8 @@ impl NonlinearEstimate {
         &self.terms
     }
 
-    /// Returns every parameter estimated: free entries of M, C and K, coefficients of terms, shape
-    /// constants.
+    /// Returns every estimated parameter: free entries of M, C and K, coefficients of terms, and
+    /// nonlinear constants.
     pub fn parameters(&self) -> &[NamedParameter] {
         &self.parameters
     }

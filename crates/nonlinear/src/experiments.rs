@@ -128,7 +128,8 @@ impl SteadyExperiments {
         self.period
     }
 
-    /// Returns the columns of every experiment at some lines.
+    /// Returns, for each experiment, the columns of the equations of motion of its mean period on
+    /// the lines `rows`.
     pub(super) fn columns(
         &self,
         rows: &[usize],
@@ -139,8 +140,8 @@ impl SteadyExperiments {
         self.steady.par_iter().map(mean).collect()
     }
 
-    /// Returns the columns of every period of an experiment at some lines; empty for a single
-    /// period.
+    /// Returns, for each period of an experiment, the columns of the equations of motion on the
+    /// lines `rows`; empty for a single period.
     pub(super) fn columns_of_periods(
         &self,
         experiment: usize,

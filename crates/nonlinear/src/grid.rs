@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn a_cube_has_the_lines_of_the_addition_theorem() {
-        // x = 1 + cos: x³ = 5/2 + 15/4 cos + 3/2 cos 2 + 1/4 cos 3.
+        // For x = 1 + cos τ, the cube is x³ = 5/2 + 15/4 cos τ + 3/2 cos 2τ + 1/4 cos 3τ.
         let grid = Grid::new(4, 32);
         let one = Complex::from(1.0);
         let x = grid.to_samples([one, one].into_iter());

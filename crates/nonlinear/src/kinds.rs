@@ -16,8 +16,9 @@ const TESTED: [(Option<[u32; 2]>, &str); 4] = [
     (Some([0, 3]), "cubic damping"),
 ];
 
-/// Exponents of displacement and velocity in further terms: a spring force in proportion to the
-/// fifth power of the displacement, and damping that depends on the displacement.
+/// Exponents of displacement and velocity in the terms that [`further_terms`] adds to [`TESTED`]: a
+/// spring force in proportion to the fifth power of the displacement, and damping that depends on
+/// the displacement.
 const FURTHER: [[u32; 2]; 3] = [[5, 0], [1, 1], [2, 1]];
 
 /// Friction with a known constant b (a velocity), because records of fast motion do not determine

@@ -1,5 +1,5 @@
-//! Limits of this crate: for the end of searches, and for significant, negligible and rounding
-//! effects.
+//! Limits of this crate. They decide when a search ends, and which effects are significant, are
+//! negligible or are due to rounding.
 
 /// Maximum number of Gauss–Newton steps of a search; a search that needs more did not start near a
 /// minimum.
@@ -8,7 +8,8 @@ pub(crate) const SEARCH_STEPS: usize = 60;
 /// Maximum number of blocks of time into which one experiment is divided for standard errors.
 pub(crate) const COVARIANCE_MOST: usize = 32;
 
-/// Minimum number of blocks of all experiments for standard errors from the scatter of the blocks.
+/// Minimum number of blocks, summed over all experiments, for standard errors from the scatter of
+/// the blocks.
 pub(crate) const FEWEST: usize = 10;
 
 /// Minimum length of a block, in time constants of the free response: for blocks of at least this
@@ -53,7 +54,7 @@ pub(crate) const PREDICTION_SHOTS: usize = 30;
 /// Maximum change of the state over one period, relative to the state, for a steady state.
 pub(crate) const PREDICTION_CLOSED: f64 = 1e-10;
 
-/// Exponent of the growth of a term above which its extrapolation is unreliable.
+/// Growth exponent of a term above which the extrapolation of this term is unreliable.
 pub(crate) const HIGHEST_ORDER: f64 = 3.5;
 
 /// Standard error of the restoring force, relative to the restoring force, above which the
@@ -97,10 +98,12 @@ pub(crate) const SIMULATION_STEP: f64 = 1e-6;
 /// Minimum half-width, in lines, of the averages of the residual spectrum.
 pub(crate) const HALF_WIDTH: usize = 10;
 
-/// Maximum number of independent averages of a smooth spectrum.
+/// Maximum number of independent averages of a smooth spectrum: each average is over neighbouring
+/// lines.
 pub(crate) const WEIGHTING_GROUPS: usize = 32;
 
-/// Minimum residual power of a line, relative to the largest line of its equation.
+/// Minimum average of the residual power around a line, relative to the largest residual power of
+/// the same equation; a lower average is raised to this limit.
 pub(crate) const WEIGHTING_FLOOR: f64 = 1e-12;
 
 /// Total number of windows for the first search on open records: over many cycles, the response of
@@ -115,7 +118,7 @@ pub(crate) const SCATTER_ROUNDING: f64 = 1e-9;
 /// of the kinds of noise is negligible.
 pub(crate) const NOISE_SPAN: f64 = 14.0;
 
-/// First step of the search for the noise variances, in the logarithm of a ratio.
+/// First step of the search for the noise variances: a change of the logarithm of a variance ratio.
 pub(crate) const NOISE_STEP: f64 = 2.0;
 
 /// Change of twice the logarithm of the likelihood below which the search for the noise variances

@@ -125,8 +125,8 @@ impl<'a> Propagation<'a> {
 mod tests {
     use super::*;
 
-    /// The test is ⟨g, L e⟩ = ⟨Lᵀ g, e⟩ for every quantity, with transitions that change from
-    /// sample to sample.
+    /// The adjoint Lᵀ of a propagation L satisfies ⟨g, L e⟩ = ⟨Lᵀ g, e⟩ for every measured
+    /// quantity, with transitions that change from sample to sample.
     #[test]
     fn the_adjoint_is_one() {
         let (n, samples) = (2, 12);

@@ -49,7 +49,8 @@ pub(super) struct Line<'a> {
 pub(super) struct PeriodScatter {
     covariance: DMatrix<f64>,
     sums: DVector<f64>,
-    /// Squared contributions, each divided by its degrees of freedom.
+    /// Sum over the lines, for each parameter: the squared variance that a line contributes,
+    /// divided by the degrees of freedom of this line.
     squares: DVector<f64>,
     periods: usize,
 }
@@ -112,7 +113,8 @@ pub(super) struct Powers {
     residual: f64,
     noise: f64,
     signal: f64,
-    /// Squared noise powers, divided by the degrees of freedom of the residual and of the scatter.
+    /// Two sums over the lines: the squared noise power divided by the degrees of freedom of the
+    /// residual, and divided by the degrees of freedom of the scatter.
     squares: [f64; 2],
 }
 

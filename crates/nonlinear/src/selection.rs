@@ -46,7 +46,7 @@ pub struct Selection {
     pub terms: Terms,
     /// Steps of the selection: the first without any candidate, the others each with one more term.
     pub steps: Vec<SelectionStep>,
-    /// Best of the candidates that the criterion refused.
+    /// Step with the best of the candidates that the criterion refused.
     pub refused: Option<SelectionStep>,
     /// Names of the terms that were added and later removed; the least certain term comes first.
     pub removed: Vec<String>,
@@ -184,11 +184,12 @@ impl Selection {
     }
 }
 
-/// Weighted sums of squared residuals for some of the columns.
+/// Weighted sums of squared residuals of a fit with some of the columns.
 struct Misfit {
-    /// Sum of squares of all experiments, fitted together.
+    /// Sum of squared residuals of all experiments, with coefficients that were fitted to all of
+    /// them together.
     fitted: f64,
-    /// Sum of squares of all experiments without a model.
+    /// Sum of squared residuals of all experiments if all coefficients are zero.
     all: f64,
     /// Sum of squares of each experiment, with the coefficients that were fitted to all other
     /// experiments; used only with [`Criterion::HeldOut`], otherwise empty.

@@ -169,7 +169,8 @@ pub(super) fn fit_shape(
         return Err(EstimateError::NotConverged { searches: 1, steps });
     }
     let parameters = undetermined.join(", ");
-    let directions = format!("no value of {parameters} fits better than chance");
+    let directions =
+        format!("no value of {parameters} fits significantly better than other values");
     Err(EstimateError::Undetermined { parameters, directions })
 }
 

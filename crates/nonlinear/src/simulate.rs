@@ -19,7 +19,7 @@ pub(super) enum Direction {
     Entry(Parameter),
     /// Coefficient of a term.
     Term(usize),
-    /// Constant inside the law of a term.
+    /// Constant inside the law of a term: index of the term, and index of the constant in its law.
     Constant(usize, usize),
 }
 
@@ -35,7 +35,8 @@ pub(super) struct FineForce {
 impl FineForce {
     /// Interpolates a band-limited force by the Fourier series of one period. For an open record
     /// this period is the record followed by its mirror image, so that the force has no jump. The
-    /// number of steps is the number that the response from `start` needs.
+    /// number of steps in a sampling interval is doubled until the response from `start` hardly
+    /// changes.
     pub(super) fn sufficient(
         force: &Record,
         system: &NonlinearSystem,
@@ -263,7 +264,7 @@ impl<'a> Tangent<'a> {
     }
 
     /// Returns the linearised motion about the response, from sample to sample; the directions must
-    /// be the initial state. `None` if the response overflows.
+    /// be the entries of the initial state. `None` if the response overflows.
     pub(super) fn transitions(
         &mut self,
         force: &FineForce,
@@ -293,7 +294,7 @@ impl<'a> Tangent<'a> {
         Some(transitions)
     }
 
-    /// Integrates state and derivatives over a sampling interval; false if they overflow.
+    /// Integrates state and derivatives over a sampling interval; returns `false` if they overflow.
     fn interval(
         &mut self,
         force: &FineForce,

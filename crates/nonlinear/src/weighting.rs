@@ -13,14 +13,15 @@ use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
     serde(rename_all = "kebab-case")
 )]
 pub enum Weighting {
-    /// Weighting with the highest likelihood of the residual, chosen from the others by Akaike's
-    /// criterion.
+    /// Weighting with the highest likelihood of the residual, chosen from the other weightings by
+    /// Akaike's criterion.
     #[default]
     Automatic,
-    /// Equal size on all lines of an equation of motion: white noise of the force.
+    /// Equation error of the same size on all lines of an equation of motion, as from white noise
+    /// on the force.
     WhiteForce,
-    /// Equal size, on all lines, of the response of the linear part to the equation error: lines
-    /// near a resonance have the largest weights.
+    /// Equation error to which the linear part responds with the same size on all lines. Lines near
+    /// a resonance then have the largest weights.
     Response,
     /// Smooth spectrum: the spectrum of the residual, averaged over neighbouring lines and all
     /// experiments.
@@ -93,7 +94,8 @@ impl Weights {
     }
 }
 
-/// Returns the variances scaled to the mean power of each equation.
+/// Returns the variances, multiplied by one factor for each equation so that the ratio of power to
+/// variance has the mean 1.
 fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMatrix<f64> {
     let lines = power.nrows() - first;
     let mut scaled = variance.clone();

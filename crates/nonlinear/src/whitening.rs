@@ -26,26 +26,26 @@ use crate::limits::{NOISE_ROUNDS, NOISE_SETTLED, NOISE_SPAN, NOISE_STEP};
 /// Motion linearised about the simulated response of one record, from sample to sample.
 pub(super) struct NoisePath(Vec<NoiseStep>);
 
-/// One sample of a [`NoisePath`].
+/// Matrices of a [`NoisePath`] at one sample.
 struct NoiseStep {
-    /// Φ, 2n × 2n.
+    /// Matrix Φ from the state to the state at the next sample, 2n × 2n.
     state: DMatrix<f64>,
-    /// G, 2n × n.
+    /// Matrix G from the force noise to the state at the next sample, 2n × n.
     input: DMatrix<f64>,
-    /// C, n × 2n.
+    /// Matrix C from the state to the response, n × 2n.
     output: DMatrix<f64>,
-    /// H, n × n.
+    /// Matrix H from the force noise to the response at the same sample, n × n.
     direct: DMatrix<f64>,
 }
 
 /// Filter that makes the residual of one record white.
 pub(super) struct Filter {
-    /// Gains of all samples side by side, 2n × n each.
+    /// Gains of the Kalman filter at all samples, side by side, 2n × n each.
     gains: DMatrix<f64>,
     /// Inverses of the triangular factors of the covariances of the innovations: n × n for each
     /// sample, all samples side by side.
     inverses: DMatrix<f64>,
-    /// Sum of the logarithms of the determinants of the covariances.
+    /// Sum over the samples of the logarithm of the determinant of the innovation covariance.
     log_determinant: f64,
 }
 
@@ -86,7 +86,8 @@ impl NoisePath {
         let (mut covariance, mut gain) = (zeros(n, n), zeros(2 * n, n));
         let (mut spread, mut next) = (zeros(2 * n, 2 * n), zeros(2 * n, 2 * n));
         for (sample, NoiseStep { state, input, output, direct }) in self.0.iter().enumerate() {
-            // The two matrices are G and H times the standard deviations of the force noise.
+            // `pushed` and `at_once` are G and H; each column is multiplied by the standard
+            // deviation of the noise on its force.
             pushed.copy_from(input);
             at_once.copy_from(direct);
             for (force, variance) in variances.force.iter().enumerate() {
@@ -190,8 +191,9 @@ pub(super) fn most_likely(
     if levels.iter().any(|level| *level <= 0.0 || !level.is_finite()) {
         return None;
     }
-    // This is the variance of force noise that alone explains the residual, from the channel on
-    // which it has most effect.
+    // For each force, this is the noise variance that alone explains the residual of one channel.
+    // The channel is the one on which noise of this force has the largest effect relative to the
+    // residual.
     let of_force = DVector::from_fn(n, |force, _| {
         let effect = path.mean_square(force).component_div(&levels).max();
         if driven[force] && effect > 0.0 && effect.is_finite() { 1.0 / effect } else { 0.0 }
@@ -234,8 +236,8 @@ pub(super) fn most_likely(
 mod tests {
     use super::*;
 
-    /// Reference: the covariance of the residual, computed sample by sample. The filter makes it
-    /// the unit matrix, and states its determinant.
+    /// The covariance of the residual is computed sample by sample. After the filter this
+    /// covariance is the unit matrix, and the determinant that the filter reports is correct.
     #[test]
     fn the_filter_makes_the_covariance_one() {
         let (n, samples) = (2, 9);
@@ -252,7 +254,8 @@ mod tests {
             force: DVector::from_vec(vec![1.1, 0.4]),
         };
         let filter = path.filter(&variances).unwrap();
-        // Response to one unit of each force sample, as columns; samples of a channel are adjacent.
+        // Each column of this matrix is the response to one unit of one force sample; the samples
+        // of a channel are adjacent.
         let mut carried = DMatrix::zeros(n * samples, n * samples);
         for at in 0..samples {
             for force in 0..n {

@@ -14,7 +14,7 @@ use crate::limits;
 /// The journal and its films during the search for the equilibrium.
 pub(super) struct Search<'a> {
     bearing: &'a FiniteBearing,
-    /// Load over 6 μ Ω R² (R/c)².
+    /// Load divided by 6 μ Ω R² (R/c)².
     load: f64,
     pub(super) position: Vector2<f64>,
     films: Vec<Option<Film>>,
@@ -127,8 +127,8 @@ impl<'a> Search<'a> {
         Err(BearingError::FilmNotConverged { iterations, change, position })
     }
 
-    /// Returns the bounded step of the journal towards the equilibrium, and its length before the
-    /// bound.
+    /// Returns the limited step of the journal towards the equilibrium, and the length of this step
+    /// before the limitation.
     fn journal_step(
         &self,
         load: Vector2<f64>,
@@ -176,8 +176,8 @@ mod tests {
         .map(|(bore, s)| (FiniteBearing::new(bore, 1.0).unwrap().with_mesh(mesh).unwrap(), s))
     }
 
-    /// The derivatives agree with finite differences of the load: the films are solved again after
-    /// a small displacement.
+    /// The derivatives agree with finite differences of the load. For each difference, the films
+    /// are solved again after a small displacement of the journal.
     #[test]
     fn tangents_are_the_derivatives_of_the_discrete_load() {
         for (bearing, sommerfeld) in bearings() {

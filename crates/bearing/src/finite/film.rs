@@ -24,7 +24,8 @@ pub(super) struct Film {
     pub(super) fronts: [Vec<f64>; 2],
     /// True if the film starts or ends within the pad, not at its edge.
     pub(super) free: [Vec<bool>; 2],
-    /// Pressure over 6 μ Ω (R/c)²: rows without the last × columns.
+    /// Pressure divided by 6 μ Ω (R/c)²: one row for each row of the mesh except the last, one
+    /// column for each column of the mesh.
     pub(super) pressure: DMatrix<f64>,
 }
 

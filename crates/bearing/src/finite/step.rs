@@ -10,7 +10,7 @@ use crate::limits;
 /// Linearisation of a film: its load, and the derivatives of the pressure and of the film
 /// boundaries (fronts) with respect to displacement and velocity of the journal.
 pub(super) struct Step {
-    /// Load of the film once it satisfies its equations, to first order.
+    /// Load of the film after the Newton step, to first order.
     pub(super) load: Vector2<f64>,
     /// Derivatives of the load with respect to displacement and velocity, along the static load
     /// and across.

@@ -96,10 +96,12 @@ pub(super) struct HalfFilm {
 }
 
 impl HalfFilm {
-    /// Computes ∫ G n / h³ dθ over the half where G < 0, with h = 1 − ε cos θ from the line of
-    /// centres, n = (cos θ, sin θ) and G = Ω/2 ∂h/∂θ + ∂h/∂t = p sin θ − q cos θ.
+    /// Computes ∫ G n / h³ dθ over the half of the circumference where G < 0. The angle θ is
+    /// counted from the line of centres, with h = 1 − ε cos θ, n = (cos θ, sin θ) and G = Ω/2 ∂h/∂θ
+    /// + ∂h/∂t = p sin θ − q cos θ.
     ///
-    /// G vanishes at both ends of this half, which therefore do not contribute to the derivatives.
+    /// G is zero at both ends of this half; therefore the ends do not contribute to the
+    /// derivatives.
     pub(super) fn new(position: [f64; 2], velocity: [f64; 2], omega: f64) -> Self {
         let eccentricity = position[0].hypot(position[1]);
         let [cos, sin] =

@@ -28,7 +28,7 @@ impl Integrals {
         let last = (root * sin).atan2(cos - e);
         let first = (-root * sin).atan2(-cos - e);
         let first = if first < last { first } else { first - TAU };
-        // ∫ cosᵏγ dγ and ∫ cosᵏγ sinγ dγ.
+        // `mean` has the integrals ∫ cosᵏγ dγ, and `slope` returns the integrals ∫ cosᵏγ sinγ dγ.
         let ([s1, c1], [s0, c0]) = (<[f64; 2]>::from(last.sin_cos()), first.sin_cos().into());
         let span = last - first;
         let mean = [
@@ -87,7 +87,8 @@ mod tests {
         for e in [0.0, 1e-9, 0.1, 0.5, 0.9] {
             for end in [-PI + 1e-9, -2.5, -1.0, -1e-12, 0.0, 1e-12, 0.3, 1.7, 3.0, PI] {
                 let Integrals { second, third } = Integrals::new(e, end);
-                // The kernel peaks at 1 / (1 − ε)ⁿ.
+                // The tolerance is relative to the maximum of 1 / (1 − ε cos θ)ⁿ, which is 1 / (1 −
+                // ε)ⁿ.
                 let scale = |n: i32| 1e-10 / (1.0 - e).powi(n);
                 for (sines, value) in (0..).zip(second) {
                     let expected = by_quadrature(e, end, sines, 2 - sines);

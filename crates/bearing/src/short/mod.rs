@@ -46,7 +46,7 @@ impl ShortBearing {
         Ok(Self { length_over_diameter })
     }
 
-    /// Returns the equilibrium at an eccentricity over the clearance (a ratio).
+    /// Returns the equilibrium for a ratio of eccentricity to clearance.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the eccentricity is not between 0 and 1, or leads to no

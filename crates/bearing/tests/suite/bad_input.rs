@@ -74,7 +74,7 @@ fn a_journal_outside_the_bore_has_no_film() {
     }
 }
 
-/// Loads that are too heavy for any mesh soon end in an error.
+/// A load that is too heavy for any mesh must give an error after a short time.
 #[test]
 fn hopeless_loads_end_in_an_error() {
     for sommerfeld in [1e-12, 1e-300] {

@@ -1,4 +1,5 @@
-//! Very short and very long bearings against closed forms, and the order of the discretisation.
+//! Comparison of very short and very long bearings with closed forms, and tests of the order of the
+//! discretisation.
 
 use std::f64::consts::PI;
 
@@ -69,8 +70,8 @@ fn everything_converges_with_the_square_of_the_step() {
     }
 }
 
-/// For L/D → 0 the flow is axial, as in Ocvirk's bearing. The difference from its position and its
-/// eight coefficients decreases at least in proportion to L/D.
+/// For L/D → 0 the flow is axial, as in Ocvirk's bearing. The position and the eight coefficients
+/// differ from those of Ocvirk's bearing; these differences decrease at least in proportion to L/D.
 #[test]
 fn short_bearings_tend_to_ocvirk() {
     for eccentricity in [0.2, 0.6] {
@@ -93,7 +94,8 @@ fn short_bearings_tend_to_ocvirk() {
 fn long_bearings_tend_to_sommerfeld() {
     let e: f64 = 0.4;
     let sommerfeld = (2.0 + e * e) * (1.0 - e * e).sqrt() / (12.0 * PI * PI * e);
-    // The slope is dW/dε / W. The mean rotation of the oil has half the speed of the shaft.
+    // `slope` is (dW/dε) / W. The damping 2/ε is twice the magnitude of the stiffness −1/ε, because
+    // the oil rotates on average with half the speed of the shaft.
     let slope = 1.0 / e - 2.0 * e / (2.0 + e * e) + e / (1.0 - e * e);
     let squeeze = (2.0 + e * e) / (e * (1.0 - e * e));
     let expected = [0.0, e, 0.0, slope, -1.0 / e, 0.0, 2.0 / e, 0.0, 0.0, squeeze];

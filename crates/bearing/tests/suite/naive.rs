@@ -1,6 +1,6 @@
-//! A naive solver of the same problem: finite differences on a mesh that does not move, with the
-//! pressure set to zero wherever it would be negative (Christopherson). The iteration ends when the
-//! pressure no longer changes.
+//! A naive solver for the film of a finite bearing, as an independent reference: finite differences
+//! on a mesh that does not move, with the pressure set to zero wherever the pressure would be
+//! negative (Christopherson). The iteration ends when the pressure no longer changes.
 
 use mechid_bearing::{Bore, FiniteBearing};
 

@@ -1,8 +1,8 @@
-//! Lund and Thomsen's tables of 1978: 14 rows, transcribed.
+//! Comparison of computed bearings with 14 rows of Lund and Thomsen's tables of 1978.
 
 use mechid_bearing::{Bore, Conditions, Equilibrium, FiniteBearing};
 
-/// A row of the table: the computed equilibrium and the printed values.
+/// A row of the tables of Lund and Thomsen: the computed equilibrium and the printed values.
 struct Row {
     name: String,
     ours: Equilibrium,
@@ -35,15 +35,17 @@ fn rows() -> Vec<Row> {
     rows
 }
 
-/// Largest difference over the largest entry of its kind.
+/// Returns the largest difference between computed and printed values, divided by the largest
+/// printed value.
 fn deviation(ours: &[f64], printed: &[f64]) -> f64 {
     let largest = printed.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let differences = ours.iter().zip(printed).map(|(a, b)| (a - b).abs());
     differences.fold(0.0, f64::max) / largest
 }
 
-/// The required accuracy is 2 %. The rows of the elliptical bearing agree within the printed
-/// digits, those of the bearing with two grooves within 1 %; the book gives the reason.
+/// The computed coefficients agree with the table of Lund and Thomsen. The required accuracy is 2
+/// %. The rows of the elliptical bearing agree within the printed digits, and the rows of the
+/// bearing with two grooves agree within 1 %; the book gives the reason.
 #[test]
 fn coefficients_agree_with_lund_and_thomsen() {
     for row in rows() {
@@ -71,7 +73,7 @@ fn places_of_the_journal_agree_with_lund_and_thomsen() {
     }
 }
 
-/// The table of `theory/bearing.md` of the book, line by line.
+/// The table on the page `theory/bearing.md` of the book equals the computed table, line by line.
 #[test]
 fn the_table_of_the_book_is_from_a_run() {
     let page = include_str!("../../../../docs/book/src/theory/bearing.md");

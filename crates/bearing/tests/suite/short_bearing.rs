@@ -1,4 +1,5 @@
-//! The short bearing against published formulas, quadrature and differences.
+//! Comparison of the short bearing with published formulas, numerical integration and finite
+//! differences.
 
 use std::f64::consts::PI;
 
@@ -7,8 +8,9 @@ use mechid_bearing::{BearingError, Conditions, ShortBearing, ShortFilm};
 const CONDITIONS: Conditions =
     Conditions { diameter: 0.05, length: 0.0125, clearance: 50e-6, viscosity: 0.02, omega: 300.0 };
 
-/// The eight coefficients as rotor dynamics books print them (Friswell et al., Dynamics of Rotating
-/// Machines, 2010, section 5.5.1), there with u across the load and v along it, upwards.
+/// Returns the eight coefficients from the formulas in books on rotor dynamics (Friswell et al.,
+/// Dynamics of Rotating Machines, 2010, section 5.5.1). The formulas have u across the load and v
+/// along the load, upwards; the result has the axes x and y of this crate.
 fn printed(e: f64) -> ([[f64; 2]; 2], [[f64; 2]; 2]) {
     let (s, p) = (e * e, PI * PI);
     let g = 1.0 - s;
@@ -20,7 +22,7 @@ fn printed(e: f64) -> ([[f64; 2]; 2], [[f64; 2]; 2]) {
     let buu = h * 2.0 * PI * g.sqrt() * (p * (1.0 + 2.0 * s) - 16.0 * s) / e;
     let buv = -h * 8.0 * (p * (1.0 + 2.0 * s) - 16.0 * s);
     let bvv = h * 2.0 * PI * (p * g * g + 48.0 * s) / (e * g.sqrt());
-    // Ours: x along the load, downwards, and y such that rotation leads from x to y.
+    // In this crate, x is along the load, downwards, and the journal rotates from x to y.
     ([[vv, -vu], [-uv, uu]], [[bvv, -buv], [-buv, buu]])
 }
 
@@ -77,7 +79,7 @@ fn by_quadrature(position: [f64; 2], velocity: [f64; 2]) -> [f64; 2] {
     sum
 }
 
-/// States in clearances and clearances per radian of rotation.
+/// Positions in clearances, and velocities in clearances per radian of rotation.
 const STATES: [([f64; 2], [f64; 2]); 7] = [
     ([0.3, 0.4], [0.0, 0.0]),
     ([0.3, 0.4], [0.2, -0.5]),
@@ -99,8 +101,8 @@ fn the_force_is_the_integral_of_the_pressure_at_any_state() {
         let size = expected[0].hypot(expected[1]);
         for axis in 0..2 {
             let error = (ours[axis] - expected[axis]).abs();
-            // The quadrature has a kink where the pressure begins, so that its error is of second
-            // order in its step.
+            // The integrand has a kink where the pressure begins; therefore the error of the
+            // quadrature is of second order in the step.
             assert!(error < 1e-8 * size, "{position:?} {ours:?} {expected:?}");
         }
     }

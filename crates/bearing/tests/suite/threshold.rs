@@ -1,4 +1,5 @@
-//! Whirl and threshold against the eigenvalues of the rotor, errors against scatter.
+//! Tests of the threshold: whirl frequency and critical mass are compared with the eigenvalues of
+//! the rotor, and standard errors with the scatter of drawn coefficients.
 
 use mechid_bearing::{Bore, Coefficients, FiniteBearing, ShortBearing, Threshold};
 use mechid_model::{JournalBearing, KyxSign, OilFilm};

@@ -1,4 +1,5 @@
-//! A rigid rotor on the nonlinear film, integrated in time: oil whirl against the linear threshold.
+//! A rigid rotor on the nonlinear film, integrated in time: comparison of the oil whirl with the
+//! linear threshold.
 
 use std::f64::consts::TAU;
 
@@ -74,7 +75,7 @@ fn threshold() -> Threshold {
 }
 
 /// A small whirl of the nonlinear rotor neither grows nor decays at the critical mass of the
-/// linear one.
+/// linearised film.
 #[test]
 fn small_whirl_has_the_linear_threshold() {
     let threshold = threshold();
@@ -86,8 +87,9 @@ fn small_whirl_has_the_linear_threshold() {
     assert!((crossing - 1.0).abs() < 2e-4, "{crossing}");
 }
 
-/// Above the threshold the whirl grows until the film bounds it, with about half the frequency of
-/// rotation; below it, the rotor returns to rest.
+/// The whirl of a rotor heavier than the critical mass grows until the film limits the amplitude;
+/// the frequency of this whirl is about half the frequency of rotation. A lighter rotor returns to
+/// rest.
 #[test]
 fn whirl_of_an_unstable_rotor_stays_within_the_clearance() {
     let critical = threshold().critical_mass().unwrap();

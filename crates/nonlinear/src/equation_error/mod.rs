@@ -146,7 +146,7 @@ fn check_determined(names: &[String], open: &[Direction]) -> Result<(), Estimate
     })
 }
 
-/// Returns √(Σ|e|² / Σ|b|²) of each equation.
+/// Returns √(Σ|e|² / Σ|b|²) of each equation of motion, with the residuals e and the forces b.
 fn nrmse(
     equations: &Equations<'_>,
     columns: &[Columns],

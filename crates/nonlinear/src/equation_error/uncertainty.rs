@@ -92,8 +92,8 @@ impl Fit {
     }
 
     /// Adds the blocks of time of an experiment to the scatter, from the weighted deviations of the
-    /// periods (rows × degrees of freedom). Terms multiply noise and response. This correlates the
-    /// lines, but hardly correlates the blocks of time.
+    /// periods (rows × degrees of freedom). Nonlinear terms multiply noise and response. This
+    /// product correlates the lines, but hardly correlates the blocks of time.
     fn push_blocks(
         &self,
         equations: &Equations<'_>,

@@ -87,15 +87,15 @@ pub fn output_error(
 enum Weights {
     /// One weight for each channel, from the size of the residual of the channel.
     Levels,
-    /// Inverse of the most likely noise on force and response; used if a record has one period and
-    /// the residual is consistent with this noise.
+    /// Inverse of the covariance of the most likely noise on force and response. It is used if a
+    /// record has one period and the residual is consistent with this noise.
     Noise,
-    /// Inverse of the most likely noise on force and response, even if the residual is not
-    /// consistent with this noise.
+    /// Inverse of the covariance of the most likely noise on force and response, even if the
+    /// residual is not consistent with this noise.
     AnyNoise,
 }
 
-/// Returns the [`output_error`] with these weights.
+/// Returns the fit of [`output_error`] with these weights.
 fn search(
     records: &[SteppedRecord],
     measured: ResponseQuantity,
@@ -260,7 +260,8 @@ impl<'a> Problem<'a> {
         DMatrix::from_columns(&residuals)
     }
 
-    /// Returns the residuals of a record, or derivatives of them, with their weights.
+    /// Returns `values` after weighting; `values` are the residuals of a record, or derivatives of
+    /// these residuals.
     fn weighted(&self, at: usize, mut values: DMatrix<f64>) -> DMatrix<f64> {
         match &self.noise {
             Some(noise) => noise[at].0.whiten(&noise[at].1, &mut values),

@@ -39,7 +39,8 @@ pub fn output_error_of_open_records(
     output_error(records, measured, &start)
 }
 
-/// Returns the factors of the constants inside the laws at which a search begins.
+/// Returns the factors for the constants inside the laws. For each factor, one search begins at the
+/// given constants times this factor.
 fn factors(terms: &Terms) -> &'static [f64] {
     let has_constants = terms.iter().any(|term| !term.law().constants().is_empty());
     if has_constants { &[1.0, 0.5, 2.0] } else { &[1.0] }
@@ -55,14 +56,15 @@ fn scaled(terms: &Terms, factor: f64) -> Option<Terms> {
     Terms::new(terms.iter().map(scaled_term).collect::<Option<_>>()?).ok()
 }
 
-/// Returns the records cut into windows of equal length, if they are long enough.
+/// Returns the windows of all records. The windows of a record have equal length; a record that is
+/// too short for two windows remains whole.
 fn windows(records: &[SteppedRecord]) -> Result<Vec<SteppedRecord>, EstimateError> {
     let windows_per_record = OPEN_WINDOWS.div_ceil(records.len().max(1));
     let mut windows = Vec::new();
     for record in records {
         let samples = record.force.len();
-        // The initial state of a window has 2n unknowns: a window without many more samples has
-        // little information beyond this state.
+        // The initial state of a window has 2n unknowns, so a window needs many more samples than
+        // this to determine the other parameters.
         let fewest = (OUTPUT_FORGOTTEN as usize) * 16 * record.force.channels();
         let count = (samples / fewest).clamp(1, windows_per_record);
         let len = samples / count;

@@ -23,7 +23,7 @@ pub fn best_output_error(
     best_search(records, measured, starts, Weights::Noise)
 }
 
-/// Returns the [`best_output_error`] with these weights.
+/// Returns the fit of [`best_output_error`] with these weights.
 pub(super) fn best_search(
     records: &[SteppedRecord],
     measured: ResponseQuantity,

@@ -24,7 +24,8 @@ fn sampling() -> Sampling {
     Sampling::new(0.01, LEN).unwrap()
 }
 
-/// x, ẋ and ẍ of `channels` multisines on odd lines up to 41, about 1 m in size.
+/// Returns x, ẋ and ẍ of `channels` multisines on odd lines up to 41; x has an RMS value of about 1
+/// m.
 fn prescribed(channels: usize) -> Response {
     prescribed_on(sampling(), channels)
 }
@@ -71,7 +72,8 @@ fn coupled() -> NonlinearSystem {
     NonlinearSystem::new(linear.unwrap(), terms, vec![120.0, 3.0]).unwrap()
 }
 
-/// Returns lines that contain the ninth power of the prescribed response.
+/// Returns an experiment on lines 1 to 250, which contain the powers of the prescribed response up
+/// to the sixth.
 fn data(force: &Record, response: &Record, measured: ResponseQuantity) -> SteadyExperiments {
     let lines = Lines::new(sampling(), 1..=250).unwrap();
     let mut data = SteadyExperiments::new(&lines, force.channels(), measured);
@@ -102,8 +104,8 @@ fn coefficients_of_a_prescribed_response_come_out() {
         let values: Vec<f64> = found.parameters().iter().map(|p| p.estimate.value).collect();
         let expected = [vec![2.0, 5.0, 900.0], truth.clone()].concat();
         for (value, expected) in values.iter().zip(&expected) {
-            // The tolerance allows for the rounding of sums over some hundred lines, with forces a
-            // thousand times as large as the smallest term.
+            // The tolerance allows for the rounding of sums over several hundred lines, with forces
+            // a thousand times as large as the smallest term.
             assert!((value / expected - 1.0).abs() < 1e-9, "{value} for {expected}");
         }
         assert!(found.unexplained()[0] < 1e-9);
@@ -120,7 +122,8 @@ fn coefficients_of_a_prescribed_response_come_out() {
     }
 }
 
-/// Reference: the forces of the springs and dampers at the prescribed response, in closed form.
+/// The points of the restoring-force surface are the forces of the springs and dampers at the
+/// prescribed response, computed in closed form.
 #[test]
 fn points_of_the_surface_are_those_of_the_springs_and_dampers() {
     for (system, channels) in [(single("k2: x^2, c2: v^3", vec![40.0, 0.02]), 1), (coupled(), 2)] {
@@ -151,9 +154,8 @@ fn points_of_the_surface_are_those_of_the_springs_and_dampers() {
     }
 }
 
-/// Reference: forces that are powers of the motion. The data determine a cubic spring up to one and
-/// a half times their range, but neither a spring of fifth order nor a term that is hidden by
-/// noise.
+/// A cubic spring can be extrapolated to one and a half times the range of the data. The
+/// extrapolation is reported as poor for a spring of fifth order, and for a term that noise hides.
 #[test]
 fn terms_that_extrapolate_badly_are_told() {
     let response = prescribed(1);
@@ -177,7 +179,8 @@ fn terms_that_extrapolate_badly_are_told() {
         let [k1, k3, k5] = [900.0 * x, 80.0 * x.powi(3), 20.0 * x.powi(5)];
         assert!((fifth[1].share[at] / (k5 / (k1 + k3 + k5)) - 1.0).abs() < 0.02, "{fifth:?}");
     }
-    // The constant force does not grow; the damper is hidden by noise.
+    // The result omits the constant force, because this force does not grow. Noise hides the
+    // damper.
     let drowned = with("f: x^0, c3: v^3", vec![1.5, 1e-4], 0.3);
     assert_eq!(drowned.len(), 1);
     assert!(drowned[0].is_poor() && !drowned[0].grows_fast(), "{drowned:?}");
@@ -225,8 +228,8 @@ fn phase_delay_and_bend_are_found_by_variable_projection() {
     let response = prescribed(1);
     let force = band_limited_force(&system);
     let channels = ChannelPhase { delay: 4e-4, cubic: 1.2, quintic: 2.5 };
-    // The measuring channels are applied to the response; correction of the result gives the
-    // response again.
+    // Both records must contain the effect of the measuring channels. `as_measured` applies it to
+    // the response only; for the force, a correction with opposite delay and phase applies it.
     let measured = channels.as_measured(response.displacement()).unwrap();
     let undo = ChannelPhase { delay: -4e-4, cubic: -1.2, quintic: -2.5 };
     let (seen, _) = undo.correct(&force, &measured).unwrap();
@@ -246,7 +249,8 @@ fn phase_delay_and_bend_are_found_by_variable_projection() {
         ("p5", 2.5),
     ] {
         let value = found.parameter(name).unwrap().estimate.value;
-        // The tolerance allows for derivatives by differences, and for the end of the search.
+        // The tolerance allows for the error of the finite differences, and for the step at which
+        // the search ends.
         assert!((value / expected - 1.0).abs() < 1e-5, "{name} = {value}");
     }
     assert_eq!(found.covariance().nrows(), found.parameters().len());
@@ -266,8 +270,8 @@ fn a_prescribed_response_is_predicted_and_fitted() {
     assert!(gap(found.displacement(), response.displacement()) < 1e-4);
     assert!(gap(found.acceleration(), response.acceleration()) < 1e-3);
 
-    // The initial state in the middle is found from displacements alone, far from the ends of the
-    // record.
+    // The record is a window from the middle of the period. Its initial state is estimated from
+    // displacements only; the result is compared far from the ends of the window.
     let part = |record: &Record| record.window(50, 300).unwrap();
     let (push, seen) = (part(&force), part(response.displacement()));
     let start = fitted_start(&system, &push, &[(ResponseQuantity::Displacement, &seen)]).unwrap();
@@ -275,7 +279,7 @@ fn a_prescribed_response_is_predicted_and_fitted() {
     let inner = |record: &Record| record.window(50, 200).unwrap();
     assert!(gap(&inner(open.displacement()), &inner(&seen)) < 1e-2);
 
-    // Output error starts from another estimate and returns to this one.
+    // The output-error fit starts from an equation-error estimate and returns the true parameters.
     let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
     let begin = fitted(&all, "kc: (x1-x2)^3, cq: x2^2 v2", &EquationErrorOptions::default());
     let record = SteppedRecord {
@@ -298,7 +302,7 @@ fn the_right_terms_are_chosen_and_named() {
     let system = single("k3: x^3, c2: v^3", vec![80.0, 0.02]);
     let response = prescribed(1);
     let force = system.force(&response).unwrap();
-    // Rounding to a ten-thousandth of the force is used instead of noise.
+    // The force is rounded to multiples of 0.05 N; the rounding errors are used instead of noise.
     let rounded = force.data().map(|f| (f / 0.05).round() * 0.05);
     let force = Record::new(force.sampling(), rounded).unwrap();
     let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
@@ -358,7 +362,8 @@ fn what_cannot_be_told_apart_is_named() {
     ));
 }
 
-/// A spring that softens fails: the response grows without bound.
+/// The prediction returns an error if the response grows without bound, as with this softening
+/// spring, or if the system is too stiff for the time step.
 #[test]
 fn a_system_that_lets_go_is_told() {
     let system = single("k3: x^3", vec![-5e4]);

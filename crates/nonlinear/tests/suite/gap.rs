@@ -17,7 +17,8 @@ use crate::study::runs;
 const PERIODS: usize = 4;
 const STIFFNESS: f64 = 5053.24;
 
-/// 2 kg at 8 Hz between stops at 5 mm; four periods with 1 % of noise on force and response.
+/// Returns force and response of an oscillator of 2 kg and 8 Hz between two stops with a clearance
+/// of 5 mm: four periods with 1 % of noise on both records.
 fn measure(amplitude: f64, seed: u64) -> [Record; 2] {
     let sampling = Sampling::new(1.0 / 256.0, 512).unwrap();
     let lines = random_phases(4..60, amplitude, seed);
@@ -32,8 +33,8 @@ fn measure(amplitude: f64, seed: u64) -> [Record; 2] {
     [with(&force, 2 * seed), with(&response, 2 * seed + 1)]
 }
 
-/// Returns the error of the estimated clearance in its standard errors, or the reason for a
-/// failure.
+/// Returns the error of the estimated clearance divided by the standard error, or the reason why
+/// the fit failed.
 fn search(amplitude: f64, clearance: f64, seed: u64) -> Result<f64, String> {
     let [force, response] = measure(amplitude, seed);
     let unknowns = Unknowns::unknown_mass(1).unwrap();

@@ -13,7 +13,7 @@ use crate::stepped::{random_phases, steady_after};
 use crate::study::{assert_honest, judge, runs};
 
 const DISPLACEMENT: ResponseQuantity = ResponseQuantity::Displacement;
-/// 2 kg, 4 N s/m, 2 Hz.
+/// True parameters of the oscillator: 2 kg, 4 N s/m, natural frequency 2 Hz.
 const TRUTH: [(&str, f64); 4] = [("m", 2.0), ("c", 4.0), ("k", 315.827), ("k3", 110.0)];
 
 /// Returns a record of 16 s, from rest, of the oscillator with a further force that depends on
@@ -51,8 +51,9 @@ fn fitted(record: &SteppedRecord) -> NonlinearFit {
     output_error_of_open_records(records, DISPLACEMENT, &start.unwrap(), &terms).unwrap()
 }
 
-/// Reference: the oscillator, simulated by extrapolation of high order. Noise on the force colours
-/// the residual; the fit weights the residual with the noise that makes it most likely.
+/// About 95 % of the 95 % intervals contain the true parameters of the simulated oscillator. Noise
+/// on the force makes the residual coloured; the fit weights the residual with the most likely
+/// noise.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn intervals_of_open_records_hold_with_noise_on_the_force() {
@@ -69,7 +70,8 @@ fn intervals_of_open_records_hold_with_noise_on_the_force() {
     assert_honest(&judged, runs);
 }
 
-/// Reference: the forces that the model lacks.
+/// A further term is found in every record with a force that the model lacks, and in almost no
+/// record of a system that the model describes completely.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn terms_that_a_fit_lacks_are_found() {

@@ -1,4 +1,5 @@
-//! Several periods with noise on force and response: intervals, the residual against the noise, the choice of terms.
+//! Records of several periods with noise on force and response: tests of the intervals, of the
+//! comparison of the residual with the noise, and of the selection of terms.
 
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{ResponseQuantity, Terms};
@@ -17,12 +18,12 @@ use crate::study::runs;
 const PERIODS: usize = 4;
 const DISPLACEMENT: ResponseQuantity = ResponseQuantity::Displacement;
 const STIFFNESS: f64 = 315.827;
-/// 2 kg, 4 N s/m, 2 Hz.
+/// True parameters of the oscillator: 2 kg, 4 N s/m, natural frequency 2 Hz.
 const TRUTH: [(&str, f64); 4] =
     [("m", 2.0), ("c", 4.0), ("k", STIFFNESS), ("k3", 0.35 * STIFFNESS)];
 
-/// Oscillator 2 ẍ + 4 ẋ + k x + 0.35 k x³. The force or the motion of a period has lines up to the
-/// line `last`.
+/// Oscillator 2 ẍ + 4 ẋ + k x + 0.35 k x³ = F. The prescribed force, or the prescribed motion, has
+/// lines up to `last`.
 struct Oscillator {
     sampling: Sampling,
     last: usize,
@@ -38,17 +39,19 @@ fn with_noise(period: [Record; 2], levels: [f64; 2], seed: u64) -> [Record; 2] {
 }
 
 impl Oscillator {
-    /// 4 s, in which the free response falls to a fiftieth.
+    /// Returns the oscillator under a force whose period is 4 s; in this time the free response
+    /// falls to a fiftieth.
     fn short() -> Self {
         Self { sampling: Sampling::new(1.0 / 64.0, 256).unwrap(), last: 31 }
     }
 
-    /// 32 s.
+    /// Returns the oscillator under a force whose period is 32 s.
     fn long() -> Self {
         Self { sampling: Sampling::new(1.0 / 32.0, 1024).unwrap(), last: 127 }
     }
 
-    /// Returns the response to a force on the lines up to `last`.
+    /// Returns the force and the response, with noise, of the oscillator; the force has the lines
+    /// up to `last`.
     fn driven(&self, levels: [f64; 2], seed: u64) -> [Record; 2] {
         let lines = random_phases(1..=self.last, 10.0, seed);
         let (force, response) = steady_after(6, self.sampling, &[lines], |x, v, f| {
@@ -57,8 +60,8 @@ impl Oscillator {
         with_noise([force, response], levels, seed)
     }
 
-    /// Returns the response of the linear part with a friction force (N) that is smoothed below 0.1
-    /// m/s.
+    /// Returns the force and the response, with noise, of the linear part with friction. The
+    /// friction force has the size `friction` (N) and is smoothed below 0.1 m/s.
     fn rubbing(&self, friction: f64, seed: u64) -> [Record; 2] {
         let lines = random_phases(1..=self.last, 10.0, seed);
         let (force, response) = steady_after(6, self.sampling, &[lines], |x, v, f| {
@@ -68,9 +71,9 @@ impl Oscillator {
         with_noise([force, response], [0.01, 0.01], seed)
     }
 
-    /// Returns a motion, which is the response of the linear part to a force with equal lines, and
-    /// the force of the oscillator in closed form. The lines of this force end at three times the
-    /// last line of the motion.
+    /// Returns the force that a prescribed motion of the oscillator needs, in closed form, and this
+    /// motion. The motion is the response of the linear part to a force with the same amplitude on
+    /// all lines. The lines of the returned force end at three times the last line of the motion.
     fn moved(&self, levels: [f64; 2], seed: u64) -> [Record; 2] {
         let phases = random_phases(8..=self.last, 3.5, seed);
         let record = |order: i32| {
@@ -111,8 +114,9 @@ impl Oscillator {
     }
 }
 
-/// Reference: the scatter over the seeds. With 40 runs of four parameters, the share of intervals
-/// that contain the truth has a standard deviation of 2 to 3 %.
+/// About 95 % of the intervals contain the true values, and the scatter of the estimates over the
+/// seeds agrees with the standard errors. With 40 runs of four parameters, the share of intervals
+/// that contain the true value has a standard deviation of 2 to 3 %.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn intervals_of_a_short_record_hold_with_noise_on_the_force() {
@@ -144,8 +148,8 @@ fn intervals_of_a_short_record_hold_with_noise_on_the_force() {
     }
 }
 
-/// Reference: the generator. The residual of a correct model is noise; the residual without the
-/// cubic spring is larger.
+/// The residual of the model with the cubic spring is consistent with the noise of the periods; the
+/// residual of the model without this spring exceeds the noise.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn a_residual_is_compared_with_the_noise_of_the_periods() {
@@ -168,9 +172,10 @@ fn a_residual_is_compared_with_the_noise_of_the_periods() {
     assert!(wrong.len() >= 5 && wrong.iter().all(|p| *p < 1e-6), "{wrong:?}");
 }
 
-/// Reference: the generator. Most of the information of a record about a cubic spring is in a few
-/// blocks of time, whose scatter has one degree of freedom: in one of ten records, a spring known
-/// to 0.4 % was not significant.
+/// The cubic spring is selected in every record, and a false term in at most one of ten records.
+/// Most of the information of a record about a cubic spring is in a few blocks of time, whose
+/// scatter has one degree of freedom. With standard errors from these blocks, a spring known to 0.4
+/// % was not significant in one of ten records.
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn a_true_term_is_kept_and_a_false_one_is_not() {
@@ -193,9 +198,9 @@ fn a_true_term_is_kept_and_a_false_one_is_not() {
     assert!(10 * more <= runs, "{chosen:?}");
 }
 
-/// Reference: the generator. The intervals contain the true values with friction and without it.
-/// Friction that is in the model but not in the system is not significant, and friction is chosen
-/// from candidates only if the system has it.
+/// The intervals contain the true values of the simulated oscillator, both with and without
+/// friction. Friction that is in the model but not in the system is not significant, and friction
+/// is chosen from candidates only if the system has it.
 #[test]
 fn friction_is_present_only_where_it_acts() {
     let (test, unknowns) = (Oscillator::short(), Unknowns::unknown_mass(1).unwrap());

@@ -1,5 +1,5 @@
-//! A measured spring that hardens: the part that nonlinear terms explain, and the validity of their
-//! standard errors.
+//! Measured records of a hardening spring: the part of the response that nonlinear terms explain,
+//! and the validity of the standard errors.
 
 use mechid_estimate::Unknowns;
 use mechid_model::{InitialState, NonlinearSystem, ResponseQuantity, Terms};
@@ -22,7 +22,7 @@ fn fit(data: &SteadyExperiments, terms: &str, options: EquationErrorOptions) -> 
     equation_error(data, &unknowns, &terms.parse().unwrap(), &options).unwrap()
 }
 
-/// Small-amplitude natural frequency in Hz.
+/// Returns the natural frequency for small amplitudes, in Hz.
 fn natural_hz(found: &NonlinearEstimate) -> f64 {
     found.linear().modes().unwrap()[0].natural_frequency_hz.value
 }
@@ -31,7 +31,7 @@ fn natural_hz(found: &NonlinearEstimate) -> f64 {
 fn two_terms_explain_the_schroeder_record() {
     let Some(record) = schroeder() else { return };
     let record = record.without_mean();
-    // Periods 3 to 10 after the switch-on.
+    // The test uses periods 3 to 10 after the force is switched on.
     let (start, len) = (11608 + 2 * 1024, 8 * 1024);
     let (force, response) =
         (channel_window(&record, 0, start, len), channel_window(&record, 1, start, len));
@@ -71,8 +71,8 @@ fn realised(record: &Record, which: &[usize]) -> SteadyExperiments {
     data
 }
 
-/// Returns the RMS error of the displacement of some realisations, in mV, predicted through the
-/// whole record.
+/// Returns the RMS error, in mV, of the predicted displacement in two realisations; the prediction
+/// runs through the whole record.
 fn rmse(
     record: &Record,
     system: &NonlinearSystem,
@@ -111,7 +111,8 @@ fn four_realisations_predict_two() {
     assert!(errors.iter().all(|e| *e <= 0.22), "{errors:?} mV");
 }
 
-/// Two realisations, to save time; the book has the numbers of four.
+/// The output-error fit predicts other realisations with the same error limit as the equation-error
+/// fit. The fit uses only two realisations to save time; the book has the numbers for four.
 #[test]
 fn output_error_predicts_as_well() {
     let Some(record) = realisations() else { return };
@@ -170,8 +171,9 @@ fn held_out_realisations_choose_the_springs_first() {
     assert_eq!(names[..2], ["k3", "k2"], "{found:?}");
 }
 
-/// Six realisations and four nonlinear columns are timed in an optimised build only; the shortest
-/// of three runs counts, because the computer has other tasks, too.
+/// The fit of six realisations with four nonlinear columns takes less than a second. The time is
+/// tested in an optimised build only; the shortest of three runs counts, because other programs may
+/// run at the same time.
 #[test]
 #[allow(clippy::print_stderr, reason = "the time is read")]
 fn six_realisations_are_fitted_within_a_second() {

@@ -1,25 +1,25 @@
-//! Responses of nonlinear systems by extrapolation of very high order: the reference for the
-//! nonlinear estimators, which share no code with it.
+//! Responses of nonlinear systems, computed by extrapolation of very high order. They are the
+//! reference for the nonlinear estimators, which share no code with this module.
 
 use std::f64::consts::TAU;
 
 use mechid_signal::{Record, Sampling};
 
-/// Amplitude and phase on a line: A cos(n ω₀ t + φ).
+/// Line n, amplitude A and phase φ of the signal A cos(n ω₀ t + φ).
 pub type Cosine = (usize, f64, f64);
 
 /// Number of periods after which a system that decays within a tenth of a period is independent of
 /// its initial state.
 const SETTLED: usize = 3;
 
-/// Numbers of substeps of the extrapolated midpoint rule: order 12.
+/// Numbers of substeps of the extrapolated midpoint rule; the extrapolation has order 12.
 const SUBSTEPS: [usize; 6] = [2, 4, 6, 8, 10, 12];
 
-/// Force and displacement over a steady period of ẍ = acceleration(x, ẋ, F).
+/// Returns force and displacement over one period of the steady motion ẍ = acceleration(x, ẋ, F).
 ///
-/// Gragg's midpoint rule, extrapolated in h² (Hairer, Nørsett & Wanner, *Solving Ordinary
-/// Differential Equations I*, section II.9), with one step per sample and the exact force at every
-/// instant.
+/// The method is Gragg's midpoint rule, extrapolated in h² (Hairer, Nørsett & Wanner, *Solving
+/// Ordinary Differential Equations I*, section II.9), with one step per sample and the exact force
+/// at every instant.
 pub fn steady<const N: usize>(
     sampling: Sampling,
     forces: &[Vec<Cosine>; N],
@@ -28,7 +28,7 @@ pub fn steady<const N: usize>(
     steady_after(SETTLED, sampling, forces, acceleration)
 }
 
-/// Returns force and displacement in the last of this many periods from rest.
+/// Returns force and displacement in the last of `settled` periods; the motion begins from rest.
 pub fn steady_after<const N: usize>(
     settled: usize,
     sampling: Sampling,
@@ -38,8 +38,8 @@ pub fn steady_after<const N: usize>(
     let (dt, len) = (sampling.dt(), sampling.len());
     let turns: Vec<(f64, f64)> =
         (0..len).map(|k| (TAU * k as f64 / len as f64).sin_cos()).collect();
-    // Forces at a fraction of each sampling interval: every line turns by whole multiples of 2π/len
-    // from sample to sample.
+    // Returns the forces at a fraction of each sampling interval. From one sample to the next, the
+    // phase of line n advances by 2πn/len.
     let forces_at = |fraction: f64| {
         let mut all = vec![[0.0; N]; len];
         for (dof, lines) in forces.iter().enumerate() {
@@ -54,7 +54,8 @@ pub fn steady_after<const N: usize>(
         }
         all
     };
-    // The instants of the substeps repeat from period to period: levels × instants × samples.
+    // Forces at the instants of all substeps: levels × instants × samples. They are the same in
+    // every period.
     let table = SUBSTEPS.map(|count| -> Vec<_> {
         (0..count).map(|k| forces_at(k as f64 / count as f64)).collect()
     });
@@ -97,7 +98,7 @@ fn step<'a, const N: usize>(
             let next = plus(&before, 2.0 * h, &rate(&now, forces(level, instant)));
             (before, now) = (now, next);
         }
-        // Aitken–Neville in h², from the newest value backwards.
+        // The Aitken–Neville scheme extrapolates in h²; the row begins with the newest value.
         let mut row = vec![now];
         for column in 0..level {
             let ratio = (*count as f64 / SUBSTEPS[level - 1 - column] as f64).powi(2) - 1.0;
@@ -110,7 +111,7 @@ fn step<'a, const N: usize>(
     table[SUBSTEPS.len() - 1]
 }
 
-/// Cosines of equal amplitude with random phases from a seed.
+/// Returns cosines of equal amplitude with random phases from a seed.
 pub fn random_phases(lines: impl Iterator<Item = usize>, amplitude: f64, seed: u64) -> Vec<Cosine> {
     use rand::{RngExt, SeedableRng};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);

@@ -1,6 +1,7 @@
 //! Hundreds of noisy experiments on nonlinear systems of known truth.
 //!
-//! `MECHID_RUNS=1000` repeats the studies with as many runs; the suite takes fewer.
+//! `MECHID_RUNS=1000` repeats the studies with 1000 runs; without this variable, each study has
+//! fewer runs.
 
 use mechid_estimate::Unknowns;
 use mechid_model::{Matrix, ResponseQuantity, Terms};
@@ -27,14 +28,15 @@ pub fn runs(in_suite: u64) -> u64 {
     std::env::var("MECHID_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(in_suite)
 }
 
-/// ẍ + 0.16 ẋ + x + k₃ x³ = F on odd lines up to 201, x of about 1.
+/// Returns force and displacement of the steady motion ẍ + 0.16 ẋ + x + k₃ x³ = F. The force has
+/// odd lines up to 201; x is about 1.
 fn duffing(cubic: f64) -> (Record, Record) {
     let force = random_phases((1..=201).step_by(2), 0.06, 3);
     steady(sampling(), &[force], |x, v, f| [f[0] - 0.16 * v[0] - x[0] - cubic * x[0].powi(3)])
 }
 
-/// Two masses of 1 and 1.5 with springs to the ground, and with a linear and a cubic spring between
-/// them.
+/// Returns forces and displacements of two masses of 1 and 1.5 that have springs to the ground, and
+/// a linear and a cubic spring between the two masses.
 fn coupled() -> (Record, Record) {
     let force = [5, 6].map(|seed| random_phases((1..=201).step_by(2), 0.06, seed));
     steady(sampling(), &force, |x, v, f| {
@@ -63,7 +65,8 @@ fn steady_data(force: &Record, response: &Record, last: usize) -> SteadyExperime
     data
 }
 
-/// Output error on the mean period, started from least squares.
+/// Returns the output-error fit to the mean period; the search starts from the equation-error
+/// estimate.
 fn identify(
     (force, response): &(Record, Record),
     unknowns: &Unknowns,
@@ -82,7 +85,9 @@ fn identify(
     found
 }
 
-/// Coverage of the 95 % interval, and bias in standard deviations, of each parameter.
+/// Returns for each parameter: the name, the coverage of the 95 % interval, the bias, and the
+/// stated standard error. Bias and standard error are divided by the standard deviation of the
+/// estimates.
 pub fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String, f64, f64, f64)> {
     let runs = found.len() as f64;
     truth
@@ -105,7 +110,7 @@ pub fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String,
 
 #[track_caller]
 pub fn assert_honest(judged: &[(String, f64, f64, f64)], runs: u64) {
-    // The limits are three standard deviations of a share, and of a mean.
+    // The limits allow for three standard deviations of the coverage, and of the bias.
     let slack = 3.0 * (0.05 * 0.95 / runs as f64).sqrt();
     for (name, coverage, bias, stated) in judged {
         let told = format!("{name}: {coverage:.3}, bias {bias:.3} σ, stated {stated:.3} σ");
