@@ -12,7 +12,7 @@ use crate::{IoError, Quantity, Unit};
 pub enum Place {
     /// Line number, as in a text editor.
     Line(u64),
-    /// A sample of a column, where the file has no lines.
+    /// Number of a sample of a column, if the file has no lines.
     Sample(usize),
     /// A byte, in a binary file.
     Byte(usize),
@@ -47,7 +47,7 @@ pub(crate) struct Contents {
     pub complex: Vec<ComplexArray>,
     /// MATLAB text variables, by their names.
     pub texts: Vec<(String, String)>,
-    /// Notes about the file, such as what was left out.
+    /// Notes about the file, for example about omitted contents.
     pub remarks: Vec<String>,
     /// Number of the last line of a text, if no line break ends it.
     pub open_line: Option<u64>,
@@ -124,8 +124,8 @@ fn strides<'a>(lengths: impl Iterator<Item = &'a usize>) -> Vec<usize> {
 pub(crate) struct Column {
     /// Name; empty if the column has none.
     pub name: String,
-    /// `true` if it has a name or a first value; `false` for the column that a trailing delimiter
-    /// creates.
+    /// `true` if the column has a name or a first value; `false` for the column that a trailing
+    /// delimiter creates.
     pub filled: bool,
     /// Numbers, all finite, or the reason why the column cannot be used.
     pub values: Result<Vec<f64>, Unusable>,
@@ -286,7 +286,8 @@ impl Lines {
         }
     }
 
-    /// Returns the line of a sample, counted from 0.
+    /// Returns the line of the file that contains `sample`, which is counted from 0; if the line is
+    /// not known, returns the number of the sample, counted from 1.
     pub fn position(&self, sample: usize) -> Place {
         let after = self.runs.partition_point(|(first, _)| *first <= sample);
         match after.checked_sub(1).map(|run| self.runs[run]) {

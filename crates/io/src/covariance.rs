@@ -44,8 +44,8 @@ impl ParameterCovariance {
 ///
 /// # Errors
 /// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Undetermined`] if an
-/// entry is null, as JSON writes infinite numbers, and [`IoError::Description`] if the covariance
-/// does not have one row and one column per parameter, or if it has a negative variance.
+/// entry is null (JSON writes infinite numbers as null), and [`IoError::Description`] if the
+/// covariance does not have one row and one column per parameter, or if it has a negative variance.
 pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovariance>, IoError> {
     #[derive(Deserialize)]
     struct Described {

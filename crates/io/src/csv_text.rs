@@ -19,7 +19,7 @@ const BUFFER_BYTES: usize = 1 << 16;
 pub fn csv_text(sampling: Sampling, columns: &[(String, &[f64])]) -> String {
     let mut text = header(columns.iter().map(|(name, _)| name.as_str()));
     for (name, column) in columns {
-        assert_eq!(column.len(), sampling.len(), "column {name} is as long as the time axis");
+        assert_eq!(column.len(), sampling.len(), "column {name} must be as long as the time axis");
     }
     for (k, time) in sampling.times().enumerate() {
         push_row(&mut text, time, columns.iter().map(|(_, column)| column[k]));
@@ -95,9 +95,9 @@ impl CsvFile {
     /// [`IoError::Write`].
     ///
     /// # Panics
-    /// If its number of rows differs from the number of samples.
+    /// If the number of rows differs from the number of samples.
     pub fn finish(mut self) -> Result<BegunFile, IoError> {
-        assert_eq!(self.rows, self.sampling.len(), "there is a row for every instant");
+        assert_eq!(self.rows, self.sampling.len(), "every instant needs one row");
         self.file.append(&self.text)?;
         Ok(self.file)
     }

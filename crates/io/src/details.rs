@@ -137,7 +137,8 @@ mod tests {
         assert!(parse_details("date,F,x\n0,1,2\n").is_empty());
     }
 
-    /// Reference: the example of the specification of National Instruments.
+    /// The header is the example that National Instruments gives in its specification; operator and
+    /// date are read from it.
     #[test]
     fn the_header_of_a_labview_file_has_operator_and_date() {
         let text = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t1\nSeparator\tTab\n\

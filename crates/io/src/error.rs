@@ -78,7 +78,7 @@ pub enum IoError {
         column: String,
         /// The row, counted from 1.
         row: usize,
-        /// Description of the content of that row.
+        /// Description of the value that the column has in this row.
         what: &'static str,
     },
     /// The rows of one record are not consecutive.
@@ -143,7 +143,7 @@ pub enum IoError {
         file: String,
         /// Line number of the header or of the first row of numbers.
         line: u64,
-        /// Fields of the table.
+        /// Number of fields on the first line of the table.
         fields: usize,
     },
     /// Header lines are to be skipped in a file that is not text.
@@ -157,7 +157,7 @@ pub enum IoError {
     Empty {
         /// The file.
         file: String,
-        /// Description of the content.
+        /// Statement of what the file lacks.
         found: &'static str,
     },
     /// A line has more or fewer fields than the first line.
@@ -168,9 +168,9 @@ pub enum IoError {
         file: String,
         /// Line of the file.
         line: u64,
-        /// Fields on that line.
+        /// Number of fields on the line.
         got: usize,
-        /// Fields on the first line.
+        /// Number of fields on the first line.
         expected: usize,
     },
     /// The file has no column of this name or number.
@@ -254,7 +254,7 @@ pub enum IoError {
         file: String,
         /// Number and name of the column.
         column: String,
-        /// Description of the content.
+        /// Description of the content of the column.
         what: String,
     },
     /// A column is in a unit of another quantity.
@@ -389,17 +389,17 @@ pub enum IoError {
     StatedRates {
         /// The file.
         file: String,
-        /// Name of one number.
+        /// Name of the first number.
         first: String,
-        /// Value of that number, in Hz or s.
+        /// Value of the first number, in Hz or s.
         first_value: f64,
-        /// Rate that it states, in Hz.
+        /// Sampling rate that the first number states, in Hz.
         first_hz: f64,
-        /// Name of the other number.
+        /// Name of the second number.
         second: String,
-        /// Value of the other number, in Hz or s.
+        /// Value of the second number, in Hz or s.
         second_value: f64,
-        /// Rate that it states, in Hz.
+        /// Sampling rate that the second number states, in Hz.
         second_hz: f64,
     },
     /// The sampling rate is not positive and finite.
@@ -465,7 +465,7 @@ pub enum IoError {
     #[error("{}", Message(format_args!("\"{lines}\" is not a choice of lines: write all, odd, even, or numbers and ranges such as \
          1:2:335 (first:step:last) separated by commas")))]
     LineSpec {
-        /// Text of the choice.
+        /// Text of the choice of lines.
         lines: String,
     },
     /// A text has no columns of frequency responses.
@@ -488,7 +488,7 @@ pub enum IoError {
     #[error("{}", Message(format_args!("lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
          frequency of a period of {}", message::count(*len, "sample"))))]
     LineOutside {
-        /// Text of the choice.
+        /// Text of the choice of lines.
         lines: String,
         /// Line that does not exist.
         line: usize,

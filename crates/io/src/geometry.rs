@@ -43,7 +43,7 @@ pub struct PointShape {
     pub frequency_hz: f64,
     /// Damping ratio, a pure number.
     pub damping_ratio: f64,
-    /// Real and imaginary part of the displacement along x, y, z, for each point, a pure number.
+    /// Displacement of each point along x, y, z, as real and imaginary part, in pure numbers.
     pub displacement: Vec<[[f64; 2]; 3]>,
 }
 
@@ -59,7 +59,7 @@ pub struct NodalModes {
     pub modes: Vec<NodalMode>,
 }
 
-/// A mode at nodes.
+/// Mode at the nodes of a structure, as a universal file states it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalMode {
     /// Natural frequency, in Hz.
@@ -189,7 +189,7 @@ impl Geometry {
         if geometry.points.is_empty() {
             return Err(IoError::Empty {
                 file: file.into(),
-                found: "it has no row `name, x, y, z`",
+                found: "there is no row `name, x, y, z`",
             });
         }
         Ok(geometry)
@@ -367,7 +367,8 @@ mod tests {
         assert_eq!(rotation, [[[0.0; 2]; 3]; 2]);
     }
 
-    /// Reference: reading back what was written, and the field widths of the format.
+    /// Points and lines are the same after the universal file is read back. The numbers and field
+    /// widths of a shape are those of the format.
     #[test]
     fn a_universal_file_keeps_points_lines_and_shapes() {
         let geometry = Geometry::parse("g", "10 0 0 0\n20 0.5 0 0.125\nline 10 20\n").unwrap();
@@ -381,8 +382,8 @@ mod tests {
         assert!(text.lines().all(|line| line.len() <= 80));
         let lines: Vec<&str> = text.lines().collect();
         let at = lines.iter().position(|line| line.trim() == "55").unwrap();
-        // Structural model, complex eigenvalues, three translations, displacement, complex, three
-        // values.
+        // The line states: structural model, complex eigenvalues, three translations, displacement,
+        // complex, three values.
         assert_eq!(
             lines[at + 6].split_whitespace().collect::<Vec<_>>(),
             ["1", "3", "2", "8", "5", "3"]

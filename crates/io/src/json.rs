@@ -31,8 +31,8 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<(String, T), IoEr
     }
 }
 
-/// Returns the folder to which the paths in a JSON file are relative; the current one for standard
-/// input.
+/// Returns the folder to which the paths in a JSON file are relative; the current folder for
+/// standard input.
 pub(crate) fn folder(path: &Path) -> &Path {
     if standard::is_input(path) { Path::new("") } else { path.parent().unwrap_or(Path::new("")) }
 }

@@ -150,8 +150,8 @@ mod tests {
         }
     }
 
-    /// A cell array of units beside a matrix has the units of its columns; one that fits no matrix
-    /// is a remark.
+    /// Units in a cell array are assigned to the columns of the matrix in the same struct; a cell
+    /// array that fits no matrix becomes a remark.
     #[test]
     fn a_list_of_units_belongs_to_the_matrix_beside_it() {
         let column = |name: &str| Column::from_numbers(name.into(), vec![1.0, 2.0]);
@@ -165,7 +165,7 @@ mod tests {
         let units: Vec<&str> = read.columns.iter().map(|column| column.unit.as_str()).collect();
         assert_eq!(units, ["kN", "g", ""]);
         assert!(read.remarks.is_empty());
-        // Names with gaps in their numbers.
+        // A column whose number is larger than the number of units has no unit.
         let mut gaps = contents();
         gaps.columns[1].name = "rec.data[9]".into();
         let units: Vec<String> = with_labels(gaps).columns.into_iter().map(|c| c.unit).collect();

@@ -54,29 +54,32 @@ pub struct ReadOptions {
 /// memory is allocated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a row of text, including quoted line breaks; 4 MiB by default.
+    /// Maximum number of bytes of a row of text, including quoted line breaks; 4 MiB by default.
     pub row_bytes: usize,
-    /// Number of columns, in any format; 65,536 by default.
+    /// Maximum number of columns, in any format; 65,536 by default.
     pub columns: usize,
-    /// Unpacked bytes of a compressed MATLAB variable, or of a MATLAB or universal file in gzip; 1
-    /// GiB by default.
+    /// Maximum number of unpacked bytes of a compressed MATLAB variable, or of a MATLAB or
+    /// universal file in gzip; 1 GiB by default.
     pub unpacked_bytes: usize,
-    /// Numbers in memory at one time, over all columns; 2²⁸ (2 GiB) by default. A long text that is
-    /// read in chunks ([`RecordFile`](crate::RecordFile)) may have any number of rows.
+    /// Maximum number of numbers in memory at one time, over all columns; 2²⁸ (2 GiB) by default. A
+    /// long text that is read in chunks ([`RecordFile`](crate::RecordFile)) may have any number of
+    /// rows.
     pub numbers: usize,
-    /// Number of bytes that a text in gzip may have for each byte of the compressed file, in
-    /// addition to 64 MiB; 100 by default. Gzip reduces the printed numbers of a measured record to
-    /// about a quarter.
+    /// Maximum number of bytes of a text in gzip for each byte of the compressed file, in addition
+    /// to 64 MiB; 100 by default. Gzip reduces the printed numbers of a measured record to about a
+    /// quarter.
     pub text_per_byte: usize,
-    /// Bytes of the name of a column, a unit or a record; 4 KiB by default.
+    /// Maximum number of bytes of the name of a column, a unit or a record; 4 KiB by default.
     pub name_bytes: usize,
-    /// Memory that a file of any size may use, in bytes; 256 MiB by default.
+    /// Memory that a file may use in addition to `memory_per_byte` for each of its bytes, in bytes;
+    /// 256 MiB by default.
     pub memory_bytes: usize,
     /// Additional memory for each byte of the file, in bytes; 512 by default. Each number of a
     /// measured record takes at least one byte of the file, so a file with more numbers than bytes
     /// is not a measured record.
     pub memory_per_byte: usize,
-    /// Largest memory that any file may use, in bytes; 8 GiB by default.
+    /// Maximum memory that a file may use, in bytes, even if `memory_per_byte` would allow more; 8
+    /// GiB by default.
     pub most_memory_bytes: usize,
 }
 

@@ -13,9 +13,9 @@ const MATRICES: [&str; 4] = ["mass", "damping", "stiffness", "gyroscopic"];
 /// Reads the description of a machine with its sensors and inputs from a JSON file (`-`: standard
 /// input).
 ///
-/// A matrix of an element is a list of rows, a sparse matrix by its `size`, `rows`, `columns` and
-/// `values`, or the name of a file in the folder of the description: Matrix Market (`.mtx`,
-/// `.mtx.gz`), or a text with one row of numbers per row of the matrix, without a header.
+/// A matrix of an element is given as a list of rows, as a sparse matrix with its `size`, `rows`,
+/// `columns` and `values`, or as the name of a file in the folder of the description: Matrix Market
+/// (`.mtx`, `.mtx.gz`), or a text with one row of numbers per row of the matrix, without a header.
 ///
 /// # Errors
 /// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`] with the cause and the name of the
@@ -81,7 +81,7 @@ mod tests {
 
     use super::*;
 
-    /// The same stiffness in every form that a file and a description can have.
+    /// The same stiffness is read from every form that a description or a file can have.
     #[test]
     fn matrices_have_many_forms() {
         let folder = std::env::temp_dir().join(format!("mechid-machine-{}", std::process::id()));

@@ -74,7 +74,7 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
     let mut lines = Lines { file: source.file.clone(), at: 0, text: Vec::new(), limits: *limits };
     if !lines.next(&mut source)? {
         return Err(
-            lines.malformed("it is empty, but a Matrix Market file begins with %%MatrixMarket")
+            lines.malformed("the file is empty; a Matrix Market file begins with %%MatrixMarket")
         );
     }
     let header = Header::parse(&lines)?;
@@ -129,7 +129,7 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
 }
 
 impl Header {
-    /// Returns the numbers of rows and of stored entries, by the line with the size.
+    /// Returns the numbers of rows and of stored entries, from the line with the size.
     fn size(&self, lines: &Lines) -> Result<(usize, usize), IoError> {
         let sizes: Vec<Option<usize>> = lines.words().map(whole).collect();
         match (self.is_coordinate, sizes.as_slice()) {
@@ -140,10 +140,15 @@ impl Header {
                 Ok((*rows, self.symmetry.stored(*rows)))
             }
             (true, [Some(_), Some(_), Some(_)]) | (false, [Some(_), Some(_)]) => {
-                Err(lines.malformed("the matrix of a machine has as many rows as columns"))
+                Err(lines.malformed("the matrix of a machine must have as many rows as columns"))
             }
-            (true, _) => Err(lines.malformed("rows, columns and number of entries are needed")),
-            (false, _) => Err(lines.malformed("the numbers of rows and columns are needed")),
+            (true, _) => {
+                Err(lines
+                    .malformed("this line must state the numbers of rows, columns and entries"))
+            }
+            (false, _) => {
+                Err(lines.malformed("this line must state the numbers of rows and columns"))
+            }
         }
     }
 
@@ -191,8 +196,8 @@ impl Symmetry {
         }
     }
 
-    /// Returns the row and column of the next stored entry: down the columns, in a symmetric matrix
-    /// from the diagonal on.
+    /// Returns the row and column of the next stored entry. The entries are stored column by
+    /// column; a symmetric matrix has only the entries from the diagonal downwards.
     fn after(self, row: usize, column: usize, size: usize) -> Option<(usize, usize)> {
         let first = match self {
             Self::General => 0,
@@ -307,7 +312,8 @@ mod tests {
         Ok(DMatrix::from(&sparse))
     }
 
-    /// Reference: the matrices, written by hand as the format says.
+    /// Matrices of every format and symmetry are read. The expected entries are written by hand
+    /// according to the format.
     #[test]
     fn formats_and_symmetries_are_those_of_the_format() {
         let general = "%%MatrixMarket matrix coordinate real general\n% a comment\n\n3 3 4\n\
@@ -335,7 +341,7 @@ mod tests {
     fn what_breaks_the_format_is_told_with_its_line() {
         let banner = "%%MatrixMarket matrix coordinate real general\n";
         for (text, expected) in [
-            ("".into(), "line 1: it is empty"),
+            ("".into(), "line 1: the file is empty"),
             ("1 2 3\n".into(), "line 1: a Matrix Market file begins"),
             (banner[1..].into(), "line 1: a Matrix Market file begins"),
             (

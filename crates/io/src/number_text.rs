@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-/// Appends a number with the fewest digits that identify it, in the form of `{:?}`; of two equally
-/// near texts, this function takes the text with an even last digit, and `{:?}` takes the larger
-/// number.
+/// Appends a number with the fewest digits that identify it, in the form of `{:?}`. If two such
+/// texts are equally near to the number, this function takes the text with an even last digit,
+/// whereas `{:?}` takes the larger number.
 pub(crate) fn push_number(text: &mut String, value: f64) {
     if !value.is_finite() {
         let _ = write!(text, "{value:?}");
@@ -22,7 +22,7 @@ pub(crate) fn push_number(text: &mut String, value: f64) {
     }
 }
 
-/// Appends a number below 1e-4, printed as 0.0000…, in exponent notation.
+/// Appends a number below 1e-4 in exponent notation; `printed` is its text in the form 0.0000….
 fn push_small(text: &mut String, printed: &str) {
     let (sign, size) = printed.strip_prefix('-').map_or(("", printed), |size| ("-", size));
     let places = size.trim_start_matches("0.");

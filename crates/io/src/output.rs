@@ -259,7 +259,7 @@ fn resolved(path: &Path) -> io::Result<PathBuf> {
             _ => path,
         });
     }
-    Err(io::Error::other("it is a symbolic link that leads back to itself"))
+    Err(io::Error::other("this symbolic link leads back to itself"))
 }
 
 /// Creates the temporary file for `destination`.
@@ -273,8 +273,8 @@ fn stage(destination: PathBuf) -> io::Result<(File, Stage)> {
     Ok((file, Stage::Beside { temporary, destination }))
 }
 
-/// Gives a new file the permissions of the file that it replaces. Failure is ignored: the owner may
-/// differ, and some file systems have no permissions.
+/// Gives a new file the permissions of the file that it replaces. A file system that does not
+/// support permissions is not an error.
 fn keep(file: &File, permissions: Permissions) -> io::Result<()> {
     match file.set_permissions(permissions) {
         Err(e) if e.kind() == io::ErrorKind::Unsupported => Ok(()),
@@ -427,8 +427,8 @@ fn temporaries() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// Removes the temporary files of every [`BegunFile`] of this process that is not complete.
 ///
-/// A program calls it when a signal ends it, since destructors do not run then. The files cannot be
-/// completed afterwards.
+/// A program calls this function when a signal ends the program, because destructors do not run
+/// then. The files cannot be completed afterwards.
 pub fn remove_unfinished_files() {
     for path in &*temporaries() {
         let _ = fs::remove_file(path);

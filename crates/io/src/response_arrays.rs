@@ -72,7 +72,7 @@ fn add_array(
             let [to, from] = named.clone().unwrap_or(numbers);
             if responses.functions.iter().any(|f| f.response == to && f.reference == from) {
                 return Err(format!(
-                    "{} and another array have the response at {} to a force at {}: leave one out",
+                    "{} and another array have the response at {} to a force at {}: omit one array",
                     escaped(&array.name),
                     escaped(&to),
                     escaped(&from)
@@ -110,7 +110,7 @@ struct Header {
     /// Words of the name, without its unit.
     words: Vec<String>,
     quantity: Option<ResponseQuantity>,
-    /// Unit and its text.
+    /// Unit, and the text that states it.
     unit: Option<(ResponseUnit, String)>,
     /// Text that may be a unit and is not understood.
     unclear_unit: Option<String>,
@@ -196,9 +196,9 @@ fn leaf(name: &str) -> &str {
     &name[start..]
 }
 
-/// Removes a unit at the end of the words of a name and returns it: `g`, `N` as `g/N`, `mm`, `s2`,
-/// `N` as `mm/s2/N`. If the name states a quantity, the unit need not be a unit of frequency
-/// responses.
+/// Removes a unit at the end of the words of a name and returns it: the words `g` and `N` give
+/// `g/N`; the words `mm`, `s2` and `N` give `mm/s2/N`. If the name states a quantity, the unit need
+/// not be a unit of frequency responses.
 fn take_unit_words(words: &mut Vec<String>, has_quantity: bool) -> Option<String> {
     let joined = |count: usize| {
         let first = words.len().checked_sub(count).filter(|first| *first > 0)?;

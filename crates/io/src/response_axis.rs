@@ -15,7 +15,7 @@ const IN_RADIANS: [&str; 4] = ["omega", "w", "ω", "radians"];
 /// Names of a column of multiples of the speed of rotation.
 const ORDERS: [&str; 2] = ["order", "orders"];
 
-/// Beginnings of the names of a column of speeds of rotation.
+/// Prefixes of the names of a column with rotational speeds.
 const SPEEDS: [&str; 4] = ["speed", "rpm", "rotation", "drehzahl"];
 
 /// Returns the column of frequencies, by its name or its field in a struct.
@@ -44,7 +44,7 @@ pub(crate) fn frequencies(
             return Err(IoError::Description {
                 file: table.file().into(),
                 what: format!(
-                    "it has responses, but no vector of their frequencies: save this vector as {}",
+                    "the responses need a vector of their frequencies: save this vector as {}",
                     FREQUENCY[..4].join(" or ")
                 ),
             });
@@ -112,7 +112,7 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     if let Some(short) = responses.functions.iter().find(|one| one.values.len() != hz.len()) {
         let (count, points) = (short.values.len(), [&short.response, &short.reference]);
         let what = format!(
-            "the response at {} to {} has {count} values for {} frequencies",
+            "the response at {} to a force at {} has {count} values for {} frequencies",
             escaped(points[0]),
             escaped(points[1]),
             hz.len()
@@ -150,9 +150,8 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     Ok(())
 }
 
-/// Returns the number of values at the highest frequencies that mirror the values at the lowest
-/// frequencies: those of the lines above half the sampling rate. The table may lack the line at 0
-/// Hz.
+/// Returns the number of lines above half the sampling rate: the values at these highest
+/// frequencies mirror the values at the lowest frequencies. The table may lack the line at 0 Hz.
 fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
     /// Maximum relative difference between a value and its mirror image, from the rounding of
     /// printed numbers.

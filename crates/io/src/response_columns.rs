@@ -37,9 +37,10 @@ struct Heading {
     quantity: Option<ResponseQuantity>,
     /// `true` for a force per response: the inverse of a receptance, mobility or accelerance.
     is_inverse: bool,
-    /// Unit of the column and its text, if it is stated.
+    /// Unit of the column and the text that states it, if any.
     unit: Option<(ResponseUnit, String)>,
-    /// Text of a unit that contradicts the name or another unit, and what it contradicts.
+    /// Text of a unit that contradicts the name of the column or another unit, and the text that it
+    /// contradicts.
     contradiction: Option<[String; 2]>,
     /// Factor from the unit of the column to SI units.
     in_si: f64,
@@ -123,7 +124,8 @@ impl Heading {
         (self.quantity, self.is_inverse) = (Some(quantity), true);
     }
 
-    /// Reads the texts in brackets and in the line of units.
+    /// Updates the part and the unit from the texts in brackets, `notes`, and from the line of
+    /// units.
     fn take_notes(&mut self, table: &Table, column: usize, notes: Vec<String>) {
         let row = label_notes(&format!("[{}]", table.unit_text(column)));
         let is_phase = matches!(self.part, Part::Phase(_));
@@ -145,8 +147,8 @@ impl Heading {
         }
     }
 
-    /// Returns the doubt about the column: a text that may be a unit, or a level in dB without its
-    /// reference.
+    /// Returns a text of the column that may be a unit but is not understood, or a text which
+    /// states that a level in dB has no reference. `None` if the column has neither.
     fn doubt(&self) -> Option<StatedUnit> {
         let has_reference = self.part != Part::Level || self.unit.is_some();
         let text = "dB without a reference".into();
@@ -172,8 +174,8 @@ impl Heading {
     }
 }
 
-/// Returns the reference of a level, which is empty if it has none; `None` for other text:
-/// `dB re 1 m/s²/N`, `dB(g/N)`, `dB`.
+/// Returns the reference of a level in dB, such as `dB re 1 m/s²/N` or `dB(g/N)`; the reference is
+/// empty for `dB` alone. `None` if the text is not a level.
 fn level(note: &str) -> Option<&str> {
     let after = note.get(..2).filter(|start| start.eq_ignore_ascii_case("db"))?;
     let after = &note[after.len()..];
@@ -318,7 +320,8 @@ pub(crate) fn add_functions(
     Ok(())
 }
 
-/// Function that returns the column of the same response whose part passes a test.
+/// Function that searches the columns of one response and returns the column whose part (real part,
+/// phase, …) passes a test.
 type OtherPart<'a> = dyn Fn(&dyn Fn(Part) -> bool) -> Option<&'a Heading> + 'a;
 
 /// Reads one response.
@@ -410,7 +413,8 @@ fn polar<'a>(
     Ok(pairs.map(|(value, phase)| Complex::from_polar(size(*value), phase * unit)).collect())
 }
 
-/// Returns the error for a column whose response has no column for the other part.
+/// Returns the error for a column of one part of a response, such as the real part, if there is no
+/// column of the other part.
 fn missing(table: &Table, heading: &Heading, what: &str) -> IoError {
     IoError::Description {
         file: table.file().into(),

@@ -70,7 +70,7 @@ pub struct FrequencyResponses {
     /// Remarks on parts of the file that were left out or converted.
     pub remarks: Vec<String>,
     /// Columns whose headers have a text that may be a unit: number and name of the column, the
-    /// text, and the quantity needed.
+    /// text, and the quantity that its unit should have.
     pub doubts: Vec<(String, StatedUnit, Quantity)>,
     /// Memory, in bytes, that an analysis of the file may use ([`Limits::memory`]); `None` without
     /// a limit, as for responses that are not from a file.
@@ -115,7 +115,8 @@ pub struct AveragedSegments {
 }
 
 impl AveragedSegments {
-    /// Names of the columns with these numbers, in the order of [`AveragedSegments::numbers`].
+    /// Names of the columns of the numbers that [`AveragedSegments::numbers`] returns, in the same
+    /// order.
     pub const COLUMNS: [&str; 5] =
         ["segment_samples", "segment_hop", "segments", "segment_window", "sample_rate_hz"];
 

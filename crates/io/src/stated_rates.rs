@@ -106,7 +106,7 @@ fn enclosing(name: &str) -> &str {
     name.rsplit_once(['.', '/']).map_or("", |(place, _)| place)
 }
 
-/// The time step, in s, that a number states.
+/// Returns the time step, in s, that a named number states.
 pub(crate) fn step(name: &str, value: f64) -> Option<f64> {
     let key = name.rsplit_once(['.', '/']).map_or(name, |(_, key)| key);
     let key = key.to_lowercase().replace('_', "");

@@ -21,8 +21,8 @@ const MOST_ROWS: usize = Limits::DEFAULT.numbers / NUMBERS_PER_ROW;
 /// matrices.
 const DENSE_DOF: usize = 64;
 
-/// Maximum fraction of non-zero entries of full matrices that are stored as sparse ones; with more,
-/// the factors of a matrix with an irregular pattern may be full.
+/// Maximum fraction of non-zero entries with which full matrices are stored as sparse matrices;
+/// above it, the factors of a matrix with an irregular pattern may be full.
 const SPARSE_SHARE: f64 = 0.1;
 
 /// Maximum number of degrees of freedom of a machine in sparse matrices for computations that need
@@ -181,7 +181,7 @@ pub(crate) enum SystemSource {
 
 /// Content of the files that a description names.
 pub(crate) struct LoadedSystem {
-    /// The machine, if it is a large one.
+    /// Sparse form of the system if its matrices are large and sparse; otherwise `None`.
     pub(crate) sparse: Option<SparseSystem>,
     /// Nonlinear terms of the file with the system.
     pub(crate) nonlinear: Option<NonlinearDescription>,
@@ -207,8 +207,7 @@ impl SystemSource {
         };
         let (file, Machine { system, nonlinear }) = json::read::<Machine>(&path)?;
         let Self::Described(mut system) = system else {
-            let what =
-                "the `system` in this file is the name of another file: name that other file";
+            let what = "the `system` in this file is the name of another file: as `system`, give that other file instead of this file";
             return Err(IoError::Description { file, what: what.into() });
         };
         let mut files = system.files(json::folder(&path));
@@ -218,7 +217,7 @@ impl SystemSource {
         Ok(LoadedSystem { sparse, nonlinear, files })
     }
 
-    /// Returns whether all matrices are lists of rows.
+    /// Returns whether all matrices are given as lists of rows.
     pub(crate) fn lists_rows(&self) -> bool {
         matches!(self, Self::Described(system) if system.lists_rows())
     }
@@ -285,7 +284,7 @@ impl SystemDescription {
     }
 
     /// Reads the Matrix Market files that the description names, relative to `folder`; returns the
-    /// machine if it is a large one.
+    /// sparse form of the system if its matrices are large and sparse.
     pub(crate) fn load(
         &mut self,
         file: &str,
@@ -322,7 +321,7 @@ impl SystemDescription {
         }))
     }
 
-    /// Returns whether all matrices are lists of rows.
+    /// Returns whether all matrices are given as lists of rows.
     pub(crate) fn lists_rows(&self) -> bool {
         let matrices = [Some(&self.mass), self.damping.as_ref(), self.stiffness.as_ref()];
         matrices.iter().all(|entries| matches!(entries, Some(Entries::Rows(_))))

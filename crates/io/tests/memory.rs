@@ -1,4 +1,4 @@
-//! A text of any length is processed by the estimators in the same memory.
+//! The memory that the estimators need does not grow with the length of a text file.
 //!
 //! The counter covers the whole program; therefore this file has one test.
 
@@ -17,14 +17,15 @@ use peak_alloc::PeakAlloc;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Number of samples in a period, and of periods in a section.
+/// Number of samples in a period.
 const PERIOD: usize = 500;
+/// Number of periods in a section.
 const AT_ONCE: usize = 4;
 
 /// Number of rows at the beginning that stay in memory.
 const HELD: usize = 2000;
 
-/// Number of bytes of a block of text with its numbers.
+/// Number of bytes that a block of text and its numbers occupy.
 const BLOCK: usize = 130_000;
 
 const COLUMNS: [&str; 4] = ["f", "x", "v", "a"];

@@ -51,7 +51,7 @@ pub(super) fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Exci
     from.deserialize_any(OneOrMore)
 }
 
-/// Names of the kinds in a description.
+/// Names of the kinds of excitation in a description.
 const KINDS: &str = "multisine, harmonic, sweep, prbs, random, impulse, half-sine";
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -182,13 +182,13 @@ impl<'de> Deserialize<'de> for Excitation {
     }
 }
 
-/// The force between two samples.
+/// Course of the force between two samples.
 enum Between {
     /// A function of time.
     Function(Box<dyn Fn(f64) -> f64>),
     /// The value of the earlier sample.
     Held,
-    /// Unknown; with the name of the force for messages.
+    /// Unknown; the text is the name of the force in messages.
     Unknown(&'static str),
 }
 

@@ -51,7 +51,7 @@ pub struct Experiment {
     #[serde(skip)]
     files: Vec<PathBuf>,
     system: SystemSource,
-    /// The machine in sparse matrices, if it is a large one.
+    /// The machine in sparse matrices, if it is large and sparse.
     #[serde(skip)]
     sparse: Option<SparseSystem>,
     #[serde(default)]
@@ -85,7 +85,7 @@ fn one() -> usize {
     1
 }
 
-/// Number of samples in a period, and their rate.
+/// Number of samples in a period, and the sampling rate.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SamplingDescription {
@@ -104,12 +104,12 @@ impl Experiment {
         experiment.loaded(file, json::folder(path.as_ref()))
     }
 
-    /// Reads the description of an experiment in a text; `file` is its name in messages. The names
-    /// of other files in it are relative to the current folder.
+    /// Reads the description of an experiment in a text; `file` is its name in messages. The paths
+    /// of other files in the description are relative to the current folder.
     ///
     /// # Errors
     /// [`IoError::NotJson`] for a text of another kind, [`IoError::Json`] with field, line and
-    /// column for a wrong description, also of the system in another file; [`IoError::Read`],
+    /// column for a wrong description, or a wrong system in another file; [`IoError::Read`],
     /// [`IoError::Malformed`], [`IoError::TooLarge`] and [`IoError::Model`] for a Matrix Market
     /// file.
     pub fn parse(file: impl Into<String>, text: &str) -> Result<Self, IoError> {
@@ -176,7 +176,7 @@ impl Experiment {
         self.sparse.as_ref()
     }
 
-    /// Number of degrees of freedom of the system.
+    /// Returns the number of degrees of freedom of the system.
     ///
     /// # Errors
     /// As [`Experiment::system`].

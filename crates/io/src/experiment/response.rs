@@ -27,7 +27,7 @@ pub struct InitialMotion {
     pub velocity: PerDof,
 }
 
-/// One number per degree of freedom, or a single number for a system of one.
+/// One number per degree of freedom, or a single number for a system with one degree of freedom.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
 #[serde(untagged, expecting = "expected a number, or a list with one for each degree of freedom")]
 pub enum PerDof {
@@ -35,9 +35,9 @@ pub enum PerDof {
     #[default]
     #[serde(skip)]
     Zero,
-    /// The only degree of freedom, in m or m/s.
+    /// One number for the only degree of freedom, in m or m/s.
     One(f64),
-    /// Each degree of freedom, in m or m/s.
+    /// One number for each degree of freedom, in m or m/s.
     Each(Vec<f64>),
 }
 

@@ -10,7 +10,8 @@ use crate::json;
 #[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum SchemeChoice {
-    /// No time steps: the receptance at each spectral line. Periodic responses only.
+    /// Exact periodic response, without time steps: the receptance is applied at each spectral
+    /// line. It is possible only for periodic responses.
     #[default]
     Exact,
     /// Newmark's method; by default average acceleration.
@@ -131,10 +132,10 @@ pub enum ReturnedAcceleration {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SubStepLoad {
-    /// Linear between both ends of the step.
+    /// Linear interpolation of the force between both ends of the step.
     #[default]
     Linear,
-    /// Value of the excitation itself at that instant.
+    /// Exact value of the excitation at the end of the first sub-step.
     Exact,
 }
 
@@ -142,9 +143,9 @@ pub enum SubStepLoad {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeldOrLinear {
-    /// The value of the earlier sample.
+    /// Force of the earlier sample.
     Held,
-    /// Linear between both samples.
+    /// Linear interpolation of the force between both samples.
     Linear,
 }
 
@@ -152,13 +153,13 @@ pub enum HeldOrLinear {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MiddleLoad {
-    /// The value at the beginning of the step.
+    /// Force at the beginning of the step.
     Held,
-    /// The mean of both ends.
+    /// Mean of the forces at both ends of the step.
     Linear,
-    /// The value of the excitation itself.
+    /// Exact value of the excitation in the middle of the step.
     Exact,
-    /// The value of the Fourier series through the samples of one period.
+    /// Value of the Fourier series through the force samples of one period.
     BandLimited,
     /// The value of the cubic spline through the samples of one period.
     Spline,

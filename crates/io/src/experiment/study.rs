@@ -122,7 +122,8 @@ impl ExperimentStudy {
         }
         let folder = folder.into();
         let study = Self { file, folder, description, fields, runs, memory_gb: None };
-        // A wrong name is wrong in every run, so the first run is read at once.
+        // A field name that does not exist is an error in every run. Reading the first run finds
+        // this error.
         study.experiment(1)?;
         Ok(study)
     }
@@ -139,7 +140,7 @@ impl ExperimentStudy {
         self.runs
     }
 
-    /// The fields that change, with their values in each run.
+    /// Returns the fields that change, with their values in each run.
     pub fn fields(&self) -> &[StudyField] {
         &self.fields
     }

@@ -8,13 +8,15 @@ use crate::labels::states_unit;
 /// NeXus.
 const FACTORS: [&str; 2] = ["scale_factor", "scaling_factor"];
 
-/// Name, in lower case, of an attribute that is added to the numbers after the multiplication.
+/// Name, in lower case, of the attribute whose value is added to the stored numbers after they are
+/// multiplied by the factor.
 ///
 /// # Source
 /// *NetCDF Climate and Forecast (CF) Metadata Conventions*, version 1.11, section 8.1.
 const OFFSET: &str = "add_offset";
 
-/// Names, in lower case, of an offset that programs add before the multiplication or after it.
+/// Names, in lower case, of an offset that some programs add before the multiplication by the
+/// factor, and other programs after it.
 const UNCLEAR_OFFSETS: [&str; 2] = ["offset", "scaling_offset"];
 
 /// Names, in lower case, of an attribute that describes a channel.

@@ -45,7 +45,7 @@ pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Conten
     let contents = read.map_err(|fault| fault.error(file, Place::Byte(1)))?;
     let contents = with_labels(with_own_times(with_stated_rates(contents)));
     if contents.columns.is_empty() {
-        return Err(IoError::Empty { file: file.into(), found: "it has no data set of numbers" });
+        return Err(IoError::Empty { file: file.into(), found: "there is no data set of numbers" });
     }
     Ok(contents.with_usual_length())
 }
@@ -296,8 +296,8 @@ fn damaged(error: hdf5_pure::Error) -> Fault {
     )
 }
 
-/// Subtracts the memory of numbers from the budget; a file of `len` bytes can have only a limited
-/// number of them.
+/// Subtracts the memory of `count` numbers from the budget; returns an error if a file of `len`
+/// bytes cannot contain them.
 fn take_numbers(count: u64, bytes_each: u64, len: u64, budget: &mut Budget) -> Result<(), Fault> {
     let bytes = count.saturating_mul(bytes_each.max(1));
     if bytes > len.max(MIN_BYTES).saturating_mul(MAX_EXPANSION) {

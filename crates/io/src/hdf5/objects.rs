@@ -21,19 +21,20 @@ const REFERENCE: u32 = 0xdd00_0000;
 /// Maximum number of words of a variable that refers to an object: a single object needs six.
 const MAX_WORDS: u64 = 16;
 
-/// Words of an object in the table: class, two unknown ones, two kinds of properties, dependencies.
+/// Number of words of an object in the table: class, two unknown words, two kinds of properties,
+/// dependencies.
 const OBJECT_WORDS: usize = 6;
 
-/// Words of a class in the table; the second one is its name.
+/// Number of words of a class in the table; the second word is its name.
 const CLASS_WORDS: usize = 4;
 
-/// Words of a property: name, kind, value.
+/// Number of words of a property: name, kind, value.
 const PROPERTY_WORDS: usize = 3;
 
 /// Kind of a property whose value is in a cell.
 const IN_CELL: u32 = 1;
 
-/// Number of cells before the cells of the values.
+/// Number of cells of `MCOS` before the cells with the values of properties.
 const FIRST_VALUE: usize = 2;
 
 /// Offset of the names in the table, in bytes: a version, the number of names and eight offsets
@@ -51,7 +52,7 @@ pub(super) struct Objects {
     cells: Vec<Object>,
     names: Vec<String>,
     classes: Vec<u32>,
-    /// Properties that a special function of the class wrote.
+    /// Properties of objects whose class has its own save function.
     saved: Vec<u32>,
     objects: Vec<u32>,
     properties: Vec<u32>,
@@ -165,7 +166,7 @@ enum RowTimes {
 
 impl Reader {
     /// Adds the variables of a timetable as columns, with their units and instants; returns whether
-    /// the data set refers to one.
+    /// the data set refers to a timetable.
     pub(super) fn add_timetable(
         &mut self,
         dataset: &Dataset,

@@ -13,10 +13,11 @@ use memchr::memmem;
 /// Start of a node: its signature, version 1, and a reserved byte.
 const START: &[u8] = b"SNOD\x01\0";
 
-/// Bytes of a node before its entries: the start, and the number of entries.
+/// Number of bytes of a node before its entries: those of `START`, and two for the number of
+/// entries.
 const HEADER: usize = 8;
 
-/// Bytes of an entry with addresses of eight bytes.
+/// Number of bytes of an entry whose addresses have eight bytes.
 const ENTRY: usize = 40;
 
 /// Offset, within an entry, of the address of its object; `KIND` is the offset of the kind of the

@@ -10,7 +10,8 @@ use crate::contents::Fault;
 use crate::limits::Budget;
 use crate::mat::COMPLEX_NUMBERS;
 
-/// Maximum number of channels of an array; one with more is refused as transposed.
+/// Maximum number of channels of an array; an array with more is refused, because it is probably
+/// transposed.
 const MAX_CHANNELS: usize = 4096;
 
 /// Contents of a data set.
@@ -49,7 +50,7 @@ pub(super) struct Array {
 
 /// Reason why a data set cannot be read as an array of numbers.
 pub(super) enum Trouble {
-    /// Only this data set cannot be used.
+    /// The data set cannot be used, but other data sets of the file can.
     Unusable(String),
     /// The whole file is refused.
     Fault(Fault),

@@ -17,7 +17,7 @@ pub(crate) struct Array {
 /// The value of a variable.
 #[derive(Debug)]
 pub(crate) enum Value {
-    /// Real numbers, in columns.
+    /// Real numbers, column by column.
     Real { rows: usize, columns: usize, values: Vec<f64> },
     /// Complex numbers, the first index fastest.
     Complex { lengths: Vec<usize>, values: Vec<Complex<f64>> },

@@ -43,7 +43,7 @@ impl Endian {
 pub(crate) struct Element<'a> {
     pub kind: u32,
     pub data: &'a [u8],
-    /// Offset of its data in the file.
+    /// Offset of the data of the element in the file.
     pub at: usize,
 }
 
@@ -79,7 +79,7 @@ impl<'a> Elements<'a> {
         self.padded(|kind| kind != COMPRESSED)
     }
 
-    /// Reads the next element; the end is an error.
+    /// Reads the next element; returns an error if there is none.
     pub fn required(&mut self, what: &str) -> Result<Element<'a>, Fault> {
         let at = self.base + self.next;
         self.next()?.ok_or_else(|| Fault::new(at, format!("a variable ends before its {what}")))

@@ -41,7 +41,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents,
     })?;
     let contents = with_labels(with_own_times(with_stated_rates(contents)));
     if contents.columns.is_empty() {
-        return Err(IoError::Empty { file: file.into(), found: "it has no vector of numbers" });
+        return Err(IoError::Empty { file: file.into(), found: "there is no vector of numbers" });
     }
     Ok(contents.with_usual_length())
 }

@@ -41,7 +41,8 @@ pub fn is_possible(source: &impl ChunkReader) -> bool {
     source.get_bytes(start, len as usize).is_ok_and(|footer| is_possible_schema(&footer))
 }
 
-/// Parses a footer; `false` if a list has more elements than bytes or the schema is not a tree.
+/// Parses a footer; `false` if a list has more elements than the footer has remaining bytes, or if
+/// the schema is not a tree.
 fn is_possible_schema(footer: &[u8]) -> bool {
     let walked = Bytes(footer).fields(|bytes, field, kind| match (field, kind) {
         (SCHEMA, LIST) => {
@@ -71,7 +72,8 @@ impl Tree {
         Self { rest: elements, open: Vec::new() }
     }
 
-    /// Adds an element; `None` if it has more children than elements follow, or is nested too deep.
+    /// Adds an element; `None` if fewer elements follow than this element has children, or if the
+    /// nesting is too deep.
     fn push(&mut self, children: i64) -> Option<()> {
         self.rest -= 1;
         let children = u64::try_from(children).ok().filter(|count| *count <= self.rest)?;
@@ -92,7 +94,7 @@ impl Tree {
 mod tests {
     use super::*;
 
-    /// A footer whose schema has elements with these numbers of children.
+    /// Returns a footer whose schema has elements with these numbers of children.
     fn footer(children: &[u32]) -> Vec<u8> {
         let varint = |mut value: u32| {
             let mut bytes = Vec::new();
@@ -103,7 +105,7 @@ mod tests {
             bytes.push(value as u8);
             bytes
         };
-        // The version, then the list of structs.
+        // The footer begins with the version; the list of structs follows.
         let mut bytes = vec![0x15, 0x02, 0x19, 0xfc];
         bytes.extend(varint(children.len() as u32));
         for count in children {
@@ -124,7 +126,7 @@ mod tests {
         let nested = |depth: usize| [vec![1; depth], vec![0]].concat();
         assert!(is_possible_schema(&footer(&nested(GROUP_DEPTH))));
         assert!(!is_possible_schema(&footer(&nested(GROUP_DEPTH + 1))));
-        // More elements than bytes.
+        // The list states more elements than the footer has bytes.
         assert!(!is_possible_schema(&[0x19, 0xfc, 0xff, 0xff, 0xff, 0x7f, 0x00]));
         let whole = footer(&[2, 0, 0]);
         (1..whole.len()).for_each(|len| assert!(!is_possible_schema(&whole[..len]), "{len}"));

@@ -81,7 +81,8 @@ mod tests {
 
     #[test]
     fn headers_are_read_past_whatever_else_they_hold() {
-        // Type 0, 600 bytes unpacked, 3 as stored, a struct of a list of two numbers and a Boolean.
+        // The header states type 0, 600 unpacked bytes, 3 stored bytes, and a struct with a list of
+        // two numbers and a Boolean.
         let header = [
             0x15, 0x00, 0x15, 0xb0, 0x09, 0x15, 0x06, 0x2c, 0x19, 0x25, 0x02, 0x04, 0x11, 0x00,
             0x00,
@@ -90,20 +91,22 @@ mod tests {
         assert_eq!(largest_page(&page), Some(600));
         let two = [&page[..], &[0x15, 0x00, 0x15, 0x04, 0x15, 0x00, 0x00]].concat();
         assert_eq!(largest_page(&two), Some(600));
-        // Cut off anywhere, with a negative size, or with a list longer than the file.
+        // A page that is cut off, has a negative size or has a list longer than the file is
+        // refused.
         for len in 1..page.len() {
             assert_eq!(largest_page(&page[..len]), None, "{len}");
         }
         assert_eq!(largest_page(&[0x15, 0x00, 0x15, 0x01, 0x15, 0x00, 0x00]), None);
         assert_eq!(largest_page(&[0x19, 0xf5, 0xff, 0xff, 0x03, 0x00]), None);
-        // A dictionary of 6 bytes with 4 values, and with 400.
+        // A dictionary of 6 bytes can have 4 values, but not 400.
         let dictionary = |count: [u8; 2]| {
             let head = [0x15, 0x04, 0x15, 0x0c, 0x15, 0x00, 0x4c, 0x15, count[0], count[1]];
             [&head[..], &[0x15, 0x00, 0x00, 0x00]].concat()
         };
         assert_eq!(largest_page(&dictionary([0x88, 0x00])), Some(6));
         assert_eq!(largest_page(&dictionary([0xa0, 0x06])), None);
-        // Data by the indices of a dictionary, behind it and without it.
+        // A page of data with dictionary indices is accepted after the dictionary, and refused
+        // without it.
         let head = [0x15, 0x00, 0x15, 0x04, 0x15, 0x00, 0x2c, 0x15, 0x02, 0x15, 0x10, 0x00, 0x00];
         let behind = [&dictionary([0x88, 0x00])[..], &head].concat();
         assert_eq!(largest_page(&behind), Some(6));

@@ -5,13 +5,13 @@ use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 
 thread_local! {
-    /// Number of guards on this thread.
+    /// Number of calls of [`caught`] that are running on this thread.
     static GUARDS: Cell<usize> = const { Cell::new(0) };
 }
 
 /// Returns the result of `work`; `None` if it panics. The message of the panic is not printed: it
-/// has paths of the machine that compiled the decoder, and the caller reports what is wrong with
-/// the file.
+/// contains paths of the computer that compiled the decoder, and the caller reports what is wrong
+/// with the file.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Option<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

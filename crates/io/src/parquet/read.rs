@@ -47,10 +47,10 @@ pub(crate) fn read(file: &str, bytes: Vec<u8>, budget: Budget) -> Result<Content
     contents.map_err(|trouble| trouble.error(file)).and_then(|contents| usable(file, contents))
 }
 
-/// Adds the rate that a file states to its contents; an error if there is no column.
+/// Adds the rate that a file states to its contents; returns an error if there is no column.
 pub(super) fn usable(file: &str, contents: Contents) -> Result<Contents, IoError> {
     if contents.columns.is_empty() {
-        return Err(IoError::Empty { file: file.into(), found: "it has no column" });
+        return Err(IoError::Empty { file: file.into(), found: "there is no column" });
     }
     Ok(with_stated_rates(contents).with_usual_length())
 }
@@ -85,7 +85,7 @@ impl From<ParquetError> for Trouble {
 }
 
 impl Trouble {
-    /// Returns the reason with the number of rows that were read before it.
+    /// Returns the same reason, with the number of rows that were read before the reading stopped.
     fn after(self, rows: usize) -> Self {
         match self {
             Self::TooLarge(_, limit) => Self::TooLarge(rows, limit),
@@ -139,7 +139,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
     /// Returns the number of rows.
     pub fn rows(&self) -> Result<usize, Trouble> {
         let rows = self.group_rows().try_fold(0_usize, |sum, rows| sum.checked_add(rows?));
-        rows.ok_or_else(|| Trouble::Damaged("its row groups have an impossible size".into()))
+        rows.ok_or_else(|| Trouble::Damaged("the row groups have an impossible size".into()))
     }
 
     /// Returns the readers of the row groups, each created when it is first used.
@@ -461,7 +461,7 @@ fn append<T: DataType>(
 /// Key-value metadata of a file.
 struct Stated {
     numbers: Vec<(String, f64)>,
-    /// Columns and their units.
+    /// Unit of each column, by the name of the column.
     units: BTreeMap<String, String>,
 }
 

@@ -47,7 +47,7 @@ pub struct ParquetRecordWriter {
     writer: SerializedFileWriter<Stream>,
     /// Name of the record of each row that is not written yet.
     ids: Vec<ByteArray>,
-    /// Instants and channels of these rows.
+    /// Instants and channels of the rows that are not written yet.
     columns: Vec<Vec<f64>>,
 }
 
@@ -108,12 +108,20 @@ impl ParquetRecordWriter {
         sampling: Sampling,
         channels: &[&[f64]],
     ) -> Result<(), IoError> {
-        assert_eq!(channels.len() + 1, self.columns.len(), "there is a name for every channel");
+        assert_eq!(
+            channels.len() + 1,
+            self.columns.len(),
+            "the number of channels must equal the number of names"
+        );
         self.ids.resize(self.ids.len() + sampling.len(), ByteArray::from(record));
         let (instants, others) = self.columns.split_first_mut().expect("the instants are there");
         instants.extend(sampling.times());
         for (column, channel) in others.iter_mut().zip(channels) {
-            assert_eq!(channel.len(), sampling.len(), "channels are as long as the time axis");
+            assert_eq!(
+                channel.len(),
+                sampling.len(),
+                "every channel must be as long as the time axis"
+            );
             column.extend_from_slice(channel);
         }
         if self.ids.len() >= ROW_GROUP_ROWS { self.write_rows() } else { Ok(()) }
@@ -133,7 +141,7 @@ impl ParquetRecordWriter {
         }
     }
 
-    /// Writes the rows so far as a row group.
+    /// Writes the rows that are buffered so far as a row group.
     fn write_rows(&mut self) -> Result<(), IoError> {
         let Self { file, writer, ids, columns } = self;
         let mut write = || {

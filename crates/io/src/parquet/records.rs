@@ -144,7 +144,7 @@ struct Ids {
     known: BTreeSet<String>,
     rows: usize,
     refusal: Option<Refusal>,
-    /// Limit on the bytes of a name.
+    /// Maximum length of an identifier, in bytes.
     name_bytes: usize,
     /// Memory that the list of records may use.
     budget: Budget,
@@ -206,7 +206,7 @@ impl Ids {
         Ok(())
     }
 
-    /// Appends rows of one identifier.
+    /// Appends `count` rows with the identifier `id`.
     fn push(&mut self, id: String, count: usize) -> Result<(), Trouble> {
         if id.len() > self.name_bytes {
             return Err(Trouble::TooLarge(self.rows, Limit::NameBytes(self.name_bytes)));

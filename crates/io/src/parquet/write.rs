@@ -20,7 +20,7 @@ use crate::standard::output_name;
 pub struct ParquetColumn {
     /// Name.
     pub name: &'static str,
-    /// One value per row.
+    /// Values of the column, one per row.
     pub values: ParquetValues,
 }
 

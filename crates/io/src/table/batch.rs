@@ -30,7 +30,7 @@ pub(super) struct Plan {
     pub row_bytes: usize,
 }
 
-/// Row with a different number of fields or too many bytes.
+/// Row that cannot be read: it has another number of fields than the first row, or too many bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BadRow {
     /// A row whose number of fields differs from that of the first row.
@@ -48,7 +48,7 @@ pub(super) struct Batch {
     pub columns: Vec<Vec<f64>>,
     /// Reason why a wanted column cannot be used.
     pub unusable: Vec<Option<Unusable>>,
-    /// Lines of the samples.
+    /// Line numbers of the samples.
     pub lines: Lines,
     /// Line and number of fields of each row of empty fields at the end of the block. These rows
     /// count as samples only if other rows follow.
@@ -251,8 +251,8 @@ impl Plan {
         self.origins.get(column).copied().flatten()
     }
 
-    /// Checks the number of fields of a row. A difference in empty fields at the end is accepted:
-    /// some programs end only some of the lines with a delimiter.
+    /// Checks the number of fields of a row. A different number of empty fields at the end is
+    /// accepted: some programs end only some of the lines with a delimiter.
     pub fn check(&self, line: u64, fields: usize, filled: usize) -> Result<(), BadRow> {
         if fields < self.filled || filled > self.width {
             return Err(BadRow::Ragged { line, fields });

@@ -27,7 +27,8 @@ pub(super) struct Block {
     pub line: u64,
 }
 
-/// State of the end of a text.
+/// Condition of the end of a text: whether the last line is complete, and how many zero bytes
+/// follow it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct TextEnd {
     /// Last line, if no line break ends it.
@@ -69,7 +70,7 @@ impl<'a> Blocks<'a> {
         for _ in 0..options.skip_lines {
             match reader.skip_until(terminator) {
                 Ok(0) => {
-                    let finding = "all of its lines are skipped";
+                    let finding = "all lines of the file are skipped";
                     return Err(IoError::Empty { file, found: finding });
                 }
                 Ok(_) => {}
@@ -149,7 +150,7 @@ impl<'a> Blocks<'a> {
         &self.rest
     }
 
-    /// Returns the end of the text, once all of it has been read.
+    /// Returns the condition of the end of the text; `None` until all of the text has been read.
     pub fn end(&self) -> Option<TextEnd> {
         self.end.filter(|_| self.rest.is_empty())
     }

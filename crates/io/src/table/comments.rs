@@ -117,7 +117,7 @@ impl Comments {
             .map(|(at, _)| at)
     }
 
-    /// Returns the fields of a line, by its index.
+    /// Returns the fields of a comment line, by the index of the line.
     pub fn fields(&self, line: usize) -> Vec<String> {
         self.lines[line].fields.clone()
     }

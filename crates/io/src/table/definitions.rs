@@ -33,7 +33,7 @@ enum Key {
 pub(super) struct Definitions(Vec<Definition>);
 
 impl Definitions {
-    /// Reads the definitions among comments without their signs.
+    /// Reads the definitions among comments whose comment signs are removed.
     pub fn new<'a>(comments: impl Iterator<Item = &'a str>) -> Self {
         Self(comments.filter_map(Definition::parse).collect())
     }
@@ -55,7 +55,8 @@ impl Definitions {
         is_usable.then(|| numbered.into_iter().map(|(_, text)| text).collect())
     }
 
-    /// Returns the names of the columns, if there is one definition with a unit per column.
+    /// Returns the names in the definitions that have a unit; `None` if their number differs from
+    /// the number of columns.
     pub fn names(&self, widths: &RangeInclusive<usize>) -> Option<Vec<String>> {
         let name = |definition: &Definition| match &definition.key {
             Key::Name(name) if !definition.unit().is_empty() => Some(name.clone()),
@@ -79,14 +80,15 @@ impl Definitions {
     }
 }
 
-/// Returns whether a comment without its sign defines one column, by its number and with a unit.
+/// Returns whether a comment, without its comment sign, defines a column by its number and states a
+/// unit.
 pub(super) fn is_numbered_with_unit(comment: &str) -> bool {
     let definition = Definition::parse(comment);
     definition.is_some_and(|one| matches!(one.key, Key::Number(_)) && !one.unit().is_empty())
 }
 
-/// Returns whether a comment without its sign is the definition of a column by its number; `None`
-/// if it defines no column.
+/// Returns whether a comment, without its comment sign, defines a column by its number and not by
+/// its name; `None` if the comment defines no column.
 pub(super) fn is_by_number(comment: &str) -> Option<bool> {
     Definition::parse(comment).map(|definition| matches!(definition.key, Key::Number(_)))
 }

@@ -22,11 +22,11 @@ pub(crate) struct Layout {
 pub(crate) struct Row<'a> {
     /// Text without the end of its line.
     pub text: &'a [u8],
-    /// Offset in the text.
+    /// Offset of the row in the text.
     pub at: usize,
     /// Number of line ends before the row in the text.
     pub line: u64,
-    /// `true` if it has a quote that may enclose a field.
+    /// `true` if the row has a quote that may enclose a field.
     pub is_quoted: bool,
 }
 
@@ -149,7 +149,7 @@ impl State {
 pub(crate) struct Fields {
     text: Vec<u8>,
     ranges: Vec<Range<usize>>,
-    /// `true` if blanks separate the fields and some of them contain blanks.
+    /// `true` if blanks separate the fields and some fields contain blanks.
     pub is_joined: bool,
 }
 

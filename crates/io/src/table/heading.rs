@@ -16,8 +16,8 @@ const MIN_NUMBERS: usize = 2;
 /// Texts above the rows of numbers.
 #[derive(Debug, Default)]
 pub(super) struct Above {
-    /// Names and units; `None` if they are in the first row and perhaps the second, or if there are
-    /// none.
+    /// Names and units; `None` if the first row of the table has the names and perhaps the second
+    /// row the units, or if there are no names.
     pub heading: Option<Heading>,
     /// Further texts for the units of the columns, from comments and other rows. Each list has one
     /// text per column, empty for a column without a unit.
@@ -63,11 +63,11 @@ pub(super) fn first_rows(text: &[u8], layout: Layout) -> Vec<Beginning<'_>> {
 
 /// Numbers of fields in the rows of a table, up to the last field that is not empty.
 struct Filled {
-    /// Number of fields in the first row, without a comment.
+    /// Number of fields in the first row; a comment in the row does not count.
     first: usize,
     /// Smallest number of fields in the rows after the first.
     usual: usize,
-    /// `true` if all rows after the first have this number of fields.
+    /// `true` if all rows after the first have the same number of fields.
     is_uniform: bool,
 }
 
@@ -93,8 +93,9 @@ impl Filled {
 }
 
 impl Above {
-    /// Reads the rows and the comments above the numbers. There is no heading if the first row
-    /// names the columns, perhaps with units in the second row, or if no row does.
+    /// Reads the rows and the comments above the numbers. The result has no heading if the first
+    /// row of the table names the columns, perhaps with units in the second row, or if no row names
+    /// them.
     pub fn new(text: &[u8], rows: &[Beginning<'_>], layout: Layout) -> Self {
         let is_numbers = |row: &Beginning<'_>| 2 * numbers(row, layout) >= row.fields.filled();
         let begin = rows.iter().rposition(|row| !is_numbers(row)).map_or(0, |last| last + 1);
@@ -152,8 +153,8 @@ struct Names {
 }
 
 impl Names {
-    /// Detects names in the rows above the numbers or in comments; `None` if they are in the first
-    /// row, perhaps with units in the second, or if there are none.
+    /// Detects names in the rows above the numbers or in comments; `None` if the first row of the
+    /// table has the names, perhaps with units in the second row, or if there are no names.
     fn find(
         above: &[Beginning<'_>],
         comments: &Comments,

@@ -55,9 +55,9 @@ impl Instant {
 /// Clock without a date, which begins again after a day or an hour.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Clock {
-    /// Time after which it begins again, in s.
+    /// Time after which the clock begins again, in s.
     period_s: f64,
-    /// Last time of the clock, in s.
+    /// Time of the clock at the previous instant, in s.
     last_s: f64,
     /// Sum of the days or hours that have passed, in s.
     passed_s: f64,
@@ -65,8 +65,8 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// Returns the seconds since the beginning of the first day or hour. If the time goes back by
-    /// more than half a day (or half an hour), the clock has begun again; the start of a second
-    /// record seldom causes such a step.
+    /// more than half a day (or half an hour), the clock has begun again; a second record in the
+    /// same file seldom causes such a step.
     pub fn continued(&mut self, seconds: f64) -> f64 {
         if self.last_s - seconds > 0.5 * self.period_s {
             self.passed_s += self.period_s;
@@ -148,7 +148,8 @@ fn seconds(text: &str) -> Option<(f64, bool)> {
 mod tests {
     use super::*;
 
-    /// Reference: `date -d … +%s` for the days, and the clock by hand.
+    /// Dates and clock times are read as days and seconds. References: `date -d … +%s` for the
+    /// days, and hand calculation for the times of day.
     #[test]
     fn instants_of_dates_and_clocks_are_read() {
         for (text, day, seconds) in [

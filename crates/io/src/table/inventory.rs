@@ -86,8 +86,8 @@ impl RecordFile {
         instants: Option<usize>,
         take: &mut dyn FnMut(usize, usize, &[f64]),
     ) -> Result<Inventory, IoError> {
-        // In Rust, the sum of no numbers is −0; these sums begin with −0, too, as those of a column
-        // in memory.
+        // An empty sum is −0 in Rust. These sums begin with −0, so that they equal the sum of a
+        // column in memory.
         let mut sums = vec![-0.0; columns.len()];
         let mut steps = Steps::default();
         let read: Vec<usize> = columns.iter().copied().chain(instants).collect();

@@ -37,11 +37,11 @@ pub(super) struct LvmHeader {
 /// Number of columns of instants in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Instants {
-    /// No column; the first field of a row is empty.
+    /// No column of instants; the first field of a row is empty.
     No,
-    /// One column for all channels.
+    /// One column of instants for all channels.
     One,
-    /// One column before each channel.
+    /// One column of instants before the column of each channel.
     Each,
 }
 
@@ -50,7 +50,7 @@ pub(super) fn is_lvm(text: &[u8]) -> bool {
     text.starts_with(MAGIC)
 }
 
-/// Returns whether the text has the end of the headers.
+/// Returns whether the text contains the ends of all its headers.
 pub(super) fn is_complete(text: &[u8]) -> bool {
     LvmHeader::parse(text, b'\n').is_some_and(|header| text[header.bytes..].contains(&b'\n'))
 }
@@ -126,7 +126,7 @@ struct ChannelRows {
 }
 
 impl ChannelRows {
-    /// Adds a row; a row with another key is ignored.
+    /// Adds a row of the header; a row with an unknown key is ignored.
     fn add(&mut self, key: &str, fields: Vec<String>) {
         self.are_packed |= match key {
             "Samples" | "X_Dimension" | "X0" | "Delta_X" => is_packed(&fields),
@@ -143,8 +143,8 @@ impl ChannelRows {
     /// Returns the fields of a row, one per channel.
     ///
     /// If each channel has a column of instants, most programs write the field of a channel above
-    /// its values, with an empty field above the next instants. Other programs write no empty
-    /// fields.
+    /// its values, and an empty field above the next column of instants. Other programs write no
+    /// empty fields.
     fn channel_fields(&self, fields: &[String], instants: Instants) -> Vec<String> {
         let is_packed = self.are_packed || is_packed(fields);
         let step = if instants == Instants::Each && !is_packed { 2 } else { 1 };
@@ -152,8 +152,8 @@ impl ChannelRows {
     }
 }
 
-/// Returns whether a field above a column of instants has text; this field is empty if the row has
-/// one field per column.
+/// Returns whether a row has one field per channel. A row with one field per column would have
+/// empty fields above the columns of instants.
 fn is_packed(fields: &[String]) -> bool {
     fields.iter().skip(1).step_by(2).any(|field| !field.is_empty())
 }

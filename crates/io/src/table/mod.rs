@@ -98,8 +98,8 @@ impl Table {
     /// Reads the table in a file as [`Table::read`] does, with options.
     ///
     /// # Errors
-    /// As [`Table::read`], and [`IoError::NothingToSkip`] for lines to be skipped in a file that is
-    /// no text.
+    /// As [`Table::read`], and [`IoError::NothingToSkip`] if lines are to be skipped but the file
+    /// is not a text.
     pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, IoError> {
         Self::from_source(Source::open(path.as_ref())?, options)
     }
@@ -133,7 +133,7 @@ impl Table {
         Ok(Self::first_rows(source, options, usize::MAX)?.table)
     }
 
-    /// Reads a table; of a text, at most the first `limit` rows and one more.
+    /// Reads a table; from a text, it reads at most `limit` + 1 rows.
     fn first_rows(
         mut source: Source<'_>,
         options: &ReadOptions,

@@ -14,14 +14,14 @@ const MOST_LINES: usize = 5000;
 /// Beginning of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Beginning {
-    /// Line of its first row, counted from 1.
+    /// Line of the first row of the table, counted from 1.
     pub line: u64,
-    /// Number of fields of each of its rows.
+    /// Number of fields of each row of the table.
     pub fields: usize,
 }
 
-/// Returns the first line at which a table begins: rows with the same number of fields, two or
-/// more. At most two rows of words come first, then rows of numbers.
+/// Returns the first line at which a table begins. A table has at most two rows of words, then at
+/// least two rows of numbers, and all these rows have the same number of fields, at least two.
 pub(crate) fn table(text: &[u8], terminator: u8) -> Option<Beginning> {
     let mut remaining = text;
     for line in (1..).take(MOST_LINES) {

@@ -1,6 +1,6 @@
 //! Instants that are rounded to the digits with which they are printed.
 
-/// Maximum rounding error of the instants in steps; above it, a missing sample could not be
+/// Maximum rounding error of the instants, in steps; above it, a missing sample could not be
 /// distinguished from rounding.
 const COARSEST: f64 = 1.0;
 
@@ -21,7 +21,8 @@ const MOST_CORNERS: usize = 1 << 16;
 /// Number of digits of a double; rounding to more digits is not visible.
 const DOUBLE_DIGITS: i32 = 17;
 
-/// Number of first instants that are stored and checked once their digits are known.
+/// Number of instants at the beginning of a record that are stored, and checked once their digits
+/// are known.
 const BEGINNING: usize = 1024;
 
 /// Test whether instants, passed one by one, are equally spaced except for rounding.
@@ -36,7 +37,8 @@ pub(super) struct PrintedInstants {
     count: usize,
     first: f64,
     last: f64,
-    /// Largest number of decimal places and of significant digits so far.
+    /// Largest number of decimal places so far; `digits` is the largest number of significant
+    /// digits.
     decimals: i32,
     digits: i32,
     /// `true` if all instants are single-precision numbers.
@@ -46,16 +48,17 @@ pub(super) struct PrintedInstants {
     /// Rounding unit of the instants in the current decade.
     decade: Decade,
     beginning: Vec<f64>,
-    /// Intervals of the instants after the first ones.
+    /// Intervals of the instants after those in `beginning`.
     intervals: Intervals,
 }
 
-/// Intervals over the numbers of the instants; a straight line should pass through all of them.
+/// Intervals that contain the true values of the instants; a straight line over the number of the
+/// instant should pass through all of them.
 #[derive(Debug, Clone, Default)]
 struct Intervals {
-    /// Corners of the concave envelope of the lower ends.
+    /// Corners of the concave envelope of the lower ends of the intervals.
     lower_ends: Vec<Corner>,
-    /// Corners of the convex envelope of the upper ends, with the opposite sign.
+    /// Corners of the convex envelope of the upper ends of the intervals, with the opposite sign.
     upper_ends: Vec<Corner>,
     /// `true` if there are more corners than rounding creates.
     is_curved: bool,
@@ -65,7 +68,7 @@ struct Intervals {
 type Corner = (f64, f64);
 
 impl Intervals {
-    /// Adds the interval after all others.
+    /// Appends the interval `middle` ± `half` after all others.
     fn push(&mut self, number: f64, middle: f64, half: f64) {
         if self.is_curved {
             return;
@@ -90,7 +93,7 @@ impl Intervals {
         if self.is_curved {
             return f64::INFINITY;
         }
-        // The sum of two concave functions is largest at a corner of one of them.
+        // The sum of two concave polygons is largest at a corner of one of the polygons.
         let at_corners = |corners: &[Corner], others: &[Corner]| {
             let mut from = 0;
             let mut largest = f64::NEG_INFINITY;
@@ -263,7 +266,7 @@ mod tests {
         instants.are_uniform()
     }
 
-    /// Instants at a rate in Hz as a program prints them.
+    /// Returns `count` instants at `rate` Hz, each printed by `print` and read back.
     fn read(rate: f64, count: usize, print: impl Fn(f64) -> String) -> Vec<f64> {
         (0..count).map(|k| print(k as f64 / rate).parse().unwrap()).collect()
     }
@@ -277,16 +280,17 @@ mod tests {
                 uniform(read(rate, 300_000, |t| format!("{t:.decimals$}"))),
                 "{rate} {decimals}"
             );
-            // The same rate, with another first instant.
+            // The instants are also uniform with another first instant.
             assert!(uniform(read(rate, 9_000, |t| format!("{:.decimals$}", t + 7.123_456_7))));
         }
-        // Seven significant digits; the number of decimal places decreases.
+        // With seven significant digits, the number of decimal places decreases with time.
         assert!(uniform(read(25_600.0, 300_000, |t| format!("{t:.6e}"))));
         // Single precision.
         assert!(uniform((0..300_000).map(|k| f64::from((f64::from(k) / 25_600.0) as f32))));
     }
 
-    /// Instants at a rate in Hz from a random start, each off by noise, in steps.
+    /// Returns instants at `rate` Hz from a random start, with random jitter of `jitter` steps,
+    /// rounded to `decimals` decimal places.
     fn printed_with_jitter(rate: f64, decimals: usize, jitter: f64, seed: u64) -> Vec<f64> {
         let sampling = mechid_signal::Sampling::from_rate_hz(rate, 4096).unwrap();
         let off = mechid_signal::noise::white(sampling, 1, jitter.max(1e-12), seed).unwrap();
@@ -296,8 +300,8 @@ mod tests {
         off.channel(0).iter().enumerate().map(time).map(print).collect()
     }
 
-    /// Of 100 seeded records of each kind, all with rounded instants are accepted, and all with
-    /// genuine jitter or a missing sample are refused.
+    /// Tests 100 seeded records of each kind: all records with rounded instants are accepted; all
+    /// records with jitter or with a missing sample are refused.
     #[test]
     fn rounding_is_told_from_jitter_and_from_a_gap() {
         for (rate, decimals) in [(51_200.0, 5), (25_600.0, 6), (96_000.0, 5)] {
@@ -313,7 +317,7 @@ mod tests {
             for jitter in [0.02, 0.05, 0.2] {
                 assert_eq!(accepted(jitter, None), 0, "{rate} {decimals} jitter {jitter}");
             }
-            // Near the ends of a record, a missing sample can be within coarse rounding, so none is
+            // Near the ends of a record, coarse rounding can hide a missing sample, so no sample is
             // removed there.
             for lost in [64, 100, 2048, 4000] {
                 assert_eq!(accepted(0.0, Some(lost)), 0, "{rate} {decimals} without {lost}");
@@ -335,10 +339,11 @@ mod tests {
             times.remove(gap);
             assert!(!uniform(times), "{gap}");
         }
-        // A clock that runs a hundredth of a per cent faster in the second half.
+        // The clock runs faster by a hundredth of a per cent in the second half.
         let drift = |k: usize| (k as f64 + 1e-4 * k.saturating_sub(50_000) as f64) / 25_600.0;
         assert!(!uniform((0..100_000).map(|k| format!("{:.6}", drift(k)).parse().unwrap())));
-        // Instants that are too coarse to distinguish a missing sample from rounding.
+        // Instants with four decimal places are too coarse to distinguish a missing sample from
+        // rounding.
         assert!(!uniform(read(25_600.0, 1000, |t| format!("{t:.4}"))));
         assert!(!uniform([0.0, 0.0, 0.0]));
         assert!(!uniform([2.0, 1.0, 0.0]));

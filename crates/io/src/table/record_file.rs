@@ -70,14 +70,14 @@ pub struct Survey {
 
 /// Consecutive rows of the columns of a file.
 struct Chunk<'a> {
-    /// The first sample, counted from 0.
+    /// Index of the first sample of the chunk, counted from 0.
     first: usize,
     columns: &'a [&'a [f64]],
     lines: &'a Lines,
 }
 
-/// Callback for rows that are read again and the index of the first of them; returns whether to
-/// continue.
+/// Callback for a text that is read again in blocks. It receives the index of the first row of a
+/// block, and the rows of the block; it returns whether to continue.
 type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
@@ -206,8 +206,8 @@ impl RecordFile {
             (false, Some(column)) => self.sampling_of(column, steps, lengths[count])?,
             (false, None) => match time {
                 TimeAxis::RateHz(rate_hz) => time_axis::at_rate(self.head.file(), *rate_hz, len)?,
-                // The header of the file states the time axis; if it is missing, this returns the
-                // error.
+                // The header of the file may state the time axis; if it states none, this
+                // expression returns the error.
                 _ => self.head.signal(self.head.sampling(time, wanted)?.with_len(len))?,
             },
         };
@@ -294,8 +294,8 @@ impl RecordFile {
         }
     }
 
-    /// Passes every sample of some columns, by their indices, in order until `take` breaks; returns
-    /// the end of a text that was read again.
+    /// Passes all samples of the columns with the indices `columns` to `take`, in order, until
+    /// `take` breaks. Returns the end of the text if the text was read again.
     fn chunks<E: From<IoError>>(
         &self,
         columns: &[usize],

@@ -20,7 +20,7 @@ pub(super) struct Rows {
     file: String,
     layout: Layout,
     limits: Limits,
-    /// Counter of the bytes read of the file.
+    /// Counter of the bytes of the file that were read.
     stored: Stored,
     /// Decimal sign of the numbers, if it is known.
     decimal: Option<DecimalSign>,
@@ -36,16 +36,17 @@ pub(super) struct Rows {
     lines: Lines,
     /// Header of a LabVIEW measurement file.
     lvm: Option<LvmHeader>,
-    /// Units of the columns in comments and further rows, until the columns have them.
+    /// Units in comments and further rows, one list per comment or row, until they are added to the
+    /// units of the columns.
     further_units: Vec<Vec<String>>,
     /// Remarks on comments that were not read.
     remarks: Vec<String>,
-    /// Reference days of the instants of columns, by column.
+    /// Reference day of the instants, for each column of instants, by the index of the column.
     origins: BTreeMap<usize, i64>,
-    /// Clocks without a date of columns, by column.
+    /// Clock, for each column of clock times without a date, by the index of the column.
     clocks: BTreeMap<usize, Clock>,
-    /// Line and number of fields of rows of empty fields that no other row has followed yet. At the
-    /// end of the file they are ignored.
+    /// Line and number of fields of each row of empty fields that is not followed by another row
+    /// yet. At the end of the file such rows are ignored.
     empty: Vec<(u64, usize)>,
 }
 
@@ -108,7 +109,7 @@ impl Rows {
         self.columns.len()
     }
 
-    /// Returns the number of samples so far.
+    /// Returns the number of samples read so far.
     pub fn samples(&self) -> usize {
         self.samples
     }
@@ -123,12 +124,12 @@ impl Rows {
         &self.columns[column]
     }
 
-    /// Returns the lines of the samples since [`Rows::forget`].
+    /// Returns the line numbers of the samples since [`Rows::forget`].
     pub fn lines(&self) -> &Lines {
         &self.lines
     }
 
-    /// Removes the samples so far; their number and the reasons for unusable columns are kept.
+    /// Removes the samples read so far; their number and the reasons for unusable columns are kept.
     pub fn forget(&mut self) {
         for values in self.columns.iter_mut().filter_map(|column| column.values.as_mut().ok()) {
             values.clear();
@@ -231,7 +232,8 @@ impl Rows {
         self.has_samples = true;
     }
 
-    /// Adds the units in comments and further rows to those of the columns, after a semicolon.
+    /// Appends the units in comments and in further rows to the units of the columns, separated by
+    /// a semicolon.
     fn add_further_units(&mut self) {
         for units in std::mem::take(&mut self.further_units) {
             for (column, unit) in self.columns.iter_mut().zip(units) {
@@ -343,7 +345,8 @@ impl Rows {
     /// Appends the rows of the next block.
     ///
     /// # Errors
-    /// [`IoError::Ragged`] and [`IoError::TooLarge`] for a row that does not fit.
+    /// [`IoError::Ragged`] for a row with a wrong number of fields, [`IoError::TooLarge`] for a row
+    /// that is too long.
     pub fn append(&mut self, batch: &mut Batch) -> Result<(), IoError> {
         log::trace!("row {}", self.samples + batch.samples);
         let plan = self.plan();

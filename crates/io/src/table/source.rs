@@ -21,7 +21,7 @@ const AT_ONCE: u64 = 1 << 20;
 /// Byte order mark of UTF-8.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Number of first bytes that are used to detect the format.
+/// Number of bytes at the beginning of a file that are used to detect its format.
 const HEAD: u64 = 512;
 
 /// Position of the version in a MATLAB 7.3 file; such files are always little-endian.
@@ -94,11 +94,11 @@ struct TooLong(usize);
 /// File that is being read.
 pub(crate) struct Source<'a> {
     pub file: String,
-    /// `true` if it is read through gzip.
+    /// `true` if the file is read through gzip.
     pub gzip: bool,
     /// `true` for UTF-16, which is converted to UTF-8.
     pub utf16: bool,
-    /// Counter of its stored bytes.
+    /// Counter of the stored bytes of the file.
     pub stored: Stored,
     /// First bytes, which `reader` also returns.
     head: Vec<u8>,
@@ -203,7 +203,8 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Refuses more unpacked bytes than the limits allow for the bytes read.
+    /// Returns an error if `len` unpacked bytes are more than the limits allow for the number of
+    /// stored bytes that were read.
     fn check_unpacked(&self, len: usize, limits: &Limits) -> Result<(), IoError> {
         let (most, limit) = self.budget(limits).unpacked_bytes();
         if self.gzip && len > most {

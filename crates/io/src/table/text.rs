@@ -35,11 +35,11 @@ pub(super) struct TextReader<'a> {
 pub(super) struct Wanted {
     /// Indices of the columns, in rising order; all if `None`.
     pub columns: Option<Vec<usize>>,
-    /// Decimal sign, if the text was read before.
+    /// Decimal sign, if an earlier pass over the text has determined it.
     pub decimal: Option<DecimalSign>,
 }
 
-/// Callback for the rows so far after each block; returns whether to continue.
+/// Callback that receives the rows read so far, after each block; it returns whether to continue.
 pub(super) type TakeRows<'a, E> = dyn FnMut(&mut Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl<'a> TextReader<'a> {
@@ -65,12 +65,12 @@ impl<'a> TextReader<'a> {
         Ok(Self { layout, table, blocks, rows })
     }
 
-    /// Returns the rows so far.
+    /// Returns the rows read so far.
     pub fn rows(&self) -> &Rows {
         &self.rows
     }
 
-    /// Returns the end of the text, if it was reached.
+    /// Returns the condition of the end of the text; `None` if the end was not reached.
     pub fn end(&self) -> Option<TextEnd> {
         self.blocks.end()
     }

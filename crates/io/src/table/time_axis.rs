@@ -72,7 +72,8 @@ pub(super) fn common_length(table: &Table, columns: &[usize]) -> Result<usize, I
     Ok(same_length(table, &lengths)?.unwrap_or(table.len()))
 }
 
-/// Returns the length of all columns (index, number of samples); `None` without columns.
+/// Returns the common length of columns, each given as its index and its number of samples; `None`
+/// without columns.
 pub(super) fn same_length(
     table: &Table,
     lengths: &[(usize, usize)],
@@ -150,8 +151,8 @@ fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_STEP * a.abs().max(b.abs())
 }
 
-/// Returns an error if the file gives a column another rate. A rate that only a named number states
-/// may be replaced.
+/// Returns an error if the file states a rate other than `rate_hz` for the column. A rate that only
+/// a named number states may be replaced.
 fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError> {
     if matches!(table.axis(column), Axis::Stated { .. } | Axis::Contradiction { .. }) {
         return Ok(());
@@ -185,7 +186,7 @@ fn uniform_step(table: &Table, times: &[f64], unit: f64) -> Result<f64, IoError>
     steps.step(table.file(), unit)
 }
 
-/// Number of first steps whose median is the usual step.
+/// Number of steps at the beginning of a record whose median is the usual step.
 const MEDIAN_STEPS: usize = 1024;
 
 /// Running statistics of the steps between instants.

@@ -110,7 +110,7 @@ pub(super) fn doubtful(column: &Column) -> Option<StatedUnit> {
 }
 
 /// Returns whether a text is a pattern for clock times or dates, such as `hh:mm:ss.fff`, a time
-/// zone, or the beginning of a time.
+/// zone, or a word for the reference of the time, such as `relative`.
 fn is_clock(text: &str) -> bool {
     let lower = text.to_lowercase();
     let pattern = lower.contains(':') && lower.chars().all(|c| "hmsf0yd:./- t'".contains(c));

@@ -59,7 +59,9 @@ fn time_unit(header: &Header, remarks: &mut Vec<String>) -> f64 {
             "the labels of the file state instants in {text}: the instants were multiplied by {in_s} to get s"
         ),
         None => {
-            format!("the label {text} of the instants is not a unit of time: s is assumed")
+            format!(
+                "the labels of the file state instants in {text}, which is not a unit of time: s is assumed"
+            )
         }
     };
     if !remarks.contains(&remark) {

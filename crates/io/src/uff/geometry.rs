@@ -25,7 +25,7 @@ pub(crate) fn read_geometry(file: &str, bytes: &[u8]) -> Result<Geometry, IoErro
         fault.error(file, at)
     })?;
     if model.nodes.is_empty() {
-        return Err(IoError::Empty { file: file.into(), found: "it has no dataset 15 or 2411" });
+        return Err(IoError::Empty { file: file.into(), found: "there is no dataset 15 or 2411" });
     }
     let length = model.length.filter(|length| *length > 0.0).unwrap_or(1.0);
     let point = |(number, position): (&u32, &[f64; 3])| GeometryPoint {
@@ -90,7 +90,7 @@ fn nodes(lines: &mut Lines<'_>, model: &mut Model, is_one_line: bool) -> Result<
     }
 }
 
-/// Reads a trace line, which is a list of nodes; 0 interrupts it.
+/// Reads a trace line, which is a list of nodes; a 0 in the list interrupts the line.
 fn trace_lines(lines: &mut Lines<'_>, model: &mut Model) -> Result<(), Fault> {
     let about = lines.required("a trace line has no description")?;
     lines.required("a trace line has no name")?;

@@ -6,21 +6,24 @@ use crate::responses::AveragedSegments;
 use crate::units::names_quantity;
 use crate::{Quantity, StatedUnit, stated_unit};
 
-/// Prefix of a second line of description that states the decay, in 1/s, that a window adds.
+/// Prefix of the second line of the description if this line states the decay, in 1/s, that a
+/// window adds.
 pub(super) const ADDED_DECAY: &str = "ADDED DECAY 1/S ";
 
-/// Prefix of a third line of description that states the segments over which the responses are
-/// averaged, in the order of [`AveragedSegments::numbers`].
+/// Prefix of the third line of the description if this line states the segments over which the
+/// responses are averaged. The numbers after the prefix are in the order of
+/// [`AveragedSegments::numbers`].
 pub(super) const SEGMENTS: &str = "SEGMENTS ";
 
 /// Description of the function in a dataset 58.
 #[derive(Debug)]
 pub(crate) struct Header {
-    /// The first line, empty if it says NONE.
+    /// Title: the first line of the description; empty if the line is NONE.
     pub title: String,
-    /// Decay, in 1/s, that an exponential window adds to every mode, as the second line states it.
+    /// Decay, in 1/s, that an exponential window adds to every mode, as the second line of the
+    /// dataset states it.
     pub added_decay: Option<f64>,
-    /// Segments over which the function was averaged, as the third line states them.
+    /// Segments over which the function was averaged, as the third line of the dataset states them.
     pub segments: Option<AveragedSegments>,
     /// Type of the function: 1 is a response in time, 4 a frequency response function.
     pub function: u32,
@@ -33,7 +36,7 @@ pub(crate) struct Header {
     /// Number of values, or of pairs of instant and value.
     pub count: usize,
     pub is_even: bool,
-    /// First abscissa and increment, for even spacing.
+    /// First abscissa, for even spacing; `step` is the increment.
     pub start: f64,
     pub step: f64,
     /// Type of the abscissa: 17 is time, 18 frequency.
@@ -47,7 +50,7 @@ pub(crate) struct Header {
     /// Data types of the ordinate and of its denominator: 8, 11 and 12 are a response, 9 and
     /// 13 a force.
     pub ordinate: [u32; 2],
-    /// The line with the numbers, for messages.
+    /// Offset of the line that states the form and the number of the values, for messages.
     pub form_at: usize,
 }
 
@@ -108,8 +111,8 @@ impl Header {
         self.count.saturating_mul(numbers_per_value)
     }
 
-    /// Returns what the labels of the abscissa state about its unit, if it should have the quantity
-    /// `wanted`; `None` if they only name the quantity.
+    /// Returns what the labels of the abscissa state about the unit of the quantity `wanted`;
+    /// `None` if the labels only name the quantity.
     pub fn abscissa_unit(&self, wanted: Quantity) -> Option<StatedUnit> {
         let [name, unit] = &self.abscissa_labels;
         let named = |text: &str| {
@@ -187,7 +190,7 @@ fn label(text: &[u8]) -> String {
     }
 }
 
-/// Returns node and direction in the usual form: `12+Z`, `3-RX`; a scalar is its node alone.
+/// Returns node and direction in the usual form: `12+Z`, `3-RX`; only the node for a scalar.
 fn degree_of_freedom((node, direction): (i64, i64), line: &Line<'_>) -> Result<String, Fault> {
     let sign = if direction < 0 { '-' } else { '+' };
     let axis = match direction.unsigned_abs() {

@@ -65,7 +65,7 @@ impl<'a> Lines<'a> {
     /// Returns the number of the line with the byte at offset `at`, counted from 1.
     pub fn number_at(&self, at: usize) -> u64 {
         let before = &self.bytes[..at.min(self.bytes.len())];
-        // The end of the file belongs to the last line.
+        // An offset at the end of the file belongs to the last line.
         let before = if at >= self.bytes.len() { before.trim_ascii_end() } else { before };
         1 + before.iter().filter(|b| **b == b'\n').count() as u64
     }

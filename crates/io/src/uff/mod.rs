@@ -33,7 +33,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents,
     let mut lines = Lines::new(bytes);
     match datasets(&mut lines, budget) {
         Ok(contents) if contents.columns.is_empty() => {
-            Err(IoError::Empty { file: file.into(), found: "it has no dataset 58" })
+            Err(IoError::Empty { file: file.into(), found: "there is no dataset 58" })
         }
         Ok(contents) => Ok(contents.with_usual_length()),
         Err(fault) => {

@@ -34,7 +34,7 @@ pub(crate) fn read_modes(file: &str, bytes: &[u8]) -> Result<NodalModes, IoError
     let Some(first) = modes.first() else {
         return Err(IoError::Empty {
             file: file.into(),
-            found: "it has no dataset 55 with modes at nodes",
+            found: "there is no dataset 55 with modes at nodes",
         });
     };
     let zero = vec![Complex::default(); MOST_VALUES];
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Geometry, PointShape};
 
-    /// Two nodes with complex shapes, as this crate writes them.
+    /// Returns the universal file of two nodes with complex shapes, as this crate writes it.
     fn written() -> String {
         let geometry = Geometry::from_names(["1+Z", "2+Z"]);
         let names = ["1+Z".to_owned(), "2+Z".to_owned()];

@@ -37,7 +37,7 @@ pub(crate) fn read(
     match functions(file, &mut lines, budget) {
         Ok(responses) if responses.functions.is_empty() => Err(IoError::Empty {
             file: file.into(),
-            found: "it has no dataset 58 with a frequency response function",
+            found: "there is no dataset 58 with a frequency response function",
         }),
         Ok(responses) => Ok(responses),
         Err(fault) => {
@@ -99,7 +99,7 @@ fn add(
     if header.abscissa != FREQUENCY {
         let abscissa = header.abscissa;
         return Err(id.fault(format!(
-            "{} has an abscissa of type {abscissa}, but needs frequency (18)",
+            "{} has an abscissa of type {abscissa}, but needs type 18 (frequency)",
             header.kind()
         )));
     }
@@ -122,7 +122,7 @@ fn add(
     }
     if !header.is_complex {
         return Err(
-            id.fault("a frequency response function needs complex numbers, it has real ones")
+            id.fault("a frequency response function needs complex numbers, but this dataset has real numbers")
         );
     }
     let Some(reference) = header.reference.clone() else {
@@ -201,7 +201,7 @@ fn quantity(header: &Header) -> Option<ResponseQuantity> {
     }
 }
 
-/// Quantity that the label of a function without a specific type states.
+/// Returns the quantity that the label of a function without a specific type states.
 fn quantity_of_label(label: &str) -> Option<ResponseQuantity> {
     if let Some(unit) = ResponseUnit::parse(label).filter(|unit| !unit.is_inverse) {
         return Some(unit.quantity);
@@ -212,7 +212,8 @@ fn quantity_of_label(label: &str) -> Option<ResponseQuantity> {
     }
 }
 
-/// Stores the frequencies of the first function, and compares all others with them.
+/// Stores the frequencies of the first function; returns an error if another function has other
+/// frequencies.
 fn same_frequencies(
     responses: &mut FrequencyResponses,
     id: &Line<'_>,
@@ -233,7 +234,7 @@ fn same_frequencies(
         None => Ok(()),
         Some((first, other)) => {
             Err(id
-                .fault(format!("a line is at {other} Hz, but at {first} Hz in the first function")))
+                .fault(format!("a frequency is {other} Hz, but {first} Hz in the first function")))
         }
     }
 }

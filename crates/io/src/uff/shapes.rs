@@ -59,7 +59,8 @@ fn mode(text: &mut String, number: usize, shape: &PointShape, numbers: &[u32]) {
     let _ = writeln!(text, "    -1");
 }
 
-/// Returns the numbers of the nodes: their names if all are different numbers, otherwise from 1.
+/// Returns the numbers of the nodes: the names of the points if all names are positive whole
+/// numbers, otherwise 1, 2, 3, ….
 fn node_numbers(geometry: &Geometry) -> Vec<u32> {
     let named: Option<Vec<u32>> =
         geometry.points.iter().map(|point| point.name.parse().ok().filter(|n| *n > 0)).collect();

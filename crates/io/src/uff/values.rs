@@ -88,7 +88,7 @@ impl Binary {
             (Some(order @ 1..=2), Some(2)) => Ok(Some(Self { is_big_endian: order == 2 })),
             (Some(1..=2), Some(format)) => Err(id.fault(format!(
                 "floating point format {format}{} of a dataset 58b cannot be read, only 2 (IEEE 754): \
-                 export it as IEEE 754, or as text",
+                 export the dataset as IEEE 754, or as text",
                 match format {
                     1 => " (DEC VMS)",
                     3 => " (IBM 5/370)",

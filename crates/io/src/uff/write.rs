@@ -12,8 +12,8 @@ use crate::responses::{FrequencyResponses, ResponseFunction};
 const EVEN: f64 = 1e-9;
 
 /// Returns a universal file: a header (151), SI units (164), and a dataset 58 for each frequency
-/// response and coherence, in double precision; the error is a point that is not a node and a
-/// direction.
+/// response and coherence, in double precision. The error is the name of a point that does not
+/// consist of a node and a direction.
 pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, String> {
     let mut text = String::new();
     let title = printable(&responses.file);
@@ -169,7 +169,8 @@ fn narrow(number: f64) -> String {
     }
 }
 
-/// Returns node and direction of a point such as `12+Z`; a node alone is a scalar.
+/// Returns node and direction of a point such as `12+Z`; the direction is 0, as for a scalar, if
+/// there is only a node.
 fn point(label: &str) -> Result<(u32, i32), String> {
     node_and_direction(label).ok_or_else(|| label.to_owned())
 }
@@ -187,7 +188,8 @@ fn node_and_direction(label: &str) -> Option<(u32, i32)> {
 fn printable(text: &str) -> String {
     let printable: String =
         text.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '?' }).collect();
-    // A title that looks like the end of a dataset would end it, so it gets a prefix.
+    // A title that looks like the end of a dataset would end the dataset, so the title gets a
+    // prefix.
     format!("FRF of {}", printable.get(..printable.len().min(72)).unwrap_or_default())
 }
 

@@ -21,7 +21,7 @@ pub(super) struct Expression {
 impl Expression {
     const ONE: Self = Self { dimension: Dimension::NONE, in_si: 1.0 };
 
-    /// Reads a unit; `None` if the text is not one.
+    /// Reads a unit; `None` if the text is not a unit.
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         if text.is_empty() || text.len() > MAX_BYTES {
@@ -219,7 +219,8 @@ mod tests {
         Some(([l, t, f], in_si))
     }
 
-    /// Reference: the definitions of the units, worked by hand.
+    /// Products and quotients have the dimension and the size that follow by hand from the
+    /// definitions of the units.
     #[test]
     fn products_and_quotients_have_their_dimension_and_size() {
         let acceleration = [1, -2, 0];

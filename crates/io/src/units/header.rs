@@ -12,7 +12,8 @@ use super::unit_words::{unit_from_words, unit_words};
 use super::words::{is_ambiguous, split_words};
 use super::{Quantity, Unit};
 
-/// Maximum number of words of a text for a unit; a longer one that is not a unit is a description.
+/// Maximum number of words in the text of a unit; a longer text that is not a unit is a
+/// description.
 const MAX_UNIT_WORDS: usize = 2;
 
 /// Reliability of the unit that a header states for its column.
@@ -22,7 +23,7 @@ pub enum Evidence {
     Stated,
     /// The unit is read from the header, but other interpretations are possible.
     Likely,
-    /// The text may be a unit; the numbers are read without it.
+    /// The text may be a unit, but this unit is not applied to the numbers.
     Unused,
 }
 
@@ -101,7 +102,8 @@ fn other_units(
     let words = unit_from_words(outside, wanted).filter(is_clear);
     let words = unit_after_slash(outside).filter(is_clear).or(words);
     let texts: Vec<&str> = notes_of(text).collect();
-    // A sensitivity beside the unit of an amplifier states the unit of the numbers.
+    // If a text has a sensitivity beside the unit of an amplifier, the sensitivity states the unit
+    // of the numbers.
     let is_sensitivity = |note: &&str| number_and_rest(note).is_some();
     let is_electric =
         |note: &str| Expression::parse(note).is_some_and(|unit| unit.dimension.is_electric());
@@ -112,8 +114,8 @@ fn other_units(
     units.chain(of_words).chain(amplifier.map(|note| (note.to_owned(), None))).collect()
 }
 
-/// Returns a statement. If another text of the header contradicts its unit, the statement becomes a
-/// doubtful one that names both texts.
+/// Returns the statement `stated`. If another text of the header contradicts the unit, the returned
+/// statement is doubtful and names both texts.
 fn with_contradiction(stated: StatedUnit, others: Vec<(String, Option<Unit>)>) -> StatedUnit {
     let Some(used) = stated.used() else { return stated };
     let is_other = |unit: &Option<Unit>| {

@@ -134,8 +134,9 @@ pub(crate) fn is_unit(text: &str) -> bool {
     Expression::parse(text).is_some()
 }
 
-/// Returns the text of the unit that a text above a column states, clearly or not. It is empty if
-/// there is none, and for a number with a unit, which is a sensitivity or a range.
+/// Returns the text of the unit that a text above a column states, clearly or not. The result is
+/// empty if the text states no unit, or if it is a number with a unit, which is a sensitivity or a
+/// range.
 pub(crate) fn unit_text(text: &str) -> String {
     let stated = stated(text, "", None).filter(|_| number_and_rest(text).is_none());
     stated.map_or(String::new(), |stated| stated.text)

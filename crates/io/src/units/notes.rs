@@ -131,7 +131,8 @@ pub(super) fn unit_in_notes(notes: &[&str], wanted: Option<Quantity>) -> Option<
     unit(true).or_else(|| unit(false)).or_else(qualified).or_else(unclear)
 }
 
-/// Returns a note without quotation marks or brackets around all of it and without the word `unit`.
+/// Returns a note without the word `unit` and without quotation marks or brackets that enclose the
+/// whole note.
 pub(super) fn bare_note(note: &str) -> &str {
     let mut note = note.trim();
     for quote in ['"', '\''] {
@@ -146,7 +147,8 @@ pub(super) fn bare_note(note: &str) -> &str {
     without_unit_word(note)
 }
 
-/// Returns whether brackets in a text close only what they opened: those of `m/s²)·(s` do not.
+/// Returns whether each closing bracket of a text follows its opening bracket; in `m/s²)·(s` it
+/// does not.
 fn is_balanced(text: &str, [open, close]: [char; 2]) -> bool {
     let mut depth = 0_i32;
     text.chars().all(|c| {

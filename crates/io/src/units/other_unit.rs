@@ -45,8 +45,8 @@ const OTHER_WORDS: [&str; 27] = [
     "digits",
 ];
 
-/// Spellings that are a unit only as the last word, after a comma or a similar sign: `p, bar` has a
-/// unit, but `force_bar` is a mean value, `F_mg` a weight and `acc_lb` a corner.
+/// Spellings that are a unit only if they are the last word and follow a comma or a similar sign:
+/// `p, bar` has a unit, but `force_bar` is a mean value, `F_mg` a weight and `acc_lb` a corner.
 const MARKED: [&str; 22] = [
     "bar", "psi", "mg", "lb", "oz", "kp", "gf", "tf", "gn", "g0", "g_0", "dm", "km", "mil", "thou",
     "pond", "gal", "ms", "us", "ns", "sec", "gee",
@@ -55,7 +55,8 @@ const MARKED: [&str; 22] = [
 /// Spellings that are a unit only after the word `in`: `acc, rad` is radial and `acc, V` vertical.
 const AFTER_IN: [&str; 5] = ["V", "N", "rad", "mHz", "C"];
 
-/// Words, in lower case, before a number or a unit of a condition: `acc at 50 Hz`, `gain per mm`.
+/// Words, in lower case, that precede a number or a unit of a condition: `acc at 50 Hz`, `gain per
+/// mm`.
 const CONDITIONS: [&str; 11] =
     ["per", "at", "from", "of", "to", "for", "bei", "by", "above", "below", "with"];
 
@@ -70,8 +71,9 @@ enum Separator {
     In,
 }
 
-/// Returns the words at the end of a name that are a unit of another quantity than the one wanted,
-/// with this unit if it measures a [`Quantity`]. Places, directions and numbers may follow.
+/// Returns the words at the end of a name that are a unit of a quantity other than `wanted`. The
+/// unit itself is returned if it measures a [`Quantity`]. Places, directions and numbers may follow
+/// the words.
 pub(super) fn other_unit(
     name: &str,
     words: &[Range<usize>],
@@ -153,12 +155,13 @@ fn product(parts: &[&str], wanted: Quantity) -> Option<(Dimension, Option<Unit>)
     (wanted == Quantity::Force && parts.len() == 2).then_some((moment, None))
 }
 
-/// Returns whether the digit at the end of a word is that of a point rather than an exponent: `m2`.
+/// Returns whether the digit at the end of a word is the number of a point rather than an exponent:
+/// `m2`.
 pub(super) fn is_numbered(word: &str) -> bool {
     word.ends_with(|c: char| c.is_ascii_digit()) && !is_compound(word) && !is_spelling(word)
 }
 
-/// Returns whether a word is a unit with a sign of an operation: `m/s²`.
+/// Returns whether a word is a unit with an operator or an exponent sign: `m/s²`.
 fn is_compound(word: &str) -> bool {
     word.contains(['/', '^', '²', '³', '·', '*'])
 }

@@ -29,14 +29,16 @@ pub(super) fn with_plain_signs(text: &str) -> String {
     SPELLINGS.into_iter().fold(text.to_owned(), replace)
 }
 
-/// Returns the readings of a text in which a sign was lost to a wrong encoding: `?m` and `mm/s?`.
+/// Returns the possible original forms of a text in which a wrong encoding replaced a sign: `?m`
+/// and `mm/s?`.
 pub(super) fn with_restored_signs(text: &str) -> impl Iterator<Item = String> {
     const LOST: [char; 2] = ['?', '\u{fffd}'];
     let is_lost = text.contains(LOST);
     ["µ", "²"].into_iter().filter(move |_| is_lost).map(|sign| text.replace(LOST, sign))
 }
 
-/// Ways to state that values are not the samples of a signal, in lower case.
+/// Words, in lower case, for values that are not the samples of a signal but peak or effective
+/// values.
 const TREATMENTS: [&str; 10] =
     ["pk-pk", "0-pk", "pkpk", "peak", "p-p", "0-p", "rms", "pk", "pp", "eff"];
 
@@ -72,7 +74,8 @@ fn exponent(text: &str) -> Option<(i32, &str)> {
     Some((text[..end].parse().ok().filter(|_| len > 0)?, &text[end..]))
 }
 
-/// Returns the factor beside a name: `*1000`, `x 1000`, `×10`, `/1000`; `x10` may be a place.
+/// Returns the factor beside a name: `*1000`, `x 1000`, `×10`, `/1000`; `x10` may be the number of
+/// a point.
 pub(super) fn multiplier(name: &str) -> Option<&str> {
     let starts = name.char_indices().filter(|(_, c)| "*×xX/÷".contains(*c));
     starts.into_iter().find_map(|(at, sign)| {
@@ -81,7 +84,7 @@ pub(super) fn multiplier(name: &str) -> Option<&str> {
         let (number, rest) = number_and_rest(after.trim_start())?;
         let is_power_of_ten = number.log10().fract() == 0.0;
         let is_factor = match sign {
-            // A number behind a letter is a factor only if it cannot be the number of a point.
+            // A number after `x` is a factor only if it cannot be the number of a point.
             'x' | 'X' => {
                 let is_word = !before.is_some_and(char::is_alphanumeric);
                 is_word && number >= 100.0 && is_power_of_ten

@@ -41,8 +41,8 @@ pub(super) fn unit_from_words(name: &str, wanted: Option<Quantity>) -> Option<St
     Some(StatedUnit::new(&words.text, words.unit, words.evidence))
 }
 
-/// Returns the words of a name that are a unit of the quantity wanted, or of the quantity that the
-/// name states.
+/// Returns the words of a name that are a unit of the quantity `wanted`, or of the quantity that
+/// the name states.
 pub(super) fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWords> {
     if let (Some(wanted), Some(unit)) = (wanted, Unit::parse(name))
         && unit.quantity == wanted

@@ -37,7 +37,7 @@ impl Dimension {
         self == Self::NONE
     }
 
-    /// Returns the dimension of a product of two powers.
+    /// Returns the dimension of the product of `self` and a power of `other`.
     pub fn times(self, other: Self, power: i8) -> Option<Self> {
         let mut product = self;
         for (into, exponent) in product.0.iter_mut().zip(other.0) {
@@ -325,7 +325,7 @@ pub(super) const VOCABULARY: &[Entry] = &[
     ),
     entry(&["rps"], D::FREQUENCY, 1.0),
     entry(&["rads"], D::FREQUENCY, 1.0 / TURN),
-    // Angles and cycles, so that rad/s and cycles/s are frequencies.
+    // Angles and cycles are in turns, so that rad/s and cycles/s are frequencies.
     entry(&["rad", "radian", "radians"], D::NONE, 1.0 / TURN),
     entry(&["krad"], D::NONE, 1e3 / TURN),
     entry(&["deg", "degree", "degrees", "°"], D::NONE, 1.0 / 360.0),

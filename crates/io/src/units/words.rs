@@ -283,11 +283,12 @@ pub(super) fn is_ambiguous(unit: &str) -> bool {
     AMBIGUOUS.contains(&unit.to_lowercase().as_str())
 }
 
-/// Words for units with several sizes or none: tons of three kinds, decibels.
+/// Words for units with several sizes or no size: tons of three kinds, decibels, percent.
 const UNCLEAR: &[&str] =
     &["ton", "tons", "tn", "db", "dba", "dbv", "dbu", "dbm", "dbfs", "percent", "%", "%fs", "‰"];
 
-/// Returns whether a word is a unit with several sizes or none.
+/// Returns whether a word is a unit with several sizes, such as `ton`, or with no size, such as
+/// `percent`.
 pub(super) fn is_unclear(word: &str) -> bool {
     UNCLEAR.contains(&word.to_lowercase().as_str())
 }

@@ -39,7 +39,8 @@ fn a_wrong_covariance_is_refused() {
     assert!(matches!(read_covariance("/no/such/file"), Err(IoError::Read { .. })));
 }
 
-/// JSON has no infinity: an undetermined value is written as null.
+/// The message names the parameters whose variance is null. JSON has no infinity, so an
+/// undetermined value is written as null.
 #[test]
 fn an_undetermined_parameter_is_named() {
     for (matrix, named) in [

@@ -1,4 +1,4 @@
-//! Descriptions of experiments: their meaning, and the messages about wrong ones.
+//! Descriptions of experiments: their meaning, and the messages about wrong descriptions.
 
 use mechid_io::{
     Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, IoError, LoadBeyond,
@@ -6,7 +6,7 @@ use mechid_io::{
     SystemMatrices, read_covariance, read_system,
 };
 
-/// A description with these lines in place of the default ones.
+/// Returns a description with the given system, excitation and further entries.
 fn description(system: &str, excitation: &str, more: &str) -> String {
     format!(
         r#"{{
@@ -29,7 +29,8 @@ fn modal_and_physical_parameters_agree() {
     let modal = r#"{ "mass": 10, "natural_frequency_hz": 3.5588127170858854, "damping_ratio": 0.4024922359499621 }"#;
     let of = |system| parse(&description(system, FORCE, "")).unwrap().system().unwrap();
     let (a, b) = (of(SDOF), of(modal));
-    // ω = √500, ζ = 180 / (2·10·ω): given with seventeen digits, with a few rounding errors.
+    // ω = √500 and ζ = 180 / (2·10·ω) are given with seventeen digits, so that a few rounding
+    // errors remain.
     assert!((a.stiffness()[0] - b.stiffness()[0]).abs() < 1e-10);
     assert!((a.damping()[0] - b.damping()[0]).abs() < 1e-12);
 }
@@ -149,7 +150,7 @@ fn wrong_descriptions_say_what_is_wrong() {
     }
 }
 
-/// A sparse matrix as it is written in a description, rows and columns from 1.
+/// Returns a sparse matrix in the form of a description; rows and columns are counted from 1.
 fn listed(size: usize, entries: &[(usize, usize, f64)]) -> serde_json::Value {
     let rows: Vec<usize> = entries.iter().map(|entry| entry.0).collect();
     let columns: Vec<usize> = entries.iter().map(|entry| entry.1).collect();
@@ -161,7 +162,7 @@ fn listed(size: usize, entries: &[(usize, usize, f64)]) -> serde_json::Value {
 fn sparse_matrices_stand_in_the_description() {
     let described = |size: usize| {
         let one: Vec<_> = (1..=size).map(|i| (i, i, 1.0)).collect();
-        // An entry in two parts, and one above the diagonal alone.
+        // One entry of the stiffness is given in two parts, and one only above the diagonal.
         let more = [(1, 1, 2.0), (2, 1, -0.5)];
         let k: Vec<_> = one.iter().copied().chain(more).collect();
         let system = serde_json::json!({
@@ -256,7 +257,8 @@ fn the_system_of_a_report_is_read_back() {
     assert!(read_system(&path).unwrap_err().to_string().contains("missing field `system`"));
 }
 
-/// Reference: the same machine in the description itself.
+/// The system may be a path to the result file of another machine. Reference: the same machine in
+/// the description itself.
 #[test]
 fn the_system_may_be_that_of_another_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -303,7 +305,7 @@ fn the_system_may_be_that_of_another_file() {
     assert!(error.contains("a system with its mass, or the name of a JSON file"), "{error}");
 }
 
-/// Reference: closed forms in this test.
+/// The samples of every kind of excitation are those of a closed form in this test.
 #[test]
 fn every_kind_of_excitation_is_sampled() {
     let force = |excitation: &str| {
@@ -332,7 +334,7 @@ fn every_kind_of_excitation_is_sampled() {
             if (0.125..=0.375).contains(&t) { 7.0 * (tau * 2.0 * (t - 0.125)).sin() } else { 0.0 }
         }),
     );
-    // 5 N·s within one step of 1/64 s.
+    // An impulse of 5 N·s in one step of 1/64 s has a force of 320 N.
     let impulse = force(r#"{ "kind": "impulse", "momentum": 5, "at_s": 0.0625 }"#);
     assert_eq!((impulse[4], impulse.iter().sum::<f64>()), (320.0, 320.0));
     let prbs = force(r#"{ "kind": "prbs", "order": 4, "amplitude": 2, "hold_samples": 2 }"#);

@@ -1,4 +1,4 @@
-//! Small files that claim much memory are refused before it is allocated.
+//! Small files that claim much memory are refused before the memory is allocated.
 
 use std::io::Write as _;
 
@@ -29,7 +29,7 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-/// A MATLAB file of one compressed variable.
+/// Returns a MATLAB file with one compressed variable.
 fn compressed(variable: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(variable).unwrap();
@@ -42,7 +42,7 @@ fn compressed(variable: &[u8]) -> Vec<u8> {
     file
 }
 
-/// A vector of bytes.
+/// Returns a MATLAB variable that is a vector of `len` bytes.
 fn bytes_variable(len: u32) -> Vec<u8> {
     let words = [14, 56 + len.next_multiple_of(8), 6, 8, 9, 0, 5, 8, len, 1, 1, 1];
     let mut variable = words.map(u32::to_le_bytes).concat();
@@ -59,7 +59,7 @@ fn rows_have_a_limit() {
     assert_eq!(limit(long.as_bytes()), (row, Place::Line(1)));
     assert_eq!(limit(&gzip(long.as_bytes())), (row, Place::Line(1)));
     assert_eq!(limit(format!("t,f\n0,1\n1,{long}\n").as_bytes()), (row, Place::Line(3)));
-    // Shorter than one block of the reader.
+    // A row that is only a few bytes longer than the limit is refused, too.
     let some = "1".repeat(LIMITS.row_bytes);
     assert_eq!(limit(format!("t,f\n0,1\n1,{some}\n").as_bytes()), (row, Place::Line(3)));
     assert_eq!(limit(format!("{some},1\n").as_bytes()), (row, Place::Line(1)));
@@ -118,7 +118,7 @@ fn numbers_held_have_a_limit() {
     assert!(Table::parse_with("a", &compressed(&bytes_variable(1 << 16)), &OPTIONS).is_ok());
     let text = format!("t,f\n{}", "0,1\n".repeat(1 << 18));
     assert_eq!(limit(&gzip(text.as_bytes())).0, numbers);
-    // A text that is not kept in memory may have more rows.
+    // A text that is not kept in memory may have more rows than the limit on numbers allows.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.csv.gz");
     std::fs::write(&path, gzip(text.as_bytes())).unwrap();
@@ -143,7 +143,7 @@ fn memory_has_a_limit_by_the_size_of_the_file() {
     assert_eq!(memory(&file), Limit::Memory(allowed));
     let e = Table::parse("a", &file).unwrap_err().to_string();
     assert!(e.contains("MiB of memory, which is the limit for a file of this size"), "{e}");
-    // The same with gzip around the whole file: the stored size of the gzip counts.
+    // The whole file is packed with gzip: the size of the gzip file sets the limit.
     let whole = [&file[..128], &bytes_variable(160_000_000)].concat();
     assert!(matches!(memory(&gzip(&whole)), Limit::Memory(_)));
     // The limit can be raised.
@@ -169,7 +169,7 @@ fn names_have_a_limit() {
 fn more_lines_are_skipped_than_there_are() {
     let options = ReadOptions { skip_lines: 1_000_000_000_000, ..OPTIONS };
     let e = Table::parse_with("a", b"t,f\n0,1\n", &options).unwrap_err();
-    assert_eq!(e.to_string(), "a holds no data: all of its lines are skipped");
+    assert_eq!(e.to_string(), "a holds no data: all lines of the file are skipped");
 }
 
 /// Messages show any contents of a file on one line, unchanged except for escapes.

@@ -52,7 +52,7 @@ fn a_file_begun_takes_its_name_with_the_others_or_not_at_all() {
     assert_eq!(names(folder.path()), ["a"]);
     let error = write_all(vec![begun(&["new"])], &[file("no/such/folder")]).unwrap_err();
     assert!(error.to_string().contains("folder"), "{error}");
-    // Two files with one path: neither of them is overwritten.
+    // Two outputs with the same path are refused, and the file at this path keeps its content.
     let error = write_all(vec![begun(&["new"])], &[file("a")]).unwrap_err();
     assert!(error.to_string().contains("cannot write "), "{error}");
     assert_eq!(
@@ -156,7 +156,7 @@ fn a_replaced_file_keeps_its_mode_and_a_read_only_one_its_content() {
     let file = |content: &str| OutputFile { path: path.clone(), content: content.into() };
     let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o7777;
     write_all(vec![], &[file("one")]).unwrap();
-    // A new file has the mode that any program would give it in this folder.
+    // A new file gets the permissions that other programs give to a new file in this folder.
     fs::write(folder.path().join("b"), "").unwrap();
     assert_eq!(mode(&path), mode(&folder.path().join("b")));
     for wanted in [0o600, 0o640, 0o664, 0o777] {
@@ -172,8 +172,8 @@ fn a_replaced_file_keeps_its_mode_and_a_read_only_one_its_content() {
     assert_eq!(names(folder.path()), ["a", "b"]);
 }
 
-/// Files that a killed program abandoned are removed; those of a running program or of another user
-/// are not.
+/// Files that a killed program abandoned are removed; the files of a running program or of another
+/// user are not removed.
 #[test]
 fn abandoned_files_of_the_same_output_are_removed() {
     let folder = tempfile::tempdir().unwrap();
@@ -199,7 +199,7 @@ fn abandoned_files_of_the_same_output_are_removed() {
     assert_eq!(names(folder.path()), expected);
 }
 
-/// No incomplete file remains, for any end of the program.
+/// If the program ends before a file is complete, no incomplete file remains.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_file_has_no_name_before_it_is_complete() {
@@ -207,8 +207,8 @@ fn a_file_has_no_name_before_it_is_complete() {
     let path = folder.path().join("a");
     let mut begun = BegunFile::begin(&path).unwrap();
     begun.append(vec![b'x'; 100_000]).unwrap();
-    // Only on file systems with unnamed files; the others are covered by the test of abandoned
-    // files.
+    // This check needs a file system with unnamed files; the test of abandoned files covers the
+    // other file systems.
     if tempfile::tempfile_in(folder.path()).is_ok() && names(folder.path()).is_empty() {
         std::mem::forget(begun);
         assert!(names(folder.path()).is_empty());
@@ -261,7 +261,7 @@ fn a_dangling_link_stays_a_link() {
     for link in ["first", "second"] {
         assert!(std::fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
     }
-    // Links in a cycle, and a link into a folder that does not exist.
+    // A link in a cycle and a link into a folder that does not exist are refused.
     std::os::unix::fs::symlink("ring", at("ring")).unwrap();
     std::os::unix::fs::symlink("none/new.csv", at("lost")).unwrap();
     for link in ["ring", "lost"] {

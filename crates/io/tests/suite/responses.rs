@@ -1,4 +1,4 @@
-//! Frequency responses in and out of files. Reference for universal files: pyuff wrote
+//! Reading and writing of frequency responses. Reference for universal files: pyuff wrote
 //! `printed.unv` and `binary.unv` (`data/make.py`).
 
 use mechid_io::{
@@ -64,7 +64,8 @@ fn two_by_one(frequency_hz: Vec<f64>) -> FrequencyResponses {
     }
 }
 
-/// Numbers are written with 13 digits, frequencies with as many digits as fit into 13 columns.
+/// Universal files are read back. Their numbers have 13 digits; their frequencies have as many
+/// digits as fit into 13 columns.
 #[test]
 fn universal_files_are_read_back() {
     let even: Vec<f64> = (0..101).map(|k| 78.125 + 0.59604644775 * f64::from(k)).collect();
@@ -120,7 +121,8 @@ fn stated_units_become_si_units() {
     assert!(found.remarks[0].contains("multiplied by 0.0254"), "{:?}", found.remarks);
 }
 
-/// Reference: 2π rad per cycle, 60 s per minute. The numbers of the file are 1 and 2.
+/// The frequencies of the file are 1 and 2 in the unit of the label. Reference: 2π rad per cycle,
+/// 60 s per minute.
 #[test]
 fn labels_of_the_abscissa_state_the_unit_of_the_frequencies() {
     let text = two_by_one(vec![1.0, 2.0]).to_universal_file().unwrap();
@@ -177,7 +179,8 @@ fn tables_in_every_form() {
     assert_eq!(whole.coherence[1].reference.as_deref(), Some("1"));
 }
 
-/// Reference: 20 log₁₀ of the magnitude, and the order times the speed.
+/// Levels in dB, orders of a rotational speed, and points in brackets are read. Reference: a level
+/// is 20 log₁₀ of the magnitude, and a frequency is the order times the speed.
 #[test]
 fn levels_orders_and_points_in_brackets() {
     let level =
@@ -217,7 +220,7 @@ fn broken_tables_are_refused() {
     assert!(e.starts_with("\"drive end\" is not a point of a universal file"), "{e}");
     let text = two_by_one(vec![1.0, 2.0, 3.0]).to_universal_file().unwrap();
     for (what, by, message) in [
-        ("        18    0", "        17    0", "needs frequency (18)"),
+        ("        18    0", "        17    0", "needs type 18 (frequency)"),
         ("        13    0", "        12    0", "must be per excitation force"),
     ] {
         assert!(text.contains(what));
@@ -233,7 +236,7 @@ fn broken_tables_are_refused() {
     }
 }
 
-/// Impossible segments are ignored and reported.
+/// Averaging segments with impossible settings are ignored and reported.
 #[test]
 fn impossible_segments_are_told() {
     let table = |segments: [&str; 5]| {
@@ -259,7 +262,8 @@ fn impossible_segments_are_told() {
     }
 }
 
-/// An accelerance of 5 kg at 18 Hz, and the frequencies, in Hz.
+/// Returns frequencies, in Hz, and the accelerance of a mass of 5 kg with a natural frequency of 18
+/// Hz.
 fn accelerance() -> (Vec<f64>, Vec<Complex<f64>>) {
     let hz: Vec<f64> = (1..=40).map(f64::from).collect();
     let value = |hz: &f64| {
@@ -367,7 +371,7 @@ fn what_is_not_understood_in_a_table_of_responses_is_reported_or_refused() {
     }
 }
 
-/// Reference: the one-sided table in rising order.
+/// Mirrored and unsorted tables give the one-sided table in rising order.
 #[test]
 fn mirrored_and_unsorted_tables_are_the_one_sided_ones() {
     let n = 16_i32;
@@ -404,7 +408,7 @@ fn mirrored_and_unsorted_tables_are_the_one_sided_ones() {
     assert!(twice.contains("twice"), "{twice}");
 }
 
-/// Reference: H in dB is 20 log |H/reference|.
+/// Levels in dB give the response H: a level is 20 log |H/reference|.
 #[test]
 fn levels_in_decibels_are_read_with_their_reference() {
     const G: f64 = 9.80665;
@@ -440,8 +444,8 @@ fn levels_in_decibels_are_read_with_their_reference() {
     }
 }
 
-/// Angles in any unit, a coherence in per cent, and symbols in brackets; what cannot be right is
-/// refused.
+/// Reads phases in any unit of angle, coherences in per cent, and symbols in brackets. Values that
+/// cannot be right are refused.
 #[test]
 fn units_of_phases_and_coherences_are_read_or_refused() {
     let value = |header: &str, row: &str| {

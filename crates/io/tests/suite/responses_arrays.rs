@@ -1,6 +1,6 @@
 //! Frequency responses in arrays of complex numbers. Reference: SciPy and h5py wrote the files
-//! (`data/make_arrays.py`); each value contains its position: line + 1 + 10 point + 100 reference +
-//! i line.
+//! (`data/make_arrays.py`); each value encodes its indices, which are counted from 0: line + 1 + 10
+//! point + 100 reference + i line.
 
 use mechid_io::{Evidence, FrequencyResponses, IoError};
 use mechid_model::ResponseQuantity;
@@ -25,7 +25,7 @@ fn read(bytes: &[u8]) -> FrequencyResponses {
     FrequencyResponses::parse("a.mat", bytes).unwrap()
 }
 
-/// All responses of 3 points to 2 forces.
+/// Checks all frequency responses of 3 points to 2 forces.
 fn check_all(responses: &FrequencyResponses, hz: [f64; 5]) {
     assert_eq!(responses.frequency_hz, hz);
     assert_eq!(responses.functions.len(), 6);
@@ -45,7 +45,7 @@ fn frequencies_may_be_the_first_dimension_or_the_last() {
     assert_eq!(first.functions[0].quantity, None);
     assert_eq!(last.functions[0].quantity, Some(ResponseQuantity::Acceleration));
     assert!(first.remarks[0].contains("3 by 2 responses"), "{:?}", first.remarks);
-    // Columns of coherences, one for each point.
+    // The coherences have one column for each point.
     assert_eq!(first.coherence.len(), 3);
     assert_eq!(first.coherence[2].response, "3");
     assert!((first.coherence[2].values[1] - 0.96).abs() < 1e-15);
@@ -72,7 +72,8 @@ fn vectors_are_known_by_the_points_in_their_names() {
 /// Name, lengths, real and imaginary parts.
 type Variable<'a> = (&'a str, &'a [u32], &'a [f64], &'a [f64]);
 
-/// Returns a MATLAB file of vectors, which are complex if they have imaginary parts.
+/// Returns a MATLAB file whose variables are these vectors; a vector is complex if it has imaginary
+/// parts.
 fn file(variables: &[Variable<'_>]) -> Vec<u8> {
     let mut file = b"MATLAB 5.0 MAT-file".to_vec();
     file.resize(124, b' ');
@@ -112,7 +113,7 @@ fn what_is_missing_or_does_not_go_together_is_said() {
     let four: &[f64] = &[1.0, 2.0, 3.0, 4.0];
     let h: (&str, &[u32], &[f64], &[f64]) = ("H", &[3, 1], three, three);
     let text = refused(&file(&[h]));
-    assert!(text.contains("no vector of their frequencies"), "{text}");
+    assert!(text.contains("need a vector of their frequencies"), "{text}");
     let text = refused(&file(&[("f", &[4, 1], four, &[]), h]));
     assert!(text.contains("H (3 × 1) equals the number of frequencies, 4"), "{text}");
     let f: (&str, &[u32], &[f64], &[f64]) = ("f", &[3, 1], three, &[]);
@@ -129,7 +130,8 @@ fn what_is_missing_or_does_not_go_together_is_said() {
     assert!(responses.remarks.iter().any(|r| r.contains("left out: z")), "{:?}", responses.remarks);
 }
 
-/// Reference: the definitions of the units; with g/N, 1 is 9.80665 m/s² per N.
+/// A unit at the end of the name of an array is applied to the values: 1 g/N is 9.80665 m/s² per N.
+/// Reference: the definitions of the units.
 #[test]
 fn units_in_the_names_of_arrays_are_read() {
     let three: &[f64] = &[1.0, 2.0, 3.0];
@@ -174,7 +176,8 @@ fn units_in_the_names_of_arrays_are_read() {
     assert!(error.contains("um/N") && error.contains("contradicts this name"), "{error}");
 }
 
-/// Reference: the definitions of the units; the values are the frequencies + i.
+/// A unit in an attribute of an array is applied to the values. Reference: the definitions of the
+/// units; the stored values are the frequencies + i.
 #[cfg(feature = "hdf5")]
 #[test]
 fn units_in_attributes_of_arrays_are_read() {

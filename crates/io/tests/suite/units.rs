@@ -65,7 +65,8 @@ const GROUPS: [Group; 4] = [
     ),
 ];
 
-/// Styles with a position for the word and the unit; the first ones state the unit in brackets.
+/// Styles of a header, where `W` is the position of the word and `U` the position of the unit. In
+/// `BRACKETED`, the unit is in brackets.
 const BRACKETED: [&str; 24] = [
     "W [U]",
     "W (U)",
@@ -128,7 +129,7 @@ fn header(style: &str, word: &str, unit: &str) -> String {
 }
 
 /// Reference: the definitions of the units. A header in brackets gives the right factor; a header
-/// of another style gives it, or a finding reports the doubt.
+/// of another style also gives the right factor, or a finding reports the doubt.
 #[test]
 fn generated_headers_have_the_right_factor_or_a_finding() {
     let (mut all, mut right) = (0, 0);
@@ -151,7 +152,8 @@ fn generated_headers_have_the_right_factor_or_a_finding() {
                     all += 1;
                     right += usize::from(is_right);
                 }
-                // A line of units, in brackets of any kind or without.
+                // The unit is also read from a line of units, with brackets of any kind or without
+                // brackets.
                 for row in [
                     unit.to_string(),
                     format!("[{unit}]"),
@@ -168,7 +170,7 @@ fn generated_headers_have_the_right_factor_or_a_finding() {
         }
     }
     assert!(all >= 2000, "{all}");
-    // Nearly all of them are understood.
+    // At least nine tenths of the headers are understood.
     assert!(10 * right >= 9 * all, "{right} of {all}");
 }
 
@@ -185,7 +187,7 @@ fn a_text_that_is_not_understood_or_may_be_a_unit_is_reported() {
         ("Acc (100 mV/g)", Quantity::ACCELERATION, None),
         ("Acc (50 g)", Quantity::ACCELERATION, Some(50.0 * G)),
         ("Disp [0.1 mm]", Quantity::DISPLACEMENT, Some(1e-4)),
-        // The ground acceleration, or a column in g.
+        // `a_g` may be the ground acceleration or an acceleration in g.
         ("a_g", Quantity::ACCELERATION, Some(G)),
         ("x in", Quantity::DISPLACEMENT, Some(0.0254)),
         ("Disp in test rig", Quantity::DISPLACEMENT, Some(0.0254)),
@@ -321,6 +323,7 @@ fn a_unit_or_a_factor_may_be_stated() {
     assert!(Unit::parse("furlong").is_none());
 }
 
+/// A unit before the name of a quantity, or a sign that is a unit, gives the right factor.
 /// Reference: the definitions of the units.
 #[test]
 fn a_unit_may_stand_before_the_name_or_be_a_sign() {
@@ -346,8 +349,8 @@ fn a_unit_may_stand_before_the_name_or_be_a_sign() {
     assert_eq!(stated_unit("N 12 left", "", Some(Quantity::Force)), None);
 }
 
-/// Reference: the definitions of the units. Languages of spreadsheets, signs of LaTeX and of a
-/// wrong encoding.
+/// Reads headers in the languages of spreadsheets, with signs of LaTeX, and with signs of a wrong
+/// encoding. Reference: the definitions of the units.
 #[test]
 fn headers_of_other_languages_and_encodings_are_read() {
     let lbf = 0.45359237 * G;
@@ -375,7 +378,7 @@ fn headers_of_other_languages_and_encodings_are_read() {
     }
 }
 
-/// Reference: the definitions of the units. A unit that is not used is in the finding, with its
+/// Reference: the definitions of the units. The finding names a unit that is not used, with its
 /// factor.
 #[test]
 fn factors_and_lost_signs_are_reported_with_what_they_would_make() {
@@ -407,8 +410,8 @@ fn factors_and_lost_signs_are_reported_with_what_they_would_make() {
     }
 }
 
-/// Reference: the definitions of the units. A factor beside a unit is not applied; the finding has
-/// it.
+/// Reference: the definitions of the units. A factor beside a unit is not applied; the finding
+/// names this factor.
 #[test]
 fn fractions_of_a_unit_are_reported() {
     for (name, quantity, factor) in [
@@ -448,7 +451,8 @@ fn fractions_of_a_unit_are_reported() {
     }
 }
 
-/// Reference: the definitions of the units.
+/// The word `in` before a unit is a preposition and does not mean inch. Reference: the definitions
+/// of the units.
 #[test]
 fn the_word_in_before_a_unit_is_no_inch() {
     let (stated, likely) = (Evidence::Stated, Evidence::Likely);
@@ -470,13 +474,13 @@ fn the_word_in_before_a_unit_is_no_inch() {
         assert_eq!(unit.quantity, quantity, "{name}");
         assert!((unit.in_si / factor - 1.0).abs() < 1e-12, "{name}");
     }
-    // A unit that is not known.
+    // A unit that is not known is reported and not applied.
     let stated = stated_unit("F (in stone)", "", Some(Quantity::Force)).unwrap();
     assert_eq!((stated.evidence, stated.unit), (Evidence::Unused, None));
 }
 
-/// A unit in the name and another one beside it, or two in the name: one is used, and the finding
-/// names both.
+/// The header has a unit in the name and another unit beside the name, or two units in the name.
+/// One of them is used, and the finding names both.
 #[test]
 fn units_that_contradict_each_other_are_reported() {
     for (name, unit, quantity, texts) in [
@@ -590,8 +594,9 @@ fn answer(name: &str, quantity: Quantity) -> Answer {
     }
 }
 
-/// Reference: the definitions of the units, and what a person would read. A unit of the column
-/// after a mark is used; a unit of another quantity is reported.
+/// Reference: the definitions of the units, and what a person would read. A unit of the quantity of
+/// the column is used if it follows a mark, such as a comma. A unit of another quantity is
+/// reported.
 #[test]
 fn last_words_that_are_units_are_taken_or_reported() {
     const STYLES: [&str; 8] =
@@ -670,7 +675,7 @@ const FORCES: [&str; 44] = [
     "F, mean",
 ];
 
-/// Names of responses of the same kinds.
+/// Names of responses that end with a place, a channel, a treatment or a condition.
 const RESPONSES: [&str; 30] = [
     "x/y",
     "acc_g1",
@@ -704,7 +709,7 @@ const RESPONSES: [&str; 30] = [
     "sensor A",
 ];
 
-/// Reference: what a person would read. The names are of places, channels, treatments and
+/// Reference: what a person would read. The names end with places, channels, treatments and
 /// conditions.
 #[test]
 fn last_words_that_are_no_units_are_not_reported() {

@@ -25,7 +25,7 @@ fn elements_of_cell_arrays_are_columns() {
         assert_eq!(table.column("cells{3}[2]").unwrap(), X.map(|x| -x));
         let text = table.column("cells{2}").unwrap_err().to_string();
         assert!(text.contains("text"), "{text}");
-        // One column for a cell array of texts, not one for each.
+        // A cell array of texts gives one column, not one column for each text.
         let text = table.column("texts").unwrap_err().to_string();
         assert!(text.contains("a cell array"), "{text}");
     }
@@ -52,7 +52,7 @@ fn a_unit_of_a_struct_is_not_that_of_its_time() {
     assert_eq!(table.sampling(&TimeAxis::OfFile, &["one.x"]).unwrap().dt(), 0.25);
 }
 
-/// Returns a MATLAB file of one variable with the class code `class` and these elements after it.
+/// Returns a MATLAB file with one variable: the class code `class`, then `elements`.
 fn one_variable(class: u32, elements: &[(u32, &[u8])]) -> Vec<u8> {
     let mut variable = Vec::new();
     let flags = [class.to_le_bytes(), 0_u32.to_le_bytes()].concat();
@@ -72,7 +72,7 @@ fn one_variable(class: u32, elements: &[(u32, &[u8])]) -> Vec<u8> {
 
 #[test]
 fn a_timetable_is_refused_with_the_way_to_save_it() {
-    // The contents of an object in this format: name, kind, class.
+    // An object in this format contains its name, its kind and its class.
     let file = one_variable(17, &[(1, b"T"), (1, b"MCOS"), (1, b"timetable")]);
     let error = Table::parse("a.mat", &file).unwrap().column("T").unwrap_err().to_string();
     assert!(error.contains("a timetable") && error.contains("struct('time'"), "{error}");
@@ -80,7 +80,7 @@ fn a_timetable_is_refused_with_the_way_to_save_it() {
 
 #[test]
 fn structs_that_are_promised_and_not_there_are_refused() {
-    // 65,536 by 65,535 structs of one field.
+    // The file claims 65,536 by 65,535 structs with one field each, but contains none.
     let sizes = [65_536_u32, 65_535].map(u32::to_le_bytes).concat();
     let length = 2_u32.to_le_bytes();
     let file = one_variable(2, &[(5, &sizes), (1, b"s"), (5, &length), (1, b"x\0")]);

@@ -14,7 +14,8 @@ fn a_file_has_one_decimal_sign() {
         ("t\tf\n0\t999.5\n1\t1,000\n", "f", 3, DecimalSign::Point),
         ("t;f\n0;999.5\n1;1,000\n", "f", 3, DecimalSign::Point),
         ("t f\n0 1,5\n1 2.5\n2 1,5\n", "f", 3, DecimalSign::Comma),
-        // The majority of the numbers on the first lines decides, for any positions of the others.
+        // The sign of most numbers on the first lines is the decimal sign, at any position of the
+        // other numbers.
         ("version;f;g\n1.2;0,5;1,5\n1.3;0,5;1,5\n", "version", 2, DecimalSign::Comma),
     ] {
         let e = table(text).column(column).unwrap_err();
@@ -38,7 +39,8 @@ fn a_file_has_one_decimal_sign() {
     assert_eq!(table("t;f\n0;1.5\n").format(), "text, fields between semicolons");
 }
 
-/// A text of two million bytes whose first decimal sign is far from its beginning.
+/// In a text of two million bytes, the first number with a decimal sign determines the sign for all
+/// numbers, even if this number is far from the beginning of the text.
 #[test]
 fn the_decimal_sign_of_a_long_file_is_that_of_its_first_number_with_one() {
     let text = |first: &str, second: &str| {
@@ -66,7 +68,7 @@ fn the_decimal_sign_of_a_long_file_is_that_of_its_first_number_with_one() {
     );
 }
 
-/// Lines that end with a carriage return alone, as some old programs wrote them.
+/// Reads lines that end with a carriage return and no line feed, as some old programs wrote them.
 #[test]
 fn old_line_ends_are_understood() {
     let table = table("t,f\r0,1\r1,2\r");
@@ -97,7 +99,7 @@ fn zero_bytes_behind_the_rows_are_no_rows() {
     assert!(table(text).remarks().is_empty());
 }
 
-/// Quoted fields with delimiters, quotes and line breaks in them, over many blocks.
+/// Reads quoted fields that contain delimiters, quotes and line breaks, from a file of many blocks.
 #[test]
 fn quotes_are_followed_over_a_long_file() {
     let note = |k: usize| match k % 5 {
@@ -123,7 +125,7 @@ fn quotes_are_followed_over_a_long_file() {
     }
 }
 
-/// The rows that the csv crate reads.
+/// Returns the rows that the csv crate reads from a text.
 fn by_csv(text: &str, delimiter: u8) -> Vec<Vec<Vec<u8>>> {
     let reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -137,7 +139,8 @@ fn by_csv(text: &str, delimiter: u8) -> Vec<Vec<Vec<u8>>> {
 }
 
 proptest! {
-    /// Any text of a few different characters in the second and third of four fields.
+    /// Tests any text of a few different characters in the second and third of four fields; the
+    /// reference is the csv crate.
     #[test]
     fn fields_are_those_of_the_csv_crate(
         fields in prop::collection::vec("[a,;\" \n#]{0,6}", 2..12),
@@ -145,12 +148,12 @@ proptest! {
         // The delimiter is detected from these rows.
         let mut text = "0,0,0,0\n".repeat(9);
         for pair in fields.chunks_exact(2) {
-            // Quoted by hand, correctly or not.
+            // These quotes are written without a check, so that they can be wrong.
             writeln!(text, "7,{},\"{}\",9", pair[0].replace('\n', ""), pair[1]).unwrap();
         }
         let rows = by_csv(&text, b',');
-        // Rows of other lengths are refused by both readers, and a row that begins with a semicolon is
-        // a comment for one of them.
+        // Rows of other lengths are refused by both readers, and a row that begins with a semicolon
+        // is a comment for one of the two readers.
         if rows.iter().any(|row| row.len() != 4 || row[0].starts_with(b";")) {
             return Ok(());
         }
@@ -199,7 +202,7 @@ proptest! {
     }
 }
 
-/// Compares every bit of every number of a file of several blocks.
+/// Reads a file of several blocks and compares all bits of every number.
 #[test]
 fn a_long_file_is_read_to_the_last_bit() {
     let value = |k: u64| {

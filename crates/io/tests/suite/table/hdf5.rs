@@ -62,7 +62,7 @@ fn variables_of_matlab_are_columns() {
     assert_eq!(table.column("single").unwrap(), X);
     assert_eq!(table.column("rig.x").unwrap(), X);
     assert_eq!(table.scalars(), [("fs".to_owned(), 4.0)]);
-    // The time of the struct, and the time outside it.
+    // The struct contains its own time, which differs from the time outside the struct.
     assert_eq!(table.sampling(&TimeAxis::OfFile, &["rig.x"]).unwrap().dt(), 0.5);
     assert_eq!(table.sampling(&TimeAxis::OfFile, &["force"]).unwrap().dt(), 0.25);
 }
@@ -83,7 +83,8 @@ fn what_is_no_array_of_real_numbers_is_named() {
     }
 }
 
-/// Reference: the numbers −4 to 3, times the factor, plus the offset.
+/// The stored numbers −4 to 3 are multiplied by the factor that an attribute states, and the offset
+/// is then added.
 #[test]
 fn factors_and_offsets_of_attributes_are_applied() {
     let table = Table::parse("a.h5", UNITS).unwrap();
@@ -117,7 +118,8 @@ fn what_cannot_be_read_and_is_not_used_does_no_harm() {
     }
 }
 
-/// Reference: the data sets as h5py wrote them; the links to them are skipped.
+/// The data sets in groups of the old format are read as h5py wrote them, and the soft links to
+/// these data sets are skipped.
 #[test]
 fn groups_of_the_old_format_with_soft_links_are_read() {
     let table = Table::parse("a.h5", include_bytes!("../../data/links.h5")).unwrap();

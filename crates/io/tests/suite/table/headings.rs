@@ -4,7 +4,8 @@ use mechid_io::{Evidence, Quantity, Table, TimeAxis};
 
 use super::table;
 
-/// Reads a text with three columns, instants every half second, a force of 1 to 4 and an acceleration of 5 to 8.
+/// Reads a text and checks its three columns: instants every half second, a force of 1 to 4, and an
+/// acceleration of 5 to 8.
 fn three(text: &str) -> Table {
     let table = table(text);
     assert_eq!(table.len(), 4, "{text}");
@@ -46,7 +47,8 @@ fn a_comment_above_the_table_names_its_columns() {
     }
 }
 
-/// Reference: the definitions of the units; with its unit, the force of the first row is 1 kN.
+/// Names and units are also read if other lines follow them, so that the force of the first row is
+/// 1 kN. Reference: the definitions of the units.
 #[test]
 fn names_and_units_above_other_lines_are_read() {
     let blanks = ROWS.replace(',', " ");
@@ -84,7 +86,8 @@ fn names_and_units_above_other_lines_are_read() {
     }
 }
 
-/// Reference: the definitions of the units; with its unit, the force of the first row is 1 kN.
+/// Names and units are read from one comment line for each column, so that the force of the first
+/// row is 1 kN. Reference: the definitions of the units.
 #[test]
 fn definitions_of_columns_in_lines_of_their_own_are_read() {
     let mut texts = Vec::new();
@@ -120,7 +123,8 @@ fn definitions_of_columns_in_lines_of_their_own_are_read() {
     let table = three(&format!("# 2: force [kN]\n# 3: acc [g]\n{ROWS}"));
     assert!((0..3).all(|column| table.unit(column).is_none()), "{}", table.available());
     assert!(table.find("acc").is_err(), "{}", table.available());
-    // Definitions whose numbers do not begin with 0 or 1, and ranges.
+    // No units are read from definitions whose numbers do not begin with 0 or 1, from ranges, or
+    // from sensitivities.
     for above in [
         "# 2 force [kN]\n# 3 acc [g]\n",
         "# force: range 5 kN\n# acc: 50 g\n",
@@ -132,7 +136,8 @@ fn definitions_of_columns_in_lines_of_their_own_are_read() {
     }
 }
 
-/// Reference: the definitions of the units; with its unit, the force of the first row is 1 kN.
+/// Names of several words are read with their units, so that the force of the first row is 1 kN.
+/// Reference: the definitions of the units.
 #[test]
 fn names_of_several_words_above_aligned_columns_are_read() {
     let rows = ROWS.replace(',', "      ");
@@ -150,14 +155,14 @@ fn names_of_several_words_above_aligned_columns_are_read() {
         assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1e3, "{header}");
         let si = table.to_si(2, Quantity::ACCELERATION).unwrap();
         assert!((si - 9.80665).abs() < 1e-12, "{header}");
-        // The hint names the line above the names.
+        // The hint names the number of lines above the names of the columns.
         let error = Table::parse("a.txt", format!("Rig 4\n{header}\n{rows}").as_bytes());
         let error = error.unwrap_err().to_string();
         assert!(error.ends_with("`skip_lines` 1"), "{header}: {error}");
     }
 }
 
-/// A unit that is not understood is not lost in a comment or a further row.
+/// A unit that is not understood is reported, also if it is in a comment or above a further row.
 #[test]
 fn units_that_are_not_understood_above_other_lines_are_reported() {
     for above in [
@@ -206,7 +211,7 @@ fn one_name_more_than_fields_does_no_harm() {
     assert_eq!(table.sampling(&TimeAxis::Column("1"), &["2"]).unwrap().dt(), 0.5);
 }
 
-/// Reference: half a second from row to row.
+/// Dates and clock times are read as a time axis with steps of half a second.
 #[test]
 fn instants_of_dates_and_clocks_are_a_time_axis() {
     for (name, instants) in [
@@ -260,7 +265,8 @@ fn instants_of_dates_and_clocks_are_a_time_axis() {
     assert!(error.contains("line 3") && error.contains("is not a number"), "{error}");
 }
 
-/// Durations in a form for human readers.
+/// Times are read in the unit that the name of the column states; `samples` is not a unit of time
+/// and is reported.
 #[test]
 fn units_of_time_are_read_or_named() {
     for (name, factor) in [
@@ -338,7 +344,7 @@ fn channels_of_different_rates_in_a_labview_file_are_refused_together() {
 }
 
 /// In files with a column of instants for each channel, LabVIEW leaves the field above the instants
-/// empty. The third channel has no unit, so its field is empty, too.
+/// empty. The third channel has no unit, so that the field of this unit is also empty.
 #[test]
 fn channels_with_their_own_instants_have_their_own_units() {
     let above = "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tMulti\n***End_of_Header***\t\n\t\n\

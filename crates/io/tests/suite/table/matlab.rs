@@ -75,7 +75,8 @@ fn uneven_time_is_refused_with_its_sample() {
     assert!(e.contains("not uniform") && e.contains("up to sample "), "{e}");
 }
 
-/// Returns a file of one variable of doubles, composed by hand; its lengths have the type `kind`.
+/// Returns a MATLAB file with one variable of doubles, composed by hand; the lengths of the
+/// variable have the type `kind`.
 fn by_hand(values: &[f64], (kind, lengths): (u32, &[u8]), big: bool) -> Vec<u8> {
     let word = |v: u32| if big { v.to_be_bytes() } else { v.to_le_bytes() };
     let double = |v: &f64| if big { v.to_be_bytes() } else { v.to_le_bytes() };
@@ -134,7 +135,7 @@ fn lengths_that_are_none_are_refused() {
     assert_eq!(table.column("v[2]").unwrap(), [5.0, 6.0, 7.0, 8.0]);
 }
 
-/// Returns a file of vectors; those with one entry are single numbers.
+/// Returns a MATLAB file with these vectors; a vector with one entry is a single number.
 fn of_vectors(vectors: &[(&str, &[f64])]) -> Vec<u8> {
     let lengths = |values: &[f64]| [1, values.len() as u32].map(u32::to_le_bytes).concat();
     let variable = |(name, values): &(&str, &[f64])| {

@@ -1,4 +1,4 @@
-//! Tables in every dialect and format, and the messages about wrong ones.
+//! Tables in every dialect and format, and the messages about wrong tables.
 
 mod arrays;
 mod dialects;
@@ -65,7 +65,8 @@ fn a_name_that_is_a_number_wins_over_the_number() {
     assert_eq!(t.column("1").unwrap(), [6.0]);
 }
 
-/// The form of the measured benchmark record: empty leading columns and a trailing comma.
+/// Reads the format of the measured benchmark record: leading columns that are empty after the
+/// first row, and a trailing comma.
 #[test]
 fn leading_columns_with_one_value() {
     let t = table("\"Ovld2\",\"Ovld1\",\"V1\",\"V2\",\n0,0,0.5,1,\n,,-0.5,2,\n");
@@ -128,7 +129,8 @@ fn units_have_a_factor_to_the_si() {
     );
 }
 
-/// 25.6 kHz with six decimals: the steps differ by up to 2.6 %.
+/// Instants at 25.6 kHz that are printed with six decimals are uniform, although the steps differ
+/// by up to 2.6 %.
 #[test]
 fn instants_rounded_to_printed_digits_are_uniform() {
     for (decimals, unit) in [(6, ""), (5, ""), (3, "_ms"), (2, " [ms]")] {
@@ -140,7 +142,7 @@ fn instants_rounded_to_printed_digits_are_uniform() {
         let record = t.record(&TimeAxis::Column(&time), &["f"]).unwrap();
         let error = record.sampling().dt() * 25_600.0 - 1.0;
         assert!(error.abs() < 1e-5, "{decimals} {unit}: {error}");
-        // If one instant is missing, they are not uniform.
+        // If one instant is missing, the instants are not uniform.
         let (before, after) = rows.split_at(rows.match_indices('\n').nth(9_000).unwrap().0 + 1);
         let gap = after.split_once('\n').unwrap().1;
         let t = table(&format!("{time},f\n{before}{gap}"));
@@ -254,7 +256,8 @@ fn read_below(path: &std::path::Path, skip_lines: u64) -> Result<Table, IoError>
     Table::read_with(path, &ReadOptions { skip_lines, ..ReadOptions::default() })
 }
 
-/// Text that an instrument writes above its table, with the same three columns below it.
+/// Texts that instruments write above a table. In the tests, tables with the same three columns
+/// follow these texts.
 const ABOVE: [&str; 3] = [
     "Analyser 7\n",
     "Device: shaker, left\nDate;2024-03-01\n\nChannel 1 2 3\n",
@@ -313,7 +316,7 @@ fn uneven_time_is_refused_with_its_worst_step() {
         "{e}"
     );
     assert!(e.to_string().contains("resample the record"), "{e}");
-    // A second run after the first one, whose time starts again.
+    // The time of the second run starts again at zero.
     let e = of(&[0.0, 1.0, 2.0, 0.0, 1.0, 2.0]).unwrap_err().to_string();
     assert!(e.contains("the step up to line 5 is -2 s") && e.contains("had been appended"), "{e}");
     assert!(!e.contains("resample"), "{e}");
@@ -330,7 +333,7 @@ fn uneven_time_is_refused_with_its_worst_step() {
     }
 }
 
-/// Text that resembles a table more often than random bytes do.
+/// Generates texts that resemble a table more often than random bytes do.
 fn tables() -> impl Strategy<Value = String> {
     let field = prop_oneof![
         Just(String::new()),

@@ -63,7 +63,8 @@ fn a_binary_file_of_no_known_format_is_refused() {
     assert!(matches!(e, IoError::UnknownFormat { .. }), "{e}");
 }
 
-/// Text longer than one block, with comments, empty lines and both kinds of line ends.
+/// Lines are counted in a text that is longer than one block and has comments, empty lines and both
+/// kinds of line ends.
 #[test]
 fn lines_are_counted_through_a_long_file() {
     for end in ["\n", "\r\n"] {
@@ -86,7 +87,7 @@ fn lines_are_counted_through_a_long_file() {
         let bad = text.replace(&format!("{end}17777,7{end}"), &format!("{end}17777,?{end}"));
         let e = Table::parse("a.csv", bad.as_bytes()).unwrap().column("f").unwrap_err();
         assert!(matches!(e, IoError::NotANumber { line, .. } if line == lines[17_777]), "{e}");
-        // The other column stays usable.
+        // The other column remains usable.
         let table = Table::parse("a.csv", bad.as_bytes()).unwrap();
         assert!(table.record(&TimeAxis::Column("t"), &[] as &[&str]).is_ok());
     }

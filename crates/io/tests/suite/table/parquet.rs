@@ -19,7 +19,7 @@ fn table(program: &str) -> Table {
     Table::parse(program, &bytes(program)).unwrap()
 }
 
-/// The columns that `make_parquet.py` writes, to the last bit.
+/// Returns the columns that `make_parquet.py` writes, exact to the last bit.
 fn written(name: &str) -> Vec<f64> {
     let value = |k: i64| match name {
         "time" => k as f64 / 128.0,
@@ -86,7 +86,7 @@ fn damage_is_an_error_and_no_panic() {
         // The file is read or refused: a flipped bit of a number cannot be detected.
         let _ = Table::parse("a", &damaged);
     }
-    // The name of a column in a text.
+    // In a text file, PAR1 is the name of a column, not the mark of a Parquet file.
     assert_eq!(Table::parse("a.csv", b"PAR1,PAR2\n1,2\n").unwrap().names(), ["PAR1", "PAR2"]);
     let skipped = ReadOptions { skip_lines: 1, ..ReadOptions::default() };
     let error = Table::parse_with("a", &whole, &skipped).unwrap_err();
@@ -163,7 +163,8 @@ fn records_of_a_file_are_read_together_and_alone_alike() {
         let alone = file.tables(None, std::slice::from_ref(record)).unwrap().swap_remove(0);
         let rows = record.rows.clone();
         assert_eq!(alone.column("x").unwrap(), &written("x")[rows.clone()]);
-        // Instants count from the first one of the record, whichever records are read together.
+        // Instants are relative to the first instant of the record, for any set of records that are
+        // read together.
         let first = written("stamp")[rows.start];
         for (read, stamp) in
             table.column("stamp").unwrap().iter().zip(&written("stamp")[rows.clone()])
@@ -204,14 +205,14 @@ fn damage_of_a_file_of_many_records_is_an_error_and_no_panic() {
     assert!(refused > 0);
 }
 
-/// A file that ends with a footer in the compact form of Thrift.
+/// Returns a file that ends with a footer in the compact form of Thrift.
 fn with_footer(footer: &[u8]) -> Vec<u8> {
     let len = (footer.len() as u32).to_le_bytes();
     [b"PAR1\x15\x00", footer, &len, b"PAR1"].concat()
 }
 
 /// The decoder allocates the memory that the schema claims, and recurses as deep as the schema is
-/// nested.
+/// nested. A false claim and deep nesting are therefore refused before decoding.
 #[test]
 fn a_schema_that_claims_more_than_it_has_is_refused() {
     let element = |children: &[u8]| [&[0x48, 0x01, b'r', 0x15], children, &[0x00]].concat();
@@ -224,15 +225,16 @@ fn a_schema_that_claims_more_than_it_has_is_refused() {
         Err(IoError::Parquet { what, .. }) => what,
         other => panic!("{other:?}"),
     };
-    // A root of 2³¹ − 1 children, which would take 17 GB.
+    // The root claims 2³¹ − 1 children, for which the decoder would allocate 17 GB.
     let root = forged(&[element(&[0xfe, 0xff, 0xff, 0xff, 0x0f])], &[0x01]);
     assert_eq!(refused(&root), "the footer contradicts the length of the file");
-    // A hundred thousand nested groups, which would exhaust the stack.
+    // A hundred thousand nested groups would exhaust the stack of a recursive decoder.
     let nested = forged(&vec![element(&[0x02]); 100_000], &[0xa0, 0x8d, 0x06]);
     assert_eq!(refused(&nested), "the footer contradicts the length of the file");
 }
 
-/// Constant columns take hardly any space in a file.
+/// Constant columns take hardly any space in a file. A small file with a very long constant column
+/// is refused, because the numbers need more memory than the limit for files of this size.
 #[test]
 fn memory_has_a_limit_by_the_size_of_the_file() {
     use parquet::data_type::DoubleType;
@@ -263,8 +265,9 @@ fn memory_has_a_limit_by_the_size_of_the_file() {
     }
 }
 
-/// Differences of identifiers that are all the same take hardly any space, so that a small file can
-/// name millions of records; an earlier version listed them in 5 GB.
+/// A list of records that needs more memory than the limit is refused. A small file can name
+/// millions of records, because equal differences between consecutive identifiers take hardly any
+/// space; an earlier version needed 5 GB for the list.
 #[test]
 fn the_list_of_the_records_has_a_limit() {
     use parquet::basic::Encoding;
@@ -303,8 +306,8 @@ fn the_list_of_the_records_has_a_limit() {
     }
 }
 
-/// An earlier version repeated an identifier of any length in the rows and messages of a fleet, and
-/// a file of 2 MB took 1.9 GB.
+/// An identifier that is longer than the limit is refused. An earlier version repeated such an
+/// identifier in the rows and messages of a fleet, and needed 1.9 GB for a file of 2 MB.
 #[test]
 fn the_identifier_of_a_record_has_a_limit() {
     let folder = tempfile::tempdir().unwrap();
@@ -325,8 +328,8 @@ fn the_identifier_of_a_record_has_a_limit() {
     assert_eq!(records(most + 1, &Limits::DEFAULT.times(2)).unwrap().len(), 2);
 }
 
-/// An earlier version read sixty thousand columns in a time that grew with the square of their
-/// number: 18 s.
+/// The time to read a file must not grow with the square of the number of columns. In an earlier
+/// version it did, and sixty thousand columns took 18 s.
 #[test]
 fn many_columns_are_read_in_a_time_that_grows_with_their_number() {
     let read = |count: usize| {

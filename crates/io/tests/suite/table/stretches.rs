@@ -68,7 +68,7 @@ fn surveys_and_tables_agree() {
         assert!((survey.means[0] - mean).abs() < 1e-15 && survey.means[1] == -survey.means[0]);
         let rate = file.survey(&TimeAxis::RateHz(8.0), &["f"]).unwrap();
         assert_eq!((rate.sampling.dt(), rate.sampling.len()), (0.125, 9001));
-        // The same column twice, and one that cannot be used.
+        // One column is given twice, and one column cannot be used.
         let mut taken = vec![Vec::new(); 4];
         let inventory = file.inventory(&[1, 3, 1, 2], Some(0), &mut |at, first, values| {
             assert_eq!(taken[at].len(), first);
@@ -96,7 +96,7 @@ fn surveys_and_tables_agree() {
 
 #[test]
 fn what_is_wrong_is_said_in_the_same_words() {
-    // More rows than are read at a time.
+    // The text has more rows than are read at a time.
     let good = text(9001);
     let replaced = |from: &str, to: &str| {
         assert!(good.contains(from), "{from}");
@@ -170,7 +170,7 @@ proptest! {
     ) {
         let (_folder, path) = written(&text(9201));
         let advance = 1 + (share * (rows - 1) as f64) as usize;
-        // Short advances of long blocks take much time and test no more.
+        // Short advances of long blocks take much time and add no further test.
         prop_assume!(len / advance < 500);
         let [whole, part] = both(&path);
         let window = start..start + len;

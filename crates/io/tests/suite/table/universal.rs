@@ -39,7 +39,7 @@ fn functions_of_time_are_columns_with_a_time_axis() {
     }
 }
 
-/// The steps of the file are 0.25.
+/// The steps between the instants of the file are 0.25 in the unit of the label.
 #[test]
 fn labels_of_the_abscissa_state_the_unit_of_the_instants() {
     let with = |unit: &str| {
@@ -55,7 +55,11 @@ fn labels_of_the_abscissa_state_the_unit_of_the_instants() {
         ("s", 0.25, None),
         ("NONE", 0.25, None),
         ("ms", 0.25e-3, Some("the instants were multiplied by 0.001")),
-        ("samples", 0.25, Some("the label samples of the instants is not a unit of time")),
+        (
+            "samples",
+            0.25,
+            Some("the labels of the file state instants in samples, which is not a unit of time"),
+        ),
     ] {
         let table = with(unit);
         let sampling = table.sampling(&TimeAxis::OfFile, &["1-X", "12+RX"]).unwrap();
@@ -78,7 +82,7 @@ fn single_precision_is_read_printed_and_binary() {
 #[test]
 fn what_is_no_real_function_of_time_is_refused() {
     for table in both() {
-        // The name belongs to the response; the frequency response function has another one.
+        // The name belongs to the response; the frequency response function has another name.
         let e = table.column("12+Z/1-X").unwrap_err().to_string();
         assert!(e.contains("it holds a frequency response function, but a channel needs"), "{e}");
         let e = table.column("3").unwrap_err().to_string();
@@ -116,7 +120,8 @@ fn a_binary_dataset_with_a_misplaced_number_is_told() {
     }
 }
 
-/// Returns the printed file with a text replaced by another one of the same length.
+/// Returns the printed file in which occurrence `nth` of a text (from 0) is replaced by another
+/// text of the same length.
 fn with(what: &str, by: &str, nth: usize) -> Vec<u8> {
     assert_eq!(what.len(), by.len());
     let text = std::str::from_utf8(PRINTED).unwrap();
@@ -152,7 +157,8 @@ fn other_files_have_no_time_axis_of_their_own() {
     assert!(matches!(e, IoError::NoTimeAxis { .. }), "{e}");
 }
 
-/// Fortran fills its fields: numbers may touch, and double precision uses a D.
+/// Reads numbers in the form in which Fortran writes them: without blanks between full fields, and
+/// with the exponent letter D in double precision.
 #[test]
 fn touching_numbers_and_fortran_exponents() {
     let rows = "  -3.00000000000e+00  -2.00000000000e+00   1.00000000000e+00  -1.00000000000e+00";
@@ -203,7 +209,7 @@ fn broken_files_are_refused_with_the_line() {
     );
     let only_nodes = "    -1\n    15\n         1\n    -1\n";
     let e = Table::parse("a.unv", only_nodes.as_bytes()).unwrap_err().to_string();
-    assert_eq!(e, "a.unv holds no data: it has no dataset 58");
+    assert_eq!(e, "a.unv holds no data: there is no dataset 58");
 }
 
 #[test]
@@ -232,7 +238,8 @@ proptest! {
     }
 }
 
-/// The standard requires single-precision instants with double values; pyuff writes doubles.
+/// Reads single-precision instants with double-precision values. The standard requires this
+/// combination; pyuff writes double-precision instants.
 #[test]
 fn narrow_instants_among_wide_values() {
     let pairs = |narrow: bool| -> Vec<u8> {
