@@ -49,7 +49,7 @@ pub struct TextStyle {
     pub italic: bool,
     /// Colour.
     pub color: Color,
-    /// Alignment with the point.
+    /// Alignment of the text with its point.
     pub anchor: Anchor,
     /// `true` for text rotated by 90° to the left.
     pub vertical: bool,
@@ -253,8 +253,9 @@ impl Canvas {
         if style.weight == Weight::Bold {
             self.body.push_str(r#" font-weight="bold""#);
         }
-        // The length is written only where it is reliable: italics are not measured, renderers
-        // differ for superscripts and subscripts, and one or two letters do not need it.
+        // The length of a text is written only where it is reliable and needed: italics are not
+        // measured, renderers differ for superscripts and subscripts, and a text of one or two
+        // characters does not need it.
         let plain = !style.italic && runs(text).len() == 1;
         if plain && text.chars().nth(2).is_some() {
             let length = num(text_width(text, style.size, style.weight));
@@ -345,7 +346,8 @@ fn paint(fill: Option<Color>, stroke: Option<Stroke>) -> String {
     out
 }
 
-/// Returns the spans of a text, raised and lowered in a way that every viewer supports.
+/// Returns the SVG spans of a text. Superscripts and subscripts are shifted with the attribute
+/// `dy`, which every viewer supports.
 fn spans(text: &str, size: f64) -> String {
     let mut out = String::new();
     let mut height = 0.0;

@@ -41,7 +41,8 @@ impl<'a> Series<'a> {
         Series { name, x, y, slot: None }
     }
 
-    /// Returns the series with style number `slot` of the cycle, independent of its position.
+    /// Returns the series with style number `slot` of the cycle; without this call, the style
+    /// follows the position of the series.
     #[must_use]
     pub const fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(slot);
@@ -151,7 +152,7 @@ pub fn sweep_panel(
     }
 }
 
-/// Returns a figure of one [`sweep_panel`], in the units of its axes.
+/// Returns a figure with one [`sweep_panel`]; all values are in the units of the axes.
 pub fn sweep(
     title: &str,
     setting: Axis,
@@ -162,7 +163,8 @@ pub fn sweep(
     Figure::new(title).panel(sweep_panel(setting, coefficient, methods, truth))
 }
 
-/// Returns the spectral radius of time-stepping schemes over the step, with the limit of stability.
+/// Returns a figure of the spectral radius of time-stepping schemes against the step, with the
+/// limit of stability.
 ///
 /// Abscissae are Δt/T, the step over the natural period, all positive; ordinates are spectral
 /// radii.
@@ -175,7 +177,8 @@ pub fn stability(title: &str, schemes: &[Series<'_>]) -> Figure {
     for scheme in schemes {
         panel = panel.curve(Curve::line(scheme.name, scheme.x, scheme.y));
     }
-    // Only ρ ≤ 1 is compared, so curves of unstable schemes are clipped.
+    // Schemes are compared at spectral radii ρ ≤ 1, so that the curves of unstable schemes may be
+    // clipped.
     panel.y = panel.y.range(0.0, 1.6);
     Figure::new(title).panel(panel)
 }

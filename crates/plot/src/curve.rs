@@ -26,7 +26,7 @@ pub struct Curve {
     pub(crate) upper: Vec<f64>,
     pub(crate) style: Style,
     pub(crate) slot: Option<usize>,
-    /// Phases of a magnitude, in degrees; empty if it has none.
+    /// Phases of the points of a magnitude curve, in degrees; empty if the curve has no phases.
     pub(crate) phase_deg: Vec<f64>,
     /// Standard errors of the ordinates; empty if they are not known.
     pub(crate) error: Vec<f64>,
@@ -62,8 +62,8 @@ impl Curve {
         Curve::new(Kind::MarkedLine, label, x, y)
     }
 
-    /// Creates markers only, `x` and `y` of equal length in the units of the axes: for
-    /// measurements.
+    /// Creates a curve of markers without a line, for measurements. `x` and `y` are of equal
+    /// length, in the units of the axes.
     pub fn points(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::Points, label, x, y)
     }
@@ -118,8 +118,8 @@ impl Curve {
         self
     }
 
-    /// Gives a magnitude the phases of its points, in degrees, one for each: an interactive figure
-    /// then offers phase, real and imaginary part and the Nyquist plot.
+    /// Adds phases to the curve of a magnitude, in degrees, one for each point. An interactive
+    /// figure then offers phase, real and imaginary part and the Nyquist plot.
     #[must_use]
     pub fn phase(mut self, phase_deg: &[f64]) -> Self {
         self.phase_deg = phase_deg.to_vec();

@@ -137,8 +137,8 @@ fn draw_curve(
     }
 }
 
-/// Maximum number of circles that are drawn one by one; more of them are drawn as one path, which
-/// needs a third of the text.
+/// Maximum number of circles that are drawn one by one; more circles are drawn as one path, which
+/// needs only a third of the characters in the file.
 const MANY: usize = 400;
 
 /// Half-width of an error band, in standard errors.

@@ -113,7 +113,8 @@ impl Figure {
         Ok(())
     }
 
-    /// Returns the legend position of a panel, which is hidden if the figure has a shared legend.
+    /// Returns the legend position of a panel; the legend of a panel is hidden if the figure has a
+    /// shared legend.
     pub(crate) fn legend_of(&self, panel: &Panel) -> Legend {
         if self.shared_legend { Legend::Hidden } else { panel.legend }
     }

@@ -55,13 +55,13 @@ pub(crate) struct PanelLayout {
     pub(crate) labels_x: bool,
     /// `true` if the title of the panel is written above it.
     pub(crate) titled: bool,
-    /// Centre line of the ordinate's caption.
+    /// Abscissa of the centre line of the ordinate's caption, px.
     pub(crate) y_caption: f64,
     pub(crate) entries: Vec<Entry>,
     pub(crate) place: Place,
 }
 
-/// Figure with all its positions.
+/// Size of a figure, and positions of its panels and of its shared legend.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     pub(crate) size: Point,
@@ -82,8 +82,8 @@ impl Layout {
     pub(crate) fn new(figure: &Figure) -> Result<Self, PlotError> {
         let planner = Planner::new(figure)?;
         let first = planner.arrange(&vec![false; figure.panels.len()])?;
-        // A legend without a free place inside the panel goes above it; this moves every frame of
-        // the row.
+        // A legend without a free position inside its panel is drawn above the panel; this moves
+        // every frame of the row.
         let above: Vec<bool> =
             first.panels.iter().map(|panel| panel.place == Place::Above).collect();
         if above.contains(&true) { planner.arrange(&above) } else { Ok(first) }

@@ -10,11 +10,11 @@ use crate::trace::{Segment, meets};
 
 /// Height of a row, px.
 const ROW: f64 = 18.0;
-/// Length of a sample with a line, px.
+/// Length of the sample of a line in a legend, px.
 const LINE_SAMPLE: f64 = 36.0;
-/// Length of a sample without a line, px.
+/// Length of the sample of a marker without a line in a legend, px.
 const POINT_SAMPLE: f64 = 12.0;
-/// Distance between a sample and its label, px.
+/// Distance between the sample of a line or marker and its label, px.
 const GAP: f64 = 7.0;
 /// Distance between two entries in a row, px.
 const BETWEEN: f64 = 20.0;
@@ -23,14 +23,14 @@ const PADDING: f64 = 7.0;
 /// Font size of the labels, px.
 const TEXT: f64 = LABEL_SIZE - 1.0;
 
-/// Sample to the left of a label.
+/// Sample of a line or marker, to the left of a legend label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sample {
     Curve(Kind, Resolved),
     Line(Stroke),
 }
 
-/// One label with its sample.
+/// Label of a legend, with its sample of a line or marker.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
     label: String,
@@ -99,7 +99,7 @@ pub(crate) fn reference_stroke(reference: &Reference) -> Stroke {
     Stroke { color: reference.color, width: 1.1, dash: reference.dash }
 }
 
-/// Returns the width of the samples of a legend with one entry per row.
+/// Returns the width of the widest sample of a line or marker in a legend with one entry per row.
 fn indent(entries: &[Entry]) -> f64 {
     entries.iter().map(Entry::sample_length).fold(0.0, f64::max)
 }
@@ -111,9 +111,9 @@ pub(crate) fn box_size(entries: &[Entry]) -> Point {
     (indent(entries) + widest + 2.0 * PADDING, ROW * entries.len() as f64 + 2.0 * PADDING - 4.0)
 }
 
-/// Returns the corner of a legend, a box of size `legend`, that hides none of `drawn`; `None` if
-/// there is no such position. The box is inside the frame, which begins at `corner` and has the
-/// size `size`.
+/// Returns the top left corner of a legend, a box of the size `legend`, at a position where the
+/// legend hides none of the segments `drawn`; `None` if there is no such position. The box is
+/// inside the frame, which begins at `corner` and has the size `size`.
 pub(crate) fn free_place(
     corner: Point,
     size: Point,

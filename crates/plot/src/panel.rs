@@ -105,7 +105,8 @@ impl Panel {
     }
 
     /// States which part of a frequency response the panel shows, so that an interactive figure can
-    /// offer the other parts. The magnitude has curves with phases; the phase is in the next panel.
+    /// offer the other parts. The curves of a magnitude panel have phases, and the next panel shows
+    /// these phases.
     #[must_use]
     pub fn part(mut self, part: ResponsePart) -> Self {
         self.part = Some(part);

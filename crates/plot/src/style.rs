@@ -36,9 +36,9 @@ impl Color {
     pub const WHITE: Color = Color("#ffffff");
     /// Edges of legends.
     pub(crate) const LIGHT: Color = Color("#c8c8c8");
-    /// Lines of the grid at labelled ticks.
+    /// Colour of the grid lines at labelled ticks.
     pub(crate) const GRID: Color = Color("#e0e0e0");
-    /// Lines of the grid at ticks without labels.
+    /// Colour of the grid lines at ticks without labels.
     pub(crate) const FINE_GRID: Color = Color("#f1f1f1");
 
     /// Curve colours in the order of the curves of a panel. Brown and indigo replace the yellow,
@@ -184,8 +184,9 @@ mod tests {
         (a.max(b) + 0.05) / (a.min(b) + 0.05)
     }
 
-    /// Difference in Oklab, in per cent of that of black and white, for normal vision and without
-    /// red, green or blue cones (Machado, Oliveira and Fernandes 2009).
+    /// Returns the smallest difference of two colours in Oklab, in per cent of the difference of
+    /// black and white. It is the smallest of four values: for normal vision, and for vision
+    /// without red, green or blue cones (Machado, Oliveira and Fernandes 2009).
     fn least_difference(a: Color, b: Color) -> f64 {
         const VISION: [[[f64; 3]; 3]; 4] = [
             [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -213,8 +214,9 @@ mod tests {
         VISION.map(seen).map(difference).into_iter().fold(f64::INFINITY, |a, b| a.min(100.0 * b))
     }
 
-    /// Reference: WCAG 1.4.11 requires a contrast of 3:1. A difference of 2 % of that of black and
-    /// white is just visible side by side, and one of 6 % elsewhere.
+    /// Each colour must have a contrast of 3:1 to the paper (WCAG 1.4.11), and two colours must
+    /// differ by more than 6 % of the difference of black and white. A difference of 2 % is just
+    /// visible between adjacent areas, and 6 % between separate curves.
     #[test]
     fn colours_of_curves_are_seen_and_told_apart_on_both_papers() {
         let dark = |color| DARK_MODE.iter().find(|(of, _)| *of == color).map_or(color, |c| c.1);

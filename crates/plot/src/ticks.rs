@@ -63,8 +63,8 @@ fn step_of_two_ticks(low: f64, high: f64, step: f64) -> f64 {
 /// tried.
 const END: f64 = 0.1;
 
-/// Maximum ratio of the number of ticks to the wanted number, for finer steps that reach nearer to
-/// the ends.
+/// Maximum ratio of the number of ticks to the wanted number. A finer step that exceeds it is not
+/// used, even if its ticks are nearer to the ends of the axis.
 const CROWDED: f64 = 1.6;
 
 /// Returns `step`, or a finer one whose ticks are nearer to the ends of the axis, if there is space

@@ -60,8 +60,8 @@ pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
     thinned
 }
 
-/// Returns whether there are no more points than a thinned line has in a panel of this width, in
-/// px.
+/// Returns whether the number of points is at most that of a thinned line in a panel of this width,
+/// in px.
 fn are_few(points: &[Point], width: f64) -> bool {
     points.len() as f64 <= 4.0 * width
 }
@@ -75,7 +75,8 @@ pub(crate) fn thin_markers(points: Vec<Point>, width: f64, radius: f64) -> Vec<P
     points.into_iter().filter(|(x, y)| taken.insert((cell_index(*x), cell_index(*y)))).collect()
 }
 
-/// Returns the indices of the first point in each cell of this radius, in px.
+/// Returns the index of the first point in each square cell; the side of a cell is twice `radius`,
+/// in px.
 pub(crate) fn thinned_indices(points: &[Point], radius: f64) -> Vec<usize> {
     let cell = |value: f64| (value / (2.0 * radius)).floor() as i64;
     let mut taken = HashSet::new();
@@ -106,7 +107,7 @@ pub(crate) fn thin_coarsely(points: Vec<Point>, columns: f64) -> Vec<Point> {
     extremes.collect()
 }
 
-/// Keeps the longest of consecutive stems on the same half pixel of width.
+/// Keeps the longest of the consecutive stems whose abscissae are in the same half pixel.
 pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
     let longer = |a: &&Point, b: &&Point| (a.1 - base).abs().total_cmp(&(b.1 - base).abs());
     points

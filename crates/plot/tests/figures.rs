@@ -1,4 +1,4 @@
-//! What a drawn figure contains, judged by parsing it.
+//! Tests of the contents of drawn figures: the SVG document is parsed.
 
 use std::f64::consts::PI;
 
@@ -33,7 +33,7 @@ fn everything() -> Figure {
         )
 }
 
-/// Every number in the geometry of a document.
+/// Returns every coordinate and every length in an SVG document.
 fn coordinates(svg: &str) -> Vec<f64> {
     let document = roxmltree::Document::parse(svg).expect("the figure is XML");
     let geometry =
@@ -86,7 +86,7 @@ fn every_curve_and_reference_is_drawn_and_named_in_the_legend() {
 
 #[test]
 fn the_line_passes_through_its_points() {
-    // One known frame: the ends of a straight line on fixed axes fall on its corners.
+    // The axes have fixed ranges, so the ends of this line must be at two corners of the frame.
     let axis = || Axis::linear("", "").range(0.0, 1.0);
     let figure = Figure::new("").panel(Panel::new(axis(), axis()).curve(Curve::line(
         "",
@@ -363,7 +363,8 @@ fn band(svg: &str) -> Vec<f64> {
     numbers.chunks(2).map(|point| point[1]).collect()
 }
 
-/// Reference: the band of levels in decibels is that of the magnitude on a logarithmic axis.
+/// The same relative errors must give the same band, in px, for levels in decibels on a linear axis
+/// as for magnitudes on a logarithmic axis.
 #[test]
 fn an_error_has_the_same_band_on_every_scale() {
     let x: Vec<f64> = (1..=50).map(f64::from).collect();

@@ -1,4 +1,5 @@
-//! Contents of an interactive figure for its script, judged by parsing it.
+//! Tests of the data that an interactive figure contains for its script: the drawn figure is
+//! parsed.
 
 use mechid_plot::charts::{FrequencyResponse, bode};
 use mechid_plot::{
@@ -32,7 +33,7 @@ fn names_stay_text() {
     for text in [&panel["t"], &panel["x"]["l"], &panel["c"][0]["n"], &panel["c"][0]["i"][2]] {
         assert_eq!(text, HOSTILE);
     }
-    // In a page the only script is ours.
+    // A page must contain only one script, the script of the library.
     let set = FigureSet::new([(HOSTILE.to_owned(), figure.clone()), ("b".to_owned(), figure)]);
     let shape = ShapeDrawing {
         points: vec![(HOSTILE.to_owned(), [0.0; 3]), ("b".to_owned(), [1.0, 0.0, 0.0])],
@@ -78,8 +79,8 @@ fn a_response_carries_each_list_once_and_its_phase() {
     assert_eq!(panels[0]["c"][0]["p"], panels[0]["c"][1]["p"]);
     // The script draws the phase from the curves of the magnitude.
     assert!(panels[1]["c"].as_array().unwrap().is_empty());
-    // Single precision gives 8 bytes per point, which are 4/3 of that as text, and 2 bytes for the
-    // error.
+    // A point has 4 bytes for the magnitude, 3 bytes for the phase and 2 bytes for the error; as
+    // base64 text, these 9 bytes are 12 characters.
     assert!(lists.iter().map(|list| list.len()).sum::<usize>() < 4096 * 14, "{}", svg.len());
 }
 
@@ -95,7 +96,7 @@ fn a_long_record_keeps_its_extremes() {
     let data = metadata(&svg);
     assert_eq!(data["v"][0]["p"][0]["c"][0]["of"], 1_000_000);
     let list = data["a"][1].as_str().unwrap();
-    // The scale is the power of two below the largest value.
+    // The scale is 32, the largest power of two below the largest value, 50.
     assert!(list.starts_with("f 32.0 "), "{}", &list[..20]);
 }
 
@@ -127,6 +128,6 @@ fn a_matrix_has_a_square_and_a_number_for_each_entry() {
         .collect();
     assert_eq!(texts.iter().filter(|text| **text == "0.25").count(), 2);
     assert_eq!(texts.iter().filter(|text| **text == "1.00").count(), 2);
-    // The sheet and four squares.
+    // The drawing has five rectangles: the sheet and four squares.
     assert_eq!(document.descendants().filter(|n| n.has_tag_name("rect")).count(), 5);
 }

@@ -20,7 +20,8 @@ const FORCES: usize = 2;
 const MODES: [(f64, f64); 5] =
     [(8.0, 0.01), (31.0, 0.008), (70.0, 0.006), (124.0, 0.005), (194.0, 0.005)];
 
-/// Shape of a mode of a simply supported beam at a position from 0 to 1 along the beam.
+/// Returns the value of a mode shape of a simply supported beam at a position along the beam, from
+/// 0 to 1.
 fn shape(mode: usize, place: f64) -> f64 {
     ((mode + 1) as f64 * std::f64::consts::PI * place).sin()
 }
@@ -79,7 +80,8 @@ fn response(i: usize, j: usize) -> (String, Figure) {
     )
 }
 
-/// Returns a portal frame of five points with two bending modes and a mode that travels.
+/// Returns a portal frame of five points with two bending modes and a complex mode, which looks
+/// like a travelling wave.
 fn frame() -> Result<ModeShapes, Box<dyn std::error::Error>> {
     let table = "1,0,0,0\n2,0,0,1\n3,0.5,0,1.2\n4,1,0,1\n5,1,0,0\nline,1,2,3,4,5\n";
     let geometry = Geometry::parse("frame.csv", table)?;

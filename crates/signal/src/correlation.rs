@@ -30,7 +30,7 @@ impl Correlation {
 /// with the statistic of Ljung and Box.
 ///
 /// # Errors
-/// [`SignalError::TooShort`] unless there are more than `lags + 1` samples and lags.
+/// [`SignalError::TooShort`] unless `lags` is at least 1 and there are at least `lags + 2` samples.
 ///
 /// # Source
 /// Ljung & Box (1978), Biometrika 65, 297–303.
@@ -125,7 +125,8 @@ pub fn cross_correlation_of_coloured(
 impl Correlation {
     /// Tests a sum of squared coefficients. Their covariance, multiplied by the number of samples,
     /// depends only on their distance in lags: `covariance` has its values at the distances 0, 1 ….
-    /// `shared` is half the variance of the sum, minus half its variance for normal variables.
+    /// `shared` is half of the variance that the sum has in addition to the variance for normal
+    /// variables.
     fn tested(
         sum: f64,
         covariance: &[f64],
@@ -143,8 +144,8 @@ impl Correlation {
 
 /// Returns the probability that the sum of squares of `terms` normal variables of mean zero exceeds
 /// `sum`. The covariance of two variables depends only on their distance: `covariance` has its
-/// values at the distances 0, 1 …, and it is zero at larger ones. `shared` is half the variance of
-/// the sum, minus half its variance for normal variables.
+/// values at the distances 0, 1 …, and it is zero at larger ones. `shared` is half of the variance
+/// that the sum has in addition to the variance for normal variables.
 ///
 /// The sum has approximately the distribution of g χ²(h) with the same mean and variance.
 fn probability_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
@@ -196,7 +197,8 @@ pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
 /// sample.
 ///
 /// # Errors
-/// [`SignalError::TooShort`] unless there are `lags + span + 2` values, [`SignalError::NotFinite`].
+/// [`SignalError::TooShort`] unless `lags` is at least 1 and there are at least `lags + span + 2`
+/// values, [`SignalError::NotFinite`].
 ///
 /// # Source
 /// Ours.

@@ -77,8 +77,9 @@ fn scatter(record: &Record, mean: &Record, channel: usize) -> Result<Vec<f64>, S
     Ok(lines::full(mean.sampling()).iter().map(variance).collect())
 }
 
-/// Returns the smallest amplitude of each line that counts as driven, in the mean over `count`
-/// periods with this scatter.
+/// Returns, for each line, the smallest amplitude at which the line counts as driven. The amplitude
+/// is that of the mean over `count` periods, and `scatter` has the variance of each line over the
+/// periods.
 fn above_scatter(scatter: &[f64], count: usize) -> Vec<f64> {
     let noise = |at: usize| {
         let around = at.saturating_sub(limits::NOISE_NEIGHBOURS)
@@ -185,7 +186,8 @@ mod tests {
         assert!(driven_lines(&record, 190).unwrap().len() > 80);
     }
 
-    /// Reference: the distribution function at F, in closed form, and its limit e^(−F).
+    /// Checks that the quantile F is exceeded with the given probability. The references are the
+    /// closed form of this probability and its limit e^(−F).
     #[test]
     fn fishers_quantile_has_its_probability() {
         for (probability, freedom) in [(0.05, 4.0), (1e-6, 33.0), (1e-3, 1e7)] {

@@ -150,7 +150,8 @@ mod tests {
             noise::coloured(sampling, 1, 1.0, noise::Colour::PowerLaw { exponent: 8.0 }, 1);
         let found = noise_above_band(&falling.unwrap()).unwrap()[0];
         assert!(found.is_none_or(|level| level < 1e-3), "{found:?}");
-        // The spectrum behind a second-order filter falls gradually, without a step.
+        // White noise after a second-order filter must give no level: its spectrum falls gradually,
+        // without a step.
         for seed in 0..10 {
             let white = noise::white(sampling, 1, 1.0, seed).unwrap();
             let mut lines = Spectrum::from_record(&white).lines().clone();

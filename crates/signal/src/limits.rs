@@ -30,7 +30,7 @@ pub(crate) const CONSTANT_SIGNAL: f64 = 1e-12;
 /// Probability that any undriven line of a record counts as excited.
 pub(crate) const EXCITED_LEVEL: f64 = 1e-3;
 
-/// Number of lines on each side of a line whose scatter gives its noise level.
+/// Number of lines on each side of a line; their scatter determines the noise level of this line.
 pub(crate) const NOISE_NEIGHBOURS: usize = 16;
 
 /// Minimum number of weak lines that count as the noise of a single period.
@@ -52,8 +52,8 @@ pub(crate) const FLOOR_LEVELS: usize = 3;
 /// deviations of the logarithm of such a ratio in noise.
 pub(crate) const FLOOR_RATIO: f64 = 3.0;
 
-/// Standard deviation of the logarithm of a level of 64 lines under Hann's window, whose
-/// neighbours are correlated.
+/// Standard deviation of the logarithm of a level averaged over 64 lines; under Hann's window,
+/// neighbouring lines are correlated.
 pub(crate) const FLOOR_SCATTER: f64 = 0.17;
 
 /// Maximum difference between the mean levels of the upper and the lower half of a noise floor, in
@@ -83,26 +83,26 @@ pub(crate) const INTERPOLATION_REACH: usize = 16;
 /// Gaussian noise is 9 standard deviations.
 pub(crate) const HIT_OVER_NOISE: f64 = 12.0;
 
-/// Smallest peak of a hit, in steps of the converter: a force at rest flickers between two of its
-/// levels.
+/// Minimum peak of a hit, in steps of the converter; at rest, the force signal changes at random
+/// between two levels of the converter.
 pub(crate) const HIT_OVER_STEP: f64 = 4.0;
 
 /// Fraction of the largest peak above which a peak counts for the median: there may be many light
 /// hits between the good ones.
 pub(crate) const MEDIAN_PEAK_FRACTION: f64 = 0.1;
 
-/// Smallest length of a window that ends where the next one begins, relative to the median of all
-/// windows.
+/// Minimum length of a window that ends where the next window begins, relative to the median length
+/// of all windows.
 pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
 
 /// Smallest force that counts as ringing of a filter, relative to the smallest peak of a hit: four
-/// standard deviations of the noise. Weaker ringing is lost in the noise that is set to zero.
+/// standard deviations of the noise. Weaker ringing counts as noise and is set to zero.
 pub(crate) const RINGING_OVER_FLOOR: f64 = 1.0 / 3.0;
 
-/// Maximum distance, in samples, between a pulse or its ringing and another sample above the noise
-/// for which this sample also counts as ringing. Near its zero crossings ringing is weaker than the
-/// noise, and half of its lobes are negative. A larger number would count slow forces of a swinging
-/// hammer as ringing.
+/// Maximum distance, in samples, from a pulse or its ringing to the next sample above the noise, if
+/// this sample also counts as ringing. Near the zero crossings ringing is weaker than the noise,
+/// and every second lobe is negative. A larger number would count slow forces of a swinging hammer
+/// as ringing.
 pub(crate) const RINGING_GAP: usize = 8;
 
 /// Default number of samples before a pulse, as a multiple of the number of samples in the pulse.
@@ -117,26 +117,28 @@ pub(crate) const PERIODIC_MISMATCH: f64 = 0.125;
 /// Largest ratio of the squared mismatches of equally good lags.
 pub(crate) const EQUAL_LAGS: f64 = 2.0;
 
-/// Factor on the square of [`PERIODIC_MISMATCH`]; at a larger squared mismatch a slow signal no
-/// longer resembles itself. It is larger than the ratio of the squared
+/// Squared mismatch above which a slow signal no longer resembles itself, as a multiple of the
+/// square of [`PERIODIC_MISMATCH`]. This multiple is larger than the ratio of the squared
 /// mismatches of any two equally good lags.
 pub(crate) const SLOW_SIGNAL: f64 = 2.0 * EQUAL_LAGS;
 
-/// Squared mismatch due to rounding in the Fourier transforms.
+/// Maximum squared mismatch that rounding in the Fourier transforms can cause; smaller differences
+/// of squared mismatches count as zero.
 pub(crate) const MISMATCH_ROUNDING: f64 = 1e-12;
 
 /// Minimum number of pairs of samples in a fit of growth: with fewer, the two terms of the fit
 /// would explain any difference.
 pub(crate) const GROWTH_PAIRS: usize = 20;
 
-/// Smallest fraction of the difference that counts as growth; a smaller one may be rounding.
+/// Minimum fraction of the difference between samples one period apart that counts as growth; a
+/// smaller fraction may be rounding.
 pub(crate) const GROWTH_FRACTION: f64 = 0.01;
 
 /// Number of samples examined for the step of a converter.
 pub(crate) const QUANTISATION_SAMPLES: usize = 8192;
 
-/// Minimum number of different values for a step of a converter; a signal may have fewer values for
-/// other reasons.
+/// Minimum number of different values in a channel from which the step of a converter is
+/// determined; a signal may have fewer values for other reasons.
 pub(crate) const QUANTISATION_LEVELS: usize = 16;
 
 /// Largest deviation of the distance of two values from a whole number of steps, in steps: the
@@ -148,7 +150,7 @@ pub(crate) const QUANTISATION_DEVIATION: f64 = 0.05;
 /// Largest exponent of a power law; above it a single line has all the power.
 pub(crate) const NOISE_EXPONENT: f64 = 10.0;
 
-/// Largest change of the given phases before the first start, as a fraction of 2π.
+/// Largest random change of the given phases at the first starting point, as a fraction of 2π.
 pub(crate) const PHASE_CHANGE: f64 = 1e-2;
 
 /// Damping of the first step, as a multiple of the mean curvature.
@@ -161,7 +163,8 @@ pub(crate) const CREST_STEPS: usize = 400;
 /// ends.
 pub(crate) const CREST_GAIN: f64 = 1e-5;
 
-/// Largest damping; above it the norm is stationary to rounding.
+/// Maximum damping of a Newton step, as a multiple of the mean curvature. If a step needs more
+/// damping, the norm is stationary up to rounding and the search ends.
 pub(crate) const LARGEST_DAMPING: f64 = 1e6;
 
 /// Maximum number of lines for which the Hessian is formed and factored. With more lines, only

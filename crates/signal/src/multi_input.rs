@@ -19,8 +19,9 @@ use crate::phases::Phases;
 pub enum Mixing {
     /// exp(i 2π e k / n) for experiment e and input k: any number of inputs.
     Dft,
-    /// ±1, Sylvester's matrix: the number of inputs is a power of two. Only signs change, so that
-    /// every input keeps its crest factor.
+    /// Sylvester's matrix with the entries ±1: the number of inputs must be a power of two. Only
+    /// the sign of an input changes between experiments, so that every input keeps its crest
+    /// factor.
     Hadamard,
 }
 

@@ -12,8 +12,9 @@ use crate::spectrum::Spectrum;
 
 /// A periodic signal F(t) = Σ A_n cos(n ω0 t + φ_n), known exactly at any t.
 ///
-/// The multisine does not contain the fundamental ω0 (rad/s), so that it can be used with any
-/// period. The amplitudes have the unit of the signal.
+/// The fundamental frequency ω0 (rad/s) is not stored: it is an argument or follows from the
+/// sampling, so that one multisine can be used with any period. The amplitudes have the unit of the
+/// signal.
 ///
 /// ```
 /// use mechid_signal::{Multisine, Phases, Sampling, lines};
@@ -250,10 +251,11 @@ fn check_amplitudes(amplitudes: &[f64]) -> Result<(), SignalError> {
     Ok(())
 }
 
-/// Returns the largest |value| near the middle one of three equidistant samples: the vertex of
-/// their parabola if the middle one is the largest, otherwise the middle one itself.
+/// Returns the largest |value| near the middle of three equidistant samples: the vertex of the
+/// parabola through them if the middle sample is the largest, otherwise the middle sample.
 fn parabola_top(before: f64, middle: f64, after: f64) -> f64 {
-    // The sign is positive towards the vertex; there are no products, which could overflow.
+    // The values are multiplied by the sign of the middle value, so that the vertex is a maximum.
+    // Products of two values are avoided, because they could overflow.
     let [b, m, a] = [before, middle, after].map(|v| v * middle.signum());
     let bend = b - 2.0 * m + a;
     if m < b || m < a || bend >= 0.0 {

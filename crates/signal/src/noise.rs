@@ -50,7 +50,7 @@ pub enum Colour {
     /// Power density proportional to 1/f^`exponent`: 1 is pink, 2 brown (a drift), −2 violet (a
     /// differentiated signal). The lowest frequency is half a cycle per record.
     PowerLaw {
-        /// Exponent of the fall, −10 to 10, a pure number.
+        /// Exponent of 1/f, from −10 to 10, a pure number.
         exponent: f64,
     },
     /// First-order low-pass (Gauss–Markov): an autocorrelation of exp(−2π f_c |τ|), exactly.
@@ -141,8 +141,9 @@ pub fn add(
     Record::new(record.sampling(), data)
 }
 
-/// Returns white noise shaped in frequency. The samples are the first half of a period of twice the
-/// length: the end of a whole period continues at its beginning, which a record of noise does not.
+/// Returns white noise that was filtered in the frequency domain. The filtered period is twice as
+/// long as the record, and the record is its first half. In a whole period, the last samples would
+/// be correlated with the first ones, which is not so in a record of noise.
 fn power_law(
     sampling: Sampling,
     exponent: f64,

@@ -77,7 +77,8 @@ pub fn schroeder(lines: &[usize], amplitudes: &[f64]) -> Vec<f64> {
     let mut phases = Vec::with_capacity(lines.len());
     for (&line, a) in lines.iter().zip(amplitudes) {
         if let Some(previous) = previous {
-            // Each step to the next line adds the sum of the powers so far to Σ (n − l) p_l.
+            // Each step to the next line adds the sum of the powers of all earlier lines to Σ (n −
+            // l) p_l.
             phase += (line.abs_diff(previous) / step) as f64 * share;
         }
         phases.push(0.0 - TAU * phase.fract());
@@ -124,7 +125,7 @@ pub(crate) fn gcd(a: usize, b: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// The formula as printed in the source, a double sum per line.
+    /// Returns Schroeder's phases, in rad, from the formula as printed in the source, a double sum.
     fn direct_schroeder(power: &[f64]) -> Vec<f64> {
         let total: f64 = power.iter().sum();
         (0..power.len())
@@ -154,7 +155,8 @@ mod tests {
         for (k, phase) in (1..).zip(schroeder(&n, &[2.0; 31])) {
             assert!(same_angle(phase, -PI * (k * (k - 1)) as f64 / 31.0), "line {k}");
         }
-        // On odd lines only, the k-th line has the same phase as the k-th of consecutive lines.
+        // If only odd lines are excited, the k-th odd line must have the same phase as line k of a
+        // multisine of consecutive lines.
         let odd: Vec<usize> = (0..31).map(|k| 2 * k + 1).collect();
         assert_eq!(schroeder(&odd, &[2.0; 31]), schroeder(&n, &[2.0; 31]));
     }

@@ -67,7 +67,7 @@ mod tests {
             let printed: Vec<f64> =
                 rounded.iter().map(|x| format!("{x:.5e}").parse().unwrap()).collect();
             let found = quantisation_step(&printed);
-            // Six digits do not show steps of sixteen bits.
+            // Values with six digits do not resolve the steps of a 16-bit converter.
             assert!(
                 bits > 14 || (found.unwrap() / step - 1.0).abs() < 1e-2,
                 "{bits}: {found:?} for {step}"

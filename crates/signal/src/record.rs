@@ -264,7 +264,8 @@ mod tests {
         assert_eq!(e, SignalError::Length { channel: 1, got: 1, expected: 2 });
         let e = Record::from_channels(s, &[[1.0, 2.0], [0.0, f64::INFINITY]]).unwrap_err();
         assert_eq!(e, SignalError::NotFinite { sample: 1, channel: 1, value: f64::INFINITY });
-        // The record has two such values far from its beginning; the error names the first.
+        // A record of 3,000 samples has −∞ at sample 2500 and NaN at sample 2999; the error must
+        // name the first of these samples.
         let mut long = DMatrix::zeros(3000, 2);
         (long[(2500, 1)], long[(2999, 1)]) = (f64::NEG_INFINITY, f64::NAN);
         let e = Record::new(Sampling::new(0.1, 3000).unwrap(), long).unwrap_err();

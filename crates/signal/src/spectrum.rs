@@ -155,7 +155,8 @@ mod tests {
 
     use super::*;
 
-    /// The definition, term by term: the reference for the fast transform.
+    /// Returns the amplitude of line `n` from the definition, summed term by term, as the reference
+    /// for the fast transform.
     fn direct_sum(x: &[f64], n: usize) -> Complex<f64> {
         let len = x.len();
         let sum: Complex<f64> = x

@@ -32,7 +32,7 @@ pub struct RunningStatistics {
     /// Σ x² divided by the square of [`power_of_two`] of the peak. The division prevents overflow
     /// and underflow. If the peak changes, the conversion to the new scale is exact.
     squares: f64,
-    /// Σ (x − mean)², scaled as `squares`.
+    /// Σ (x − mean)², divided by the same number as `squares`.
     centred_squares: f64,
     peak: f64,
     minimum: f64,
@@ -71,8 +71,8 @@ impl RunningStatistics {
     /// Mean and RMS value are summed in the order of the samples, independently of the blocks.
     ///
     /// # Errors
-    /// [`SignalError::NotFinite`] at the sample, counted from the first of all, if a sample or the
-    /// sum so far is not finite.
+    /// [`SignalError::NotFinite`] if a sample or the sum so far is not finite; the error has the
+    /// number of the sample, counted from the first sample of all blocks.
     pub fn push(&mut self, samples: &[f64]) -> Result<(), SignalError> {
         if samples.is_empty() {
             return Ok(());
@@ -131,7 +131,8 @@ impl RunningStatistics {
         self.count
     }
 
-    /// Mean, in the unit of the samples; 0 for no samples, and if it is only rounding.
+    /// Mean, in the unit of the samples; 0 without samples, or if the mean is only a rounding
+    /// error.
     pub fn mean(&self) -> f64 {
         let mean = self.sum / self.count.max(1) as f64;
         if mean.abs() < 4.0 * f64::EPSILON * self.rms() { 0.0 } else { mean }
@@ -176,8 +177,9 @@ impl RunningStatistics {
         (self.peak > 0.0).then(|| self.peak / self.rms())
     }
 
-    /// Returns Σ (x − mean)² / unit² of the samples so far together with `count` samples of this
-    /// `mean` and this sum of squares about it.
+    /// Returns Σ (x − mean)² / unit² over the samples so far and `count` further samples. The
+    /// further samples have this `mean`, and `squares` is their sum of squares about it, divided by
+    /// unit².
     fn combined(&self, squares: f64, mean: f64, count: usize, unit: f64) -> f64 {
         if self.count == 0 {
             return squares;
@@ -201,12 +203,13 @@ impl RunningStatistics {
 mod tests {
     use super::*;
 
-    /// A fast oscillation about an offset, in any scale.
+    /// Returns samples of a fast oscillation about an offset, multiplied by `scale`.
     fn samples(count: usize, offset: f64, scale: f64) -> Vec<f64> {
         (0..count).map(|k| scale * (offset + (0.7 * k as f64).sin())).collect()
     }
 
-    /// Reference: two passes over all samples.
+    /// Returns the mean and the standard deviation from two passes over all samples, as the
+    /// reference.
     fn two_pass(samples: &[f64]) -> (f64, f64) {
         let count = samples.len() as f64;
         let mean = samples.iter().sum::<f64>() / count;

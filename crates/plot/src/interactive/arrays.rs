@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-/// Maximum length of a list that is written with all decimal digits; longer ones are in single
-/// precision.
+/// Maximum length of a list that is written with all decimal digits; longer lists are evenly spaced
+/// or in single precision.
 const EXACT: usize = 100;
 
 /// Maximum deviation of an evenly spaced list from its step, in steps.
@@ -98,7 +98,7 @@ mod tests {
             bytes.chunks(4).map(|b| scale * f64::from(f32::from_le_bytes(b.try_into().unwrap())));
         assert_eq!(kind, "f");
         for (back, value) in back.zip(&values) {
-            // Half a unit of the 24th binary digit.
+            // Single precision rounds by at most half a unit of the 24th binary digit.
             assert!((back - value).abs() <= 6e-8 * value.abs(), "{back} {value}");
         }
         let mut arrays = Arrays::default();

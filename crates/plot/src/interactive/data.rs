@@ -101,7 +101,7 @@ struct CurveData<'a> {
     dash: Option<Vec<f64>>,
     #[serde(rename = "m", skip_serializing_if = "Option::is_none")]
     marker: Option<&'static str>,
-    /// Number of points before thinning.
+    /// Number of points before thinning; `None` if the curve is not thinned.
     #[serde(rename = "of", skip_serializing_if = "Option::is_none")]
     thinned: Option<usize>,
 }
@@ -246,7 +246,8 @@ fn marker_name(marker: Marker) -> &'static str {
     }
 }
 
-/// Reduces a long record to what a screen can show: abscissae, ordinates, upper edge.
+/// Returns abscissae, ordinates and upper edge of a long record, reduced to the points that a
+/// screen can show.
 fn thin(panel: &Panel, curve: &Curve, layout: &PanelLayout) -> [Vec<f64>; 3] {
     let (low, high) = layout.x_range;
     let across = Mapping::new(panel.x.scale, (low, high), (0.0, COLUMNS));

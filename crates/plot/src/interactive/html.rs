@@ -42,7 +42,8 @@ static STYLE: LazyLock<String> = LazyLock::new(|| {
     format!("{style}@media screen and (prefers-color-scheme: dark) {{\n{colors}}}\n")
 });
 
-/// Returns the style of figures: of the elements that the script adds, and of dark mode.
+/// Returns the CSS of the figures: rules for the elements that the script adds, and rules for dark
+/// mode.
 pub fn figure_style() -> &'static str {
     &STYLE
 }
@@ -87,7 +88,8 @@ mod tests {
         }
     }
 
-    /// Reference: the hash of "abc" in FIPS 180-2.
+    /// The content policy must contain the hash of the script; the hash function must give the hash
+    /// of "abc" in FIPS 180-2.
     #[test]
     fn the_policy_names_the_hash_of_the_script() {
         let hash = STANDARD.encode(Sha256::digest(b"abc"));

@@ -34,12 +34,13 @@ pub struct FigureSet {
     members: Vec<(String, Figure)>,
 }
 
-/// Drawn set: the first figure, with the numbers of all, and a small drawing of each.
+/// Drawn set of figures: the first figure, with the numbers of all figures, and a small drawing of
+/// each figure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DrawnSet {
-    /// SVG of the first figure, with the numbers of all in an element `metadata`.
+    /// SVG of the first figure, with the numbers of all figures in an element `metadata`.
     pub svg: String,
-    /// Name and small SVG of each figure, in order; empty for a single one.
+    /// Name and small SVG of each figure, in order; empty if there is only one figure.
     pub map: Vec<(String, String)>,
 }
 
@@ -129,8 +130,8 @@ impl Figure {
     }
 }
 
-/// Inserts text for the script after the title of a document, with the special characters of XML
-/// escaped.
+/// Inserts an element `metadata` with the JSON for the script after the title of an SVG document;
+/// the special characters of XML are escaped.
 pub fn with_metadata(svg: &str, json: &str) -> String {
     let text = crate::canvas::escape(json);
     svg.replacen("</title>", &format!("</title><metadata>{text}</metadata>"), 1)

@@ -129,7 +129,7 @@ const LONG: [&str; 124] = [
     "response",
 ];
 
-/// Letters and digits of the short names; a sign precedes them.
+/// Letters and digits of the short names; each short name is `$` or `_` with one of them.
 const LETTERS: &[u8; 62] = b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
 
 /// Words of the language with a shorter equivalent.

@@ -6,7 +6,8 @@ use mechid_analysis::modal::BackboneRow;
 use mechid_analysis::text::compact;
 use mechid_plot::{Axis, Curve, Figure, Panel};
 
-/// Returns a panel for each mode of a machine: its frequency with the confidence interval.
+/// Returns a figure with one panel for each mode of a machine: the frequency against the amplitude,
+/// with the confidence interval.
 pub fn of_machine(title: &str, rows: &[BackboneRow]) -> Figure {
     let modes = rows.last().map_or(0, |row| row.mode);
     let panels = (1..=modes).map(|mode| {
@@ -22,8 +23,8 @@ pub fn of_machine(title: &str, rows: &[BackboneRow]) -> Figure {
     panels.fold(Figure::new(title), Figure::panel)
 }
 
-/// Returns frequency and damping ratio of a free decay over its amplitude (in `unit`), with their
-/// confidence intervals.
+/// Returns a figure of the frequency and the damping ratio of a free decay against the amplitude
+/// (in `unit`), with confidence intervals.
 pub fn of_decay(title: &str, row: &decay::BackboneRow, unit: &str) -> Figure {
     let amplitude: Vec<f64> = row.points.iter().map(|point| point.amplitude).collect();
     let frequency: Vec<Uncertain> = row.points.iter().map(|point| point.frequency_hz).collect();
@@ -36,7 +37,8 @@ pub fn of_decay(title: &str, row: &decay::BackboneRow, unit: &str) -> Figure {
         .share_x()
 }
 
-/// Returns values over amplitude with their intervals, if all values and intervals are finite.
+/// Returns a panel of values against the amplitude; it shows the intervals only if all intervals
+/// are finite.
 fn panel((x, y): (Axis, Axis), name: &str, amplitude: &[f64], values: &[Uncertain]) -> Panel {
     let panel = Panel::new(x, y);
     let finite = |value: &Uncertain| {

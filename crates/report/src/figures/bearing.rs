@@ -10,7 +10,7 @@ use crate::page::short_names;
 /// Half-width of a 95 % interval, in standard errors.
 const NORMAL: f64 = 1.96;
 
-/// Name of the bands.
+/// Legend label of the confidence bands.
 const INTERVAL: &str = "95 % interval";
 
 /// Number of N/m in 1 MN/m.
@@ -19,8 +19,8 @@ const MEGA: f64 = 1e6;
 /// Names of the entries of a 2×2 matrix.
 const ENTRIES: [&str; 4] = ["xx", "xy", "yx", "yy"];
 
-/// Returns Re H over ω² and Im H over ω, direct and cross-coupled: measured line by line with 95 %
-/// intervals, and fitted.
+/// Returns a figure of the dynamic stiffness H: Re H against ω² and Im H against ω, direct and
+/// cross-coupled entries, measured line by line with 95 % intervals, and fitted.
 pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
     let omega: Vec<f64> =
         bearing.dynamic_stiffness.iter().map(|line| TAU * line.frequency_hz).collect();

@@ -10,7 +10,7 @@ const SENSORS: usize = 6;
 /// Maximum number of points of a curve; a panel cannot show more.
 const POINTS: usize = 4000;
 
-/// Returns the amplitudes of every sensor, each a figure with its name.
+/// Returns a figure of the amplitudes for each sensor, with the name of the sensor.
 pub fn set(identified: &IdentifiedElements) -> Vec<(String, Figure)> {
     let spectra = identified.spectra();
     spectra
@@ -19,7 +19,8 @@ pub fn set(identified: &IdentifiedElements) -> Vec<(String, Figure)> {
         .collect()
 }
 
-/// Returns the amplitudes of the first sensors: measured, of the model, and their difference.
+/// Returns a figure of the amplitudes of the first sensors: measured, computed with the model, and
+/// their difference.
 pub fn figure(identified: &IdentifiedElements) -> Figure {
     let tests = &identified.summary().tests;
     let files: Vec<&str> = tests.iter().map(|test| test.file.as_str()).collect();

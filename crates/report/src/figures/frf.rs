@@ -18,8 +18,8 @@ pub fn title(report: &FrfTable) -> String {
     format!("{}, {}", short_names(&files), report.estimator)
 }
 
-/// Returns magnitude above phase above coherence, with one curve for every pair of response and
-/// force.
+/// Returns a figure of magnitude, phase and coherence, one below the other, with one curve for
+/// every pair of response and force.
 pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
     let alone = report.responses.len() == 1;
     let name = |response: &Response| if alone { String::new() } else { report.pair(response) };

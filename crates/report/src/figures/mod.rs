@@ -345,7 +345,7 @@ impl ToFigure for Reconstructed {
 }
 
 impl ToFigure for SweepSummary {
-    /// Draws the error over the settings.
+    /// Draws the error of a sweep as a function of the settings.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(sweep::figure(self))
     }

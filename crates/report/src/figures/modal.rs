@@ -29,7 +29,7 @@ const COARSE: usize = 600;
 const BESIDE: u32 = 40;
 
 /// Distances from a resonance, in widths of its peak, at which the additional points begin and end.
-/// At the resonance itself, an undamped system has no receptance.
+/// No point is at the resonance itself, because an undamped system has no receptance there.
 const BESIDE_WIDTHS: (f64, f64) = (0.05, 20.0);
 
 /// Minimum damping ratio for the width of a peak: a sharper resonance is truncated at 1e5 times the
@@ -45,8 +45,8 @@ const LISTED: usize = 3;
 /// A natural frequency, in Hz, with its damping ratio.
 pub type Resonance = (f64, f64);
 
-/// Returns magnitude above phase, with a curve for each pair of response and force, and the natural
-/// frequencies.
+/// Returns a figure of magnitude above phase, with a curve for each pair of response and force, and
+/// with the natural frequencies marked.
 ///
 /// # Errors
 /// [`ReportError::NothingResonates`] if all natural frequencies of the system are zero, and errors
@@ -89,7 +89,7 @@ pub fn figure(
     Ok(drawn.mark_x(&label(&natural), &natural))
 }
 
-/// Returns response, force, and name of each curve.
+/// Returns the indices of response and force, and the name, of each curve.
 fn pairs(system: &SecondOrderSystem, names: Names<'_>) -> Vec<(usize, usize, String)> {
     let dof = system.dof();
     let name = |i: usize, j: usize| names.pair(i, j);

@@ -11,9 +11,9 @@ use crate::ReportError;
 /// Maximum number of points of a curve; a panel cannot show more.
 const SHOWN: usize = 4000;
 
-/// Draws the root of the sum of squares of all responses, each divided by its RMS in the band:
-/// measured, explained by the modes, and the difference; below it the stabilisation diagram and the
-/// mode indicator.
+/// Draws three diagrams, one below the other: the root of the sum of squares of all responses, the
+/// stabilisation diagram and the mode indicator. Each response is divided by its RMS in the band;
+/// the sum is drawn as measured, as explained by the modes, and for the difference.
 ///
 /// # Errors
 /// [`ReportError`] if the diagrams cannot be computed or drawn.

@@ -46,9 +46,9 @@ const SAME_LINE: f64 = 1e-9;
 const GRID: usize = 8;
 
 /// Returns magnitude and phase of the response per unit force x_i / F_j, measured and fitted, in
-/// the quantity of the style or, if the style has none, in the measured quantity. The pairs are
-/// those of the degrees of freedom that the records determine: on lines where F_j acts alone, and
-/// on lines where as many records as degrees of freedom have independent forces. `None` if the
+/// the quantity of the style or, if the style has none, in the measured quantity. Only the pairs
+/// that the records determine are shown, from two kinds of lines: lines where F_j acts alone, and
+/// lines where as many records as degrees of freedom have independent forces. `None` if the
 /// responses to the forces cannot be separated at any line.
 ///
 /// The panels form a matrix, with a row for each response and a column for each force; with more
@@ -97,9 +97,9 @@ pub fn receptance(
 /// Maximum number of pairs of response and force that a page draws.
 pub const DRAWN_PAIRS: usize = 128;
 
-/// Returns a separate figure for each pair with a response, at most [`DRAWN_PAIRS`] of them, with
-/// the coherence of its response below the curves, if it is known. `None` if the responses to the
-/// forces cannot be separated at any line.
+/// Returns a separate figure for each pair of response and force whose receptance is not zero, at
+/// most [`DRAWN_PAIRS`] figures. Below the curves, a figure shows the coherence of the response, if
+/// this coherence is known. `None` if the responses to the forces cannot be separated at any line.
 ///
 /// # Errors
 /// As [`receptance`].
@@ -325,8 +325,8 @@ mod tests {
         .unwrap()
     }
 
-    /// Returns a record with the force of one shaker, and a part of this force with another phase
-    /// at the other degree of freedom.
+    /// Returns the record of a test in which one shaker acts on the degree of freedom `driven`. The
+    /// fraction `crosstalk` of its force acts, with another phase, on the other degree of freedom.
     fn record(driven: usize, crosstalk: f64) -> FrequencyData {
         let omega: Vec<f64> = (1..=20).map(|line| f64::from(line) * 5.0).collect();
         let force = DMatrix::from_fn(omega.len(), 2, |row, dof| {
@@ -341,7 +341,8 @@ mod tests {
             .unwrap()
     }
 
-    /// Reference: (K − ω²M + iωC)⁻¹.
+    /// The receptances separated from two records with crosstalk must equal (K − ω²M + iωC)⁻¹; a
+    /// single record with crosstalk has no receptances and is drawn as responses.
     #[test]
     fn records_with_crosstalk_are_separated_and_one_alone_is_drawn_as_responses() {
         let both = record(0, 0.02).and(&record(1, 0.02)).unwrap();

@@ -11,7 +11,8 @@ use crate::ReportError;
 /// amplitude; smaller ones are rounding errors.
 const FAINTEST: f64 = 1e-5;
 
-/// Maximum lower end of the axis, relative to the largest amplitude and without the margin.
+/// The lower end of an amplitude axis, without the margin, is at most this fraction of the largest
+/// amplitude.
 const REACH: f64 = 1e-2;
 
 /// Maximum number of characters of a title above a panel.
@@ -99,7 +100,7 @@ fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
     panel(Axis::log10("Amplitude", unit(column)).range(low, high), title, curve)
 }
 
-/// Returns the range of an axis for these amplitudes; `None` without any.
+/// Returns the range of an axis for these amplitudes; `None` if there are no amplitudes.
 fn amplitude_range(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let amplitudes = points.iter().map(|(_, amplitude)| *amplitude);
     let strongest = amplitudes.clone().reduce(f64::max)?;

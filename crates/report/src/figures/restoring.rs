@@ -21,15 +21,17 @@ const POINTS: usize = 81;
 /// Range of the curves, as a multiple of the largest displacement and velocity in the data.
 const REACH: f64 = 1.2;
 
-/// Returns the nonlinear terms of a fit of whole periods with the points of their surface.
+/// Returns the nonlinear terms of a fit of whole periods, and the points of the restoring-force
+/// surface; `None` for any other fit.
 pub fn whole_periods(identified: &Identified) -> Option<(&WithTerms, &RestoringForce)> {
     let fitted = identified.fitted().nonlinear.as_ref()?;
     Some((fitted, fitted.restoring.as_ref()?))
 }
 
 /// Returns four panels for each degree of freedom: the measured points of the surface over
-/// displacement and velocity; spring and damper with their confidence intervals, and the measured
-/// points minus the rest of the model; the residual over the displacement.
+/// displacement and velocity; one panel each for spring and damper, with the confidence interval
+/// and with the measured points minus all other terms of the model; the residual over the
+/// displacement.
 ///
 /// # Errors
 /// [`ReportError::Estimate`] if an interval cannot be computed.

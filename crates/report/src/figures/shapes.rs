@@ -17,9 +17,9 @@ pub struct ModeShapes {
 }
 
 impl ModeShapes {
-    /// Combines identified modes whose entries have these names, such as `1+Z`, with a geometry;
-    /// without a geometry, with a row or a grid of points from their names. `None` without
-    /// oscillating modes, with fewer than two entries, and if an entry has no point.
+    /// Combines identified modes, whose entries have these names, such as `1+Z`, with a geometry.
+    /// Without a geometry, the names determine a row or a grid of points. Returns `None` if no mode
+    /// oscillates, if there are fewer than two entries, or if an entry has no point.
     pub fn from_modes(
         modes: &[ShapedMode],
         names: &[String],
@@ -112,8 +112,8 @@ mod tests {
         ModeShapes { geometry: geometry.clone(), modes }
     }
 
-    /// Reference: (1, 1) and (1, −1) are orthogonal, (1, i) is equally far from both, and a rotated
-    /// shape is the same.
+    /// The criterion must be 0 for the orthogonal shapes (1, 1) and (1, −1), 0.5 for (1, i) with
+    /// either of them, and 1 for a shape multiplied by a complex number.
     #[test]
     fn assurance_is_that_of_the_definition() {
         let shapes = shapes(&[

@@ -21,8 +21,8 @@ pub struct Trace {
 const ALIKE: f64 = 1e-6;
 
 /// Returns an angle, in degrees. An angle of ±180° (up to rounding) gets the sign of the previous
-/// angle, so that the phase of an undamped system does not alternate. Without a previous angle it
-/// is −180°.
+/// angle, so that the phase of an undamped system does not alternate. Without a previous angle,
+/// ±180° becomes −180°.
 fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
     match angle.abs() > 180.0 - ALIKE {
         true if previous.is_some_and(|previous| previous > 90.0) => 180.0,
@@ -72,7 +72,8 @@ impl Trace {
     }
 
     /// Returns the curve with standard errors of its magnitudes, one for each drawn point, in the
-    /// unit of the response; a curve with an undefined error gets none.
+    /// unit of the response. If one of the errors is undefined, the curve is returned without
+    /// standard errors.
     ///
     /// # Source
     /// 20 lg(x) has the derivative 20/(x ln 10).
@@ -97,7 +98,8 @@ impl Trace {
         h.norm() > 0.0 && (!positive || omega > 0.0)
     }
 
-    /// Leaves out points that an axis cannot show: zero magnitudes, and 0 Hz on a logarithmic axis.
+    /// Creates a curve without the points that an axis cannot show: zero magnitudes, and 0 Hz on a
+    /// logarithmic axis.
     fn with_phase(
         style: FigureStyle,
         name: String,
@@ -178,7 +180,8 @@ impl FigureStyle {
 mod tests {
     use super::*;
 
-    /// Reference: 20 log₁₀ of (1 ± 2·1 %) of the magnitude.
+    /// With a standard error of 1 % of the magnitude, the upper edge of the band must be 20
+    /// log₁₀(1.02) dB above the curve.
     #[test]
     fn levels_in_decibels_keep_the_error_of_their_magnitude() {
         let style = FigureStyle { magnitude: MagnitudeScale::Decibel, ..FigureStyle::default() };

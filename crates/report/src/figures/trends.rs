@@ -65,8 +65,8 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
     panel.y(axis)
 }
 
-/// Returns the 95 % intervals as bands, which a step interrupts; a value without an interval is
-/// not part of a band.
+/// Returns the 95 % intervals as bands. A band is interrupted at every step and drift; a value
+/// without an interval is not part of a band.
 fn bands(series: &TrendSeries, usual: &[&TrendPoint]) -> Vec<Curve> {
     let is_same = |a: &&TrendPoint, b: &&TrendPoint| {
         series.changes.iter().all(|change| (a.at < change.at) == (b.at < change.at))
@@ -85,11 +85,11 @@ fn bands(series: &TrendSeries, usual: &[&TrendPoint]) -> Vec<Curve> {
     bands
 }
 
-/// Distance from the edge of the axis at which outliers beyond it are drawn, as a fraction of the
-/// axis.
+/// Distance from the edge of an axis at which outliers beyond this edge are drawn, as a fraction of
+/// the length of the axis.
 const EDGE: f64 = 0.04;
 
-/// Margin of an axis, as a fraction of it.
+/// Margin of an axis, as a fraction of the length of the axis.
 const MARGIN: f64 = 0.08;
 
 /// Returns the range of the ordinate. It includes the median and the values without outliers, so
@@ -125,7 +125,7 @@ mod tests {
 
     use super::*;
 
-    /// Values without a standard error do not prevent the figure.
+    /// A figure must be drawn if some values have no standard error; the bands omit these values.
     #[test]
     fn values_without_an_interval_are_drawn_as_points() {
         let row = |number: usize| {

@@ -21,7 +21,7 @@ pub(super) const LIKENESS: &str = "Similarity of the mode shapes (modal assuranc
 /// offers a choice. The settings give its heading, details and command.
 ///
 /// # Errors
-/// [`ReportError::Plot`] without a figure, or if one cannot be drawn.
+/// [`ReportError::Plot`] if there is no figure, or if a figure cannot be drawn.
 pub fn figure_page(
     figures: Vec<(String, Figure)>,
     shapes: Option<&ModeShapes>,

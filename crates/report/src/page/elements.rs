@@ -68,7 +68,8 @@ fn data(found: &ElementSummary) -> Markup {
     }
 }
 
-/// Returns the unknowns, how they were found, what could be added, and the notes.
+/// Returns tables of the unknowns, of the fit and of possible additional measurements, and the
+/// notes.
 fn machine(identified: &IdentifiedElements) -> Markup {
     let summary = identified.summary();
     let interval = format!("{} % interval", compact(100.0 * summary.confidence, 3));

@@ -32,10 +32,12 @@ const WIDE: f64 = 760.0;
 /// panel.
 const PANEL: [f64; 2] = [190.0, 150.0];
 
-/// Heights for a figure that fills a row, px.
+/// Heights of the panels, with their labels, in a figure that fills a row, px: of the first panel,
+/// and of each other panel.
 const WIDE_PANEL: [f64; 2] = [300.0, 180.0];
 
-/// Maximum number of figures of a set that is drawn at the smaller width.
+/// Maximum number of figures in a set for the smaller width [`WIDTH`]; a set of more figures has
+/// the width [`WIDE`].
 const BESIDE: usize = 4;
 
 /// Figure with its caption.
@@ -45,7 +47,7 @@ pub(crate) struct Drawn {
     /// Name and small drawing of each figure, to choose one; empty for a single figure.
     pub map: Vec<(String, String)>,
     pub caption: String,
-    /// `true` if it fills a row.
+    /// `true` if the figure fills a row.
     pub is_wide: bool,
 }
 
@@ -53,7 +55,7 @@ pub(super) fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn
     drawn_set(id, vec![(String::new(), figure)], caption)
 }
 
-/// Draws a set; the page shows one figure large and all figures small.
+/// Draws a set of figures; the page shows one figure large and all figures small.
 pub(super) fn drawn_set(
     id: String,
     members: Vec<(String, Figure)>,
@@ -63,7 +65,7 @@ pub(super) fn drawn_set(
     drawn_at(width, id, members, caption)
 }
 
-/// Draws a set that fills a row.
+/// Draws a set of figures that fills a row of the page.
 pub(super) fn drawn_large(
     id: String,
     members: Vec<(String, Figure)>,
@@ -88,7 +90,7 @@ fn drawn_at(
     Ok(Drawn { id, svg: drawn.svg, map: drawn.map, caption, is_wide: width == WIDE })
 }
 
-/// Returns the figure in its size at this width, px.
+/// Returns the figure with this width, px, and with the height that its rows and its legend need.
 fn sized(figure: Figure, width: f64) -> Figure {
     let panels = figure.panels();
     // The legend of many curves needs several rows.
@@ -102,9 +104,9 @@ fn times(record: &Record) -> Vec<f64> {
     record.sampling().times().collect()
 }
 
-/// Draws the time history of the window above the amplitudes of its mean period, for each channel,
-/// by its name and unit. The history has the samples of `held` if these are all samples, otherwise
-/// the extremes in `whole`.
+/// Draws a figure for each channel, with its name and unit: the time history of the window above
+/// the amplitudes of the mean period. The time history has the samples of `held` if these are all
+/// samples, otherwise the extremes in `whole`.
 fn history(
     (name, unit): (&dyn Fn(usize) -> String, &str),
     (held, whole): (&Record, &Gathered),
@@ -295,7 +297,8 @@ fn over_time(
     drawn_set(id, (0..measured.channels()).map(of_channel).collect(), caption)
 }
 
-/// Draws the amplitudes of response and residual, on the lines used or all.
+/// Draws the amplitudes of response and residual on the fitted lines of a period, or on all lines
+/// if no lines of a period were fitted.
 pub fn residual_spectrum(
     part: &RecordReview<'_>,
     residual: &Residual,
@@ -364,7 +367,8 @@ fn own_panel(residual: &str, own: &OwnCorrelation) -> Panel {
             correlation_panel(x, residual, "autocorrelation", &lags, r, bound)
         }
         OwnCorrelation::Lines(correlation) => {
-            // Real and imaginary part are drawn with a small offset.
+            // The real part of a coefficient is drawn at its distance in lines, and the imaginary
+            // part 0.2 lines further to the right.
             let distance = |at: usize| (at / 2 + 1) as f64 + 0.2 * (at % 2) as f64;
             let (r, bound) = (&correlation.coefficients, correlation.bound);
             let distances: Vec<f64> = (0..r.len()).map(distance).collect();
@@ -424,8 +428,8 @@ pub fn correlations(
     drawn_set(part.id("correlations"), members, caption)
 }
 
-/// Draws the mode shapes and their modal assurance criterion; returns no figures for one degree of
-/// freedom, and if the geometry does not have the points of the channels.
+/// Draws the mode shapes and their modal assurance criterion. `None` for one degree of freedom, if
+/// no mode oscillates, or if the geometry lacks the point of a channel.
 pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<[Drawn; 2]> {
     let report = contents.review.identified.summary();
     let dofs = contents.review.identified.estimate().dof();

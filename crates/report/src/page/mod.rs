@@ -79,8 +79,8 @@ pub struct PageSettings {
     /// Names and values of further information on the page, such as sensors, operator, date, place
     /// and comment.
     pub about: Vec<(String, String)>,
-    /// Points of the channels, on which the mode shapes are drawn; `None`: a row or a grid from
-    /// their names.
+    /// Points of the channels, at which the mode shapes are drawn; if `None`, the names of the
+    /// channels determine a row or a grid of points.
     pub geometry: Option<Geometry>,
 }
 
@@ -235,7 +235,7 @@ fn names_of(files: &[String]) -> String {
     files.iter().map(|file| base_name(file)).collect::<Vec<_>>().join(", ")
 }
 
-/// Returns the name of the first file without its folder, and how many more there are.
+/// Returns the name of the first file without its folder, and the number of further files.
 pub(crate) fn short_names(files: &[String]) -> String {
     let name = files.first().map_or("", |file| base_name(file));
     match files.len() {
@@ -366,7 +366,7 @@ fn repeat(command: Option<&str>) -> Markup {
         section id="repeat" aria-labelledby="repeat-heading" {
             h2 id="repeat-heading" { "How to repeat it" }
             @if let Some(command) = command {
-                p { "With mechid " (env!("CARGO_PKG_VERSION")) ", in the folder that the names of the files refer to:" }
+                p { "With mechid " (env!("CARGO_PKG_VERSION")) ": run this command in the folder to which the file names are relative." }
                 div.scroll role="region" tabindex="0" aria-label="The command" { pre { code { (command) } } }
             } @else {
                 p { "With mechid " (env!("CARGO_PKG_VERSION")) "." }

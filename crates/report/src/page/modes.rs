@@ -93,7 +93,8 @@ fn merits(modes: &SavedModes) -> Vec<String> {
     vec![format!("{count} of {total} checks of data and fit are good: {}", subjects.join(", "))]
 }
 
-/// Returns all modes, with the columns that some mode has.
+/// Returns the table of all modes. An optional column is present only if at least one mode has a
+/// value for it.
 fn mode_table(modes: &SavedModes) -> Markup {
     type Cell = fn(&SavedMode) -> Option<String>;
     let optional: [(&str, Cell); 6] = [

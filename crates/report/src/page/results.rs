@@ -1,4 +1,4 @@
-//! Pages of results with one figure or one set of figures: warnings, numbers and details beside it.
+//! Pages of results: one figure or one set of figures, with warnings, numbers and details.
 
 use maud::{Markup, html};
 use mechid_analysis::bearing::{BearingSummary, BearingTable, CoefficientRow};
@@ -45,7 +45,7 @@ pub struct Words {
 /// file and runs only the script of its figures.
 ///
 /// # Errors
-/// [`ReportError::Plot`] without a figure, or if one cannot be drawn.
+/// [`ReportError::Plot`] if there is no figure, or if a figure cannot be drawn.
 pub fn result_page(
     words: &Words,
     figures: Vec<(String, Figure)>,
@@ -72,7 +72,8 @@ pub fn result_page(
     Ok(document(&title, &heading, &sections, settings.command.as_deref(), &words.files))
 }
 
-/// Returns warnings (conspicuous checks, then remarks) and merits.
+/// Returns two lists: the warnings (conspicuous checks, then remarks), and the findings that
+/// support the result.
 fn verdicts(found: &[CheckRow], remarks: &[String]) -> (Vec<String>, Vec<String>) {
     let warnings = checks::conspicuous(found).into_iter().chain(remarks.iter().cloned());
     (warnings.collect(), checks::merits(found))
@@ -291,7 +292,10 @@ fn facts_of_force(found: &ForceSummary) -> Vec<Vec<String>> {
     }
     if let Some(band) = found.band_hz {
         let [low, high] = band.map(|hz| significant(hz, 4));
-        facts.push(pair("Band of force and standard error", format!("{low} to {high} Hz")));
+        facts.push(pair(
+            "Frequency band of the force and its standard error",
+            format!("{low} to {high} Hz"),
+        ));
     }
     facts
 }
@@ -473,7 +477,7 @@ pub fn identified_words(identified: &Identified) -> Words {
         warnings,
         merits,
         tables,
-        caption: "Measured, and computed with the identified machine.".into(),
+        caption: "Measured values, and values computed with the identified machine.".into(),
     }
 }
 

@@ -178,8 +178,8 @@ fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
     row
 }
 
-/// Maximum number of parameters in one table; more have a table for each matrix, so that tables
-/// side by side have similar lengths.
+/// Maximum number of parameters in one table; with more parameters, each matrix has its own table,
+/// so that tables side by side have similar lengths.
 const TOGETHER: usize = 12;
 
 /// Returns the tables of the parameters of a machine and of its modes; `terms` are the rows of
@@ -265,7 +265,8 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     })
 }
 
-/// Returns caption and cells of each of M, C and K, values with their standard errors.
+/// Returns a caption and the table cells for each of M, C and K; the cells have values with
+/// standard errors.
 fn matrices(parameters: &[ParameterRow]) -> Vec<(String, Vec<Vec<String>>)> {
     let of_one = |entries: &[ParameterRow]| {
         let unit = entries.first().map_or("", |entry| entry.unit);
@@ -286,8 +287,8 @@ fn matrices(parameters: &[ParameterRow]) -> Vec<(String, Vec<Vec<String>>)> {
     parameters.chunk_by(|a, b| a.matrix == b.matrix).map(of_one).collect()
 }
 
-/// Returns the shapes of the modes, with modulus and phase of each response; `channel` returns its
-/// name.
+/// Returns the table of the mode shapes, with modulus and phase of each response; `channel` returns
+/// the name of a response.
 pub fn shapes(modes: &[ShapedMode], channel: impl Fn(usize) -> String) -> Markup {
     let name = |(number, mode): (usize, &ShapedMode)| {
         let [re, im] = mode.eigenvalue;
@@ -419,7 +420,7 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
         p {
             "The response of the identified machine to the force of " (validation.file) ", samples " (first_sample) " to " (last_sample)
             ", compared with the measured response."
-            @if judgement::was_fitted(contents.review) { " Some of these samples were fitted, so agreement proves little." }
+            @if judgement::was_fitted(contents.review) { " The machine was fitted to some of these samples, so agreement proves little." }
         }
         (predicted(validation))
         p.note { "Fit: 100 % minus the RMS of the difference, in per cent of the RMS of the motion about its mean; at \
@@ -483,7 +484,8 @@ fn reconstruction_of(
 mod tests {
     use super::*;
 
-    /// Entries of M, C and K of a machine.
+    /// Returns table rows for the entries of M, C and K of a machine with `dofs` degrees of
+    /// freedom.
     fn entries(dofs: usize) -> Vec<ParameterRow> {
         let estimate =
             Uncertain { value: 4e7, standard_error: Some(1e-3), interval: Some([3e7, 5e7]) };

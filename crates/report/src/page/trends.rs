@@ -11,8 +11,8 @@ use super::{Drawn, PageSettings, about, figure, figure_script, head, repeat};
 use crate::ReportError;
 use crate::figures::trends::{DRAWN, panel};
 
-/// Returns a page of the results of many records: failures, every quantity over the records, and
-/// outliers, with the heading, the details and the command of the settings; HTML that loads no
+/// Returns an HTML page of the results of many records: failures, every quantity over the records,
+/// and outliers. The heading, the details and the command come from the settings. The page loads no
 /// other file and runs only the script of its figures.
 ///
 /// # Errors
@@ -85,7 +85,7 @@ fn counts(trends: &Trends) -> Markup {
             div { dt { "Records" } dd { (trends.records) } }
             div { dt { "Without a result" } dd { (trends.failed) } }
             @if trends.without_number > 0 {
-                div { dt { "Left out, no number in the name" } dd { (trends.without_number) } }
+                div { dt { "Left out: records without a number in the name" } dd { (trends.without_number) } }
             }
         }
     }

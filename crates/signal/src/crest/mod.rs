@@ -15,9 +15,9 @@ use p_norm::PNorm;
 
 /// Exponents of the continuation, and the samples per Nyquist interval for each.
 ///
-/// Below 16 the norm is almost insensitive to the peak. Above 1024 the norm is closer to the peak
-/// than the largest sample is: with 32 samples per Nyquist interval, a sine at the highest line
-/// exceeds its largest sample by at most 0.1 %.
+/// Below 16 the norm is almost insensitive to the peak. Above 1024 the norm differs less from the
+/// peak than the largest sample does: with 32 samples per Nyquist interval, a sine at the highest
+/// line exceeds its largest sample by at most 0.1 %.
 const STAGES: [(&[i32], usize); 2] = [(&[16, 32, 64], 8), (&[128, 256, 512, 1024], 32)];
 
 /// A search for the phases of minimum crest factor. The result is the same in every run.

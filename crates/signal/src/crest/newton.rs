@@ -20,7 +20,8 @@ impl Point {
     }
 }
 
-/// Reduces ‖x‖_p from given phases; `damping` is passed on from one exponent p to the next.
+/// Returns phases at which ‖x‖_p is smaller than at the given phases; `damping` is passed on from
+/// one exponent p to the next.
 pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mut f64) -> Vec<f64> {
     let mut point = Point::new(objective, phases, p);
     let mut small_gains = 0;

@@ -104,8 +104,8 @@ pub(super) struct Derivatives<'a> {
 }
 
 impl Derivatives<'_> {
-    /// Returns the mean of the diagonal of the first term of the Hessian, with ½ as the mean of
-    /// sin².
+    /// Returns the mean of the diagonal entries of the first term of the Hessian. The factors sin²
+    /// in these entries are replaced by their mean, ½.
     pub(super) fn mean_curvature(&self) -> f64 {
         let power: f64 = self.turned.iter().map(|z| 0.5 * z.norm_sqr()).sum();
         self.factor * power * self.weight.iter().sum::<f64>() / self.turned.len() as f64

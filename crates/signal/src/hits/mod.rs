@@ -236,14 +236,11 @@ impl fmt::Display for HitFault {
             Self::RecordEnds { samples, needed } => {
                 write!(
                     f,
-                    "the record ends after {samples} samples of this hit; {needed} are needed"
+                    "this hit has {samples} samples before the record ends; {needed} are needed"
                 )
             }
             Self::NextHit { samples, needed } => {
-                write!(
-                    f,
-                    "the next hit comes after {samples} samples of this hit; {needed} are needed"
-                )
+                write!(f, "this hit has {samples} samples before the next hit; {needed} are needed")
             }
         }
     }
@@ -251,8 +248,8 @@ impl fmt::Display for HitFault {
 
 /// Detects the hits of a hammer in its force, sampled every `dt` seconds.
 ///
-/// A hit begins where the force exceeds the trigger level, counted from the median of all samples.
-/// The window of the hit extends to the next hit, even a weak one, or has the length that the rule
+/// A hit begins where the force, minus the median of all samples, exceeds the trigger level. The
+/// window of the hit extends to the next hit, even a weak one, or has the length that the rule
 /// states. A force below 12 standard deviations of the noise between the hits, or below four steps
 /// of the converter, is noise.
 ///

@@ -35,7 +35,7 @@ pub(super) fn same_period(
     Some(Spectrum::from_lines(sampling, lines).and_then(|finer| finer.to_record()))
 }
 
-/// Returns the same period, begun later by the fraction `part` of a step.
+/// Returns the same period, with the start later by the fraction `part` of a sampling step.
 pub(super) fn later(spectrum: &Spectrum, part: f64) -> Result<Record, SignalError> {
     let sampling = spectrum.sampling();
     let mut lines = spectrum.lines().clone();

@@ -45,7 +45,7 @@ pub enum Interpolation {
     Linear,
     /// Cubic spline with zero second derivative at the two ends.
     NaturalSpline,
-    /// Cubic spline whose two outermost intervals share one cubic at each end.
+    /// Cubic spline in which the two outermost intervals at each end share one cubic.
     NotAKnotSpline,
     /// Piecewise cubic Hermite interpolation with monotone pieces (Fritsch and Butland).
     Pchip,
@@ -127,7 +127,8 @@ impl Interpolator {
         }
     }
 
-    /// Returns the interval of `t` and the position in it, from 0 to 1.
+    /// Returns the index of the interval between two samples that contains the instant `t`, and the
+    /// position of `t` in this interval, from 0 to 1.
     fn interval(&self, t: f64) -> Result<(usize, f64), SignalError> {
         let last = self.sampling.len() - 1;
         let steps = t / self.sampling.dt();

@@ -32,8 +32,8 @@ pub(super) fn not_a_knot(y: &[f64]) -> Vec<f64> {
     }
 }
 
-/// Solves the tridiagonal system; an end equation is (coefficient of the end, of its neighbour,
-/// right side).
+/// Solves the tridiagonal system for the slopes. Each end equation is (coefficient of the slope at
+/// the end, coefficient of the neighbouring slope, right-hand side).
 fn solve(y: &[f64], first: (f64, f64, f64), last: (f64, f64, f64)) -> Vec<f64> {
     let n = y.len();
     // After elimination d_k + above[k] · d_{k+1} = right[k].

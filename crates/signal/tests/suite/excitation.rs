@@ -1,9 +1,9 @@
-//! Properties for which the excitations are chosen.
+//! Tests of the properties for which an excitation is chosen.
 
 use mechid_signal::excitation::{HalfSine, Impulse, Prbs, Random, Sweep, SweepLaw};
 use mechid_signal::{CrestSearch, Multisine, Phases, Record, Sampling, Spectrum, measures};
 
-/// (1/N) Σ x_n x_{n+k}, indices modulo N, term by term.
+/// Returns (1/N) Σ x_n x_{n+k} with indices modulo N, summed term by term.
 fn circular(x: &[f64], lag: usize) -> f64 {
     let n = x.len();
     (0..n).map(|k| x[k] * x[(k + lag) % n]).sum::<f64>() / n as f64
@@ -24,8 +24,8 @@ fn prbs_autocorrelation_has_two_values() {
     }
 }
 
-/// A multisine of flat lines 1 … N−1 in 2N samples has the autocorrelation A²/2 Σ cos(2π n k / 2N),
-/// which is −A²/2 at even lags and 0 at odd lags.
+/// Checks that a multisine of flat lines 1 … N−1 in 2N samples has the autocorrelation A²/2 Σ
+/// cos(2π n k / 2N), which is −A²/2 at even lags and 0 at odd lags.
 #[test]
 fn flat_multisine_is_as_white_as_its_lines_allow() {
     let m = Multisine::flat(1..=127, 2.0, Phases::SchroederBinary).unwrap();
@@ -37,8 +37,8 @@ fn flat_multisine_is_as_white_as_its_lines_allow() {
     }
 }
 
-/// Table of the page studies/excitation.md of the book: a period of 1023 samples, 1 s long, lines
-/// 1 to 400 are of interest, and the largest force is 1 N.
+/// Checks the table of the page studies/excitation.md of the book. A period has 1023 samples and
+/// lasts 1 s, lines 1 to 400 are of interest, and the largest force is 1 N.
 #[test]
 fn excitations_side_by_side() {
     let s = Sampling::from_rate_hz(1023.0, 1023).unwrap();

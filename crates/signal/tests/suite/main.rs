@@ -1,6 +1,7 @@
 //! Excitation, sampling and measures, judged by closed forms.
 //!
-//! One program of many modules: each test program of its own would compile nalgebra anew.
+//! All modules form one test program, because every further test program would have to compile
+//! nalgebra again.
 
 mod crest;
 mod excitation;

@@ -1,4 +1,4 @@
-//! Values between samples against closed forms and defining equations.
+//! Tests of interpolated values against closed forms and defining equations.
 
 use mechid_signal::resample::{refine, resample};
 use mechid_signal::{
@@ -23,8 +23,9 @@ fn refined(x: &[f64], factor: usize, method: Interpolation) -> Vec<f64> {
     refine(&record(x), factor, method).unwrap().channel(0).to_vec()
 }
 
-/// The natural spline by its textbook equations for second derivatives m (m = 0 at both ends):
-/// m_{k−1} + 4 m_k + m_{k+1} = 6 (y_{k+1} − 2 y_k + y_{k−1}) for a step of 1, with a dense matrix.
+/// Returns the natural spline at the fraction `u` of interval `k`. The textbook equations for the
+/// second derivatives m (m = 0 at both ends) are solved with a dense matrix: m_{k−1} + 4 m_k +
+/// m_{k+1} = 6 (y_{k+1} − 2 y_k + y_{k−1}) for a step of 1.
 fn natural_by_moments(y: &[f64], k: usize, u: f64) -> f64 {
     let n = y.len();
     let mut a = DMatrix::<f64>::identity(n, n);
@@ -59,7 +60,8 @@ proptest! {
         let x: Vec<f64> = (0..n).map(|k| cubic(0.5 * k as f64)).collect();
         let fine = refined(&x, 4, Interpolation::NotAKnotSpline);
         for (k, v) in fine.iter().enumerate() {
-            // The values are up to 2·15³, and the equations at the ends lose one or two digits.
+            // The values are up to 2·15³, and the end equations of the spline lose one or two
+            // digits.
             prop_assert!((v - cubic(0.125 * k as f64)).abs() < 1e-9);
         }
     }
@@ -100,7 +102,8 @@ proptest! {
     }
 }
 
-/// In a natural spline the error of its ends decreases inwards by the factor 2 − √3 per sample.
+/// Checks that the error that the end conditions of a natural spline cause decreases inwards by the
+/// factor 2 − √3 per sample.
 #[test]
 fn natural_splines_forget_their_ends() {
     let cubic = |t: f64| t * t * t;
@@ -114,15 +117,15 @@ fn natural_splines_forget_their_ends() {
 
 #[test]
 fn pchip_by_hand() {
-    // The secants are 1, 3 and 0. The slopes at the samples are (3·1 − 3)/2 = 0, 2·1·3/4 = 1.5, 0,
-    // and at the end 0, because (3·0 − 3)/2 is opposite to a secant of 0. The values in the middle
-    // are (y0 + y1)/2 + (d0 − d1)/8.
+    // The secants are 1, 3 and 0. The slopes at the four samples are (3·1 − 3)/2 = 0, 2·1·3/4 =
+    // 1.5, 0 and 0. The last slope is 0, because (3·0 − 3)/2 does not have the sign of the last
+    // secant, which is 0. The values in the middle are (y0 + y1)/2 + (d0 − d1)/8.
     let fine = refined(&[0.0, 1.0, 4.0, 4.0], 2, Interpolation::Pchip);
     assert_eq!(fine, [0.0, 0.3125, 1.0, 2.6875, 4.0, 4.0, 4.0]);
 }
 
-/// The errors of sin t decrease as h² for straight lines and as h⁴ for splines, the orders of the
-/// textbooks.
+/// Checks that the interpolation errors of sin t decrease as h² for straight lines and as h⁴ for
+/// splines, the orders of the textbooks.
 #[test]
 fn orders_of_convergence() {
     let error = |n: usize, method| {
@@ -147,8 +150,8 @@ fn a_period_can_be_sampled_anew() {
     let m = Multisine::flat(1..=9, 1.0, Phases::Random { seed: 4 }).unwrap();
     let s = Sampling::new(0.1, 20).unwrap();
     let r = m.sample(s).unwrap();
-    // The 33 samples of the same period come from a transform, the 27 samples of another duration
-    // from sums of the Fourier series.
+    // The two resampled records must equal the multisine. The 33 samples of the same period come
+    // from a transform, the 27 samples of another duration from sums of the Fourier series.
     for other in [Sampling::new(2.0 / 33.0, 33).unwrap(), Sampling::new(0.13, 27).unwrap()] {
         let again = resample(&r, other, Interpolation::BandLimited).unwrap();
         for (t, x) in other.times().zip(again.channel(0)) {
