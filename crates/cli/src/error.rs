@@ -1,4 +1,4 @@
-//! Errors between the command line and the result.
+//! Errors that subcommands report to the user.
 
 use std::io::ErrorKind;
 use std::path::Path;

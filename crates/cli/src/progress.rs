@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use log::{Level, LevelFilter, Log, Metadata, Record};
 
-/// Time before the display appears: shorter work needs none.
+/// Time before progress is displayed; shorter work shows no progress.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Time between two lines of progress if standard error is no terminal, such as the log of a batch
@@ -57,7 +57,8 @@ impl Progress {
 
 /// Creates a display of the current work, its progress, the elapsed time, and how to end it.
 fn spinner() -> ProgressBar {
-    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} (Ctrl-C ends it)");
+    let style =
+        ProgressStyle::with_template("{spinner} {msg}, {elapsed} (Ctrl-C ends the program)");
     ProgressBar::new_spinner().with_style(style.expect("the template is written correctly"))
 }
 

@@ -48,7 +48,8 @@ fn files(folder: &Path) -> Vec<String> {
     fs::read_dir(folder).unwrap().map(|entry| name(entry).unwrap()).collect()
 }
 
-/// Runs `identify` on the file with its own columns, a plot and the arguments `more`; it must fail.
+/// Runs `identify` on a file with this content, with a plot and the arguments `more`; the run must
+/// fail.
 fn identify(content: &str, more: &str, parts: &[&str]) {
     let common = "identify a.csv --force force --displacement x --plot out.svg";
     refused(content, &format!("{common} {more}"), parts);
@@ -94,13 +95,13 @@ fn noise_of_the_force_belongs_to_open_records() {
         ("--force-noise -1", ["--force-noise: ", "zero or positive, got -1"]),
         ("--force-noise nan", ["--force-noise: ", "zero or positive, got NaN"]),
         ("--force-noise 1,2", ["--force-noise: ", "one for each of 1 forces, not 2"]),
-        ("--force-noise 1 --period 20", ["--force-noise: ", "it is for open records"]),
+        ("--force-noise 1 --period 20", ["--force-noise: ", "available only for open records"]),
         ("--force-noise 1 --from-frf h1", ["--force-noise: ", "not to --from-frf"]),
         (
             "--force-noise 1 --method least-squares",
             ["--method: ", "open records and hits need maximum-likelihood"],
         ),
-        ("--force-noise 1 --extent period", ["--force-noise: ", "it is for open records"]),
+        ("--force-noise 1 --extent period", ["--force-noise: ", "available only for open records"]),
     ] {
         identify(&good(), arguments, &parts);
     }
@@ -165,7 +166,7 @@ fn lines_above_the_table() {
     let parts = ["a.csv: the table seems to begin on line 4, with 3 fields", "`skip_lines` 3"];
     identify(&text, "", &parts);
     refused(&text, "info a.csv", &parts);
-    // With one line skipped too many, the names of the columns are lost.
+    // If `--skip-lines` also skips the header, the columns have no names.
     identify(&text, "--skip-lines 4 --sample-rate 250", &["a.csv has no column \"force\""]);
 }
 
@@ -233,9 +234,9 @@ fn no_excited_line() {
 fn a_force_that_is_zero() {
     let text = record(|k| (0.004 * f64::from(k), 0.0, f64::from(k)));
     identify(&text, "", &["a.csv: the force (column force) is zero throughout the window"]);
-    // A constant force excites no line, either.
+    // A force that does not vary excites no line.
     let text = record(|k| (0.004 * f64::from(k), 0.1, f64::from(k % 5)));
-    identify(&text, "", &["no excited line: over a period of 32 samples the force does not vary"]);
+    identify(&text, "", &["no excited line: the force does not vary over a period of 32 samples"]);
 }
 
 #[test]
@@ -270,7 +271,7 @@ fn a_singular_fit_names_what_the_data_do_not_excite() {
     }
     let common = "identify a.csv --force f --displacement x --velocity v --acceleration a";
     refused(&text, &format!("{common} --domain time"), &["the data do not determine m, c:"]);
-    // The sensor is not connected.
+    // A displacement that is zero in every sample is like that of a sensor that is not connected.
     let text = record(|k| {
         let t = f64::from(k);
         (0.004 * t, (t * t).sin(), 0.0)

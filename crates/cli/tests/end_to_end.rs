@@ -56,7 +56,8 @@ fn force(amplitude: f64, lines: &[u32], omega0: f64, t: f64) -> f64 {
     lines.iter().map(|&n| amplitude * (f64::from(n) * omega0 * t + f64::from(n * n)).cos()).sum()
 }
 
-/// Reference: the closed form, summed in the test.
+/// A record in closed form, summed term by term in the test, gives the parameters of its
+/// oscillator.
 #[test]
 fn a_closed_form_record_gives_its_oscillator() {
     let folder = tempfile::tempdir().unwrap();
@@ -95,8 +96,8 @@ fn a_closed_form_record_gives_its_oscillator() {
     assert_close(&report, "k", truth.k, 1e-10 * truth.k);
 }
 
-/// Reference: two equal masses on three springs move as two oscillators, in phase and in
-/// opposition.
+/// One shaker is enough to identify two equal masses on three springs. Reference: these masses move
+/// as two oscillators, in phase and in opposition.
 #[test]
 fn two_degrees_of_freedom_with_one_shaker() {
     let folder = tempfile::tempdir().unwrap();
@@ -130,8 +131,9 @@ fn two_degrees_of_freedom_with_one_shaker() {
         let scale = if name.starts_with('k') { 500.0 } else { 1.1 };
         assert_close(&report, name, value, 1e-9 * scale);
     }
-    // If no force acts on a mass and the mass is unknown, its equation has no scale and may be
-    // added to the other one. The matrices are then not given, but the modes are.
+    // If no force acts on a mass and the mass is unknown, its equation of motion has no scale and
+    // may be added to the equation of the other mass. The report then has the modes but not the
+    // matrices.
     let report = mechid(folder.path(), "identify two.csv --force f,0 --displacement x,y");
     assert!(
         report.get("system").is_none() && report["unscaled"]["equations"] == json!([1, 2]),
@@ -213,7 +215,8 @@ fn noise_stays_inside_the_standard_errors() {
     assert!(report["fit"]["unexplained_motion"].as_f64().unwrap() > 0.02);
 }
 
-/// Every scheme differs from the exact response only by its own error.
+/// The response that a time-stepping scheme simulates differs from the exact response only by the
+/// error of this scheme.
 #[test]
 fn every_scheme_simulates_what_it_says() {
     let folder = tempfile::tempdir().unwrap();
@@ -249,13 +252,13 @@ fn every_scheme_simulates_what_it_says() {
         let report = mechid(folder.path(), arguments);
         let hz = report["modes"][0]["natural_frequency_hz"]["value"].as_f64().unwrap();
         // With 320 steps per period the error of second-order schemes is about (ωΔt)²/12 to
-        // (ωΔt)²/2, 2e-4.
+        // (ωΔt)²/2, which is at most 2e-4.
         assert!((hz / (20.0 / TAU) - 1.0).abs() < 3e-4, "{name}: {hz} Hz");
     }
 }
 
-/// Reference: the closed forms of a machine under a force that is constant, or linear, between
-/// samples.
+/// A fit in the time domain finds the parameters of a machine from its exact response to a force
+/// that is constant, or linear, between samples.
 #[test]
 fn the_time_domain_gives_the_machine_whose_force_is_held_or_linear() {
     use mechid::model::{InitialState, Sdof};
@@ -288,7 +291,8 @@ fn the_time_domain_gives_the_machine_whose_force_is_held_or_linear() {
     }
 }
 
-/// The measured benchmark: ordinary least squares over the 168 odd lines of its multisine.
+/// Ordinary least squares over the 168 odd lines of the multisine gives the mode of the Silverbox,
+/// a measured benchmark.
 #[test]
 fn the_silverbox_comes_out() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -1,4 +1,5 @@
-//! The subcommand `force`: simulate, identify, reconstruct.
+//! Tests of the subcommand `force`: a record is simulated, the machine is identified, and the force
+//! is reconstructed.
 
 use std::path::{Path, PathBuf};
 
@@ -119,7 +120,8 @@ fn the_method_follows_the_record_and_says_why() {
     }
 }
 
-/// A bearing is driven in y, and only its displacement in x is measured.
+/// A bearing is driven in y, and only its displacement in x is measured; the cross-coupled
+/// coefficients give the force.
 #[test]
 fn one_sensor_finds_the_force_in_the_other_direction() {
     let folder = tempfile::tempdir().unwrap();

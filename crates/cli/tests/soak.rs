@@ -1,6 +1,6 @@
-//! Fleets under disturbances: they are killed, find the disk full, meet faulty records, or two of
-//! them write into one folder. In the end the results are those of an undisturbed run, to the last
-//! byte.
+//! Runs of `mechid fleet` under disturbances: a run is killed, finds the disk full, reads faulty
+//! records, or writes into the same folder as another run. In the end the results are those of an
+//! undisturbed run, to the last byte.
 //!
 //! `MECHID_SOAK_SECONDS=3600 cargo test --release -p mechid-cli --test soak` runs this for an hour;
 //! the check of every change runs it for some seconds.
@@ -49,7 +49,7 @@ fn write_records(home: &Path) {
     fs::write(home.join("analysis.json"), analysis).unwrap();
 }
 
-/// Starts a fleet; its shell first runs `before`.
+/// Starts `mechid fleet` in a shell that first runs `before`.
 fn start(home: &Path, results: &str, before: &str) -> Child {
     let run = "fleet day --analysis analysis.json --part-records 2 --workers 2 --quiet --output";
     Command::new("sh")
@@ -122,8 +122,8 @@ fn what_disturbs_a_fleet_leaves_nothing_half_doubled_or_different() {
         (0..1 + draws.below(5)).for_each(|_| disturbed(home, &mut draws));
         assert_eq!(start(home, "results", "").wait().unwrap().code(), Some(1));
         let mut found = contents(&home.join("results"));
-        // A file that was being written when a fleet was killed has a hidden name; a later run
-        // removes it.
+        // A file that was being written when a run of `mechid fleet` was killed has a hidden name;
+        // a later run removes it.
         found.retain(|name, _| !name.starts_with('.'));
         assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
         assert!(found == expected, "the rows differ, round {rounds}");

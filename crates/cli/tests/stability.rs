@@ -39,7 +39,7 @@ fn anchors_and_limits_are_in_the_json() {
     }
 }
 
-/// Schemes that are chosen by ρ∞ have it as spectral radius at very large steps.
+/// A scheme that is chosen by ρ∞ has the spectral radius ρ∞ at very large steps.
 #[test]
 fn schemes_of_a_radius_have_it() {
     let of = |rho: &str| {

@@ -1,8 +1,8 @@
 //! Designs a multisine of low crest factor, simulates eight measured periods, and identifies the
 //! machine with confidence intervals.
 //!
-//! Prints the crest factor before and after the search, and the parameters and the natural frequency of
-//! two estimators with their intervals.
+//! Prints the crest factor before and after the search. For each of two estimators, prints the
+//! parameters and the natural frequency with their intervals.
 //!
 //! `cargo run --package mechid --example 05_design_measure_identify`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]

@@ -1,5 +1,6 @@
-//! Reconstructs the force from a noisy response: line by line if its lines are known, by shrinkage
-//! if they are not, by a Kalman smoother without periodicity.
+//! Reconstructs the force from a noisy response with three methods: line by line if the lines of
+//! the force are known, by shrinkage if they are not known, and by a Kalman smoother, which needs
+//! no periodic force.
 //!
 //! Prints the true and the stated error of each method, in per cent of the force.
 //!

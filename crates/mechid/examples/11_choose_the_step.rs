@@ -1,5 +1,5 @@
-//! Chooses the step of a scheme: its limit of stability, and the errors of period and damping below
-//! it.
+//! Chooses the step of a scheme from its limit of stability, and from the errors of period and
+//! damping at shorter steps.
 //!
 //! Prints, for each scheme, its limit of stability, the step with a period error of 1 %, and the
 //! numerical damping at this step.
@@ -19,7 +19,7 @@ use mechid::model::Sdof;
 const ACCEPTED: f64 = 0.01;
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    // The machine has 12 Hz and a damping ratio of 0.02.
+    // The machine has a natural frequency of 12 Hz and a damping ratio of 0.02.
     let period = 1.0 / 12.0;
     let machine = Sdof::from_modal(1.0, 0.02, std::f64::consts::TAU / period)?.system();
     let wilson = WilsonTheta::new(1.4)?;
@@ -49,7 +49,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Returns the longest step, in periods, at which the error of the period is at most [`ACCEPTED`]:
-/// by halving, then by bisection.
+/// it is found by halving the step, then by bisection.
 fn longest(scheme: &dyn Scheme) -> Result<f64, IntegrateError> {
     let off = |found: Accuracy| found.period_elongation.map_or(f64::INFINITY, f64::abs);
     let good = |step: f64| Ok::<_, IntegrateError>(off(accuracy(scheme, 0.02, step)?) <= ACCEPTED);

@@ -225,7 +225,7 @@ impl ExcitationSummary {
     /// Computes the measures of inputs, which must have one time axis.
     ///
     /// # Errors
-    /// [`SignalError`] if there is no input, or one has no power.
+    /// [`SignalError`] if there is no input, or if an input has no power.
     pub fn new(inputs: &[DesignedInput]) -> Result<Self, SignalError> {
         let too_few = SignalError::TooFew { what: "inputs", least: 1, got: 0 };
         let sampling = inputs.first().ok_or(too_few)?.period.sampling();

@@ -36,7 +36,8 @@ pub struct SteppedMachine<'a> {
     pub dt: f64,
 }
 
-/// Stability and accuracy of schemes; `Display` writes tables, `Serialize` the same as data.
+/// Stability and accuracy of schemes; `Display` writes tables, `Serialize` writes the same content
+/// as data.
 ///
 /// # Source
 /// Dissertation section 3.4; Hughes (1987), *The Finite Element Method*, section 9.1.
@@ -54,7 +55,7 @@ pub struct SchemeAccuracy {
     /// Short name.
     #[serde(skip)]
     pub label: String,
-    /// Name with all parameters.
+    /// Name of the scheme with all its parameters.
     pub name: String,
     /// Largest stable step as a fraction of the undamped period; `None` if every step is stable.
     pub stability_limit: Option<f64>,
@@ -73,7 +74,7 @@ pub struct StepAccuracy {
     pub step_over_period: f64,
     /// Spectral radius of the amplification matrix, a pure number; above 1 the response grows.
     pub spectral_radius: f64,
-    /// Lengthening of the period, as a fraction of it.
+    /// Period elongation, as a fraction of the exact period.
     pub period_elongation: Option<f64>,
     /// Fraction of the amplitude lost in a period.
     pub amplitude_decay: Option<f64>,
@@ -152,7 +153,7 @@ impl From<Accuracy> for StepAccuracy {
 }
 
 impl StepAccuracy {
-    /// Returns `value`, unless the response grows.
+    /// Returns `value`, or `None` if the response grows.
     fn stable(&self, value: Option<f64>) -> Option<f64> {
         value.filter(|_| self.spectral_radius <= 1.0 + RADIUS_ROUNDING)
     }
@@ -172,7 +173,7 @@ impl MachineStability {
     }
 }
 
-/// Quantity of a chart, if it is defined.
+/// Function that returns a quantity of a chart; `None` if the quantity is not defined.
 type Quantity = fn(&StepAccuracy) -> Option<f64>;
 
 impl fmt::Display for SchemeComparison {
@@ -224,7 +225,7 @@ fn rounded(value: f64) -> String {
     if value.abs() < ZERO { "0".into() } else { significant(value, 5) }
 }
 
-/// The usual chart of textbooks.
+/// Chart of stability and accuracy that is usual in textbooks.
 #[cfg(feature = "report")]
 mod figure {
     use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
@@ -232,8 +233,9 @@ mod figure {
     use super::{NamedScheme, StepAccuracy, compare_schemes};
     use crate::integrate::IntegrateError;
 
-    /// Draws spectral radius, period elongation (%) and amplitude decay (%) of schemes over the
-    /// step as a fraction of the undamped period, for an oscillation with a damping ratio.
+    /// Draws the spectral radius, the period elongation (%) and the amplitude decay (%) of schemes
+    /// against the step as a fraction of the undamped period, for an oscillation with the given
+    /// damping ratio.
     ///
     /// # Errors
     /// As [`compare_schemes`].

@@ -12,7 +12,8 @@ macro_rules! examples {
         }
     )+
 
-        /// A file that is not in the list would never run.
+        /// Checks that the list names every file of the examples: a file that is not in the list
+        /// would never run.
         #[test]
         fn the_list_is_whole() {
             let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");

@@ -63,8 +63,9 @@ fn a_nonlinear_machine_goes_round_its_orbit() {
 }
 
 /// Reference: at the equilibrium x = 0 of ẍ + 1.5 ẋ − x + x³ = 0 the characteristic equation λ² +
-/// 1.5 λ − 1 = 0 has the root λ = 1/2, so that a disturbance grows by e^(λT) in a period T. With +
-/// x instead of − x it decays.
+/// 1.5 λ − 1 = 0 has the root λ = 1/2, so that a disturbance grows by e^(λT) in a period T, and the
+/// response is refused. With + x instead of − x, the disturbance decays, and the response is
+/// accepted.
 #[test]
 fn an_orbit_that_no_machine_stays_on_is_refused() {
     let simulated = |stiffness: f64| {
@@ -142,7 +143,8 @@ fn unstable(response: &str, samples: usize) -> Result<Simulation, SimulateError>
     simulate(&Experiment::parse("test.json", &text).unwrap())
 }
 
-/// Reference: the free response grows at the rate −c / 2m = 0.1 1/s.
+/// An unstable machine has no periodic response, and the message states the growth of its free
+/// response. Reference: the free response grows at the rate −c / 2m = 0.1 1/s.
 #[test]
 fn an_unstable_machine_has_no_periodic_response_and_is_told() {
     let refused = unstable("periodic", 64).unwrap_err();
@@ -166,7 +168,8 @@ fn simulated(scheme: &str, response: &str) -> Result<Simulation, SimulateError> 
     simulate(&Experiment::parse("test.json", &text).unwrap())
 }
 
-/// Reference: x = x0 cos ωt + v0/ω sin ωt with ω = 2.
+/// A free motion starts with the displacement x0 and the velocity v0 of the description. Reference:
+/// x = x0 cos ωt + v0/ω sin ωt with ω = 2.
 #[test]
 fn a_free_motion_starts_where_it_is_told_to() {
     let from = r#"{ "from": { "displacement": 0.5, "velocity": -3 } }"#;

@@ -170,7 +170,7 @@ fn periodic(
         // The condition number of I − Φᴺ is not used: without damping, the whole matrix may vanish.
         reciprocal_condition = singular_values(closing.clone())?.min() / (1.0 + growth);
     }
-    // N products of matrices add rounding of about N ε to Φᴺ.
+    // Φᴺ is a product of N matrices, which has a rounding error of about N ε.
     let resolved = reciprocal_condition > 4.0 * f64::EPSILON * force.len() as f64;
     let start = if resolved { closing.lu().solve(&from_rest) } else { None };
     let start = start.ok_or(ProblemError::NoPeriodicMotion {
@@ -180,8 +180,8 @@ fn periodic(
     Ok(run(&transition, force, start)?.0)
 }
 
-/// Returns the response at every sample, and the state one step after the last sample, where the
-/// first force acts again.
+/// Returns the response at every sample, and the state one step after the last sample. At the end
+/// of this step, the force has the value of the first sample, as if the record repeats.
 fn run(
     transition: &Transition,
     force: &Record,

@@ -197,7 +197,8 @@ mod tests {
         Record::from_channels(sampling, &[a.channel(0), b.channel(0)]).unwrap()
     }
 
-    /// Reference: the definition of each fault, for each line of the spectrum or for each sample.
+    /// Each fault must change the spectral lines or the samples of a record as its definition
+    /// states.
     #[test]
     fn faults_are_what_they_say() {
         let clean = two_sines();

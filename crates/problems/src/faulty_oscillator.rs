@@ -1,5 +1,5 @@
-//! An oscillator with a nonlinear spring, friction, a changing stiffness or a hidden mass,
-//! integrated by its own Runge–Kutta rule.
+//! An oscillator with a nonlinear spring, friction, a changing stiffness or a hidden mass. This
+//! module has a separate Runge–Kutta rule for its motion.
 
 use std::f64::consts::TAU;
 
@@ -37,7 +37,7 @@ impl FaultyOscillator {
     const FINER: usize = 8;
     /// Damping ratio of the hidden mass.
     const HIDDEN_DAMPING: f64 = 0.01;
-    /// Velocity at which friction has three quarters of its size, in m/s.
+    /// Velocity at which friction has about three quarters of its full magnitude, in m/s.
     const SLIP: f64 = 1e-3;
 
     /// An oscillator of 10 kg at 25 Hz with a damping ratio of 0.02 and without faults.
@@ -114,8 +114,8 @@ impl FaultyOscillator {
         all
     }
 
-    /// Returns the time derivatives of displacement and velocity, then those of the hidden mass;
-    /// `elapsed` rises from −½ at the start of the motion to ½ at its end.
+    /// Returns the time derivatives of displacement and velocity, first of the main mass, then of
+    /// the hidden mass; `elapsed` rises from −½ at the start of the motion to ½ at its end.
     fn rate(&self, force: f64, elapsed: f64, [x, v, y, w]: [f64; 4]) -> [f64; 4] {
         let omega = TAU * self.hidden_hz;
         let (spring, damper) = (omega * omega, 2.0 * Self::HIDDEN_DAMPING * omega);

@@ -154,7 +154,8 @@ impl HammerTest {
         Ok(HammerRecord { force: Record::new(self.sampling, force)?, response, hits })
     }
 
-    /// Force on one degree of freedom, and the response of all degrees of freedom.
+    /// Returns the force on one degree of freedom and the responses of all degrees of freedom, both
+    /// after the anti-aliasing filter.
     fn filtered(&self, dof: usize, pulses: &[Pulse]) -> Result<(Record, Record), ProblemError> {
         let (n, finer) = (self.shapes.nrows(), Self::FINER);
         let margin = Self::SPAN * finer;
@@ -191,7 +192,8 @@ impl HammerTest {
     }
 }
 
-/// Returns the weights of a low pass at half the final rate, under a Blackman window.
+/// Returns the weights of a low-pass filter with a Blackman window; the cutoff frequency is half
+/// the sampling rate of the record.
 fn low_pass(finer: usize, margin: usize) -> Vec<f64> {
     let weight = |k: usize| {
         let at = k as f64 - margin as f64;
@@ -219,8 +221,9 @@ struct Oscillator {
 }
 
 impl Oscillator {
-    /// Returns the response from rest to a half-sine: the sum of the responses to a sine that
-    /// begins with the pulse and to a second sine that begins half a period later.
+    /// Returns the response from rest to a half-sine: the sum of the responses to two sines. The
+    /// first sine begins at the same time as the pulse, the second begins half a period of the sine
+    /// later.
     fn response(&self, pulse: &Pulse, t: f64, quantity: ResponseQuantity) -> f64 {
         let begun = self.to_sine(pulse, t - pulse.start);
         let ended = self.to_sine(pulse, t - pulse.start - pulse.duration);
@@ -234,8 +237,8 @@ impl Oscillator {
         }
     }
 
-    /// Returns displacement and velocity `t` seconds after the beginning of a sine of force; before
-    /// it the oscillator is at rest.
+    /// Returns displacement and velocity `t` seconds after the beginning of a sinusoidal force. The
+    /// oscillator is at rest before the force begins.
     fn to_sine(&self, pulse: &Pulse, t: f64) -> [f64; 2] {
         if t <= 0.0 {
             return [0.0; 2];

@@ -15,9 +15,9 @@ use crate::random::random_stable;
 /// Support of a chain of masses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
-    /// Springs at both ends, as stiff as those between the masses.
+    /// Springs at both ends, as stiff as the springs between the masses.
     Held,
-    /// Springs at both ends, with 1/500 of the stiffness of those between the masses.
+    /// Springs at both ends, with 1/500 of the stiffness of the springs between the masses.
     Soft,
     /// No support: the chain has a rigid-body mode.
     Free,
@@ -62,7 +62,7 @@ pub fn chain(dof: usize, support: Support, damping: f64, seed: u64) -> SecondOrd
     SecondOrderSystem::new(mass, viscous, stiffness).expect("positive masses")
 }
 
-/// A machine and one period of a steady multisine test of it, without noise.
+/// A machine, and one period of a steady multisine test of this machine, without noise.
 #[derive(Debug, Clone)]
 pub struct Test {
     /// Name of the machine and the excitation, in a few words.
@@ -71,8 +71,8 @@ pub struct Test {
     pub system: SecondOrderSystem,
     /// True if M is known in the identification.
     pub mass_known: bool,
-    /// Numbers of the driven lines; above them, the period has about the same number of lines
-    /// without force.
+    /// Numbers of the driven lines. Above the highest driven line, the spectrum of the period has
+    /// about the same number of lines without force.
     pub lines: Vec<usize>,
     /// Force (N), samples × dof, one period.
     pub force: Record,
@@ -82,10 +82,10 @@ pub struct Test {
     pub acceleration: Record,
 }
 
-/// Returns machine `index` of a series of any length, each with its test: 1 to 10 degrees of
-/// freedom, damping ratios of 0.3 to 5 %, and five kinds of machine in turn. The force has lines of
-/// 10 N up to 1.3 times the highest natural frequency, with random phases; there are at least
-/// twenty lines for each degree of freedom.
+/// Returns machine number `index` of an endless series, with its test. The machines have 1 to 10
+/// degrees of freedom and damping ratios of 0.3 to 5 %; five kinds of machine follow one another in
+/// turn. The force has lines of 10 N up to 1.3 times the highest natural frequency, with random
+/// phases, and at least twenty lines for each degree of freedom.
 ///
 /// # Errors
 /// [`ProblemError::Model`] if a line is an undamped resonance.
@@ -104,8 +104,9 @@ pub fn series(index: u64) -> Result<Test, ProblemError> {
 }
 
 /// Returns a steady test of a machine: `count` lines of 10 N up to 1.3 times its highest natural
-/// frequency, with random phases. The forces act at every degree of freedom, or only at the first,
-/// whose mass is then known.
+/// frequency, with random phases. With `one_force`, the force acts only at the first degree of
+/// freedom, and M is known in the identification. Otherwise forces act at every degree of freedom,
+/// and M is unknown.
 ///
 /// # Errors
 /// [`ProblemError::Model`] if the modes cannot be found or a line is an undamped resonance.

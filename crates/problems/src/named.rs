@@ -55,7 +55,8 @@ mod tests {
 
     use super::*;
 
-    /// Half a unit of the fourth printed decimal.
+    /// Tolerance of the comparison with published values: half a unit of their fourth decimal
+    /// place.
     const PRINTED: f64 = 5e-5;
 
     #[test]

@@ -11,8 +11,8 @@ use crate::error::ProblemError;
 
 /// A housing on the oil film of a shaft in rigid supports, with shakers in x and y.
 ///
-/// The housing, of mass M_s, obeys −ω² M_s x + (H_film + H_baseline) x = f, and the shaft does not
-/// move: only the probes show its run-out.
+/// The housing, of mass M_s, obeys −ω² M_s x + (H_film + H_baseline) x = f. The shaft does not
+/// move; its run-out appears only in the signals of the probes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BearingRig {
     /// K (N/m), C (N·s/m) and M (kg) of the film, 2×2 each.
@@ -21,7 +21,8 @@ pub struct BearingRig {
     pub baseline: [Matrix2<f64>; 3],
     /// Mass of the housing, in kg.
     pub stator_mass: f64,
-    /// Fraction of the other direction in each sensor (crosstalk), a ratio.
+    /// Crosstalk of each sensor: the sensor adds the signal of the other direction, multiplied by
+    /// this ratio.
     pub crosstalk: f64,
     /// Speed of rotation, in Hz.
     pub rotation_hz: f64,
@@ -80,7 +81,7 @@ impl BearingRig {
         Self { film: [Matrix2::zeros(); 3], run_out: Vec::new(), ..self.clone() }
     }
 
-    /// Returns H of film and baseline, 2×2, in N/m, at `omega` (rad/s).
+    /// Returns the dynamic stiffness H of film and baseline, 2×2, in N/m, at `omega` (rad/s).
     ///
     /// # Source
     /// Childs and Hale (1994), Journal of Tribology 116, 337–344.

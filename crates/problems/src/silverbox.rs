@@ -14,7 +14,7 @@ use mechid_signal::{Record, Sampling};
 fn channels(file: &str, columns: [usize; 2]) -> Option<Record> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/silverbox");
     let Ok(text) = std::fs::read_to_string(folder.join(file)) else {
-        eprintln!("skipped: {file} of the Silverbox is not beside the project");
+        eprintln!("skipped: {file} of the Silverbox is missing in ../shared/data/silverbox");
         return None;
     };
     let mut channels = [Vec::new(), Vec::new()];
@@ -41,7 +41,8 @@ pub fn realisations() -> Option<Record> {
 /// Number of samples in the steady period of a realisation.
 pub const REALISATION: usize = 8192;
 
-/// Returns the first sample of the steady period of realisation 1 to 6, counted from 0.
+/// Returns the index, counted from 0, of the first sample of the steady period of a realisation;
+/// `realisation` is 1 to 6.
 pub fn start_of(realisation: usize) -> usize {
     8692 * realisation + 337
 }

@@ -1,4 +1,5 @@
-//! Steady states line by line: closed-form amplitudes, and records made of them.
+//! Steady-state responses: amplitudes in closed form, line by line, and records that are
+//! synthesised from these amplitudes.
 
 use mechid_model::{JournalBearing, KyxSign, OilFilm, ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid_signal::{Record, Sampling};
@@ -12,7 +13,8 @@ pub fn oscillator() -> SecondOrderSystem {
     Sdof::new(10.0, 180.0, 5000.0).unwrap().system()
 }
 
-/// The dissertation's bearing with −Kyx: one lightly damped and one heavily damped mode.
+/// The journal bearing of the dissertation, with the sign `KyxSign::Minus`: one lightly damped and
+/// one heavily damped mode.
 pub fn bearing() -> SecondOrderSystem {
     let film = OilFilm {
         kxx: 40.0,
@@ -40,8 +42,7 @@ pub fn forces(lines: &[usize], channels: usize, amplitude: f64) -> ComplexMatrix
     })
 }
 
-/// Displacement amplitudes G(ω) F.
-/// Lines × degrees of freedom, in m.
+/// Returns the displacement amplitudes G(ω) F, lines × degrees of freedom, in m.
 pub fn displacements(
     system: &SecondOrderSystem,
     omega: &[f64],
@@ -107,7 +108,8 @@ pub fn relative_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     (found - expected).abs().max() / expected.abs().max()
 }
 
-/// All entries of M, C and K, in the order of the unknowns if every entry is free. In SI units.
+/// Returns all entries of M, C and K in SI units, in the order of the unknowns of a fit in which
+/// every entry is free.
 pub fn all_entries(system: &SecondOrderSystem) -> DVector<f64> {
     let matrices = [system.mass(), system.damping(), system.stiffness()];
     DVector::from_iterator(
@@ -116,8 +118,8 @@ pub fn all_entries(system: &SecondOrderSystem) -> DVector<f64> {
     )
 }
 
-/// Sampling of one period of 256 samples, with twenty samples per cycle of the fastest mode, and
-/// all its lines.
+/// Returns the sampling of one period of 256 samples, with twenty samples per cycle of the fastest
+/// mode, and the numbers of its lines, 1 to 127.
 pub fn sampling(system: &SecondOrderSystem) -> (Sampling, Vec<usize>) {
     let fastest = system.modes().unwrap().iter().map(|m| m.natural_frequency()).fold(0.0, f64::max);
     let sampling = Sampling::new(std::f64::consts::TAU / (20.0 * fastest), 256).unwrap();

@@ -6,12 +6,12 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::error::ProblemError;
 
-/// Course of the force between two samples.
+/// Assumption on the force between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Between {
-    /// Held at the value of the left sample.
+    /// The force is constant, with the value of the earlier sample.
     Held,
-    /// Linear from one sample to the next.
+    /// The force is linear from one sample to the next.
     Linear,
 }
 

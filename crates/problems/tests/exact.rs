@@ -1,5 +1,5 @@
-//! Checks of the reference solutions: complex modal superposition, prescribed motions, refinement,
-//! repetition.
+//! Checks of the reference solutions against complex modal superposition and prescribed motions,
+//! and with refined and repeated forces.
 
 use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
 use mechid_problems::{
@@ -112,7 +112,8 @@ fn held_and_linear_agree_with_modal_superposition() {
 
 #[test]
 fn long_steps_are_as_exact_as_short_ones() {
-    // A held force is the same force on a grid eight times finer.
+    // A force that is held between samples is the same force with eight times the sampling rate, so
+    // both responses must be equal.
     let system = random_stable(4, 11);
     let (coarse, ratio) = (random_force(4, 40, 0.4), 8);
     let len = coarse.len() * ratio;
@@ -195,8 +196,8 @@ fn a_prescribed_motion_is_found_from_its_force() {
         let expected = Response::new(record(0), record(1), record(2)).unwrap();
         let found = exact_harmonic_periodic(&system, &record(3)).unwrap();
         assert!(gap(&found, &expected) < 1e-12, "len {len}");
-        // A motion that starts in the periodic state is periodic; any other motion starts in its
-        // given state.
+        // If the given initial state is that of the periodic motion, the response must be the
+        // periodic motion. For any other initial state, the response must begin with this state.
         let on = InitialState::new(rows[0][0].clone(), rows[0][1].clone()).unwrap();
         assert!(gap(&exact_harmonic(&system, &record(3), &on).unwrap(), &expected) < 1e-12);
         let off = exact_harmonic(&system, &record(3), &some_state(3)).unwrap();
@@ -207,9 +208,9 @@ fn a_prescribed_motion_is_found_from_its_force() {
 
 #[test]
 fn the_three_conventions_meet_on_a_fine_grid() {
-    // The force is a cosine with 2,000 samples per period. The error of the linear force is
-    // (ωΔt)²/12 of the amplitude, that of the held force ωΔt/2; the next terms are smaller by a
-    // factor of (ωΔt)² ≈ 1e-5.
+    // The force is a cosine with 2,000 samples per period. If the force is linear between the
+    // samples, the error of the response is (ωΔt)²/12 of its amplitude. If the force is held, the
+    // error is ωΔt/2. The next terms of both errors are smaller by a factor of (ωΔt)² ≈ 1e-5.
     let system = steffen_rade();
     let sampling = Sampling::new(5e-4, 2000).unwrap();
     let data = DMatrix::from_fn(2000, 2, |k, j| {
@@ -220,7 +221,7 @@ fn the_three_conventions_meet_on_a_fine_grid() {
     let linear = exact_foh_periodic(&system, &force).unwrap();
     let step = sampling.omega0() * sampling.dt();
     assert!((gap_of_displacement(&linear, &exact) / (step * step / 12.0) - 1.0).abs() < 1e-3);
-    // A held force lags by half a step.
+    // A held force lags by half a step, which gives a relative error of ω Δt/2.
     let held = exact_zoh_periodic(&system, &force).unwrap();
     assert!((gap_of_displacement(&held, &exact) / (step / 2.0) - 1.0).abs() < 1e-3);
 }

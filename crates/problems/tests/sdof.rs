@@ -1,5 +1,5 @@
-//! Two independent exact answers for one degree of freedom: the matrix exponential of this crate,
-//! and the divided differences of the closed forms in `mechid-model`.
+//! Comparison of two independent exact responses of one degree of freedom: by the matrix
+//! exponential of this crate, and by the divided differences of the closed forms in `mechid-model`.
 
 use mechid_model::{InitialState, Response, Sdof};
 use mechid_problems::{

@@ -60,7 +60,8 @@ pub fn html(py: Python<'_>, result: Arc<impl ResultOutput + ?Sized + 'static>) -
     work::watched(py, None, || Ok(()), move || result.html())
 }
 
-/// Creates the HTML page of a result with these texts without the interpreter's lock.
+/// Creates the HTML page of a result with these texts. The lock of the interpreter is released
+/// during the computation.
 pub fn page(
     py: Python<'_>,
     result: Arc<impl ResultOutput + ?Sized + 'static>,

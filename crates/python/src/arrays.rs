@@ -36,7 +36,7 @@ pub fn vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<
     values.into_pyarray(py)
 }
 
-/// Kind of a response by name, and its samples × degrees of freedom.
+/// Name of a kind of response, and the values of the response, samples × degrees of freedom.
 pub type Named<'py> = (String, Bound<'py, PyArray2<f64>>);
 
 /// Returns records with their names.

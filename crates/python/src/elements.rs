@@ -31,7 +31,7 @@ pub fn described_machine(
     let read = || -> Result<_, AnalysisError> {
         let how = IdentifyElements::new(parse_machine(name, description, Path::new(folder))?);
         let channels = match how.machine.instruments.speed {
-            // Tables over the speed have no columns of samples.
+            // Tables of results against the speed of rotation have no columns of samples.
             mechid::model::elements::Speed::Synchronous => mechid::Channels::default(),
             _ => how.channels()?,
         };

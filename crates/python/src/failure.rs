@@ -56,8 +56,8 @@ impl Failure for SimulateError {
     const CRATE: &'static str = "Simulate";
 }
 
-/// Returns the exception for an error. It has the message, and a text with the crate, the variant
-/// and all numbers; the Python class derives `code` and `fields` from this text.
+/// Returns the exception for an error. The exception has the message, and a text with the crate,
+/// the variant and all numbers; the Python class derives `code` and `fields` from this text.
 pub fn exception<E: Failure>(py: Python<'_>, failure: &E) -> PyErr {
     raised(py, failure.to_string(), format!("{}({failure:?})", E::CRATE))
 }

@@ -1,4 +1,5 @@
-//! Many records by one saved analysis: one part at a time, and the summary of all parts.
+//! Analysis of many records (a fleet) with one saved analysis: functions for one part of the
+//! records, and for the summary of all parts.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -53,9 +54,9 @@ pub fn fleet_record_column(py: Python<'_>, analysis: &str) -> PyResult<Option<St
 }
 
 /// Computes the result rows of some records and writes them into a file in `folder`, unless this
-/// file exists. Returns a report as JSON. `analysis` is JSON, too. `isolation` has the interpreter
-/// of the worker processes, the memory limit per record, in GB, and the time limit per record, in
-/// s. Without `isolation`, the records are processed in this process.
+/// file exists. Returns a report as JSON. `analysis` is JSON, too. `isolation` is the path of the
+/// Python interpreter for the worker processes, the memory limit per record, in GB, and the time
+/// limit per record, in s. Without `isolation`, the records are processed in this process.
 #[pyfunction]
 #[pyo3(signature = (records, analysis, folder, isolation))]
 pub fn fleet_part(
@@ -86,8 +87,8 @@ pub fn fleet_part(
     failure::json(py, &done)
 }
 
-/// Identifies records given by a name and named columns; returns their rows as the bytes of a
-/// Parquet file. The analysis is JSON.
+/// Identifies records, each given as a name and named columns; returns the rows of results as the
+/// bytes of a Parquet file. The analysis is JSON.
 #[pyfunction]
 pub fn fleet_rows<'py>(
     py: Python<'py>,

@@ -24,7 +24,7 @@ pub struct Machine(pub mechid::Machine);
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct ModalSystem(pub mechid::ModalSystem);
 
-/// Machine or modes of a test, which respond to forces.
+/// Machine, or modes of a test, for the computation of responses to forces.
 #[derive(FromPyObject)]
 pub enum Answering<'py> {
     Machine(PyRef<'py, Machine>),
@@ -33,7 +33,8 @@ pub enum Answering<'py> {
 
 #[pymethods]
 impl ModalSystem {
-    /// Reads a result of modes; `None` for the JSON of a machine.
+    /// Reads the modes from the JSON file of a result; returns `None` if the file describes a
+    /// machine.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
         work::brief(py, || mechid::ModalSystem::read(path)).map(|system| system.map(Self))
@@ -107,8 +108,8 @@ impl Machine {
         Ok([arrays::matrix(py, rate)?, arrays::matrix(py, input)?])
     }
 
-    /// Returns the receptances x_i / F_j at frequencies in rad/s, as frequencies × motions ·
-    /// forces.
+    /// Returns the receptances x_i / F_j at frequencies in rad/s: one row for each frequency, one
+    /// column for each pair of motion and force.
     fn receptances<'py>(
         &self,
         py: Python<'py>,

@@ -32,8 +32,8 @@ pub fn time_column(names: Vec<String>) -> Option<usize> {
     names.iter().position(|name| name == time)
 }
 
-/// Returns the sampling rate, in Hz, of equally spaced instants in the unit that the name of their
-/// column states.
+/// Returns the sampling rate, in Hz, from equally spaced instants. `name` is the name of their
+/// column; it states their unit.
 #[pyfunction]
 pub fn rate_of(py: Python<'_>, name: &str, instants: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
     let values = instants.as_array().to_vec();
@@ -113,7 +113,7 @@ impl Measurement {
         failure::json(py, self.0.channels())
     }
 
-    /// Returns the saved plan as JSON; `None` for arrays.
+    /// Returns the saved plan as JSON; `None` if the data are arrays.
     #[getter]
     fn plan(&self, py: Python<'_>) -> PyResult<Option<String>> {
         self.0.plan().map(|plan| failure::json(py, &plan)).transpose()
@@ -126,7 +126,7 @@ impl Measurement {
         arrays::record(py, force)
     }
 
-    /// Reads every kind of response of the window.
+    /// Reads every measured kind of response (displacement, velocity, acceleration) of the window.
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
         let record = self.0.clone();
         let read = move || -> Result<_, AnalysisError> { record.responses() };

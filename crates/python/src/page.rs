@@ -16,7 +16,8 @@ pub struct PageTexts {
     title: Option<String>,
     /// Names and values of further information.
     about: Vec<(String, String)>,
-    /// File of the record, whose head may have further information; empty if there is none.
+    /// File of the record, whose header may contain further information; empty if there is no
+    /// record.
     record: PathBuf,
     /// File with the positions of the channels.
     geometry: Option<PathBuf>,

@@ -57,7 +57,7 @@ impl Predicted {
         columns.map(|(name, values)| (name, arrays::vector(py, values.to_vec()))).collect()
     }
 
-    /// Returns every kind of response of a machine, and no kind for modes.
+    /// Returns the displacement, velocity and acceleration of a machine; an empty list for modes.
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
         let of = |response: &Response| {
             ResponseQuantity::ALL.map(|kind| (kind, response.quantity(kind).clone())).into()

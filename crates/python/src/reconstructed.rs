@@ -49,7 +49,7 @@ pub fn reconstruct(
     force.map(|force| Reconstructed(Arc::new(force)))
 }
 
-/// Frequencies, and amplitudes of frequencies × degrees of freedom.
+/// Frequencies, and complex amplitudes (frequencies × degrees of freedom).
 type Lines<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<Complex<f64>>>);
 
 #[pymethods]

@@ -33,7 +33,8 @@ struct Layout {
 
 #[pymethods]
 impl ResponseTable {
-    /// Reads a file, whose analysis may use this memory.
+    /// Reads a file of frequency responses. `memory_gb` is the maximum memory of their analysis, in
+    /// GB.
     #[staticmethod]
     #[pyo3(signature = (path, memory_gb))]
     fn read(py: Python<'_>, path: PathBuf, memory_gb: Option<f64>) -> PyResult<Self> {
@@ -42,8 +43,8 @@ impl ResponseTable {
         work::watched(py, None, || Ok(()), read).map(Self)
     }
 
-    /// Copies responses of frequencies × points × forces, their standard errors, and coherences of
-    /// frequencies × points; the layout is JSON.
+    /// Copies responses (frequencies × points × forces), their standard errors, and coherences
+    /// (frequencies × points); the layout is JSON.
     #[staticmethod]
     #[pyo3(signature = (layout, frequency_hz, response, std_error, coherence))]
     fn from_arrays(

@@ -1,5 +1,6 @@
-//! Excitation signals, and simulation of a described experiment, of the response to a force by a
-//! scheme, and of the exact response between samples.
+//! Excitation signals, and three simulations: a described experiment, the response to a force by a
+//! time-stepping scheme, and the exact response to a force that is constant or linear between its
+//! samples.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +22,7 @@ use crate::{failure, work};
 /// then force and responses with noise, then force and responses without noise.
 type Simulated<'py> = (String, f64, Option<Machine>, Channels<'py>, Channels<'py>);
 
-/// Force, and each kind of response.
+/// Samples of the force, and for each kind of response its name and samples.
 type Channels<'py> = (Bound<'py, PyArray2<f64>>, Vec<Named<'py>>);
 
 /// Reads a described experiment from a JSON text or, without a text, from a JSON file. For a text,
@@ -99,8 +100,8 @@ pub fn predict<'py>(
     responses(py, work::watched(py, None, || Ok(()), step)?)
 }
 
-/// One period, its lines, amplitudes and phases, RMS value, peak including values between samples,
-/// and crest factor.
+/// Sampled multisine: the samples of one period; the numbers, amplitudes and phases of its lines;
+/// then its RMS value, its peak including the values between samples, and its crest factor.
 type Sampled<'py> = (
     Bound<'py, PyArray1<f64>>,
     Vec<usize>,
@@ -109,9 +110,9 @@ type Sampled<'py> = (
     (f64, f64, f64),
 );
 
-/// Creates a multisine, with phases by a law, or optimised for a low crest factor. `search` has the
-/// number of starting points and the seed; `level` has a quantity (`amplitude`, `rms` or `peak`)
-/// and its value.
+/// Creates a multisine whose phases follow a law, or are optimised for a low crest factor. `search`
+/// has the number of starting points and the seed; `level` has a quantity (`amplitude`, `rms` or
+/// `peak`) and its value.
 #[pyfunction]
 pub fn multisine<'py>(
     py: Python<'py>,

@@ -108,7 +108,8 @@ fn shared(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
             Ok(pool)
         }
         stale => {
-            // The threads of the inherited pool are not in this process, so it must not be dropped.
+            // The threads of the inherited pool are not in this process, so the pool must not be
+            // dropped.
             std::mem::forget(stale);
             let pool = made(py, 0)?;
             *known = Some((process, Arc::clone(&pool)));
@@ -117,7 +118,7 @@ fn shared(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
     }
 }
 
-/// Releases a pool whose threads are busy: the next call creates another one.
+/// Releases a thread pool whose threads are busy, so that the next call creates another pool.
 fn abandon(pool: &Arc<ThreadPool>) {
     let mut known = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     if known.as_ref().is_some_and(|(_, shared)| Arc::ptr_eq(shared, pool)) {

@@ -106,7 +106,7 @@ fn figure(what: impl Into<String>, value: String, goal: &'static str) -> Figure 
     Figure { what: what.into(), value, goal }
 }
 
-/// A record of one mass: time, force, displacement and velocity.
+/// Writes a record of one mass: time, force, displacement and velocity.
 fn write_record(path: &Path, periods: usize) -> Result<()> {
     let description = format!(
         r#"{{

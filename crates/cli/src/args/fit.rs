@@ -31,8 +31,8 @@ pub struct FitArgs {
     /// More records of the same machine, with the same columns and window: all are fitted together
     #[arg(value_name = "RECORD")]
     pub(super) more: Vec<PathBuf>,
-    /// First samples of further windows of the first record, each as long as the one that begins at
-    /// --start; all are fitted together, as realisations of one excitation
+    /// First samples of further windows of the first record, each as long as the window at --start;
+    /// all windows are fitted together, as realisations of one excitation
     #[arg(long, value_name = "SAMPLE,…", value_parser = at_least_one, value_delimiter = ',',
           requires = "period", help_heading = "Time and window")]
     more_starts: Vec<usize>,
@@ -55,14 +55,15 @@ pub struct FitArgs {
     #[arg(long, value_name = "NOISE")]
     pub(super) noise: Option<Pooling>,
     /// Standard deviation of the noise on the force samples, in N: one value for all forces, or one
-    /// per degree of freedom. It is for open records: with it, the record is fitted as an open
-    /// record [default: estimated above the excited band, or between hits]
+    /// per degree of freedom. With this option, the record is fitted as an open record [default:
+    /// estimated above the excited band, or between hits]
     #[arg(long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true)]
     force_noise: Vec<f64>,
     /// Extent of the window: open (any part of a response; its transient is estimated with the
-    /// machine) or period (whole periods) [default: in the time domain open, or period with
-    /// spectral derivatives; in the frequency domain period with --period; without it, open for
-    /// nonlinear terms, and for a linear machine period unless a transient is found]
+    /// machine) or period (whole periods) [default: in the time domain, period with spectral
+    /// derivatives, otherwise open; in the frequency domain, period with --period; without
+    /// --period, open for nonlinear terms, and for a linear machine open if a transient is found,
+    /// otherwise period]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
     /// Assumed force between the samples. For open records, hits and the time domain: held

@@ -23,7 +23,7 @@ pub struct HitRuleArgs {
     hits: Option<HitRule>,
 }
 
-/// Hits of a hammer, and where it strikes.
+/// Hits of a hammer, and the degrees of freedom that it strikes.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Hammer tests")]
 pub struct HitArgs {

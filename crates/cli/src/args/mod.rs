@@ -349,7 +349,7 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 }
 
 impl RecordArgs {
-    /// Returns how to read the file.
+    /// Returns the settings for reading the file.
     pub fn reading(&self) -> Reading {
         Reading {
             skip_lines: self.skip_lines,

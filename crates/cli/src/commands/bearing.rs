@@ -45,7 +45,7 @@ pub struct BearingArgs {
     /// Further records of the same speed and load, with the same columns and window
     #[arg(value_name = "RECORD")]
     more: Vec<PathBuf>,
-    /// Baseline record, with the same columns and window; repeat the option for further ones
+    /// Baseline record, with the same columns and window; repeat the option for further records
     #[arg(long, value_name = "RECORD")]
     baseline: Vec<PathBuf>,
     /// The file describes tests at several speeds and loads
@@ -106,7 +106,8 @@ struct TableArgs {
     /// tables have standard errors
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "frf_table")]
     averages: Option<usize>,
-    /// Two points to use, x before y, as the tables name them [default: all]
+    /// Names in the tables of the two points to use: the point in direction x, then that in
+    /// direction y [default: all]
     #[arg(long, value_name = "POINT,…", value_delimiter = ',', requires = "frf_table")]
     points: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! `mechid fleet`: the machines behind many records.
+//! `mechid fleet`: identification of the machines of many records by one saved analysis.
 
 use std::ffi::OsString;
 use std::num::NonZero;
@@ -48,7 +48,7 @@ pub struct FleetArgs {
     /// Number of records processed at a time [default: number of processors]
     #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     workers: Option<usize>,
-    /// Number of records in a part, which is one file of the folder
+    /// Number of records in each file of the folder of results
     #[arg(long, value_name = "COUNT", default_value_t = RECORDS_PER_PART,
           value_parser = at_least_one)]
     part_records: usize,
@@ -82,7 +82,7 @@ impl FleetArgs {
         }
     }
 
-    /// Computes the missing parts, and summarises all of them.
+    /// Computes the files of results that are missing, and summarises all files of results.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let saved = SavedAnalysis::read(&self.analysis)?;
         let analysis = SavedAnalysis { time_limit: self.time_limit.or(saved.time_limit), ..saved };
@@ -95,7 +95,8 @@ impl FleetArgs {
             // The bar is hidden unless the error stream is a terminal.
             ProgressBar::new(fleet.record_count() as u64)
         };
-        let style = "{wide_bar} {pos} of {len} records, {elapsed}, {eta} left (Ctrl-C ends it)";
+        let style =
+            "{wide_bar} {pos} of {len} records, {elapsed}, {eta} left (Ctrl-C ends the run)";
         bar.set_style(
             ProgressStyle::with_template(style).expect("the template is written correctly"),
         );

@@ -1,4 +1,4 @@
-//! `mechid identify`: the machine behind a record.
+//! `mechid identify`: identification of a machine from its records.
 
 use std::ffi::OsString;
 

@@ -46,8 +46,8 @@ use crate::{options, repeat};
 /// standard error.
 ///
 /// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes to
-/// compute all of them: --modes computes only this number of modes: the lowest ones or, with
-/// --near-hz, those nearest to a frequency.
+/// compute all of them. --modes gives the number of modes to compute: the lowest modes or, with
+/// --near-hz, the modes nearest to a frequency.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid modes beam.csv --force hammer --acceleration a1 --band-hz 5:1200
@@ -213,7 +213,8 @@ impl ModesArgs {
         }
         self.refuse("a record", &[("quantity", self.quantity.is_some())])?;
         let is_decay = channels.force.is_empty() && !self.unmeasured.ambient;
-        // The fit of several decays also searches from stated frequencies.
+        // Stated frequencies need the fit of several decays, even for a single decay: only this fit
+        // searches near stated frequencies.
         let is_common = !(self.more.is_empty() && self.near_hz.is_empty());
         if is_decay && is_common {
             self.refuse("free decays", &self.decay_refusals())?;
@@ -274,8 +275,8 @@ impl ModesArgs {
         self.drawn((outcome, words), drawn, &modes, &names)
     }
 
-    /// Returns the columns of a record: those that are named, or that state a force or a response;
-    /// `None` if there is no response.
+    /// Returns the columns of a record: the columns that the user names, or the columns that the
+    /// file states to be forces and responses. `None` if there is no response.
     fn channels_of(&self, record: &Path) -> Option<Channels> {
         let mut channels = self.channels.in_file(record, &self.input).ok()?;
         if self.unmeasured.ambient {
@@ -386,7 +387,8 @@ impl ModesArgs {
         Ok(outcome.with_file(path, options::spelled(&page)))
     }
 
-    /// Refuses the first given option among some.
+    /// Returns an error for the first of the `options` that is given; `what` names the data to
+    /// which it does not apply.
     fn refuse(&self, what: &str, options: &[(&'static str, bool)]) -> Result<(), CliError> {
         let Some(&(setting, _)) = options.iter().find(|(_, given)| *given) else { return Ok(()) };
         let why = format!("it does not apply to {what}");

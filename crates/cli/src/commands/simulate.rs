@@ -1,4 +1,4 @@
-//! `mechid simulate`: the record an experiment would give.
+//! `mechid simulate`: simulated record of a described experiment.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -138,7 +138,7 @@ impl SimulateArgs {
             .with_plot(&self.plot, words, || Ok(simulation.figure(&report.record)))
     }
 
-    /// Reads the experiment; refuses an output that would replace a file that it names.
+    /// Reads the experiment; refuses an output that would replace a file named in the experiment.
     fn experiment(&self) -> Result<Experiment, CliError> {
         let experiment = Experiment::read(&self.experiment)?.with_memory_gb(self.memory_gb);
         let outputs: Vec<_> = std::iter::once(&self.output).chain(&self.plot.plot).collect();

@@ -45,10 +45,10 @@ pub struct SweepArgs {
     /// Natural frequency whose cycles NPI counts, in Hz [default: the lowest of the machine]
     #[arg(long, value_name = "HZ")]
     natural_frequency_hz: Option<f64>,
-    /// Estimator: from sample to sample, by Euler's rule (euler; its bias is proportional to the
-    /// step) or with a force that is held or linear between samples; by the equation of motion at
-    /// the samples (needs the acceleration); or by least squares or maximum likelihood on the
-    /// spectra
+    /// Estimator: euler, held and linear fit the change of the state from sample to sample (euler:
+    /// Euler's rule, whose bias is proportional to the step; held, linear: the force between
+    /// samples); equation-of-motion fits the equation of motion at the samples (needs the
+    /// acceleration); least-squares and maximum-likelihood fit the spectra
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "linear")]
     estimator: Estimator,
     /// Find the mass of a described machine, too; otherwise the mass of the description is used

@@ -18,7 +18,7 @@ const UNITS: [(&str, &str); 8] = [
     ("PA·S", "Pa·s"),
 ];
 
-/// Values that are numbers without a unit.
+/// Placeholders in help texts for numbers without a unit.
 const PURE: [&str; 9] =
     ["PERCENT", "STEPS", "RATIO", "LAMBDA", "BETA", "GAMMA", "THETA", "RADIUS", "FRACTION,…"];
 
@@ -57,7 +57,7 @@ fn every_subcommand_has_examples_that_are_understood() {
         let examples = examples(&help);
         assert!(!examples.is_empty(), "{name} --help has no Examples:");
         for example in &examples {
-            // The shell reads a redirection itself.
+            // The shell handles a redirection, which is not an argument of the program.
             let call = example.split_once(" > ").map_or(example.as_str(), |(call, _)| call);
             let parsed = Cli::try_parse_from(words(call));
             assert!(parsed.is_ok(), "{example}\n{}", parsed.unwrap_err());
@@ -90,7 +90,8 @@ fn every_option_is_explained_and_names_its_unit() {
             let unit = UNITS.iter().find(|(value, _)| name.starts_with(value));
             match unit {
                 Some((_, unit)) => assert!(help.contains(unit), "{place}: {help}"),
-                // A level is in the unit of its own column, or has no unit.
+                // If the placeholder of a number implies no unit, the number is without unit, or
+                // the help text states the unit, such as the unit of the column.
                 None => assert!(
                     PURE.contains(&name.as_str()) || help.contains("unit"),
                     "{place} takes a number called {name}: which unit?"

@@ -1,6 +1,6 @@
-//! Lines for the reader's shell that are not commands of `mechid`. Each is checked against the
-//! workspace, and the program that it starts is run. A page must not have a line that this file
-//! does not know.
+//! Shell commands of the pages that are not commands of `mechid`. Each command is checked against
+//! the workspace, and the program that it starts is run. A page must not have a command that this
+//! file does not know.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use super::runs::Run;
 pub const BEGINNINGS: [&str; 8] =
     ["cargo ", "git ", "mdbook ", "rustup ", "pip ", "python ", ".ci/", "MECHID_"];
 
-/// The workspace as cargo describes it, against which the lines are checked.
+/// The workspace as cargo describes it; the command lines of the pages are checked against it.
 pub struct Workspace {
     root: PathBuf,
     metadata: Value,
@@ -26,10 +26,11 @@ impl Workspace {
         Self { root: root.to_owned(), metadata: serde_json::from_str(&told).unwrap() }
     }
 
-    /// Returns the way in which one line is run.
+    /// Returns the way in which a test runs a command line of the pages.
     ///
     /// # Errors
-    /// If the line does not fit the workspace; the error gives the reason.
+    /// If the workspace has no target, option or script for the command line; the error gives the
+    /// reason.
     pub fn meaning(&self, line: &str) -> Result<Run, String> {
         let typed = line.split(" # ").next().unwrap_or_default().trim();
         let mut words = shlex::split(typed).ok_or("no shell reads it")?;
@@ -90,7 +91,7 @@ impl Workspace {
             ("new", None) | ("add", None) => self.begins_a_crate(own),
             ("install", _) => self.installs(value(own, &["--path"]).unwrap_or_default()),
             ("tree", _) if own.is_empty() => Ok(Run::Always),
-            // `.ci/run` has the commands for the whole workspace.
+            // Commands for the whole workspace must be among the commands of `.ci/run`.
             _ if own.contains(&"--workspace") => self.is_run_always(typed),
             _ => Err("nothing runs this command of cargo".into()),
         }
@@ -107,8 +108,8 @@ impl Workspace {
         self.metadata["packages"].as_array().unwrap().iter().find(|p| p["name"] == name)
     }
 
-    /// Checks that the package in this folder has the program `mechid`. `.ci/python` compiles it
-    /// without the tests and their features.
+    /// Checks that the package in this folder has the program `mechid`. The script `.ci/python`
+    /// compiles the program, without the tests and their features.
     fn installs(&self, folder: &str) -> Result<Run, String> {
         let manifest = self.root.join(folder).join("Cargo.toml");
         let packages = self.metadata["packages"].as_array().unwrap();
@@ -157,7 +158,7 @@ fn cargo(root: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Checks that cargo's own help has every option.
+/// Checks that the help of cargo lists every option of the command.
 fn known_options(task: &str, words: &[&str]) -> Result<(), String> {
     let help = Command::new(env!("CARGO")).args([task, "-h"]).output().unwrap();
     if !help.status.success() {
@@ -187,7 +188,8 @@ fn target(package: &Value, kind: &str, name: &str) -> Option<Value> {
     targets(package, kind).into_iter().find(|target| target["name"] == name).cloned()
 }
 
-/// Checks that `cargo test` runs each measurement of these benches once.
+/// Checks that the package has benches, and that `cargo test` runs the measurements of each bench
+/// once.
 fn is_benched(package: Option<&Value>) -> Result<Run, String> {
     let benches = package.map(|package| targets(package, "bench")).unwrap_or_default();
     match benches.iter().find(|bench| bench["test"] != true) {
@@ -197,8 +199,8 @@ fn is_benched(package: Option<&Value>) -> Result<Run, String> {
     }
 }
 
-/// Checks that the sources of a test have the tests that a line selects and the variables that it
-/// sets.
+/// Checks that the source files of a test target contain the test function that a command line
+/// selects, and the environment variables that the line sets.
 fn test_knows(test: &Value, words: &[&str], settings: &[String]) -> Result<(), String> {
     let main = Path::new(test["src_path"].as_str().unwrap());
     let files = below(main.parent().unwrap());

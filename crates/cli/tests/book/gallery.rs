@@ -1,4 +1,5 @@
-//! Pages of the gallery; their measured records are stored next to the project, not in it.
+//! Tests of the gallery pages. The measured records of the pages are stored outside the repository,
+//! in a folder next to it.
 
 use std::fs;
 use std::path::{Path, PathBuf};

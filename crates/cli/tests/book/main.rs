@@ -36,7 +36,7 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Returns a page with the files that it includes.
+/// Returns the text of a page, followed by the texts of the files that it includes.
 fn whole(path: &Path) -> String {
     let text = read(path);
     let includes = Page::parse(&text).includes;
@@ -78,7 +78,8 @@ fn documents() -> Vec<PathBuf> {
 /// Faults found in the pages.
 #[derive(Default)]
 struct Findings {
-    /// Answers and pictures that differ from those of the program; blessing replaces them.
+    /// Answers and pictures that differ from those of the program; a run with `MECHID_BLESS=1`
+    /// replaces them.
     stale: Vec<String>,
     /// Faults that only an author can correct.
     wrong: Vec<String>,
@@ -205,7 +206,8 @@ fn every_page_can_be_found() {
     }
 }
 
-/// If a block shows a file, the text must name it, because the line of the fence is not shown.
+/// If a code block shows a file, the text of the page must name the file, because the opening line
+/// of the block, which names it, is not visible in the book.
 #[test]
 fn readers_are_told_what_to_call_a_file() {
     for page in chapters().concat() {
@@ -218,8 +220,8 @@ fn readers_are_told_what_to_call_a_file() {
     }
 }
 
-/// Numbers of three or more digits in the text of introduction and tutorial must be in a block of
-/// the same chapter, rounded to the digits written.
+/// Every number of three or more digits in the text of the introduction and the tutorial also
+/// appears in a code block of the same chapter; the text may round it.
 #[test]
 fn the_tutorial_says_what_its_blocks_show() {
     let mut looked_at = 0;
@@ -273,8 +275,8 @@ fn tables_fit_on_a_screen() {
     assert!(rows > 100, "{rows} rows");
 }
 
-/// Returns every line for a shell, in blocks and in running text, and its page. Lines that make or
-/// enter a folder are not among them.
+/// Returns every shell command of the pages, in blocks and in running text, with its page. Commands
+/// that make or enter a folder are excluded.
 fn shell_lines(wrong: &mut Vec<String>) -> Vec<(PathBuf, String)> {
     let mut all = Vec::new();
     for document in documents() {
@@ -388,7 +390,8 @@ fn the_reference_has_every_subcommand() {
     assert!(commands > 8, "{list}");
 }
 
-/// The book has the sentence with the counts from the generated audit.
+/// The page on the reproduction of the dissertation has the same sentence with counts as the
+/// generated audit.
 #[test]
 fn the_book_counts_as_the_audit_does() {
     let audit = read(&root().join("docs/thesis/audit.md"));

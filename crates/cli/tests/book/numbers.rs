@@ -9,7 +9,7 @@ pub struct Written {
 }
 
 impl Written {
-    /// Returns true if the exact number, rounded to the same digits, is this number.
+    /// Returns true if `exact`, rounded to the digits of this number, equals this number.
     pub fn is_of(&self, exact: f64) -> bool {
         (exact - self.value).abs() <= self.half * (1.0 + 1e-6)
     }
@@ -37,8 +37,8 @@ pub fn written(text: &str) -> Vec<Written> {
         .collect()
 }
 
-/// Returns every number in a block without its sign; of a number with a power of ten also the
-/// digits before it.
+/// Returns every number in a block without its sign; for a number with a power of ten, also the
+/// number without this power.
 pub fn all(block: &str) -> Vec<f64> {
     let part = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-');
     let mut found = Vec::new();

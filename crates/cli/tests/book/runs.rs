@@ -1,6 +1,7 @@
-//! Runs the programs that lines for the reader's shell start.
+//! Runs the programs that the shell commands of the pages start.
 //!
-//! They are built without the reader's `--release` if that would compile everything again.
+//! The programs are built without `--release`, even if a command on a page has it, because a second
+//! profile would compile everything again.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -11,18 +12,18 @@ use std::time::Duration;
 use mdbook_driver::MDBook;
 use serde_json::Value;
 
-/// The way in which a line is run.
+/// The way in which a test runs a command line of the pages.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Run {
-    /// The check of every change runs the line; these tests are a part of it.
+    /// The checks of every change already run this line, so it is not run here.
     Always,
     /// A program or an example of the workspace with the arguments of the line.
     Program { kind: &'static str, name: String, arguments: Vec<String> },
-    /// The line builds the book in this folder with mdBook.
+    /// The command line builds a book with mdBook; the value is the folder of the book.
     Book(String),
 }
 
-/// The programs and examples that lines start, by their kinds and names.
+/// Paths of the programs and examples that the shell commands of the pages start, by kind and name.
 pub struct Programs(BTreeMap<(String, String), PathBuf>);
 
 impl Run {
@@ -83,7 +84,7 @@ impl Programs {
     }
 }
 
-/// Runs all of them, several at a time; returns the failures in their order.
+/// Runs all `runs`, several at a time; returns the failures in the order of the runs.
 pub fn go_all(runs: &BTreeSet<Run>, root: &Path, programs: &Programs) -> Vec<String> {
     let (waiting, failed) = (Mutex::new(runs.iter()), Mutex::new(BTreeMap::new()));
     let work = || {
@@ -104,7 +105,8 @@ pub fn go_all(runs: &BTreeSet<Run>, root: &Path, programs: &Programs) -> Vec<Str
     failed.map(|(run, why)| format!("{run:?}: {why}")).collect()
 }
 
-/// A command of the pages that takes longer than this is stopped and named.
+/// Maximum time of a command of the pages; a command that takes longer is stopped and reported as a
+/// failure.
 const LONGEST: Duration = Duration::from_secs(600);
 
 /// Returns the output of a command, which must not be empty; the exit code must be 0.

@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-/// The ways to start the program: an installed one, and one in a fresh clone.
+/// The ways to start the program: an installed program, and the program of a fresh clone.
 const PROGRAM: [&str; 2] = ["mechid", "cargo run --package mechid-cli --"];
 
-/// Tools of every shell with which the pages cut rows and columns out of a text.
+/// Standard shell commands with which the pages select rows and columns of a text.
 const TEXT_TOOLS: [&str; 2] = ["tail ", "paste "];
 
 /// A folder with the repository's examples and the files that earlier commands wrote.
 pub struct Session {
-    /// The folder is removed with the session.
+    /// Temporary folder; it is removed at the end of the session.
     _home: TempDir,
     /// Current folder of the reader.
     folder: PathBuf,
-    /// Exit code of the last command; the page must show one that is not 0 by `echo $?`.
+    /// Exit code of the last command; if the code is not 0, the page must show it by `echo $?`.
     code: i32,
 }
 

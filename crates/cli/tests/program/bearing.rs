@@ -35,8 +35,8 @@ fn rig(rotation_hz: f64, load: f64) -> (BearingRig, [f64; 8]) {
     (rig, [kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy])
 }
 
-/// Writes the records of a test in x and one in y, with this number of periods, as `name-x.csv` and
-/// `name-y.csv`.
+/// Writes the record of a test in direction x as `name-x.csv` and that of a test in direction y as
+/// `name-y.csv`, each with this number of periods.
 fn write(folder: &Path, rig: &BearingRig, periods: usize, name: &str) {
     let sampling = Sampling::from_rate_hz(1024.0, PERIOD).unwrap();
     let lines: Vec<usize> = (6..=50).step_by(2).collect();
@@ -76,7 +76,7 @@ fn a_campaign_is_one_table_over_speed_and_load() {
         let tests = [format!("p{at}-x.csv"), format!("p{at}-y.csv")];
         described.push(json!({ "tests": tests, "rotation_hz": rotation_hz, "load": load }));
     }
-    // The settings of one test are those of the campaign.
+    // The campaign uses the settings that the report of one test states.
     let one =
         format!("bearing p0-x.csv p0-y.csv {CHANNELS} --stator-mass 20 --clearance 1e-4 --json");
     let settings = json_of(&mechid(folder, &one))["analysis"].clone();
@@ -161,7 +161,8 @@ fn tables_of_frequency_responses_are_a_bearing_test() {
     let below = json_of(&mechid(folder, &format!("{tables} {how} --band-hz 20:100")));
     assert!(below["lines"].as_u64().unwrap() < found["lines"].as_u64().unwrap());
 
-    // A campaign of these tables gives the same numbers.
+    // A campaign description with these tables gives the same coefficients as the command with the
+    // tables.
     let files = ["displacement-x", "acceleration-x", "displacement-y", "acceleration-y"];
     let campaign = json!({
         "frf_table": true,

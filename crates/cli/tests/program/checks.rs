@@ -108,7 +108,8 @@ fn every_way_to_fit_is_looked_at_afterwards_record_by_record() {
     }
 }
 
-/// The force is linear between the samples, so without noise the residual is only rounding.
+/// The force is linear between the samples, so a correct model without noise leaves only rounding
+/// as residual. The checks of the residual find a wrong mass, and noise.
 #[test]
 fn a_refined_fit_is_judged_from_measured_sample_to_measured_sample() {
     let place = tempfile::tempdir().unwrap();
@@ -158,7 +159,8 @@ fn a_fit_of_responses_to_a_random_force_is_judged_line_by_line() {
 fn an_unstable_machine_is_not_led_through_a_long_record() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path();
-    // A negative spring, as of a magnetic bearing without control, grows by a factor e in 0.100 s.
+    // On a negative spring, such as a magnetic bearing without control, the motion grows by a
+    // factor e in 0.100 s.
     let one = |value: f64| nalgebra::DMatrix::from_element(1, 1, value);
     let system = SecondOrderSystem::new(one(1.0), one(0.0), one(-100.0)).unwrap();
     let rest = InitialState::rest(1);
@@ -174,7 +176,7 @@ fn an_unstable_machine_is_not_led_through_a_long_record() {
     assert!(told.contains("grows e-fold every 0.100 s"), "{told}");
 }
 
-/// A faulty channel is named with the same fault by every estimator.
+/// Every estimator reports the same fault of a faulty channel.
 #[test]
 fn what_is_wrong_with_a_channel_is_named() {
     let place = tempfile::tempdir().unwrap();
@@ -235,12 +237,14 @@ fn a_dead_channel_is_named_whether_it_can_be_fitted_or_not() {
     assert!(zero.contains("; x is 0 in all 400 samples"), "{zero}");
     let time = said("offset.csv --force f --displacement v --velocity x --domain time");
     assert!(time.contains("; x is 0.25 in all 400 samples"), "{time}");
-    // The spectrum of a constant is only rounding, but the fit has a result.
+    // The spectrum of a constant consists of rounding errors, so the fit gives a result; a check
+    // must report the fault.
     let way = "identify offset.csv --force f --displacement x";
     assert_eq!(verdicts(place.path(), way, "range"), ["bad"]);
 }
 
-/// Noise on displacement, velocity and acceleration biases the equation of motion.
+/// Noise on displacement, velocity and acceleration biases least squares on the equation of motion,
+/// and a check reports the bias.
 #[test]
 fn noise_that_biases_least_squares_in_time_is_told() {
     let place = tempfile::tempdir().unwrap();

@@ -35,7 +35,8 @@ fn simulated() -> tempfile::TempDir {
     folder
 }
 
-/// Description of the same machine by elements: two sensors, unknown springs and dampers.
+/// Describes the simulated machine by elements, with two sensors and with unknown springs and
+/// dampers.
 fn three() -> Value {
     let link = |name: &str, ends: Value| {
         let mut link =
@@ -101,7 +102,7 @@ fn two_sensors_find_springs_and_dampers_and_other_commands_read_the_result() {
     is_true(&open);
     assert_eq!(open["tests"][0]["kind"], "open");
     write(at, "found.json", &periodic);
-    // The saved settings contain the complete description.
+    // The saved settings contain all six elements of the machine.
     assert_eq!(periodic["analysis"]["machine"]["elements"].as_array().unwrap().len(), 6);
     let modes: Value = serde_json::from_str(&mechid(at, "modes found.json --json")).unwrap();
     let error = modes["modes"][0]["natural_frequency_hz"]["standard_error"].as_f64().unwrap();
@@ -136,8 +137,8 @@ fn a_table_of_frequency_responses_gives_the_same() {
     is_true(&report);
 }
 
-/// A rigid rotor on a bearing, with trial weights at several speeds; the response is known in
-/// closed form.
+/// The response of a rigid rotor with a trial weight at several speeds gives the coefficients of
+/// its bearing. The response is known in closed form.
 #[test]
 fn unbalance_over_the_speed_gives_a_bearing() {
     let folder = tempfile::tempdir().unwrap();
@@ -209,9 +210,9 @@ fn unbalance_over_the_speed_gives_a_bearing() {
     assert!(message.contains("give a table over the speed (--speed-table)"), "{message}");
 }
 
-/// Every faulty description gives a message of one line with the name of the faulty part. The runs
-/// are those of the shaft in the example; a shaft that is too soft by 1 % is named, and the
-/// intervals include its effect.
+/// If the shaft in the description of the example rotor is too soft by 1 %, a note names the
+/// stiffness of the shaft, and the intervals of the bearing coefficients include the effect of this
+/// error.
 #[test]
 fn a_wrong_part_of_a_rotor_is_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -277,8 +278,8 @@ fn bad_descriptions_are_told_by_name() {
         ]);
     });
     assert!(told.contains("lost.mtx"), "{told}");
-    // If the data do not determine an unknown at all, the command fails; if they determine only a
-    // sum of several, it does not.
+    // If the data do not determine an unknown at all, the command fails; if they determine only the
+    // sum of several unknowns, it succeeds.
     let told = message(&|m| {
         for at in 3..6 {
             (m["elements"][at]["k"], m["elements"][at]["c"]) = (json!(3e4), json!(4));
@@ -353,15 +354,17 @@ fn two_loggers_on_a_shake_table() {
         // of the data disagree.
         let of_noise = error / report["error_scale"].as_f64().unwrap();
         assert!((delay - 0.015).abs() < 3e-4 && of_noise < 1e-4, "{delay} ± {error}");
-        // Other parts move, too, and the residual shows it.
+        // The model has only one storey, but other parts of the structure also move, so the
+        // residual is not white.
         let checks = report["checks"].as_array().unwrap();
         let is_told = |check: &Value| check["subject"] == "whiteness" && check["verdict"] != "good";
         assert!(checks.iter().any(is_told), "{checks:?}");
     }
 }
 
-/// Good hits of a hammer are open records. Bad hits are excluded and named, also on the page.
-/// Reference: the matrices behind the modes of the generator.
+/// Good hits of a hammer are fitted as open records. Bad hits are excluded, and the report and the
+/// page name these hits. Reference: the matrices of the generator; the unknown factors of damping
+/// and stiffness must be 1.
 #[test]
 fn hits_of_a_hammer_and_the_page() {
     let rig = HammerTest {

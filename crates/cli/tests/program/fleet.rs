@@ -40,14 +40,16 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     assert_eq!(failed.status.code(), Some(1), "{}", String::from_utf8_lossy(&failed.stderr));
     let report: Value = serde_json::from_slice(&failed.stdout).unwrap();
     assert_eq!(report["failures"][0]["code"], "io.empty");
-    // The part of a and b is unchanged; only that of c is computed again.
+    // The part with the records a and b is unchanged; only the part with c and the new record d is
+    // computed.
     assert_eq!((&report["computed_parts"], &report["other_parts"]), (&1.into(), &1.into()));
 
     let trends =
         program(home.path(), "trends out/results --output page.html --plot trends.svg --json");
     assert_eq!(trends.status.code(), Some(0), "{}", String::from_utf8_lossy(&trends.stderr));
     let trends: Value = serde_json::from_slice(&trends.stdout).unwrap();
-    // The folder has both versions of the second part; for its record the newer one counts.
+    // The folder has two versions of the second part; the newer version counts for the record c,
+    // which is in both.
     assert_eq!((&trends["records"], &trends["failed"]), (&4.into(), &1.into()));
     assert_eq!(trends["superseded"], 1);
     assert_eq!(trends["series"][0]["points"].as_array().unwrap().len(), 3);
@@ -61,7 +63,7 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     let refused = program(home.path(), "trends day");
     assert_eq!(refused.status.code(), Some(2));
 
-    // The rows of the last run count, also if an earlier one had computed them.
+    // The rows of the last run count, even if an earlier run had computed these rows.
     let of_other =
         analysis.replace("\"window\"", "\"identify\": {\"method\": \"least-squares\"}, \"window\"");
     fs::write(home.path().join("other.json"), of_other).unwrap();
@@ -78,7 +80,8 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     let again: Value = serde_json::from_slice(&program(home.path(), &run).stdout).unwrap();
     assert_eq!((&again["computed_records"], values()), (&0.into(), of_first));
 
-    // An error in the settings is an error of the run, not of a record.
+    // An error in the settings ends the run with exit code 2; it is not an error of a single
+    // record.
     fs::write(home.path().join("analysis.json"), "{}").unwrap();
     let refused = program(home.path(), "fleet day --analysis analysis.json --output none");
     assert_eq!(refused.status.code(), Some(2));
@@ -121,7 +124,8 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
         assert!((value - mass).abs() < 4.0 * error, "{point}");
     }
 
-    // The standard deviation over 100 seeds, known to 7 %, agrees with the standard errors.
+    // The standard deviation over 100 seeds has a standard error of 7 %, and agrees with the
+    // standard errors of the fits.
     json("simulate rig.json --runs 100 --output seeds.parquet --json");
     json("fleet seeds.parquet --analysis analysis.json --output seeds --json");
     let trends = json("trends seeds --json");
@@ -168,8 +172,8 @@ fn records_that_end_their_process_become_rows() {
         member.finish().unwrap()
     };
     let header = packed("time,force,displacement\n");
-    // One file takes a minute to read; another has columns with rows that need more memory than
-    // allowed.
+    // One file takes a minute to read; another has more columns and rows than the allowed memory
+    // can hold.
     let rows = packed(&"0,1,2\n".repeat(1 << 20));
     fs::write(day.join("slow.csv.gz"), [header, rows.repeat(400)].concat()).unwrap();
     let wide = format!("{}\n", ["1"; 20_000].join(","));
@@ -205,7 +209,8 @@ fn records_that_end_their_process_become_rows() {
     assert_eq!((&again["computed_records"], &again["failed"]), (&0.into(), &2.into()));
 }
 
-/// The default memory of a record is more than this system allows a process.
+/// A fleet runs within a limit of the operating system (4 GB) that is lower than the default memory
+/// of a record.
 #[cfg(target_os = "linux")]
 #[test]
 fn the_memory_that_the_system_allows_is_enough_for_a_fleet() {
@@ -240,7 +245,7 @@ fn results_among_the_records_are_refused() {
     assert_eq!(fs::read_dir(&day).unwrap().count(), 1);
 }
 
-/// Records are different if their names differ only in bytes that are not UTF-8.
+/// Two records whose names differ only in bytes that are not UTF-8 are different records.
 #[cfg(target_os = "linux")]
 #[test]
 fn names_without_a_text_stay_apart() {

@@ -44,8 +44,8 @@ fn force(k: usize) -> f64 {
     3.0 * turn(20.0) + if k < BURST { 0.0 } else { 100.0 * turn(32.0) }
 }
 
-/// Writes the exact motion for this force as a text and as a MATLAB file, and the machine; returns
-/// x, v and a.
+/// Writes the exact motion under `force` as a text file and as a MATLAB file, and the description
+/// of the machine; returns x, v and a.
 fn motion(folder: &Path) -> [Vec<f64>; 3] {
     let wave = |amplitude: f64, samples: f64| -> Vec<f64> {
         let turn = |k: usize| (std::f64::consts::TAU * k as f64 / samples).sin();
@@ -71,8 +71,9 @@ fn motion(folder: &Path) -> [Vec<f64>; 3] {
     [x, v, a]
 }
 
-/// Runs `force` on both files, which must give the same report and output. Returns the report and
-/// the output; `error` is the name of the standard error.
+/// Runs `force` on the text file and on the MATLAB file, which must give the same report and
+/// output. Returns the report and the output; `error` is the name of the column with the standard
+/// error.
 fn both(folder: &Path, arguments: &str, error: &str) -> (Value, Record) {
     let run = |file: &str| -> (Value, Record) {
         let call = format!("force {file} --system machine.json {arguments} --output f.csv --json");
@@ -120,8 +121,9 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     told("rms", rms((0..SAMPLES).map(force)));
     told("standard_error", rms((0..SAMPLES).map(error)));
     told("peak", (0..SAMPLES).map(|k| force(k).abs()).fold(0.0, f64::max));
-    // The two pieces, one from the first sample and one up to the last, contain different parts of
-    // the burst. The frequencies of both forces are lines of a piece.
+    // The spectrum is averaged over two pieces of the record, one from the first sample and one up
+    // to the last sample; they contain different parts of the burst. Both frequencies of the force
+    // are spectral lines of a piece.
     told("strongest_hz", 32.0);
     let part = |piece: Range<usize>| 100.0 * (piece.end - BURST) as f64 / PIECE as f64;
     let parts = [part(0..PIECE), part(SAMPLES - PIECE..SAMPLES)];
@@ -145,7 +147,8 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     assert_eq!(report["remarks"], held["remarks"]);
 }
 
-/// Reference: the standard error from noise and machine together, for each sample separately.
+/// The standard error of each force sample combines the stated noise of the response and the
+/// standard errors of the machine. Reference: the same combination, computed here for each sample.
 #[test]
 fn sample_by_sample_the_noise_stated_is_counted() {
     let folder = tempfile::tempdir().unwrap();
@@ -242,7 +245,7 @@ fn periods_and_windows_of_a_long_text_are_those_of_all_of_it() {
         let size = truth.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
         close(&found, column, &|k| truth[k], 1e-11 * size);
     }
-    // This method needs the whole open record in memory.
+    // The method tikhonov needs the whole open record in memory.
     let (report, _) =
         both(folder.path(), "--displacement x --start 270001 --method tikhonov", "standard_error");
     assert_eq!(report["samples"], 123);
@@ -273,8 +276,8 @@ fn nothing_is_left_of_a_file_begun_when_the_end_of_the_record_is_bad() {
     }
 }
 
-/// Line 3 of a period of 64 samples is line 12 of four periods. If a user forgets --period, a
-/// message says that the motion is at other lines.
+/// Line 3 of a period of 64 samples is line 12 of a window of four periods. If `--period` is not
+/// given, a note says that the given lines contain only a part of the motion.
 #[test]
 fn lines_of_another_period_are_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -7,7 +7,8 @@ use serde_json::Value;
 
 use super::mechid;
 
-/// Hits on one and on the other of two masses, with the accelerations of both.
+/// Arguments for hits on the first and on the second of two masses, with the accelerations of both
+/// masses.
 const ROVING: &str = "hammer-1.csv hammer-2.csv --force force --struck 1,2 --acceleration a1,a2 --hits \
                       --band-hz 5:45";
 
@@ -38,8 +39,9 @@ fn channels_keep_their_names_and_the_picture_has_the_coherence() {
     assert!(picture.contains(">x at a2 / force at a1<"));
 }
 
-/// Reference: reciprocity at the second mode. The hits end before the response has decayed, which
-/// causes an error of some per cent.
+/// Averaged frequency responses of a roving hammer satisfy reciprocity at the second mode to 10 %.
+/// The windows of the hits end before the response has decayed, which causes an error of some per
+/// cent.
 #[test]
 fn frequency_responses_are_averaged_over_the_hits_at_every_place() {
     let place = folder();

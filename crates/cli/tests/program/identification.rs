@@ -182,7 +182,7 @@ fn another_record_is_predicted() {
     let exact = json(folder, &format!("{common} --validate b.csv"));
     assert_eq!(fits(&exact).len(), 2);
     assert!(fits(&exact).iter().all(|fit| *fit > 99.9999), "{exact}");
-    // The prediction lacks only the noise.
+    // The prediction differs from the validation record only by the noise of this record.
     let noise = json(folder, &format!("{common} --validate c.csv:101"));
     assert_eq!(noise["validation"]["first_sample"], 101);
     assert!(fits(&noise).iter().all(|fit| (fit - 90.0).abs() < 1.5), "{noise}");
@@ -224,8 +224,8 @@ fn one_kind_of_motion_is_enough_with_derivatives() {
         let found = json(folder, &format!("{common} --derivatives spectral"));
         assert!(error(&found) < 1e-9, "{motion}: {found}");
         assert_eq!(verdict(&found, "before", "periodicity"), "good");
-        // The highest line has thirteen samples per cycle, and the polynomial is fitted to eleven
-        // samples.
+        // The polynomial of order 8 covers eleven samples, less than one cycle of the highest line
+        // (thirteen samples), so its error is small.
         let found = json(folder, &format!("{common} --derivatives savitzky-golay:11:8"));
         assert!(error(&found) < 0.02, "{motion}: {found}");
         refused(folder, &common, &["--derivatives sets how", "savitzky-golay:WINDOW:ORDER"]);
@@ -260,7 +260,8 @@ fn intermediate_points_make_the_step_smaller_and_nothing_more_certain() {
         assert!(error(&finer) < error(&once) / better, "{way}: {} {}", error(&finer), error(&once));
         let freedom = finer["covariance"]["degrees_of_freedom"].as_u64().unwrap();
         let measured = once["covariance"]["degrees_of_freedom"].as_u64().unwrap();
-        // An open record has one interval less than a period.
+        // After linear or spline interpolation the refined record is open: it has one interval
+        // fewer than the period, so one equation may be missing.
         assert!(measured - freedom <= 1, "{way}: {freedom} {measured}");
     }
     refused(folder, &format!("{common} --refine 8"), &["FACTOR:linear"]);
@@ -291,7 +292,7 @@ fn a_whole_period_closes() {
         refused(folder, &table, &["belongs to records", "states its units in its header"]);
     }
     let weights = format!("{common} --method least-squares --noise smooth");
-    refused(folder, &weights, &["--noise: it applies only to --method maximum-likelihood"]);
+    refused(folder, &weights, &["--noise: available only with --method maximum-likelihood"]);
     let weights = format!("{common} --noise per-line --extent period");
     refused(folder, &weights, &["--noise: per-line takes the noise of each line"]);
     let lines = "--domain time --lines odd --plot a.svg";
@@ -302,7 +303,8 @@ fn a_whole_period_closes() {
     );
 }
 
-/// The report names periods without noise, and a record whose period was not stated.
+/// If the record repeats but no period is stated, a remark states the number of samples after which
+/// the record repeats.
 #[test]
 fn periods_taken_as_one_are_told() {
     let place = tempfile::tempdir().unwrap();
@@ -345,7 +347,8 @@ fn masses_may_be_known_in_part() {
     refused(folder, &format!("{common} unknown,-1"), &["got -1 kg"]);
 }
 
-/// Each record has a force on one line, so a single record does not determine the three unknowns.
+/// Two records fitted together give the exact parameters. Each record has a force on one line only,
+/// so a single record does not determine the three unknowns.
 #[test]
 fn several_records_are_one_fit() {
     let place = tempfile::tempdir().unwrap();
@@ -391,7 +394,8 @@ fn frequency_responses_are_estimated_and_fitted() {
         for (at, hz) in column("frequency_hz").iter().enumerate() {
             let exact = system.receptance(hz * std::f64::consts::TAU).unwrap()[(0, 0)];
             let gap = (re[at] - exact.re).hypot(im[at] - exact.im);
-            // The estimator Hv takes a square root, and so the root of the rounding error.
+            // The estimator Hv takes a square root, so its error is the square root of the rounding
+            // error.
             let tolerance = if estimator == "hv" { 1e-6 } else { 1e-10 };
             assert!(gap < tolerance * exact.norm(), "{estimator} {hz}: {gap}");
             assert!((column("coherence_1")[at] - 1.0).abs() < 1e-9);

@@ -135,7 +135,8 @@ fn a_table_below_other_lines_and_in_utf16_is_the_same_table() {
     assert_eq!(wide, told);
 }
 
-/// A ramp has many lines, but no vibration; its mean and its ends are reported.
+/// The time column is a ramp: its spectrum has many lines, but no vibration. `info` reports its
+/// mean and its extreme values, and its spectrum only if the column is requested.
 #[test]
 fn the_time_column_has_no_spectrum_unless_asked_for() {
     let folder = folder();
@@ -171,8 +172,8 @@ fn a_mean_of_zero_is_told_as_zero() {
     close(&report["channels"][1]["mean"], 1e-9, 1e-11);
 }
 
-/// A single period does not show that it repeats. If --period states it, its lines are exact and do
-/// not spread to their neighbours as under a window.
+/// A record of one period does not show that it repeats. If `--period` states the period, the
+/// spectral lines are exact; they do not spread to neighbouring lines as under a window.
 #[test]
 fn a_period_that_is_given_has_exact_lines() {
     let folder = tempfile::tempdir().unwrap();

@@ -42,7 +42,8 @@ fn column(folder: &Path, file: &str, name: &str) -> Vec<f64> {
     Table::read(folder.join(file)).unwrap().column(name).unwrap().to_vec()
 }
 
-/// Reference: the last of several periods from rest; the transient has decayed before this period.
+/// The periodic response of a large machine agrees with the last of several periods simulated from
+/// rest; the transient has decayed before this period.
 #[test]
 fn the_periodic_response_of_a_large_machine_is_what_a_long_run_comes_to() {
     let home = tempfile::tempdir().unwrap();
@@ -94,8 +95,8 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
                       acceleration_2,acceleration_1\n";
         assert!(text.starts_with(header), "{}", text.lines().next().unwrap());
 
-        // The machine of 64 degrees of freedom has dense matrices. A wave passes 30 masses per
-        // second, so 60 in 2 s.
+        // The machine of 64 degrees of freedom has dense matrices. In the 2 s of the record a wave
+        // passes 60 masses (30 per second), so it does not reach the far end.
         chain(home.path(), 64, &rest);
         mechid(home.path(), "simulate chain/chain.json --output small.csv --plot small.svg");
         for name in ["force_2", "displacement_1", "displacement_2", "velocity_1", "acceleration_2"]
@@ -119,7 +120,8 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
     assert!(apart > 0.05 * largest(&mut linear.into_iter()), "the spring matters: {apart}");
 }
 
-/// Reference: mode r has ω = 2 √(k/m) sin(r π / 2(n + 1)); the damping is proportional to K.
+/// Modes of a chain of 3000 masses agree with the closed form: mode r has ω = 2 √(k/m) sin(r π /
+/// 2(n + 1)), and the damping is proportional to K.
 #[test]
 fn some_modes_of_a_large_machine_are_found() {
     let home = tempfile::tempdir().unwrap();
@@ -199,8 +201,9 @@ fn what_a_large_machine_does_not_have_is_refused() {
     assert!(!home.path().join("x.csv").exists());
 }
 
-/// Reference: the stability limit of central differences, 2 over the highest frequency 60 sin(n π /
-/// 2(n + 1)) rad/s, slightly reduced by damping; and the equations of motion.
+/// The largest stable step of central differences is 2 divided by the highest frequency, 60 sin(n π
+/// / 2(n + 1)) rad/s; damping reduces it slightly. The simulated steady state satisfies the
+/// equation of motion.
 #[test]
 fn a_large_machine_has_a_steady_state_and_largest_steps() {
     let home = tempfile::tempdir().unwrap();
@@ -235,7 +238,8 @@ fn a_large_machine_has_a_steady_state_and_largest_steps() {
     }
 }
 
-/// Reference: the simulated record; its steady state is exact and has no error of a time step.
+/// The force and the predicted response agree with the simulated record, whose steady state is
+/// exact: it has no error of a time step.
 #[test]
 fn a_machine_of_a_hundred_masses_finds_its_force_and_predicts_its_response() {
     let home = tempfile::tempdir().unwrap();

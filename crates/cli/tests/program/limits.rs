@@ -157,7 +157,8 @@ fn chain_table(points: usize, lines: usize) -> String {
     text
 }
 
-/// An earlier version had no limit for tables: the modes of 60 points and three forces took 1.9 GB.
+/// A table that needs more memory than allowed is refused. An earlier version had no limit for
+/// tables: the modes of 60 points and three forces took 1.9 GB.
 #[test]
 fn a_table_of_many_points_is_refused_before_any_work() {
     let home = tempfile::tempdir().unwrap();
@@ -195,7 +196,7 @@ fn a_description_of_a_long_record_is_refused_before_any_work() {
     let description = fs::read_to_string(home.path().join("long.json")).unwrap();
     let shorter = description.replace(&(1_u64 << 50).to_string(), "100");
     fs::write(home.path().join("long.json"), shorter).unwrap();
-    // 1000 numbers of 128 bytes.
+    // The simulation needs 128 bytes for each of the 1000 samples.
     refused(home.path(), &format!("{simulate} 0.00012"));
     let allowed = limited(home.path(), &format!("{simulate} 0.00013"));
     assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
@@ -248,7 +249,8 @@ fn a_text_that_repeats_itself_in_gzip_is_refused() {
     assert!(message.contains("the compressed data are longer than"), "{message}");
 }
 
-/// The description has 120 kB, the most that one argument of a command line takes.
+/// Nonlinear terms are refused quickly if the data do not determine their coefficients. The terms
+/// are one argument of 87 kB; an argument of a command line has at most 128 kB.
 #[test]
 fn many_nonlinear_terms_are_refused_before_any_work() {
     let home = tempfile::tempdir().unwrap();

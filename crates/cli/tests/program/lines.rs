@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::mechid;
 
-/// Reference: the lines of the force. Force and motion have noise, as from load cells and
-/// displacement probes.
+/// Only the lines that the force excites are used, although force and motion have noise, like that
+/// of load cells and displacement probes.
 #[test]
 fn noise_on_the_force_does_not_look_like_force() {
     let folder = tempfile::tempdir().unwrap();

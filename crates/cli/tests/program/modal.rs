@@ -39,7 +39,8 @@ fn a_known_machine_has_its_published_modes() {
     assert!(text.contains("1 damped frequency") && text.contains("2 direction 2"), "{text}");
 }
 
-/// One degree of freedom, calculated by hand; only k has a variance.
+/// The standard errors of the modes agree with a calculation by hand for one degree of freedom in
+/// which only k has a variance.
 #[test]
 fn standard_errors_follow_from_the_covariance() {
     let place = tempfile::tempdir().unwrap();
@@ -51,7 +52,7 @@ fn standard_errors_follow_from_the_covariance() {
     // At ωn = 20 rad/s the relation dωn/ωn = dk/2k turns ±8 N/m of 800 N/m into ±0.5 %.
     let error = mode["natural_frequency_hz"]["standard_error"].as_f64().unwrap();
     assert!((error - 0.005 * 20.0 / std::f64::consts::TAU).abs() < 1e-12);
-    // The damping ratio ζ = c/(2√(km)) has the same relative error.
+    // The damping ratio ζ = c/(2√(km)) has the same relative error as the natural frequency.
     let error = mode["damping_ratio"]["standard_error"].as_f64().unwrap();
     assert!((error - 0.005 * 0.4 / (2.0 * 1600f64.sqrt())).abs() < 1e-14);
     let text = String::from_utf8(mechid(place.path(), &["modes", "found.json"]).stdout).unwrap();
@@ -86,7 +87,7 @@ fn what_identify_found_is_read_back_with_its_uncertainty() {
     for quantity in ["natural_frequency_hz", "damping_ratio"] {
         for part in ["value", "standard_error"] {
             let [a, b] = [&found, &modal].map(|r| r["modes"][0][quantity][part].as_f64().unwrap());
-            // The file has seventeen digits, and the sums are the same.
+            // `modes` computes the same sums as `identify`, from a file that has seventeen digits.
             assert!((a / b - 1.0).abs() < 1e-9, "{quantity} {part}: {a} {b}");
         }
     }

@@ -23,8 +23,8 @@ fn modes(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// Reference: the machine behind the examples, whose response is known in closed form: modes at 12
-/// Hz with 1 % and at 31 Hz with 1.5 % damping.
+/// Checks that a report has the two modes of the machine of the examples: 12 Hz with 1 % damping
+/// and 31 Hz with 1.5 % damping. The examples are its response in closed form.
 fn are_those_of_the_machine(report: &Value) {
     let found = report["modes"].as_array().unwrap();
     assert_eq!(found.len(), 2, "{report}");
@@ -87,8 +87,8 @@ fn a_hammer_that_roves_gives_the_shapes() {
     }
 }
 
-/// Reference: the machine behind the examples, which has proportional damping and is reciprocal.
-/// The hits on each point are in one half of the records, so each half lacks one of the forces.
+/// Real shapes and reciprocity can be imposed on the modes of the examples, because their machine
+/// has proportional damping and is reciprocal. Each of the two records has hits on one point only.
 #[test]
 fn known_properties_are_imposed() {
     let folder = examples();
@@ -147,8 +147,8 @@ fn what_means_nothing_is_refused() {
     }
 }
 
-/// Writes 4 s at 256 Hz of a machine of 20 Hz and 2 % damping under two random forces, by an exact
-/// recursion. `gain` scales the second force, and `fault` changes the channels.
+/// Writes a record of 4 s at 256 Hz: the exact response of a machine (20 Hz, 2 % damping) to two
+/// random forces. `gain` scales the second force, and `fault` changes the channels.
 fn two_shakers(folder: &Path, name: &str, gain: f64, fault: impl Fn([f64; 4]) -> [f64; 4]) {
     let (omega, zeta, dt) = (TAU * 20.0, 0.02, 1.0 / 256.0);
     let pole = Complex::new(-zeta * omega, omega * (1.0f64 - zeta * zeta).sqrt());
@@ -202,8 +202,8 @@ fn faults_of_a_test_are_told_in_a_line_each() {
     );
 }
 
-/// A requested mode that is only noise is reported as such; so are struck points that were not
-/// stated.
+/// A requested mode that is only noise is reported as noise. If the struck points were not stated,
+/// the report says so.
 #[test]
 fn what_was_asked_for_may_be_noise() {
     let folder = examples();
@@ -228,7 +228,8 @@ fn what_was_asked_for_may_be_noise() {
     assert_eq!(is_one_point(record), None);
 }
 
-/// Further files and options that a kind of data does not have are refused.
+/// The command refuses options, and additional files, that do not apply to the given kind of data
+/// (machine, free decay, ambient record).
 #[test]
 fn what_does_not_apply_is_refused() {
     let folder = examples();
@@ -250,8 +251,8 @@ fn what_does_not_apply_is_refused() {
     assert!(outside.contains("900 Hz is not between"), "{outside}");
 }
 
-/// Reference: the machine behind the examples; the responses are averages of hits under an
-/// exponential window.
+/// A table of frequency responses gives the modes of the machine of the examples. The responses are
+/// averages over hits with an exponential window.
 #[test]
 fn a_table_gives_the_modes_of_the_record() {
     let folder = examples();
@@ -294,8 +295,8 @@ fn a_table_gives_the_modes_of_the_record() {
     assert!(message.contains("name the columns of a record"), "{message}");
 }
 
-/// Reference: the shapes that the decay has without points. In the result and in comparisons, the
-/// entries are named by the points of the sensors, even without forces.
+/// Shapes of a free decay have the points of the sensors as names of their entries, in results and
+/// in comparisons, although no force is measured. Reference: the same shapes without stated points.
 #[test]
 fn results_without_forces_are_compared_at_the_points_of_their_sensors() {
     let folder = examples();
@@ -341,7 +342,8 @@ fn results_without_forces_are_compared_at_the_points_of_their_sensors() {
     assert_eq!(compared["points"], serde_json::json!(["7+Z", "8+Y", "9+X"]), "{compared}");
 }
 
-/// Reference: the fit of all modes of the same decay.
+/// A fit near a stated frequency finds only the mode near this frequency. The frequency of the mode
+/// agrees with a fit of all modes of the same decay.
 #[test]
 fn a_decay_is_searched_from_a_stated_frequency() {
     let folder = examples();
@@ -357,7 +359,8 @@ fn a_decay_is_searched_from_a_stated_frequency() {
     assert!((number(&found[0], "value") - hz).abs() < 4.0 * error, "{near}");
 }
 
-/// Reference: two records of the same machine, and its description.
+/// The modes of two records of the same machine are paired, and do not differ significantly. The
+/// shapes and frequency responses that the command writes can be read again.
 #[test]
 fn two_results_are_compared() {
     let folder = examples();
@@ -386,8 +389,9 @@ fn two_results_are_compared() {
     assert_eq!(again["modes"].as_array().unwrap().len(), 2, "{again}");
 }
 
-/// The example is a part of a longer test and begins in motion, so the prediction from rest states
-/// that it lacks this motion. The force in the record explains both responses.
+/// The example is a part of a longer test and begins in motion, so a prediction from rest differs
+/// from the record, and a note says that the prediction begins at rest. The force in the record
+/// explains both responses.
 #[test]
 fn a_result_predicts_responses_and_finds_the_force() {
     let folder = examples();

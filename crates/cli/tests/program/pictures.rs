@@ -144,7 +144,7 @@ fn every_pair_of_two_and_the_driving_points_of_many_are_drawn() {
         assert_eq!(of_class(panel, "curve").len(), 6);
         assert_eq!(of_class(panel, "reference").len(), 8);
     }
-    // Without damping and without walls the phase jumps between 0 and −180°.
+    // The phase of a chain without damping and without walls at its ends jumps between 0 and −180°.
     let svg = drawn(folder.path(), "modes free.json");
     has(&svg, &["natural frequency, 7.1176 Hz", "0", "−180"]);
     let texts = texts(&Document::parse(&svg).unwrap());

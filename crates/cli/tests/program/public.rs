@@ -24,7 +24,8 @@ fn columns() -> [Vec<f64>; 4] {
     [0, 1, 2, 4].map(|at| rows.iter().map(|row| row[at]).collect())
 }
 
-/// Writes lines and below them columns, each divided by its factor to SI units.
+/// Writes a file with the lines `above` and, below these, the columns. The values are in SI units;
+/// the values of a column are divided by its factor.
 fn table(file: &Path, above: &[&str], columns: &[(&[f64], f64)], separator: &str) {
     let mut text: String = above.iter().map(|line| format!("{line}\n")).collect();
     for row in 0..columns[0].0.len() {
@@ -55,7 +56,8 @@ fn mass(report: &Value) -> (f64, bool) {
 /// and the delimiter.
 type Case<'a> = (&'a [&'a str], f64, &'a [f64], f64, f64, &'a str);
 
-/// Cases F1, F2, F7, F31, F34, F39: units in a header, and times as clock readings.
+/// Cases F1, F2, F7, F31, F34, F39: units in a header, and times written as clock readings, are
+/// used.
 #[test]
 fn units_that_stand_in_a_header_are_used() {
     let home = tempfile::tempdir().unwrap();
@@ -121,11 +123,11 @@ fn units_that_are_not_sure_are_asked_about() {
         assert!(asks, "{header}: {found}");
         let text = report["checks"].to_string();
         assert!(text.contains(part), "{header}: {text}");
-        // The subcommand `info` asks, too.
+        // The subcommand `info` also asks about the unit.
         let text = mechid(home, "info a.csv");
         assert!(text.contains(part), "{header}: {text}");
     }
-    // A stated sensitivity or a factor settles the question.
+    // With a stated sensitivity or factor, no check asks about the unit.
     let above = ["time,Force [mV; 11.2 mV/N],x"];
     table(&home.join("a.csv"), &above, &[(&t, 1.0), (&f, 1.0 / 11.2), (&x, 1.0)], ",");
     let line = "identify a.csv --force 2 --displacement 3 --period 256";
@@ -143,7 +145,8 @@ fn units_that_are_not_sure_are_asked_about() {
     assert!((stated / expected - 1.0).abs() < 1e-6 && (scaled / expected - 1.0).abs() < 1e-6);
 }
 
-/// Cases F5, F38: axes, units and directions in tables of frequency responses.
+/// Cases F5, F38: the axes, units and directions that a table of frequency responses states are
+/// used.
 #[test]
 fn axes_and_units_of_response_tables_are_used() {
     let home = tempfile::tempdir().unwrap();

@@ -147,12 +147,13 @@ fn channels_of_a_universal_file_need_no_names() {
         "identify alone.unv --period 256",
         "identify alone.unv --force 1+Z --acceleration 1+Z --period 256",
     );
-    // Other records are read by the names of the first one, in any order.
+    // The channels of further records are found by the names in the first record, in any order.
     same("modes one.unv turned.unv", "modes one.unv turned.unv --force 1+Z --acceleration 1+Z,2+Z");
-    // A roving hammer: the point of each record is in its file.
+    // With a roving hammer, the file of each record states the point of the force.
     let roving = json(home, "modes one.unv two.unv");
     assert_eq!(roving["inputs"], serde_json::json!(["1+Z", "2+Z"]));
-    // Two forces and two responses without points may belong together in two ways.
+    // Two forces and two responses without points can be paired in two ways, so the columns must be
+    // named.
     let rows: Vec<Vec<&str>> = text.lines().map(|row| row.split(',').collect()).collect();
     let write_table = |file: &str, header: &str, columns: &[usize]| {
         let row = |row: &Vec<&str>| columns.iter().map(|at| row[*at]).collect::<Vec<_>>().join(",");
@@ -167,7 +168,8 @@ fn channels_of_a_universal_file_need_no_names() {
     write_table("two.csv", "time,f1 [N],f2 [N],x1 [m],x2 [m]", &[0, 1, 1, 2, 2]);
     let message = refused(home, "identify two.csv --period 256");
     assert!(message.contains("--force"), "{message}");
-    // A column without a unit may be a force, and a second kind of response another test.
+    // A column without a unit may be a force, and responses of two kinds may belong to two tests,
+    // so the channels must be named.
     write_table("plain.csv", "time,force,x1 [m]", &[0, 1, 2]);
     write_table("kinds.csv", "time,f1 [N],x1 [m],a1 [m/s^2]", &[0, 1, 2, 4]);
     for file in ["plain.csv", "kinds.csv"] {
@@ -176,8 +178,8 @@ fn channels_of_a_universal_file_need_no_names() {
     }
 }
 
-/// A displacement of micrometres beside an acceleration: a shape has entries of both units, so that
-/// it states no modal mass.
+/// If the responses are a displacement and an acceleration, the entries of a shape have two units,
+/// so no modal mass is reported.
 #[test]
 fn responses_of_several_kinds_give_no_modal_mass() {
     let home = tempfile::tempdir().unwrap();
@@ -194,13 +196,13 @@ fn responses_of_several_kinds_give_no_modal_mass() {
     assert!(two["notes"].to_string().contains("different quantities"), "{}", two["notes"]);
 }
 
-/// Masses of a machine with two points; its dampers and springs follow.
+/// Masses of a machine with two points, in kg; its damping is `C` and its stiffness is `K`.
 const M: [f64; 2] = [4.0, 3.0];
 const C: Matrix2<f64> = Matrix2::new(25.0, -8.0, -8.0, 18.0);
 const K: Matrix2<f64> = Matrix2::new(9e4, -5e4, -5e4, 7e4);
 
-/// Accelerance of this machine at 0.25 … 50 Hz, from the inverse of the dynamic stiffness; `signs`
-/// are those of the two directions.
+/// Returns the accelerance of the machine with the matrices `M`, `C` and `K` at 0.25 … 50 Hz, from
+/// the inverse of the dynamic stiffness; `signs` are the signs of the two directions.
 fn accelerance(response: usize, reference: usize, signs: [f64; 2]) -> Function<'static> {
     let values = (1..=200).flat_map(|line| {
         let omega = TAU * 0.25 * f64::from(line);
@@ -224,7 +226,8 @@ fn accelerance(response: usize, reference: usize, signs: [f64; 2]) -> Function<'
     }
 }
 
-/// Cases F24, F38: a row of responses, and negative directions.
+/// Cases F24, F38: a row of the response matrix is enough by reciprocity, and a negative direction
+/// changes the sign.
 #[test]
 fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     let home = tempfile::tempdir().unwrap();
@@ -244,7 +247,7 @@ fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     let report = json(home, "identify row.unv --frf-table --structure symmetric");
     exact(&report);
     assert!(report["remarks"].to_string().contains("By reciprocity"), "{report}");
-    // Force and response are both in −Z, or only one of them.
+    // First both points have the direction −Z, then only the second point.
     for signs in [[-1.0, -1.0], [1.0, -1.0]] {
         let all = [(0, 0), (0, 1), (1, 0), (1, 1)];
         write(&home.join("neg.unv"), &all.map(|(i, j)| accelerance(i, j, signs)));
@@ -252,8 +255,8 @@ fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     }
 }
 
-/// Oscillator of 3 kg, 8 Hz and 5 % damping from rest: returns time, force and displacement; exact
-/// for a force that is linear between samples.
+/// Returns time, force and displacement of an oscillator (3 kg, 8 Hz, 5 % damping) that starts from
+/// rest. The displacement is exact if the force is linear between samples.
 fn driven(count: usize, rate: f64, force: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let sampling = Sampling::from_rate_hz(rate, count).unwrap();
     let force: Vec<f64> = sampling.times().map(force).collect();
@@ -274,7 +277,8 @@ fn write_table(file: &Path, header: &str, columns: &[&[f64]]) {
     fs::write(file, text).unwrap();
 }
 
-/// Case F28: the force excites few lines, and a longer record does not change that.
+/// Case F28: if the force excites too few lines for the unknowns, the message states their number
+/// and names `--lines all`.
 #[test]
 fn a_force_that_drives_few_lines_is_named() {
     let home = tempfile::tempdir().unwrap();
@@ -294,7 +298,8 @@ fn a_force_that_drives_few_lines_is_named() {
     assert!((mass / 3.0 - 1.0).abs() < 0.01, "{mass}");
 }
 
-/// Case F29: the motion of the ground is given among the forces.
+/// Case F29: an acceleration of the ground that is given as a force is refused; the message names
+/// the option `--machine`.
 #[test]
 fn the_motion_of_a_support_is_no_force() {
     let home = tempfile::tempdir().unwrap();
@@ -307,7 +312,7 @@ fn the_motion_of_a_support_is_no_force() {
     assert!(message.contains("named elements (--machine)"), "{message}");
 }
 
-/// Case F31: spellings of a time column.
+/// Case F31: a time column is read correctly with every usual spelling of its name and unit.
 #[test]
 fn spellings_of_time_are_read_or_named() {
     let home = tempfile::tempdir().unwrap();
@@ -342,7 +347,7 @@ fn the_table_below_many_lines_is_found() {
     assert!(mechid(home.path(), "info a.csv --skip-lines 300").contains("3 columns, 50 samples"));
 }
 
-/// In the time domain a delay is named even if it is far beyond the usual search range.
+/// In the time domain the message states the delay even if it is far beyond the usual search range.
 #[test]
 fn a_delay_of_fifty_samples_is_named_in_the_time_domain() {
     let home = tempfile::tempdir().unwrap();

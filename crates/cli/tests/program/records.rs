@@ -216,8 +216,8 @@ fn what_was_left_out_of_a_file_is_told() {
     }
 }
 
-/// The frequency responses of one sensor to two forces; a comment with two names above five columns
-/// is not read, and a note says so.
+/// Frequency responses to two forces are the same with one and with two sensors. A comment with two
+/// names above five columns is not used as a header, and a note says so.
 #[test]
 fn frequency_responses_take_any_numbers_of_forces_and_responses() {
     let folder = tempfile::tempdir().unwrap();

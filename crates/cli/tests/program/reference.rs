@@ -49,17 +49,18 @@ fn is_named(section: &str, path: &str) -> bool {
         .iter()
         .filter_map(|field| path.strip_suffix(field))
         .any(|parent| row(parent).is_some_and(|row| row.contains("uncertain")));
-    // The page of file formats describes the fields of a machine.
+    // The page of file formats describes the fields of a machine, so a link to it is enough.
     let of_description = ["analysis.machine.", "machine."].iter().any(|m| path.starts_with(m));
     if of_description && section.contains("formats.md#machines-of-named-elements") {
         return true;
     }
-    // An object or list may be null if the page names its fields.
+    // A value that is null in this report may be an object or a list, so it is enough that the page
+    // names its fields.
     of_uncertain || [".", "["].iter().any(|next| section.contains(&format!("`{path}{next}")))
 }
 
-/// The machine of the example with two parallel springs that can be found only as a sum, and with a
-/// candidate for a sensor.
+/// The machine of the example, with two parallel springs and with a candidate position for a
+/// sensor. The data determine only the sum of the stiffnesses.
 const DRAWN: &str = r#"{
     "dofs": ["x"],
     "elements": [
@@ -143,7 +144,8 @@ fn every_field_of_every_report_is_in_the_reference() {
         let page = page();
         let mut section = section(&page, &format!("mechid {command}")).to_owned();
         if ["report", "bearing"].contains(&command) {
-            // The two reports also contain all fields of `identify`, or its checks.
+            // The report of `report` also has all fields of the report of `identify`; the report of
+            // `bearing` has the checks of `identify`.
             section += self::section(&page, "mechid identify");
         }
         let mut paths = BTreeSet::new();
@@ -193,7 +195,8 @@ fn the_description_in_the_reference_is_one() {
     }
 }
 
-/// An initial state may lack the velocity or the displacement.
+/// An initial state may be given as a displacement without a velocity, or as a velocity without a
+/// displacement.
 #[test]
 fn a_start_needs_no_more_than_it_says() {
     let folder = tempfile::tempdir().unwrap();

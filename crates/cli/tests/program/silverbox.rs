@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::mechid;
 
-/// First samples of the steady periods of the six realisations, counted from 1.
+/// Index of the first sample in steady state, for each of the six realisations, counted from 1.
 const STARTS: [usize; 6] = [9030, 17722, 26414, 35106, 43798, 52490];
 
 /// Returns the path of a file of the benchmark; if it is missing, prints a note and returns `None`.
@@ -20,7 +20,7 @@ fn file(name: &str) -> Option<PathBuf> {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/silverbox").join(name);
     if !path.exists() {
-        eprintln!("skipped: {name} of the Silverbox is not beside the project");
+        eprintln!("skipped: {name} of the Silverbox is missing in ../shared/data/silverbox");
         return None;
     }
     Some(path.canonicalize().unwrap())
@@ -48,8 +48,8 @@ fn the_schroeder_record_is_explained() {
     let Some(path) = file("Schroeder80mV.csv") else { return };
     let folder = tempfile::tempdir().unwrap();
     let window = format!("{} --start 13657 --period 1024 --periods 8 --lines 1:335", record(&path));
-    // Automatic weights would follow the residual force; with springs alone they leave 1.5 % of the
-    // response unexplained.
+    // The commands state the weighting. With automatic weights, which follow the residual force, a
+    // model with springs as the only nonlinear terms does not explain 1.5 % of the response.
     for (terms, most) in [
         ("--nonlinear k2:x1^2,k3:x1^3 --weighting white-force", 0.0070),
         ("--nonlinear k2:x1^2,k3:x1^3,c2:|v1|v1 --weighting response --search phase", 0.0025),
@@ -62,7 +62,8 @@ fn the_schroeder_record_is_explained() {
         let kind = told["nonlinear"]["distortion"]["text"].as_str().unwrap();
         assert!(kind.contains("cubic stiffness"), "{kind}");
     }
-    // The picture shows surface, spring, damper and residual.
+    // The picture shows the measured restoring force, the spring force, the damping force and the
+    // residual force.
     let drawn = format!("identify {window} --nonlinear k2:x1^2,k3:x1^3 --quiet --plot drawn.svg");
     mechid(folder.path(), &drawn);
     let svg = fs::read_to_string(folder.path().join("drawn.svg")).unwrap();
@@ -89,7 +90,8 @@ fn four_windows_of_a_file_predict_the_other_two() {
         record(&path),
         STARTS[0]
     );
-    // Terms chosen by held-out realisations give the same fit as when they are named by hand.
+    // Terms that are selected by means of held-out realisations give the same fit as the same terms
+    // given by `--nonlinear`.
     let candidates = "--candidates k2:x1^2,k3:x1^3,k5:x1^5,k4:x1^4 --criterion held-out";
     let chosen = identified(folder.path(), &format!("{four} {candidates}"));
     let steps = chosen["nonlinear"]["selection"]["steps"].as_array().unwrap();

@@ -8,7 +8,8 @@ use super::{mechid, refused};
 
 const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
 
-/// Runs a shell line in a folder with the examples; `mechid` is the program in it.
+/// Runs a shell line in a folder with the examples; the command `mechid` in this line starts the
+/// program under test.
 fn shell(folder: &Path, line: &str) -> Output {
     for file in ["machine.csv", "machine.json"] {
         fs::copy(Path::new(EXAMPLES).join(file), folder.join(file)).unwrap();
@@ -27,7 +28,8 @@ fn text(bytes: &[u8]) -> &str {
 const FORCE: &str = "mechid force machine.csv --system machine.json --displacement displacement \
                      --period 256";
 
-/// If the file goes to standard output, the report goes to standard error.
+/// If the output file is standard output, the report goes to standard error, so that standard
+/// output has only the file.
 #[test]
 fn an_output_to_standard_output_is_alone_there() {
     let folder = tempfile::tempdir().unwrap();
@@ -58,7 +60,8 @@ fn an_output_to_standard_output_is_alone_there() {
     }
 }
 
-/// The output is larger than a pipe, and its reader stops after three lines.
+/// If the reader of a pipe stops after three lines of a longer output, the program ends with exit
+/// code 141 and no error.
 #[test]
 fn a_reader_may_have_seen_enough() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,12 +131,13 @@ fn a_record_may_come_from_standard_input() {
         text(&ragged.stderr),
         "error: standard input, line 3: this line has 1 field, but the first line has 2\n"
     );
-    // A file named `-` exists, too.
+    // The path `./-` means a file with the name `-`, not standard input.
     fs::write(folder.path().join("-"), "t,x\n0,1\n1,2\n").unwrap();
     assert!(mechid(folder.path(), "info ./-").starts_with("./-: "));
 }
 
-/// A machine is passed from one call to the next, with the covariance of its parameters.
+/// One command passes an identified machine, with the covariance of its parameters, to the standard
+/// input of the next command.
 #[test]
 fn a_description_may_come_from_standard_input() {
     let folder = tempfile::tempdir().unwrap();
@@ -208,7 +212,8 @@ fn a_full_stream_is_told_by_the_exit_code() {
         ("mechid identify --help | head -1; exit ${PIPESTATUS[0]}".to_owned(), 141),
     ] {
         let run = shell(folder.path(), &line);
-        // The report may be written to the pipe before its reader ends.
+        // If the program has written the whole report before the reader closes the pipe, the exit
+        // code is 0 instead of 141.
         let piped = code == 141 && run.status.code() == Some(0);
         assert!(piped || run.status.code() == Some(code), "{line}: {:?}", run.status);
         assert!(!text(&run.stderr).contains("panicked"), "{line}");

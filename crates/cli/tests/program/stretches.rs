@@ -74,7 +74,8 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     let remarks = report["remarks"].as_array().unwrap();
     let part = "rec: the checks that look at single samples cover only samples 1 to 262000";
     assert!(remarks.iter().any(|r| r == part), "{remarks:?}");
-    // The part not in memory counts, too: 8 of 270 periods have a hundred times the noise.
+    // The part of the record that is not kept in memory affects the result, too: 8 of 270 periods
+    // have a hundred times the noise.
     let beginning = both("identify --period 1000 --periods 262 --method maximum-likelihood");
     let error = |report: &Value| report["parameters"][2]["standard_error"].as_f64().unwrap();
     assert!(error(&report) > 10.0 * error(&beginning), "{report}");
@@ -143,8 +144,8 @@ fn a_sweep_of_a_long_text_takes_every_nth_row() {
     }
 }
 
-/// A fit in the time domain that reads the record in sections gives the same result as one of all
-/// samples in memory.
+/// A fit in the time domain that reads the record in sections gives the same result as a fit with
+/// all samples in memory.
 #[test]
 fn stretches_of_a_long_text_meet_as_in_one_record() {
     let folder = records();
@@ -202,7 +203,8 @@ fn stretches_of_a_long_text_meet_as_in_one_record() {
     }
 }
 
-/// The prediction of a record in sections gives the same fit as that of all samples in memory.
+/// A fit by prediction that reads the record in sections gives the same result as with all samples
+/// in memory.
 #[test]
 fn a_long_text_is_predicted_as_one_record() {
     let folder = records();
@@ -238,8 +240,8 @@ fn a_long_text_is_predicted_as_one_record() {
 /// Number of samples, more than the part of a text kept in memory.
 const SPIKED: usize = 270_000;
 
-/// Returns a column that alternates between 3 and 1, with one sample of 80 near the end, and a sine
-/// with eight samples per cycle; as lines of text and as columns.
+/// Returns a record as lines of text and as columns: the time, a column that alternates between 3
+/// and 1 with one sample of 80 near the end, and a sine with eight samples per cycle.
 fn spiked() -> (Vec<String>, Vec<(String, Vec<f64>)>) {
     let mut square: Vec<f64> = (0..SPIKED).map(|k| if k % 2 == 0 { 3.0 } else { 1.0 }).collect();
     square[SPIKED - 2] = 80.0;
@@ -296,7 +298,7 @@ fn levels_of_a_long_text_are_those_of_all_of_it() {
     close("rms", (5.0 + (80.0 * 80.0 - 9.0) / n).sqrt());
     close("peak", 80.0);
     close("minimum", 1.0);
-    // The period is that of the part without the spike.
+    // The period is found from the first part of the record, which does not contain the spike.
     assert_eq!(square["period"]["samples"], 2);
     assert_eq!(
         report["remarks"][0],
@@ -340,7 +342,7 @@ fn what_is_wrong_near_the_end_of_a_long_text_is_told_with_its_line() {
     assert!(message.contains(what), "{message}");
 }
 
-/// A history over time shows the whole window, in memory or not.
+/// A time history shows the whole window, whether the record is kept in memory or not.
 #[test]
 fn a_long_text_is_drawn_whole() {
     let folder = records();

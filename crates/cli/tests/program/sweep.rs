@@ -6,8 +6,8 @@ use std::fs;
 use assert_cmd::Command;
 use serde_json::Value;
 
-/// The dissertation's oscillator under a flat multisine; the response is the exact one to the
-/// band-limited force.
+/// Experiment with the dissertation's oscillator under a flat multisine; its response is the exact
+/// response to the band-limited force.
 const EXPERIMENT: &str = r#"{
     "system": { "mass": 10, "damping": 180, "stiffness": 5000 },
     "sampling": { "samples": 256, "rate_hz": 1 },
@@ -71,7 +71,8 @@ fn a_sweep_that_finds_nothing_says_why() {
     );
 }
 
-/// A record in closed form: the oscillator under fifteen lines with a period of 240 samples.
+/// Writes a record in closed form: an oscillator in steady state, driven by a multisine of fifteen
+/// lines with a period of 240 samples.
 fn record(folder: &std::path::Path) {
     use mechid::signal::{Multisine, Phases, Sampling};
     let system = mechid::model::Sdof::new(10.0, 180.0, 5000.0).unwrap().system();
@@ -108,7 +109,7 @@ fn a_record_is_swept_by_taking_fewer_samples() {
     let [low, high] = [0, 1].map(|at| point["parameters"][2]["interval"][at].as_f64().unwrap());
     assert!(low < high);
     assert!(place.path().join("s.svg").exists());
-    // The same settings given as sample rates; the text report names the best one.
+    // The same settings are given as sampling rates; the text report names the best setting.
     let rates = report(&format!("{known} --rate-hz 100,50"));
     assert_eq!(errors(&rates), errors(&euler)[..2]);
     let best = told(&format!("{known} --rate-hz 50,100 --best"));
@@ -120,7 +121,7 @@ fn a_record_is_swept_by_taking_fewer_samples() {
         let found = report(&format!("{spectra} --decimate 1,2,4 {mass}"));
         assert!(errors(&found).iter().all(|e| *e < 1e-8), "{found}");
     }
-    // If a period is no multiple of the factor, the point of this setting says so.
+    // If the period is no multiple of the factor, the result of this setting states the failure.
     let uneven = report(&format!("{spectra} --decimate 1,7"));
     let reason = uneven["points"][1]["failure"].as_str().unwrap();
     assert_eq!(

@@ -35,7 +35,7 @@ fn completions_know_every_subcommand() {
     assert!(message.contains("bash, elvish, fish, powershell, zsh"), "{message}");
 }
 
-/// Reference: bash itself, which parses the script without running it.
+/// The shell bash parses the completion script without an error; it does not run the script.
 #[test]
 fn bash_understands_its_completions() {
     let folder = tempfile::tempdir().unwrap();
@@ -68,7 +68,7 @@ fn quiet_success_says_nothing_and_quiet_failure_says_what_is_wrong() {
     assert!(message.starts_with("error: a.csv has no column \"x\""), "{message}");
 }
 
-/// Messages use the singular for one, and ordinal numbers have the right ending.
+/// Messages use the singular for a count of one, and ordinal numbers have the right ending.
 #[test]
 fn one_thing_is_told_as_one() {
     let folder = tempfile::tempdir().unwrap();
@@ -100,8 +100,8 @@ fn one_thing_is_told_as_one() {
     assert!(told.contains("--mass gives 1 value, the record has 2 degrees of freedom"), "{told}");
 }
 
-/// The displacement is a random walk: warnings and notes follow one another, one line each, without
-/// gaps.
+/// The displacement is a random walk, so the report has warnings and notes. Each is one line, and
+/// no empty line separates them.
 #[test]
 fn warnings_stand_together() {
     let folder = tempfile::tempdir().unwrap();

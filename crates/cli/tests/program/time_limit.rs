@@ -72,6 +72,7 @@ fn every_record_of_a_fleet_has_the_limit() {
     let whole = report("");
     let limited = report("--time-limit 0");
     assert_eq!((&whole["failed"], &limited["failed"]), (&0.into(), &0.into()), "{limited}");
-    // The limit belongs to the analysis, so its rows are other rows.
+    // The time limit is a setting of the analysis, so a run with another limit computes the record
+    // again.
     assert_eq!(limited["computed_records"], 1);
 }

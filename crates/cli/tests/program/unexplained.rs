@@ -1,4 +1,5 @@
-//! Remarks on a force that contradicts the measured motion, and on its noise.
+//! Remarks of `mechid force` on a force, a period or a channel that contradicts the measured
+//! motion, and tests of the noise level in the standard error of the force.
 
 use std::fs;
 use std::path::Path;
@@ -161,9 +162,9 @@ fn what_the_machine_is_known_to_is_expected() {
             let found = report(folder.path(), &format!("{way} {noise}"));
             let told = remarks(&found);
             if doubted && way.contains("kalman") {
-                // A force without a limited band can follow both channels of a wrong machine by its
-                // values between the samples. A remark says that the machine may be wrong, and the
-                // interval contains the true force.
+                // With a wrong machine, a force that is not band-limited can explain both channels
+                // by its values between the samples. A note says that the machine may be wrong, and
+                // the interval contains the true force.
                 assert!(told.contains("hardly determines the force"), "{way}, {found}");
                 assert!(told.contains("another machine"), "{way}, {found}");
                 let force = &found["forces"][0];
@@ -185,16 +186,18 @@ fn what_the_machine_is_known_to_is_expected() {
 fn noise_is_that_of_the_record_before_periods_are_averaged() {
     let folder = tempfile::tempdir().unwrap();
     motion(folder.path(), &[1, 2]);
-    // Noise estimated from the lines without force and stated noise give the same error.
+    // The standard error is the same whether the noise is stated or estimated from the lines
+    // without force.
     let lines = format!("{BOTH} --period 512 --lines 5:60");
     let error = |arguments: &str| {
         let found = report(folder.path(), arguments);
         found["forces"][0]["standard_error"].as_f64().unwrap()
     };
     let (found, stated) = (error(&lines), error(&format!("{lines} --noise 4e-8,4e-8")));
-    // The level is known to 4 % from 195 lines of two channels.
+    // The noise level, estimated from 195 lines of two channels, has a standard error of 4 %.
     assert!((found / stated - 1.0).abs() < 0.16, "{found}, stated {stated}");
-    // Shrinkage reports the level in the form of --noise: before periods are averaged.
+    // The method shrinkage reports the noise level before periods are averaged, as the option
+    // `--noise` states it.
     let found = report(folder.path(), &format!("{BOTH} --period 512"));
     let chosen = found["chosen"].as_array().unwrap().iter();
     let levels = chosen.filter(|c| c["name"].as_str().unwrap().starts_with("noise of channel"));

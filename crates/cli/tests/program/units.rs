@@ -116,7 +116,8 @@ fn timed(folder: &Path, name: &str, time: &str, per_second: f64) {
     fs::write(folder.join(name), format!("{header}\n{}", rows.collect::<String>())).unwrap();
 }
 
-/// At 128 Hz the samples are 7.8125 ms apart, and 512 of them last 4 s.
+/// A time column in milliseconds without a unit is taken as seconds; a note states the sampling
+/// rate for milliseconds. At 128 Hz the samples are 7.8125 ms apart, and 512 samples last 4 s.
 #[test]
 fn milliseconds_that_do_not_say_so_are_asked_about() {
     let place = tempfile::tempdir().unwrap();
@@ -157,7 +158,8 @@ fn milliseconds_that_do_not_say_so_are_asked_about() {
     assert!(page().contains("has no unit"));
 }
 
-/// A slow record with a stated unit of time is accepted, and so is a fast one without a unit.
+/// A time column without unit gives a question only if the time steps or the duration would be
+/// unusually long in seconds; a time column with a unit gives no question.
 #[test]
 fn slow_records_with_a_unit_and_fast_ones_without_are_not_doubted() {
     let folder = tempfile::tempdir().unwrap();
@@ -208,7 +210,8 @@ fn a_time_column_with_a_factor_or_an_unknown_unit_is_asked_about() {
     }
 }
 
-/// Reference: the same record with the names in SI units.
+/// If the name of a force column has the unit psi, the report has one warning, and the parameters
+/// are those of the same record with SI units in its column names.
 #[test]
 fn a_unit_of_another_quantity_in_a_name_gives_a_warning() {
     let names = ["\"Force, psi\"", "x_mm", "velocity", "acceleration"];

@@ -1,4 +1,4 @@
-//! The page in a real browser, if one is installed.
+//! Tests of the page in a real browser; they are skipped if no browser is installed.
 
 use std::{fs, path::Path, process};
 
@@ -15,7 +15,8 @@ fn browse(folder: &Path, width: u32) -> Option<(String, String)> {
         parent.postMessage([innerWidth, document.documentElement.scrollWidth,
             ...beyond.map(e => e.tagName)].join(' '), '*');
     })</script>";
-    // The copy may run the script of the test; the policy still forbids loading other files.
+    // In the copy of the page, the security policy allows the script of this test and still forbids
+    // loading other files.
     let own = page(folder);
     let hash = own.find("script-src").expect("a policy for the script");
     let end = hash + own[hash..].find('"').expect("the end of the policy");

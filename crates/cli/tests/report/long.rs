@@ -1,5 +1,5 @@
-//! The page of a record that is too long to keep in memory: it describes the whole record, and is
-//! not larger than others.
+//! The page of a record that is too long to keep in memory: it describes the whole record, and the
+//! size of its file is limited.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -137,7 +137,8 @@ fn numbers_and_pictures_are_those_of_all_samples() {
         near(&cells[7], 100.0 * apart / varying, 3);
     }
 
-    // The mean period is that of all samples; its lines are computed from their definition.
+    // The expected values are computed here from the mean period of all samples and from the
+    // definition of the Fourier coefficients.
     let told: Value = serde_json::from_str(&told).unwrap();
     let value = |at: usize| told["parameters"][at]["value"].as_f64().unwrap();
     let [m, c, k] = [0, 1, 2].map(value);
@@ -155,7 +156,7 @@ fn numbers_and_pictures_are_those_of_all_samples() {
     // The peak of the force adds 2 N to the mean period, but is not in the part kept in memory.
     near(&cells[1], measured.sqrt(), 4);
     near(&cells[2], found.sqrt(), 4);
-    // The peak of the force is the last but one of the samples drawn.
+    // The peak of the force is the second last of the drawn samples.
     let force = figure(&document, "figure-force");
     let curve = force.descendants().find(|node| node.attribute("class") == Some("curve")).unwrap();
     let path = curve.descendants().find_map(|node| node.attribute("d")).unwrap();

@@ -23,8 +23,9 @@ fn mechid(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Writes a record of two periods: a force of equal lines, the steady displacement of two
-/// oscillators side by side, summed term by term, and white noise.
+/// Writes a record of two periods: a force with the same amplitude on every line, and the steady
+/// displacement of two parallel oscillators with white noise. The displacement is summed term by
+/// term.
 ///
 /// `second` is the stiffness of the second oscillator; infinity means that there is none.
 fn rig(names: [&str; 3], second: f64, noise: f64) -> tempfile::TempDir {
@@ -183,7 +184,8 @@ fn the_page_is_whole_and_stands_alone() {
     assert!(!html.replace("url(#", "").contains("url("));
 }
 
-/// Reference: the oscillator whose response is summed in the record, and its period.
+/// The page states the parameters of the oscillator, the levels of the channels and the lines of
+/// the force as in the closed form of the record.
 #[test]
 fn the_page_says_what_is_in_the_record() {
     let folder = rig(NAMES, f64::INFINITY, 0.0);
@@ -209,8 +211,8 @@ fn the_page_says_what_is_in_the_record() {
     assert_eq!(heading, "Evidence for the numbers");
 }
 
-/// Reference: a correct model leaves a residual with the power of the noise; a mode that the model
-/// lacks leaves more.
+/// With a correct model the residual has the power of the noise; if the model lacks a mode, the
+/// residual has more power, and the page reports this.
 #[test]
 fn a_missing_mode_shows_in_the_residual() {
     let likely = [&USUAL[..], &["--method", "maximum-likelihood"]].concat();
@@ -222,7 +224,8 @@ fn a_missing_mode_shows_in_the_residual() {
         let is_missing = second.is_finite();
         assert_eq!(checks(&document).contains("good misfit"), !is_missing);
         let remarks = remarks(&document);
-        // The power of the residual is a remark for or against the fit.
+        // A note for or against the fit compares the power of the residual with the power of the
+        // noise.
         for (heading, text) in &remarks {
             let bad = heading.starts_with("Before");
             assert_eq!(text.contains("exceeds the noise"), bad && is_missing, "{text}");
@@ -260,7 +263,7 @@ fn names_of_others_stay_text() {
     assert_eq!(handlers.filter(|a| a.name().starts_with("on")).count(), 0);
     assert_eq!(text(tagged(&document, "h1")[0]), title);
     assert_eq!(text(tagged(&document, "title")[0]), title);
-    // Text in brackets is not part of a name, including angle brackets.
+    // Text in brackets, including angle brackets, is not part of a name.
     let shown = "alert(1)";
     assert_eq!(row(&document, "Channels over the window", shown)[1], "force");
     let command = text(tagged(&document, "code")[0]);
@@ -294,7 +297,7 @@ fn programs_get_the_report_of_identify_and_the_place_of_the_page() {
     assert_eq!(printed, identified);
 }
 
-/// The receptance of an open record is averaged over segments; the page has everything else, too.
+/// The page of an open record has all seven figures; the receptance is averaged over segments.
 #[test]
 fn an_open_record_has_its_page_too() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -327,11 +330,13 @@ fn an_open_record_has_its_page_too() {
     assert_eq!(figures.len(), 7);
     let force = row(&document, "Computed and measured force", "force");
     let difference: f64 = force[4].strip_suffix(" %").unwrap().parse().unwrap();
-    // Noise of 1 % on the motion gives an error of about 1 % of the force, which is mostly inertia.
+    // Noise of 1 % on the motion gives an error of about 1 % in the force, because the force is
+    // mostly inertia.
     assert!(difference > 0.5 && difference < 5.0, "{difference}");
 }
 
-/// Reference: the added noise, relative to the motion in closed form.
+/// The page shows every fitted record and a validation record. Reference for the quality of the
+/// prediction: the noise that was added to the motion in closed form.
 #[test]
 fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let folder = rig(NAMES, f64::INFINITY, 1e-3);
@@ -355,7 +360,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     assert_eq!(ids.iter().filter(|id| **id == "figure-validation").count(), 1);
     let fit = &row(&document, "Prediction of the responses", "x")[1];
     let fit: f64 = fit.strip_suffix(" %").unwrap().parse().unwrap();
-    // A uniform number has the standard deviation of its width divided by √12.
+    // The standard deviation of a uniform random number is the width of its range divided by √12.
     let motion: f64 = row(&document, "Channels over the window", "x")[4].parse().unwrap();
     let noise = 4e-2 / 12f64.sqrt();
     let expected = 100.0 * (1.0 - noise / motion.hypot(noise));
@@ -363,7 +368,8 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let remarks = remarks(&document);
     let (_, merits) = remarks.iter().find(|(heading, _)| heading.starts_with("Evidence")).unwrap();
     assert!(merits.contains("noisy.csv, samples 1 to 512"), "{merits}");
-    // Validation on fitted samples proves little; on other samples of the same record it counts.
+    // Validation on the fitted samples proves little; validation on other samples of the same
+    // record counts as evidence.
     for (more, proves) in [
         (&["--validate", "rig.csv"][..], false),
         (&["--validate", "rig.csv:257", "--periods", "1"], true),
@@ -374,8 +380,9 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     }
 }
 
-/// The lines are those of a segment, not of the record. Reference: the exact response of an
-/// oscillator to sines with no whole number of periods in a segment.
+/// The page of a record that is averaged over segments has the spectral lines of a segment, not of
+/// the whole record. Reference: the exact response of an oscillator to sines with no whole number
+/// of periods in a segment.
 #[test]
 fn a_record_in_segments_has_its_page_too() {
     let (m, c, k) = (2.0, 6.0, 800.0);

@@ -91,7 +91,7 @@ pub enum SimulateError {
     },
 }
 
-/// Writes the number with four decimals, and the modulus of a complex number.
+/// Writes a multiplier with four decimals, and adds the modulus of a complex multiplier.
 fn multiplier_text(multiplier: Complex<f64>) -> String {
     let number = |value: f64| message::number_to(value, 4);
     match multiplier.im {

@@ -200,7 +200,7 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
         .map_err(|error| error.with_instability(instability))
 }
 
-/// Repeats a period this many times.
+/// Repeats a period `periods` times.
 fn repeated(period: &Record, periods: usize) -> Result<Record, SignalError> {
     let len = period.len();
     let sampling = period.sampling().with_len(len * periods)?;

@@ -12,14 +12,15 @@ use super::{SimulateError, simulate};
 /// Name of the column with the number of the run.
 const RUN: &str = "run";
 
-/// Summary of the records of a study; `Display` writes it as text, `Serialize` the same as data.
+/// Summary of the records of a study; `Display` writes the summary as text, `Serialize` writes the
+/// same content as data.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct RunsSummary {
     /// Number of runs.
     pub runs: usize,
     /// Number of samples of all runs together.
     pub samples: usize,
-    /// Column that names the run of each row, counted from 1.
+    /// Name of the column that contains the number of the run of each row, counted from 1.
     pub record_column: &'static str,
     /// Channels of each run.
     pub channels: Vec<String>,

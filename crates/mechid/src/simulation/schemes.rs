@@ -74,8 +74,8 @@ pub fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, Simula
     }))
 }
 
-/// Returns the force within the steps from one period `force`, if the scheme interpolates the
-/// samples.
+/// Returns the force at the inner instants of the steps, interpolated from one period `force`;
+/// `None` if the scheme does not interpolate the samples.
 pub fn interpolated(
     experiment: &Experiment,
     force: &Record,

@@ -21,7 +21,7 @@ use super::{SimulateError, SimulatedSystem};
 pub struct Multiplier {
     /// The factor.
     pub value: Complex<f64>,
-    /// Error of the factor for the steps of the scheme (pure number).
+    /// Error of the factor without the error due to the time step of the scheme (pure number).
     pub error: f64,
     /// Error of the factor due to the time step of the scheme (pure number); `None` if it is not
     /// known.
@@ -45,7 +45,8 @@ impl From<Response> for Stepped {
     }
 }
 
-/// Computes the steps through one force record, or through the period of a periodic response.
+/// Computes the response step by step, over one force record or over the period of a periodic
+/// response.
 pub(super) fn stepped(
     experiment: &Experiment,
     scheme: &dyn Scheme,
@@ -90,7 +91,7 @@ pub(super) fn stepped(
     }
 }
 
-/// Returns the response of an orbit, or an error if its largest multiplier shows that it is
+/// Returns the response of an orbit, or an error if its largest multiplier shows that the orbit is
 /// unstable.
 fn stayed_on(orbit: &PeriodicOrbit) -> Result<Stepped, SimulateError> {
     let multiplier = match orbit.multipliers().first() {

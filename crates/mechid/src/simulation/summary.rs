@@ -11,7 +11,8 @@ use serde::Serialize;
 
 use super::{Multiplier, Simulation};
 
-/// Summary of a [`Simulation`]; `Display` writes it as text, `Serialize` the same as data.
+/// Summary of a [`Simulation`]; `Display` writes the summary as text, `Serialize` writes the same
+/// content as data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulationSummary {
     /// Scheme that computed the response, with its parameters.
@@ -31,7 +32,7 @@ pub struct SimulationSummary {
     /// Oscillating modes of the machine (of its linear part if it is nonlinear), in rising order of
     /// frequency; none for a sparse machine.
     pub modes: Vec<SimulatedMode>,
-    /// Channels of the record, in its order.
+    /// Channels of the record, in the order of the record.
     pub channels: Vec<SimulatedChannel>,
     /// The fastest growing free response of an unstable machine.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -52,7 +53,7 @@ pub struct SimulationSummary {
 pub struct SchemeConvention {
     /// Subject of the convention.
     pub what: &'static str,
-    /// Choice that is used.
+    /// Choice that the scheme uses.
     pub choice: &'static str,
 }
 
@@ -68,11 +69,11 @@ pub struct SimulatedMode {
 /// A channel of the record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulatedChannel {
-    /// Name of its column.
+    /// Name of the column of the channel.
     pub column: String,
-    /// SI unit of its samples.
+    /// SI unit of the samples of the channel.
     pub unit: &'static str,
-    /// RMS value without noise, in `unit`.
+    /// RMS value with noise, in `unit`.
     pub rms: f64,
     /// RMS value of the noise, in `unit`.
     pub noise_rms: f64,
@@ -87,7 +88,7 @@ pub struct FreeGrowth {
     pub growth_rate: f64,
     /// Time in which the response doubles, in s.
     pub doubling_time_s: f64,
-    /// Text with these numbers.
+    /// Text that describes the growth of the response.
     pub text: String,
 }
 
@@ -104,7 +105,7 @@ pub struct LargestMultiplier {
     /// Error of the factor due to the time step of the scheme (pure number); `None` if it is not
     /// known.
     pub scheme_error: Option<f64>,
-    /// Text with these numbers.
+    /// Text with the modulus of the factor, its error, and the stability of the response.
     pub text: String,
 }
 
@@ -117,7 +118,7 @@ pub struct SimulatedTerms {
     pub coefficients: Vec<f64>,
 }
 
-/// One quantity of all degrees of freedom, before and after noise.
+/// One quantity at several degrees of freedom, without and with noise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Group<'a> {
     pub name: &'static str,
