@@ -1,10 +1,10 @@
 //! Random and damaged input for every reader and public function of the workspace.
 //!
-//! A [`Target`] takes bytes and returns an error if the code breaks a promise; a panic, a hang and
-//! too much memory are errors, too. [`run`] calls it with the files of its corpus (a folder of
-//! `corpus` in this package) and then with mutations of them, or with random bytes; the target
-//! draws the arguments of public functions from random bytes. Each case is determined by the seed
-//! and its number.
+//! A [`Target`] takes bytes and returns an error if a checked property does not hold; a panic, a
+//! hang and too much memory are errors, too. [`run`] calls it with the files of its corpus (a
+//! folder of `corpus` in this package) and then with mutations of them, or with random bytes; the
+//! target draws the arguments of public functions from random bytes. Each case is determined by the
+//! seed and its number.
 //!
 //! - `cargo test -p mechid-fuzz` runs some thousand cases of each target.
 //! - `cargo run --release -p mechid-fuzz -- --cases 10000000` runs many. `--target NAME` selects
@@ -57,7 +57,7 @@ pub struct Target {
     pub input: Input,
     /// Memory that a case may use, in bytes: a constant part and a part for each byte of the input.
     pub memory: [usize; 2],
-    /// Runs a case; an error says which promise is broken.
+    /// Runs a case; an error states the property that does not hold.
     pub run: fn(&[u8]) -> Result<(), String>,
 }
 
@@ -98,8 +98,8 @@ pub struct Summary {
     pub peak: usize,
     /// Longest time that a case took.
     pub longest: Duration,
-    /// Number of cases that reached each [`Depth`](depth::Depth) and no greater one, in its order:
-    /// refused by the reader, read, analysis begun, with a result.
+    /// Number of cases by the greatest [`Depth`](depth::Depth) that each case reached: refused by
+    /// the reader, read, analysis begun, with a result.
     pub depths: [u64; 4],
 }
 
@@ -116,7 +116,7 @@ impl std::fmt::Display for Summary {
     }
 }
 
-/// A case that broke a promise.
+/// A case that failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
     /// Name of the target.
@@ -158,7 +158,7 @@ pub fn corpus(target: &Target) -> io::Result<Vec<(String, Vec<u8>)>> {
 /// running. The memory is measured for the whole process, so only one run may be active.
 ///
 /// # Errors
-/// The first case that panics, breaks a promise, or needs too much time or memory.
+/// The first case that panics, violates a checked property, or needs too much time or memory.
 ///
 /// # Panics
 /// If the corpus cannot be read or is empty.

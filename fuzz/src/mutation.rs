@@ -112,7 +112,7 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
         }
         6 => input.truncate(at),
         7 => {
-            // A binary number, such as a length or an offset, replaces one.
+            // A binary number overwrites some bytes, as if a length or an offset had another value.
             let number: u64 = match random.random_range(0..5) {
                 0 => 0,
                 1 => 1 << random.random_range(0..64),

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use mechid_fuzz::{Cases, run, targets};
 
-/// A single test runs the targets one after the other, because the memory is measured for the whole
-/// program.
+/// Runs cases of every target: none may panic, hang, use too much memory or violate a checked
+/// property. A single test runs the targets one after the other, because the memory is measured for
+/// the whole program.
 #[test]
 fn no_target_breaks_a_promise() {
     let cases = Cases {

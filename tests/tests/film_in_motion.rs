@@ -122,7 +122,8 @@ fn a_test_at_small_amplitude_finds_the_coefficients_of_the_geometry() {
     let truth = [kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy];
     assert!(found.summary().amplitude.unwrap().largest_displacement < 0.01 * CONDITIONS.clearance);
     for (row, exact) in found.summary().coefficients.iter().zip(truth) {
-        // A value may deviate by 3.3 standard errors: an interval of 99.9 % for each of the eight.
+        // Each of the eight coefficients may deviate by 3.3 standard errors, the bound of a 99.9 %
+        // interval.
         let error = row.estimate.standard_error.unwrap();
         assert!((row.estimate.value - exact).abs() < 3.3 * error, "{row:?}, exactly {exact}");
         let largest = if row.name.starts_with('k') { kxy } else { cxx };
@@ -139,8 +140,8 @@ fn bias(lines: &[usize], amplitude: f64) -> [f64; 3] {
     [largest / CONDITIONS.clearance, 100.0 * k, 100.0 * c]
 }
 
-/// The picture `name` in the folder of `theory/bearing.md` is the one drawn here; its numbers agree
-/// to half a pixel. `MECHID_BLESS=1` writes it.
+/// Checks that the picture `name` of `theory/bearing.md` is the one drawn here; the numbers may
+/// differ by half a pixel. With `MECHID_BLESS=1` the picture is written first.
 fn is_in_the_book(name: &str, figure: &Figure) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../docs/book/src/theory/film_in_motion")
@@ -165,7 +166,8 @@ fn is_in_the_book(name: &str, figure: &Figure) {
     }
 }
 
-/// Bias of a linear fit at larger amplitudes: the table and first figure of `theory/bearing.md`.
+/// Checks the table and the first figure of `theory/bearing.md`, which show the bias of a linear
+/// fit at larger amplitudes.
 #[test]
 fn the_bias_over_amplitude_is_what_the_book_says() {
     let page = include_str!("../../docs/book/src/theory/bearing.md");
@@ -175,7 +177,8 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
     );
     let [mut of_all, mut of_odd] = [(); 2].map(|()| Vec::<[f64; 3]>::new());
     for amplitude in [0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2] {
-        // Half as many lines with the same total power.
+        // There are half as many odd lines; the factor √2 of their amplitudes gives the same total
+        // power.
         let (a, b) = (bias(&all(), amplitude), bias(&odd(), 2_f64.sqrt() * amplitude));
         let [[at, k, c], [odd_at, odd_k, odd_c]] = [a, b];
         table +=
@@ -250,8 +253,8 @@ fn linear_growth(masses: f64) -> f64 {
     eigenvalues.iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The second figure of `theory/bearing.md`: orbits of a rig test, the whirl of rotors above the
-/// threshold, and the growth rate of a small whirl.
+/// Checks that the second figure of `theory/bearing.md` is the one computed here: orbits of a rig
+/// test, the whirl of rotors above the threshold, and the growth rate of a small whirl.
 #[test]
 fn the_film_in_motion_is_what_the_book_shows() {
     let across = || Axis::linear("y / c", "").range(-1.05, 1.05);

@@ -26,8 +26,8 @@ enum Task {
         /// Only the table or figure of this number, for example 5.6.4 or figure-5.2.4.
         #[arg(long, value_name = "NUMBER")]
         only: Option<String>,
-        /// Compare with the golden files (to 1e-9), tables, figures and pages of the repository,
-        /// without writing any; files that do not belong to them fail, too.
+        /// Compare with the golden files (to 1e-9) and with the tables, figures and pages of the
+        /// repository, without writing them; superfluous files are errors, too.
         #[arg(long, conflicts_with = "bless")]
         check: bool,
         /// Rewrite the golden files on purpose.
@@ -47,8 +47,8 @@ enum Task {
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
-    /// Run the studies of many seeded experiments; write their results as Parquet and the tables of
-    /// the book (short form), or all studies for a given time (long form).
+    /// Run studies of many seeded experiments and write their results as Parquet. The short form
+    /// tests the coverage of the intervals; the long form runs all studies in a given time.
     Studies {
         /// Compare the short form with the page of the book, without writing it.
         #[arg(long, conflicts_with_all = ["seconds", "out"])]
@@ -59,23 +59,24 @@ enum Task {
         /// First seed.
         #[arg(long, default_value_t = 0)]
         seed: u64,
-        /// Part of the names of the long studies to run [default: all].
+        /// Run only the long studies whose names contain this text [default: all].
         #[arg(long, default_value = "", hide_default_value = true)]
         only: String,
         /// Cargo's profile for the long studies.
         #[arg(long, default_value = "release")]
         profile: String,
-        /// Folder of the results; the book is not written then [default: target/studies].
+        /// Folder of the results; if it is given, the book is not written [default:
+        /// target/studies].
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
     /// Measure how time grows with degrees of freedom and samples, and write the page of the book
     /// about it (with --release, on an idle machine).
     MeasureCost {
-        /// Seconds for each point.
+        /// Time for the repeated runs of each point, in s.
         #[arg(long, default_value_t = 0.5)]
         seconds: f64,
-        /// Only the tests of a laboratory, by the program of the same build.
+        /// Measure only the laboratory tests, with the program of the same build.
         #[arg(long)]
         lab: bool,
     },

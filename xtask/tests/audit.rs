@@ -43,7 +43,7 @@ fn every_slip_misprint_claim_and_suggestion_is_on_the_page() {
         assert!(page.contains(&format!("| S{number} |")), "S{number}");
     }
     assert!(!page.contains("NaN"));
-    // A table is not drawn if a row has another number of cells than the head.
+    // A Markdown table is not drawn if a row and the header have different numbers of cells.
     let cells = |line: &str| line.replace("\\|", "").matches('|').count();
     for pair in page.lines().collect::<Vec<_>>().windows(2) {
         if pair[0].starts_with('|') && pair[1].starts_with('|') {
@@ -61,15 +61,15 @@ fn the_correction_overturns_what_the_slips_made() {
         |number: u8| -> &Judged { judged.iter().find(|j| j.claim.number == number).unwrap() };
     let holds = |f: &Finding| f.holds();
     for (number, printed, corrected) in [
-        // Every comparison confirms the next claims, with and without slips.
+        // Every comparison confirms claims 4, 10 and 23, with and without slips.
         (4, Holds::Yes, Holds::Yes),
         (10, Holds::Yes, Holds::Yes),
         (23, Holds::Yes, Holds::Yes),
-        // The harmonic offset makes these claims hold.
+        // Claims 14, 19 and 13 hold, at least in part, only because of the harmonic offset.
         (14, Holds::Yes, Holds::No),
         (19, Holds::Yes, Holds::No),
         (13, Holds::Hardly, Holds::No),
-        // A misalignment of one sample makes these claims hold.
+        // Claims 3 and 25 hold only because of a misalignment of one sample.
         (3, Holds::Yes, Holds::Hardly),
         (25, Holds::Yes, Holds::Hardly),
     ] {

@@ -27,8 +27,8 @@ fn every_row_is_met_or_explained_but_those_of_appendix_b_and_two_records() {
             // appendix E no settings.
             let is_unstated =
                 ["table B", "table E"].iter().any(|part| row.quantity.starts_with(part));
-            // Two modes of the arm do not predict another record, and two weak modes of the frame
-            // differ from those of a subspace model.
+            // Known disagreements: two modes of the arm do not predict another record, and two weak
+            // modes of the frame differ from those of a subspace model.
             let is_known = match judge.name {
                 "CD player's arm" => row.quantity.contains("predicted"),
                 "Steel subframe, two shakers" => {

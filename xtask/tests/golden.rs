@@ -16,7 +16,7 @@ fn tables_and_figures_agree_with_their_golden_files() {
     assert_eq!(files, reproduction.golden_files(), "a golden file without its table or figure");
 }
 
-/// The pages of a folder and the folders in it.
+/// Returns the pages of a folder and of its subfolders.
 fn pages(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let (folders, mut files): (Vec<PathBuf>, Vec<PathBuf>) = entries.partition(|e| e.is_dir());

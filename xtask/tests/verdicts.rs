@@ -1,4 +1,4 @@
-//! The reproduction gives the printed digits: a drop in these counts is a fault.
+//! The reproduction gives the printed digits. A smaller number of reproduced values is a fault.
 
 use std::path::Path;
 
@@ -25,8 +25,8 @@ fn every_cell_with_known_settings_is_explained() {
     let (published, rows) = reproduced();
     // 1,990 printed estimates less the 20 of Appendix B, whose integrator the text does not name.
     assert_eq!(rows.len(), 1970);
-    // To the digit, rounded twice (5.3.3, NPI 21.4), misprints (4936 and three columns without
-    // their sign), unexplained.
+    // Number of estimates with each verdict: to the digit; rounded twice (5.3.3, NPI 21.4);
+    // misprints (4936, and three columns without their sign); unexplained.
     assert_eq!(counts(rows.iter().map(|r| &r.estimate)), [1938, 1, 31, 0]);
     assert_eq!(counts(rows.iter().map(|r| &r.error)), [1934, 0, 36, 0]);
     let tables: Vec<&str> = published.tables().collect();
@@ -38,7 +38,8 @@ fn every_cell_with_known_settings_is_explained() {
     assert_eq!(counts(all.iter()), [143, 0, 9, 0]);
 }
 
-/// A verdict can be negative: without one of the slips, fewer cells are reproduced.
+/// A verdict can be negative: without any slip, no estimate of table 5.3.1 is reproduced to the
+/// digit.
 #[test]
 fn without_the_slips_most_cells_do_not_come_out() {
     let (_, rows) = reproduced();

@@ -185,7 +185,7 @@ fn settings(d: &mut Draw) -> Result<Option<Identify>, String> {
     Ok(Some(how))
 }
 
-/// Prints a result, as text and as JSON.
+/// Checks that a result has a text of at most [`LONGEST_TEXT`] bytes, and valid JSON.
 fn printed<T: Display + serde::Serialize>(result: &T) -> Result<(), String> {
     let text = result.to_string();
     if text.is_empty() || text.len() > LONGEST_TEXT {

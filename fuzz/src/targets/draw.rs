@@ -15,7 +15,7 @@ const LONGEST_MESSAGE: usize = 2_000;
 /// Most samples of a record.
 const MOST_SAMPLES: usize = 96;
 
-/// Values that follow from the bytes of a case; zeros when they are used up.
+/// Values that follow from the bytes of a case; zeros after the last byte.
 pub struct Draw<'a>(Unstructured<'a>);
 
 impl<'a> Draw<'a> {
@@ -80,7 +80,7 @@ impl<'a> Draw<'a> {
         (0..self.below(most + 1)).map(|_| self.number()).collect()
     }
 
-    /// Returns a size: a small one, or one that fits into no memory.
+    /// Returns a size: a small one, or one that is too large for any memory.
     pub fn size(&mut self) -> usize {
         match self.below(24) {
             1 => usize::MAX,

@@ -131,7 +131,7 @@ fn passed<T>(result: Result<T, AnalysisError>) -> Result<Option<T>, String> {
     }
 }
 
-/// Prints a result, as text and as JSON.
+/// Checks that a result has a text, and can be written as JSON.
 fn printed<T: Display + serde::Serialize>(result: &T) -> Result<(), String> {
     reached(Depth::Fitted);
     if result.to_string().is_empty() {
@@ -381,7 +381,8 @@ fn terms(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Analyses a fleet of the record and a good one: each has a row, even if the record is damaged.
+/// Analyses a fleet of two records, the input and a good one. Each record has a row in the results,
+/// even if the input is damaged.
 fn fleet(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let records = folder.path().join("records");

@@ -215,7 +215,7 @@ pub const TARGETS: [Target; 11] = [
         name: "identifiers",
         corpus: "parquet",
         input: Input::Mutations(&["PAR1", "\x15\0", "\x19\x2c", "\u{7f}\u{7f}"]),
-        // The list of the records may use the memory of a small file.
+        // The list of the records may use as much memory as the reader allows for any small file.
         memory: [300 << 20, 600],
         run: identifiers,
     },
@@ -392,10 +392,11 @@ fn chunks(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Largest number of samples of a period that is computed.
+/// Maximum number of samples per period for which the forces of an experiment are computed.
 const MOST_SAMPLES: usize = 1 << 12;
 
-/// Parses a text as every kind of description: of a system, an experiment, and others.
+/// Parses a text as each kind of description in turn, such as a covariance, a system or an
+/// experiment.
 fn descriptions(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let path = folder.path().join("a.json");

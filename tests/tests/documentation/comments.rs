@@ -108,7 +108,8 @@ impl Comment {
     }
 }
 
-/// Returns the phrases of `phrases.txt` beside this file: the text of each line up to two spaces.
+/// Returns the phrases of `phrases.txt` in this folder: the text before the first two spaces of
+/// each line.
 pub fn phrases() -> Vec<&'static str> {
     let lines = include_str!("phrases.txt").lines().filter(|line| !line.starts_with('#'));
     lines.filter_map(|line| line.split("  ").next()).map(str::trim).collect()

@@ -48,9 +48,10 @@ pub enum Kind {
 pub struct Item {
     pub place: String,
     pub docs: String,
-    /// Documentation of the type that it belongs to, or of the variant if it is a field of one.
+    /// Documentation of the type that contains the item; for a field of a variant, documentation of
+    /// the variant.
     pub around: String,
-    /// Documentation at the head of its file.
+    /// Documentation at the head of the file that contains the item.
     pub file: String,
     pub kind: Kind,
 }

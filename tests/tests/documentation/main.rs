@@ -135,7 +135,8 @@ fn comments_have_plain_words() {
     none(&faults, "comments with a phrase of `phrases.txt`");
 }
 
-/// The program shows the messages of the log as its progress.
+/// Checks that no message of the log has a value in debug format (`:?`), because the program shows
+/// these messages as its progress.
 #[test]
 fn progress_is_reported_in_words() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

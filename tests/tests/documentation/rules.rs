@@ -217,7 +217,7 @@ fn name(ty: &Type) -> Option<String> {
     }
 }
 
-/// Returns true if the type has one of these names, or contains a type that has.
+/// Returns true if the type has one of these names, or contains a type that has one of them.
 fn mentions(ty: &Type, names: &[&str]) -> bool {
     match ty {
         Type::Reference(inner) => mentions(&inner.elem, names),
@@ -236,12 +236,12 @@ fn mentions(ty: &Type, names: &[&str]) -> bool {
     }
 }
 
-/// Number of operations that need no source in a body of several statements: a conversion, a ratio,
-/// a sum of two terms.
+/// Maximum number of arithmetic operations that need no source, in a function body of several
+/// statements: enough for a conversion, a ratio or a sum of two terms.
 const PLAIN: usize = 2;
 
-/// Number of operations that need no source in a body that is one expression, because
-/// the formula is read from the code itself.
+/// Maximum number of arithmetic operations that need no source, in a function body that is one
+/// expression: the code itself shows the formula.
 const FORMULA: usize = 4;
 
 /// Returns true if a function with numbers in its signature does more than pass on, compare,

@@ -12,7 +12,8 @@ use super::{Judge, Row};
 /// Number of masses of the chain.
 const MASSES: usize = 60;
 
-/// A chain of equal masses on equal springs, one end fixed and the other free.
+/// Compares the natural frequencies of a chain of equal masses and springs with the closed form;
+/// one end is fixed, the other end is free.
 pub(super) fn chain() -> Result<Judge, String> {
     let (mass, stiffness) = (2.0, 5000.0);
     let springs = DMatrix::from_fn(MASSES, MASSES, |i, j| match i.abs_diff(j) {
@@ -49,7 +50,8 @@ pub(super) fn chain() -> Result<Judge, String> {
     })
 }
 
-/// A damped oscillator at rest under a force that grows in proportion to time.
+/// Compares the displacement of a damped oscillator with the closed form. The oscillator starts at
+/// rest, and the force grows in proportion to time.
 pub(super) fn transient() -> Result<Judge, String> {
     let (mass, damping, stiffness, rate) = (10.0, 40.0, 9000.0, 300.0);
     let sampling = Sampling::new(0.025, 61).map_err(|e| e.to_string())?;

@@ -14,7 +14,7 @@ const DIGITS: &str =
 /// Tables with modes in place of parameters.
 const MODAL: [&str; 3] = ["E1", "E2", "E-steffen-rade-2"];
 
-/// Printed estimates of all tables.
+/// Compares the printed estimates of all tables with the computed ones.
 pub(super) fn estimates(published: &Published, results: &Results) -> Result<Judge, String> {
     let mut rows = Vec::new();
     for number in published.tables().filter(|number| !MODAL.contains(number)) {
@@ -38,7 +38,7 @@ pub(super) fn estimates(published: &Published, results: &Results) -> Result<Judg
     })
 }
 
-/// Printed mean errors, recomputed from the printed errors of their columns.
+/// Compares the printed mean errors with the means of the printed errors of their columns.
 pub(super) fn means(published: &Published, results: &Results) -> Judge {
     let rows = published.tables().flat_map(|number| {
         let cells = cells::rows(number, published, results);
@@ -60,7 +60,8 @@ pub(super) fn means(published: &Published, results: &Results) -> Judge {
     }
 }
 
-/// Printed modes of the two-mass system; the settings of the identified modes are not printed.
+/// Compares the printed modes of the two-mass system with the computed ones; the settings of the
+/// identified modes are not printed.
 pub(super) fn modes(published: &Published) -> Result<Judge, String> {
     let mut rows = Vec::new();
     for number in published.tables().filter(|number| MODAL.contains(number)) {

@@ -14,7 +14,7 @@ const COEFFICIENTS: [&str; 7] = ["Kxx", "Kxy", "Kyx", "Kyy", "Bxx", "Bxy", "Byy"
 /// neighbours, in degrees.
 const MISPRINT: (&str, f64) = ("83.29", 85.29);
 
-/// Lund and Thomsen's 14 rows of finite bearings.
+/// Compares Lund and Thomsen's 14 rows of finite bearings with our values.
 pub(super) fn lund_thomsen(root: &Path) -> Result<Judge, String> {
     let file = root.join("crates/bearing/tests/lund_thomsen_1978.csv");
     let table = std::fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
@@ -101,7 +101,7 @@ fn printed_formulas(e: f64) -> [(&'static str, f64); 8] {
     ]
 }
 
-/// The short bearing by the formulas of textbooks.
+/// Compares the coefficients of the short bearing with the formulas of a textbook.
 pub(super) fn short_bearing() -> Result<Judge, String> {
     let words = |e: mechid::bearing::BearingError| e.to_string();
     let bearing = ShortBearing::new(0.25).map_err(words)?;

@@ -50,7 +50,7 @@ const RECORDS: [[&str; 4]; 6] = [
     ],
 ];
 
-/// Rows of all records.
+/// Compares the published numbers of all records with those on the pages of the gallery.
 pub(super) fn records(root: &Path) -> Result<Vec<Judge>, String> {
     let file = root.join("tests/published/programs/measured.csv");
     let words = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());

@@ -1,6 +1,6 @@
-//! Numbers of this workspace that others have printed or that have a closed form, on one page.
+//! Comparison of numbers of this workspace with printed numbers and with closed forms, on one page.
 //!
-//! No row is judged by a simulator of this workspace.
+//! No reference comes from a simulator of this workspace.
 
 mod closed_forms;
 mod dissertation;
@@ -33,7 +33,7 @@ pub enum Status {
 pub struct Row {
     /// Quantity.
     pub quantity: String,
-    /// The number as printed, or by the closed form.
+    /// Expected number: as printed, or from the closed form.
     pub expected: String,
     /// The number of this workspace.
     pub ours: String,

@@ -1,4 +1,4 @@
-//! The page of the book.
+//! The page of the book that compares our numbers with published ones.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

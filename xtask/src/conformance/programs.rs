@@ -103,7 +103,8 @@ fn scheme(name: &str, values: &[Value]) -> Result<Box<dyn Scheme>, String> {
     })
 }
 
-/// Steps of three storeys by the integrators of OpenSees.
+/// Compares the displacements of three storeys after each step with those of the integrators of
+/// OpenSees.
 pub(super) fn opensees(root: &Path) -> Result<Judge, String> {
     let system = chain()?;
     let mut responses: BTreeMap<String, Response> = BTreeMap::new();
@@ -213,7 +214,7 @@ impl Ours {
         })
     }
 
-    /// Returns a value, the size to which its rounding error is compared, and its unit.
+    /// Returns a value, the magnitude with which its rounding error is compared, and its unit.
     fn value(&self, [what, at, of]: &[String; 3]) -> Result<(f64, f64, &'static str), String> {
         Ok(match what.as_str() {
             "eigenvalue" => {
@@ -246,7 +247,8 @@ impl Ours {
     }
 }
 
-/// Eigenvalues, receptances, exact steps, quantiles, a logarithm and averaged spectra of SciPy.
+/// Compares eigenvalues, receptances, exact steps, quantiles, a logarithm and averaged spectra with
+/// those of SciPy.
 pub(super) fn scipy(root: &Path) -> Result<Judge, String> {
     let ours = Ours::compute()?;
     let mut rows = Vec::new();

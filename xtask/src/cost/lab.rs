@@ -20,7 +20,7 @@ const MOST_SECONDS: f64 = 120.0;
 /// Time between two readings of the memory of a program.
 const POLL: Duration = Duration::from_millis(20);
 
-/// One case: its name, the arguments of the program, and the file that they read.
+/// One case: its name, its input file, and the arguments of the program.
 struct Case {
     name: &'static str,
     file: &'static str,
@@ -30,7 +30,7 @@ struct Case {
 /// Time and memory of a case.
 struct Cost {
     name: &'static str,
-    /// `None` if it was ended after [`MOST_SECONDS`].
+    /// Time in s; `None` if the program was stopped after [`MOST_SECONDS`].
     seconds: Option<f64>,
     /// Largest memory in GB; `None` if the system does not report it.
     memory: Option<f64>,
@@ -128,7 +128,7 @@ fn cases(folder: &Path) -> Result<Vec<Case>, String> {
 /// Writes a random test of a chain, with 0.3 % noise on the force and 1 % on the displacements.
 fn shaken(path: &Path, dof: usize, driven: &[usize], samples: usize) -> Result<(), String> {
     let system = chain(dof, Support::Held, 0.02, 1);
-    // The response of a period is exact; an open record is a part of it.
+    // The response to a whole period is computed exactly; the open record is a part of this period.
     let period = Sampling::from_rate_hz(128.0, samples + 1536).map_err(|e| e.to_string())?;
     let white = noise::white(period, driven.len(), 50.0, 1).map_err(|e| e.to_string())?;
     let mut data = DMatrix::zeros(period.len(), dof);
@@ -171,7 +171,7 @@ fn decay(path: &Path) -> Result<(), String> {
     fs::write(path, csv_text(sampling, &columns)).map_err(|e| e.to_string())
 }
 
-/// Writes a chain of 1,000 masses as rows with all zeros.
+/// Writes a chain of 1,000 masses with complete matrices, which include all zeros.
 fn dense_chain(path: &Path) -> Result<(), String> {
     let n = 1000;
     let rows = |diagonal: f64, beside: f64| -> Vec<Vec<f64>> {

@@ -10,7 +10,7 @@ pub struct Growth {
     pub name: &'static str,
     /// Sizes, pure numbers.
     pub sizes: Vec<f64>,
-    /// Least time at each size, in s.
+    /// Shortest time at each size, in s.
     pub seconds: Vec<f64>,
 }
 
@@ -24,8 +24,9 @@ impl Growth {
         self.seconds.push(seconds);
     }
 
-    /// Returns the exponent of the size in the time, by least squares on the logarithms of the
-    /// larger half of the sizes, at least three: at small sizes, other costs are larger.
+    /// Returns the exponent p of the time, which grows as size^p, by least squares on the
+    /// logarithms. Only the larger half of the sizes is used, but at least three: at small sizes,
+    /// other costs dominate.
     pub fn slope(&self) -> f64 {
         let from = self.sizes.len() - (self.sizes.len() / 2 + 1).max(3).min(self.sizes.len());
         let logs = |values: &[f64]| values[from..].iter().map(|v| v.ln()).collect::<Vec<_>>();
@@ -43,7 +44,8 @@ impl Growth {
     }
 }
 
-/// Returns the shortest of several runs, in s: for about `seconds` together, at least three.
+/// Returns the time of the shortest of several runs, in s. The runs are repeated for about
+/// `seconds`, but at least three times.
 pub fn shortest<T>(seconds: f64, mut run: impl FnMut() -> T) -> f64 {
     let begin = Instant::now();
     let mut shortest = f64::INFINITY;

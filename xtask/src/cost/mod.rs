@@ -54,10 +54,10 @@ pub fn write(root: &Path, seconds: f64) -> Result<(), String> {
     Ok(())
 }
 
-/// Measures the tests of a laboratory alone, and writes their table into the page of the book.
+/// Measures only the laboratory tests, and writes their table into the page of the book.
 ///
 /// # Errors
-/// As [`write()`], and a page without such a table.
+/// The errors of [`write()`], or a page without a table of laboratory tests.
 pub fn write_lab(root: &Path) -> Result<(), String> {
     let path = root.join("docs/book/src/choose/cost.md");
     let failed = |e: std::io::Error| format!("{}: {e}", path.display());

@@ -1,4 +1,4 @@
-//! The page of the book.
+//! The page of the book about computing time.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ Each point is the shortest of several runs, because other programs can only leng
 
 ![Time over degrees of freedom and over samples](cost.svg)
 
-The power of n is fitted to the larger half of the sizes.
+The exponent of n in the tables is fitted to the larger half of the sizes.
 
 ";
 
@@ -27,7 +27,7 @@ For long records the time is proportional to the number of samples, apart from t
 A time that grows faster than in proportion shows that the numbers no longer fit into the caches of the processor, or that other programs ran.
 ";
 
-/// Load of the machine, if the system reports it.
+/// Returns a sentence about the load of the computer, if the system reports the load.
 fn load() -> String {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let average = std::fs::read_to_string("/proc/loadavg").ok();
@@ -42,15 +42,15 @@ fn load() -> String {
 /// Heading and text of the tests of a laboratory, above their table.
 const LAB: &str = "## Tests of a laboratory
 
-Time and memory of the program with its default settings, on simulated records; `measure-cost --lab` \
-measures only these.
+The table shows the time and memory that the program needs with its default settings, on simulated records; `measure-cost --lab` \
+measures only this table.
 
 ";
 
-/// Heading below the table of these tests.
+/// Heading below the table of the laboratory tests.
 const AFTER_LAB: &str = "## What the numbers follow from\n\n";
 
-/// Returns the page with another table of the tests of a laboratory; `None` if it has none.
+/// Returns the page with a new table of the laboratory tests; `None` if the page has no such table.
 pub fn with_lab(page: &str, table: &str) -> Option<String> {
     let (before, others) = page.split_once(LAB)?;
     let (_, after) = others.split_once(AFTER_LAB)?;

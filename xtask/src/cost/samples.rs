@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 use super::measure::{Growth, shortest};
 
-/// Number of buffered rows of a text.
+/// Number of rows that the reader of a text file buffers.
 const HELD: usize = 1 << 18;
 
 pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {

@@ -9,7 +9,8 @@ use super::measure::{Growth, shortest};
 
 const DT: f64 = 1e-3;
 
-/// Time of a step and of the preparation, with one force and two degrees of freedom observed.
+/// Measures the times of a step and of the preparation, with a force on one degree of freedom and
+/// the responses of two.
 pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     let dense: Vec<usize> = vec![2, 5, 10, 20, 50, 100, 200, 500];
     let chain = vec![100, 300, 1000, 3000, 10_000, 30_000, 100_000];
@@ -69,7 +70,8 @@ fn both<S: System, E: std::fmt::Display>(
     Ok([step, prepare])
 }
 
-/// Returns the time per step: the difference of the times of a long and a short record.
+/// Returns the time per step, in s: the difference between the times of a long and a short record,
+/// divided by the difference in steps.
 fn per_step(system: &dyn System, seconds: f64) -> Result<f64, String> {
     let n = system.dof();
     let steps = (20_000_000 / (n * n.min(100))).clamp(20, 200_000);

@@ -38,14 +38,14 @@ impl Role {
     }
 }
 
-/// Course of an arrow from box to box.
+/// Path of an arrow from box to box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Route {
-    /// Along the row or the column both boxes lie in.
+    /// Along the row or the column that contains both boxes.
     Straight,
-    /// Along the row of the first, then along the column of the second.
+    /// Along the row of the first box, then along the column of the second box.
     RowFirst,
-    /// Along the column of the first, then along the row of the second.
+    /// Along the column of the first box, then along the row of the second box.
     ColumnFirst,
     /// Below all boxes.
     Below,
@@ -72,7 +72,7 @@ struct Arrow {
     both_ends: bool,
 }
 
-/// A block diagram in the making.
+/// A block diagram to which boxes and arrows are added one by one.
 #[derive(Debug)]
 pub struct BlockDiagram {
     title: String,
@@ -109,7 +109,7 @@ impl BlockDiagram {
         self.arrows.push(Arrow { from, to, route, both_ends: false });
     }
 
-    /// Joins two boxes that are compared.
+    /// Joins two compared boxes by an arrow with two heads.
     pub fn double_arrow(&mut self, from: BoxId, to: BoxId) {
         self.arrows.push(Arrow { from, to, route: Route::Straight, both_ends: true });
     }

@@ -98,7 +98,8 @@ struct Simulation {
     response: BoxId,
 }
 
-/// Excitation, true machine, integrator and response along row 1, the true machine above.
+/// Draws excitation, integration and response in a row, and the true parameters above the
+/// integration.
 fn simulation(diagram: &mut BlockDiagram, machine: Machine) -> Simulation {
     let truth = diagram.block((1, 0), Role::Data, "True parameters", &[machine.truth()]);
     let excitation = diagram.block(
@@ -128,7 +129,7 @@ struct Estimation {
     row: usize,
 }
 
-/// Draws the way from excitation and response to parameters.
+/// Draws the boxes and arrows that lead from excitation and response to the identified parameters.
 fn estimation(
     diagram: &mut BlockDiagram,
     machine: Machine,

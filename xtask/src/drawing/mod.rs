@@ -7,7 +7,7 @@ mod symbols;
 
 use diagrams::{Domain, ForceEquation, Machine};
 
-/// One drawing under the dissertation's number.
+/// One drawing with its number in the dissertation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Drawing {
     /// Number of the figure, such as `5.4.1`.

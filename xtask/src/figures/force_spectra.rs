@@ -33,7 +33,8 @@ impl Spectra {
         Ok(self.panels()?.into_iter().fold(figure, Figure::panel))
     }
 
-    /// Panels of both readings side by side; for the bearing the driven direction above the other.
+    /// Returns the panels with and without slips side by side; for the bearing, the driven
+    /// direction is above the other direction.
     fn panels(self) -> Result<Vec<Panel>, String> {
         let readings: Result<Vec<Vec<ForceLines>>, String> =
             Reading::BOTH.into_iter().map(|reading| self.lines(reading)).collect();

@@ -16,8 +16,8 @@ struct Receptance {
     value: Vec<Complex<f64>>,
 }
 
-/// Receptance of the machine as the scheme simulates it: X(ω)/F(ω) of the degree of freedom `dof`,
-/// driven in the last.
+/// Receptance of the machine as the scheme simulates it: X(ω)/F(ω), with X the displacement of the
+/// degree of freedom `dof` and F the force on the last degree of freedom.
 fn simulated(
     reading: Reading,
     case: Case,
@@ -63,7 +63,8 @@ fn panels(case: Case, dof: usize, name: &str) -> Result<[Panel; 2], String> {
     let sizes = size(&truth);
     let (low, high) =
         sizes.iter().fold((f64::INFINITY, 0.0f64), |(low, high), h| (low.min(*h), high.max(*h)));
-    // The curves of schemes with a zero at the Nyquist frequency leave the picture there.
+    // Near the Nyquist frequency, the curves of schemes that have a zero there fall below this
+    // range.
     let mut magnitude = Panel::new(omega(), Axis::log10(name, "m/N").range(low / 5.0, high * 2.0))
         .curve(exact_look(Curve::line("exact", &truth.omega, &sizes)));
     let mut phase = Panel::new(omega(), Axis::linear("Phase", "°").step(90.0))

@@ -1,7 +1,7 @@
 //! The dissertation's figures that show data, each with the numbers it is drawn from.
 //!
-//! A figure that depends on the slips of the original programs shows both, on the same scale: on
-//! the left with the slips, on the right without them.
+//! A figure that depends on the slips of the original programs has two parts on the same scale: on
+//! the left the curves with the slips, on the right the curves without them.
 
 mod csv;
 mod excitation;
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 pub use self::csv::table;
 
-/// One figure under the dissertation's number.
+/// One figure with its number in the dissertation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Numbered {
     /// Number of the figure, such as `5.2.4`; `P1-4` is figure 4 of the first paper of Appendix D.
@@ -24,7 +24,7 @@ pub struct Numbered {
     pub figure: Figure,
 }
 
-/// A figure to be computed: its number, and how.
+/// A figure to be computed: its number, and the function that draws it.
 pub(crate) struct Plan {
     pub(crate) number: &'static str,
     pub(crate) draw: Box<dyn Fn() -> Result<Figure, String> + Send + Sync>,
@@ -69,8 +69,8 @@ mod tests {
 
     use super::*;
 
-    /// The numbered figures that show data, those of Appendices A and C, and those of the first
-    /// paper.
+    /// Checks that all figures with data are drawn: the numbered ones, those of Appendices A and C,
+    /// and those of the first paper.
     #[test]
     fn no_figure_is_missing() {
         let mut expected: Vec<String> =
@@ -122,7 +122,8 @@ mod tests {
         }
     }
 
-    /// Smallest and largest |F̂/F| over all lines, from a computation in another language.
+    /// Compares the smallest and the largest |F̂/F| over all lines with a computation in another
+    /// language.
     #[test]
     fn identified_forces_span_the_ranges_found_independently() {
         let ranges = [

@@ -11,7 +11,8 @@ use crate::thesis::estimates::{self, Listed};
 use crate::thesis::published::Method;
 use crate::thesis::simulate::{Sequences, correct, slipped};
 
-/// The bearing; each program uses the sign of Kyx it was written with.
+/// The bearing with −Kyx. If the slips are replayed, the simulation uses the sign of the original
+/// program.
 pub(crate) const BEARING: Machine = Machine::Bearing { kyx: KyxSign::Minus };
 
 /// Reading of the dissertation: with the slips of the original programs, or without.
@@ -124,7 +125,7 @@ fn identified(sequences: &Sequences, listed: &[f64]) -> Result<SecondOrderSystem
     let mut stiffness = DMatrix::from_row_slice(n, n, &listed[..entries]);
     let damping = DMatrix::from_row_slice(n, n, &listed[entries..]);
     if let Machine::Bearing { kyx } = sequences.machine {
-        // The tables list Kyx without the sign under which it enters.
+        // The tables list Kyx without the sign that it has in K.
         stiffness[(1, 0)] *= kyx.factor();
     }
     SecondOrderSystem::new(truth.mass().clone(), damping, stiffness)

@@ -37,7 +37,7 @@ impl Sweep {
         self
     }
 
-    /// Estimates of one parameter, methods × NPI.
+    /// Returns the estimates of one parameter: a vector for each method, with a value for each NPI.
     fn estimates(&self, reading: Reading, parameter: usize) -> Result<Vec<Vec<f64>>, String> {
         let one = |method: Method, npi: f64| {
             let case = Case { machine: self.machine, nt: self.nt, npi };
@@ -83,7 +83,8 @@ impl Sweep {
         Ok(panel.title(reading.title()))
     }
 
-    /// Panels of both readings of one parameter on one scale; one panel if no slip is involved.
+    /// Returns two panels of one parameter on the same scale, with and without the slips; one panel
+    /// if no slip has an effect.
     fn panels(&self, parameter: &str) -> Result<Vec<Panel>, String> {
         let panels: Result<Vec<Panel>, String> =
             Reading::BOTH.into_iter().map(|reading| self.panel(reading, parameter)).collect();

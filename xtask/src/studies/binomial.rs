@@ -13,9 +13,10 @@ pub const FALSE_ALARM: f64 = 0.001;
 /// Limits of the number of independent intervals that contain the true value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Smallest number without an alarm.
+    /// Smallest number of intervals with the true value that raises no alarm.
     pub fewest: u64,
-    /// Largest number without a report that the intervals are wider than necessary.
+    /// Largest number of intervals with the true value for which the intervals are not reported as
+    /// too wide.
     pub most: u64,
 }
 
@@ -57,7 +58,8 @@ pub fn power(experiments: u64, loss: f64) -> Result<f64, String> {
 mod tests {
     use super::*;
 
-    /// Checks twenty experiments by hand: P(X ≤ 14) = 0.00033 and P(X ≤ 15) = 0.0026 at 95 %.
+    /// Compares the limits and the power for twenty experiments with probabilities by hand: P(X ≤
+    /// 14) = 0.00033 and P(X ≤ 15) = 0.0026 for a coverage of 95 %.
     #[test]
     fn limits_and_power_of_twenty_experiments() {
         let limits = Limits::new(20).unwrap();

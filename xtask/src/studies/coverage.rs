@@ -1,5 +1,5 @@
-//! Seeded experiments on a known oscillator, fast enough for thousands of them: coverage of the
-//! intervals.
+//! Coverage of the intervals in seeded experiments on a known oscillator. Thousands of these
+//! experiments take only seconds.
 
 use mechid::analysis::identify::{Method, Source};
 use mechid::analysis::{Identified, Identify, Measurement, identify};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::binomial::STATED;
 
-/// Samples of a period.
+/// Number of samples per period.
 const PERIOD: usize = 128;
 /// Highest line of the force.
 const LAST: usize = 40;
@@ -75,9 +75,9 @@ pub const KINDS: [Kind; 4] = [
 pub struct Interval {
     /// Seed of the experiment.
     pub seed: u64,
-    /// Letter of the parameter.
+    /// Letter of the parameter: m, c or k.
     pub parameter: &'static str,
-    /// Value of the machine, in SI units.
+    /// True value of the parameter, in SI units.
     pub truth: f64,
     /// Estimate with its 95 % interval, in SI units; `None` if the identification failed.
     pub estimate: Option<[f64; 3]>,
@@ -98,7 +98,8 @@ fn words(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-/// Mass, damping and stiffness: the resonance is on a line, its damping ratio 5 %.
+/// Returns mass, damping and stiffness with their letters. The resonance is on a spectral line, and
+/// the damping ratio is 5 %.
 fn parameters() -> Result<[(&'static str, f64); 3], String> {
     let (mass, omega) = (10.0, RESONANCE * sampling()?.omega0());
     Ok([("m", mass), ("c", 2.0 * 0.05 * mass * omega), ("k", mass * omega * omega)])

@@ -107,7 +107,8 @@ pub(super) fn run(
 }
 
 impl Study {
-    /// Returns the number of experiments of the longest run that the share allows, and its output.
+    /// Returns the number of experiments, and the output, of the longest run that the share of the
+    /// time allows.
     fn run(&self, program: &Path, share: Duration) -> Result<(u64, String), String> {
         let start = Instant::now();
         let printed = self.printed(program, self.probe, share)?;
@@ -138,11 +139,11 @@ fn built(root: &Path, chosen: &[&Study], profile: &str) -> Result<PathBuf, Strin
     }
     finished(&mut cargo, Duration::MAX)?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
-    // Cargo's folder of the profile dev has another name.
+    // Cargo's folder of the profile `dev` is called `debug`.
     Ok(target.join(if profile == "dev" { "debug" } else { profile }).join("examples"))
 }
 
-/// Returns the output of a command; one that takes longer is stopped.
+/// Returns the output of a command; a command that takes longer than `longest` is stopped.
 fn finished(command: &mut Command, longest: Duration) -> Result<String, String> {
     let words = |e: std::io::Error| e.to_string();
     let mut child = command.stdout(Stdio::piped()).spawn().map_err(words)?;
@@ -191,7 +192,7 @@ fn tables(text: &str) -> Vec<Printed> {
 }
 
 impl Printed {
-    /// Study, row, column and value of all cells except the first of each row.
+    /// Returns study, row, column and value of each cell, except the first cell of each row.
     fn cells(&self, study: &str) -> Vec<[String; 4]> {
         let Some((header, rows)) = self.lines.split_first() else { return Vec::new() };
         let rows = rows.iter().skip(1).filter(|row| row.len() > 1);

@@ -1,5 +1,5 @@
-//! Studies of many seeded experiments by one command: coverage of intervals in a short form for
-//! every change, and all studies in a long form with a time budget.
+//! Studies of many seeded experiments. The short form tests the coverage of the intervals at every
+//! change of the code; the long form runs all studies in a given time.
 
 pub mod binomial;
 pub mod coverage;
@@ -15,8 +15,8 @@ use coverage::{Interval, KINDS};
 
 pub use page::differences;
 
-/// Number of experiments of each kind in the short form; [`short_power`] is their power to detect a
-/// loss.
+/// Number of experiments of each kind in the short form; [`short_power`] returns the probability
+/// that they detect a loss of coverage.
 pub const SHORT: u64 = 4096;
 /// Number of experiments between two checks of the time.
 const BLOCK: u64 = 1024;
@@ -34,7 +34,8 @@ pub struct Plan {
     pub only: String,
     /// Cargo's profile for the long studies.
     pub profile: String,
-    /// Folder of the results; `None` for `target/studies`, and the tables of the book are written.
+    /// Folder of the results. `None` means `target/studies`; only then are the tables of the book
+    /// written.
     pub out: Option<PathBuf>,
 }
 
@@ -43,7 +44,7 @@ pub struct Plan {
 pub struct Coverage {
     /// Kind of experiment.
     pub kind: &'static str,
-    /// Letter of the parameter.
+    /// Letter of the parameter: m, c or k.
     pub parameter: &'static str,
     /// Number of experiments.
     pub experiments: u64,
@@ -65,8 +66,8 @@ impl Coverage {
         }
     }
 
-    /// Returns a sentence about a coverage below the stated one; `None` if the coverage may be the
-    /// stated one.
+    /// Returns a sentence if the coverage is significantly below the stated coverage; otherwise
+    /// `None`.
     ///
     /// # Errors
     /// A message if there are no experiments.
@@ -116,7 +117,7 @@ fn coverages(
     Ok(all)
 }
 
-/// Returns sentences about coverages below the stated one.
+/// Returns a sentence for each coverage that is significantly below the stated coverage.
 ///
 /// # Errors
 /// A message if there are no experiments.

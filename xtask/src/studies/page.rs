@@ -1,4 +1,4 @@
-//! The page of the book, and tables between marks in other pages.
+//! The page of the book about the coverage of intervals, and tables of studies in other pages.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ fn power_sentence() -> Result<String, String> {
     ))
 }
 
-/// Writes the table and the sentence about its power into the page.
+/// Writes the table of coverages, and the sentence about the power of the test, into the page.
 pub(super) fn write(root: &Path, coverages: &[Coverage]) -> Result<(), String> {
     rewrite(&place(root), "coverage", &table(coverages)?)?;
     rewrite(&place(root), "power", &power_sentence()?)
@@ -73,7 +73,7 @@ pub(super) fn rewrite_tables<'a>(
     Ok(written)
 }
 
-/// Range of the table of a text that has the header of `table`.
+/// Returns the range, in `text`, of the table that has the header of `table`.
 fn table_like(text: &str, table: &str) -> Option<std::ops::Range<usize>> {
     let header = format!("\n{}\n", table.lines().next()?);
     let start = text.find(&header)? + 1;
@@ -81,7 +81,7 @@ fn table_like(text: &str, table: &str) -> Option<std::ops::Range<usize>> {
     Some(start..start + rows.map(str::len).sum::<usize>())
 }
 
-/// Replaces the text between the marks of a name; without marks the page is an error.
+/// Replaces the text between the marks of a name; a page without these marks is an error.
 fn rewrite(page: &Path, name: &str, content: &str) -> Result<(), String> {
     let words = |e: &dyn std::fmt::Display| format!("{}: {e}", page.display());
     let text = std::fs::read_to_string(page).map_err(|e| words(&e))?;
@@ -98,7 +98,7 @@ fn marked(text: &str, name: &str) -> Option<std::ops::Range<usize>> {
     Some(start..end)
 }
 
-/// Returns the differences of the committed page from these coverages.
+/// Returns the differences between the committed page and these coverages.
 ///
 /// # Errors
 /// The message of the file that fails.

@@ -34,7 +34,7 @@ pub(super) fn write(path: &Path, all: &[(Coverage, Vec<Interval>)]) -> Result<()
     write_parquet(path, &columns, &[]).map_err(|e| e.to_string())
 }
 
-/// Writes a row for each cell of the tables that a study printed.
+/// Writes the cells of the tables that a study printed, one row for each cell.
 pub(super) fn write_cells(path: &Path, cells: &[[String; 4]]) -> Result<(), String> {
     let names = ["study", "row", "column", "value"];
     let columns: Vec<ParquetColumn> = names

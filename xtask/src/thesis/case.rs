@@ -5,7 +5,7 @@ use mechid::signal::{Multisine, Phases, Record, Sampling, lines};
 use mechid_problems::{dissertation_bearing, dissertation_sdof};
 use nalgebra::DMatrix;
 
-/// Model, one of two.
+/// Model of the dissertation: one degree of freedom, or the bearing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Machine {
     /// One degree of freedom with this damping in N·s/m (180, in some figures 50).
@@ -37,10 +37,10 @@ impl Machine {
         }
     }
 
-    /// The "natural frequency" the step size follows from, in rad/s.
+    /// The "natural frequency" in the formula for the step size, in rad/s.
     ///
-    /// For the bearing it is the largest damped frequency of the system with −Kyx, for any
-    /// sign the simulation itself uses.
+    /// For the bearing it is the largest damped frequency of the system with −Kyx, even if the
+    /// simulation uses +Kyx.
     pub fn omega_n(self) -> f64 {
         match self {
             Machine::SingleDof { .. } => dissertation_sdof().natural_frequency(),
@@ -105,9 +105,9 @@ fn rows(matrix: &DMatrix<f64>) -> Vec<f64> {
 pub struct Case {
     /// The machine.
     pub machine: Machine,
-    /// Samples of one period.
+    /// Number of samples in one period.
     pub nt: usize,
-    /// Natural over fundamental frequency.
+    /// Ratio of the natural to the fundamental frequency.
     pub npi: f64,
 }
 

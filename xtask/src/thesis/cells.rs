@@ -15,7 +15,7 @@ pub struct Judged {
     pub value: f64,
     /// Verdict of the comparison.
     pub verdict: Verdict,
-    /// Reason, where it is a misprint.
+    /// Reason, if the printed number is a misprint.
     pub reason: Option<&'static str>,
 }
 
@@ -28,11 +28,11 @@ pub struct Row {
     pub estimate: Judged,
     /// Error of the estimate, in per cent.
     pub error: Judged,
-    /// The same estimator without slips.
+    /// Estimate by the same estimator without slips.
     pub correct: f64,
     /// Error of the estimate without slips, in per cent.
     pub correct_error: f64,
-    /// Estimate of our best estimator.
+    /// Estimate by our best estimator.
     pub best: f64,
     /// Error of our best estimator, in per cent.
     pub best_error: f64,
@@ -119,7 +119,7 @@ pub struct Mean {
     pub parameter: String,
     /// Column.
     pub method: Method,
-    /// Printed and recomputed from the printed errors of the column.
+    /// Printed mean error, compared with the mean of the printed errors of the column.
     pub printed: Judged,
     /// Mean of the errors without slips.
     pub correct: f64,
@@ -167,7 +167,7 @@ fn judge_mean(column: &[&Row], printed: &str, listed: Option<&'static MeanMispri
     Judged { printed: printed.to_owned(), value, verdict, reason }
 }
 
-/// Returns the correct error for a misprinted one.
+/// Returns the correct error of a cell whose printed error is a misprint; otherwise `None`.
 fn right_error(row: &Row) -> Option<f64> {
     let cell = &row.cell;
     let misprint = misprints::find(&cell.table, cell.method, cell.npi, Field::Error)?;

@@ -6,8 +6,8 @@ use std::path::Path;
 /// Maximum difference of two coordinates, in px, that rounding on another processor explains.
 const PIXELS: f64 = 0.1;
 
-/// Returns whether two texts have the same words, and two drawings points that differ by rounding
-/// at most.
+/// Returns whether two texts are equal, or two drawings differ only by rounding of their
+/// coordinates.
 pub fn agree(ours: &str, committed: &str) -> bool {
     if ours == committed || !ours.starts_with("<svg") {
         return ours == committed;
@@ -15,7 +15,7 @@ pub fn agree(ours: &str, committed: &str) -> bool {
     let (a, b) = (parts(ours), parts(committed));
     a.len() == b.len()
         && a.iter().zip(&b).all(|(a, b)| match (a.parse::<f64>(), b.parse::<f64>()) {
-            // A whole number may be a word of the drawing.
+            // A number without a decimal point may be part of a word, so it must be equal.
             (Ok(x), Ok(y)) if a.contains('.') || b.contains('.') => (x - y).abs() < PIXELS,
             _ => a == b,
         })

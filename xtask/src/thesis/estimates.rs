@@ -67,8 +67,8 @@ fn free_force(sequences: &Sequences, offset: usize) -> Listed {
 
 type Amplitudes = (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f64>>);
 
-/// Returns the amplitudes of harmonics n at (n + offset)·ω0; they include the mean if its frequency
-/// is not zero.
+/// Returns the angular frequencies (n + offset)·ω0 in rad/s, and the amplitudes of force and
+/// displacement of the harmonics n. With the offset 1, the first harmonic is n = 0, the mean.
 fn amplitudes(sequences: &Sequences, offset: usize) -> Amplitudes {
     let (x, f) = (
         Spectrum::from_record(sequences.response.displacement()),
@@ -77,7 +77,8 @@ fn amplitudes(sequences: &Sequences, offset: usize) -> Amplitudes {
     let first = 1 - offset;
     let harmonics = x.sampling().len() / 2 - first;
     let omega0 = x.sampling().omega0();
-    // The original series has no constant term; its zeroth coefficient is 2/N Σ x, twice the mean.
+    // The original series has no separate constant term: its zeroth coefficient is 2/N Σ x, twice
+    // the mean.
     let amplitudes = |s: &Spectrum| {
         DMatrix::from_fn(harmonics, s.channels(), |row, c| {
             if row + first == 0 { s.line(0, c) * 2.0 } else { s.line(row + first, c) }
@@ -94,8 +95,8 @@ fn fit(sequences: &Sequences, data: &FrequencyData) -> Listed {
     Ok(machine.listed(&estimate.stiffness(), &estimate.damping()))
 }
 
-/// The dissertation's estimator in the time domain, eqs. (4.5.12) and (4.5.28): Euler over a
-/// whole period.
+/// The dissertation's estimator in the time domain, eqs. (4.5.12) and (4.5.28): least squares with
+/// Euler's rule over a whole period.
 pub fn time(sequences: &Sequences) -> Listed {
     fit_in_time(sequences, Discretisation::Euler)
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 /// Relative difference above which two numbers differ.
 const TOLERANCE: f64 = 1e-9;
 
-/// Largest difference, relative to the largest number of its column, that is rounding.
+/// Largest difference, relative to the largest number of its column, that counts as rounding.
 const NOISE: f64 = 1e-12;
 
-/// Largest difference of errors in per cent that is rounding: a relative change of a value by 1e-9
-/// changes its error by this number.
+/// Largest difference of errors in per cent that counts as rounding: a relative change of a value
+/// by 1e-9 changes its error by this number.
 const PERCENT_NOISE: f64 = 100.0 * TOLERANCE;
 
 /// Path of the golden file of a table or figure.

@@ -55,7 +55,7 @@ fn row(cell: &Cell, points: usize) -> Result<Row, String> {
     })
 }
 
-/// Estimates on records with `factor − 1` further instants in every interval.
+/// Returns the estimates on records with `factor − 1` interpolated instants in every interval.
 ///
 /// # Errors
 /// The message of the interpolation or the estimation that fails.

@@ -2,7 +2,7 @@
 
 use super::published::Method;
 
-/// Number of a cell, one of two.
+/// Number that is misprinted in a cell: the estimate or its error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Field {
     /// The estimate.
@@ -18,11 +18,11 @@ pub struct Misprint {
     pub table: &'static str,
     /// Column.
     pub method: Method,
-    /// Row; `None` for the whole column.
+    /// NPI of the row; `None` if the whole column is misprinted.
     pub npi: Option<f64>,
     /// Number that is misprinted.
     pub field: Field,
-    /// Printed value; a dash for a column.
+    /// Printed value; a dash if a whole column is misprinted.
     pub printed: &'static str,
     /// Right value.
     pub right: &'static str,

@@ -22,13 +22,14 @@ pub const SETTING: &str = "Nt = 2048, amplitude 1 N on the first mass, NPI = 20 
 pub struct ModalRow {
     /// Printed cell.
     pub cell: Cell,
-    /// Computed value: with the dissertation's estimator where a value is identified.
+    /// Computed value; if the value is identified, by the dissertation's estimator.
     pub value: Complex<f64>,
     /// Verdict of the comparison.
     pub verdict: Verdict,
     /// Reason of a misprint.
     pub reason: Option<&'static str>,
-    /// Value from the response without Euler's bias; `None` for theoretical rows.
+    /// Value identified by our best estimator, without the bias of Euler's rule; `None` if the
+    /// value is not identified.
     pub best: Option<Complex<f64>>,
 }
 
@@ -146,7 +147,8 @@ fn judged(cell: &Cell, ours: &Modal, best: Option<&Modal>) -> ModalRow {
     ModalRow { cell: cell.clone(), value, verdict, reason, best }
 }
 
-/// `a`, `a+bi` or `a+bj`, both parts by their printed digits.
+/// Compares the real and the imaginary part of a number with their printed digits; `printed` is
+/// `a`, `a+bi` or `a+bj`.
 fn compare_complex(value: Complex<f64>, printed: &str) -> Verdict {
     let Some(body) = printed.strip_suffix(['i', 'j']) else { return compare(value.re, printed) };
     let Some(split) = body.rfind(['+', '-']).filter(|at| *at > 0) else {

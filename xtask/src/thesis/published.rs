@@ -39,7 +39,7 @@ impl Method {
         Method::WilsonTheta,
     ];
 
-    /// Name for a reader.
+    /// Returns the name of the method for readers.
     pub fn name(self) -> &'static str {
         match self {
             Method::Rk4 => "Runge-Kutta 4",
@@ -54,7 +54,7 @@ impl Method {
         }
     }
 
-    /// The key used in the files.
+    /// Returns the key of the method in the files of printed values.
     pub fn key(self) -> &'static str {
         match self {
             Method::Rk4 => "rk4",
@@ -79,9 +79,9 @@ pub struct Cell {
     pub parameter: String,
     /// `time` or `frequency`, empty for adopted values.
     pub domain: String,
-    /// Samples of one period.
+    /// Number of samples in one period.
     pub nt: Option<usize>,
-    /// Natural over fundamental frequency, where the table states it.
+    /// Ratio of the natural to the fundamental frequency, if the table states it.
     pub npi: Option<f64>,
     /// Column.
     pub method: Method,

@@ -16,13 +16,13 @@ use crate::{drawing, figures};
 pub struct Artefact {
     /// File stem, such as `table-5.6.4` or `figure-5.2.4`.
     pub name: String,
-    /// All digits of its data; `None` for a drawing.
+    /// Data as CSV with all digits; `None` for a drawing.
     pub csv: Option<String>,
-    /// Form for a reader.
+    /// Form for readers: Markdown or SVG.
     pub view: View,
 }
 
-/// Form of an artefact for a reader.
+/// Form of an artefact for readers.
 #[derive(Debug, Clone)]
 pub enum View {
     /// A table.
@@ -52,8 +52,8 @@ impl View {
         }
     }
 
-    /// Returns its caption: the first sentence below the heading of a table, the title of a figure
-    /// without its `number`.
+    /// Returns the caption: of a table, the first sentence below its heading; of a figure, its
+    /// title without `number`.
     fn caption(&self, number: &str) -> &str {
         match self {
             View::Markdown(text) => {
@@ -128,7 +128,7 @@ fn selects(only: &str, name: &str) -> bool {
     begins(number) || begins(name)
 }
 
-/// The page that links to everything.
+/// Returns the index page, which has links to all tables and figures.
 fn index(artefacts: &[Artefact]) -> String {
     let mut text = String::from(
         "# The dissertation, reproduced\n\n\
@@ -159,7 +159,8 @@ fn natural(name: &str) -> (bool, Vec<(usize, String)>) {
 }
 
 impl Reproduction {
-    /// Keeps only the tables and figures with that number, or of that part.
+    /// Keeps only the tables and figures that `number` selects: one number, or a part of the
+    /// dissertation such as `5.6`.
     ///
     /// # Errors
     /// A message with the names that exist.

@@ -17,11 +17,11 @@ pub struct Key {
     pub is_frequency_domain: bool,
     /// `true` for the bearing, `false` for the single degree of freedom.
     pub is_bearing: bool,
-    /// Tables 5.3.1 and 5.3.2 leave the coefficient of the force free in two columns.
+    /// `true` if the coefficient of the force is free, as in two columns of tables 5.3.1 and 5.3.2.
     pub free_force: bool,
-    /// Samples of one period.
+    /// Number of samples in one period.
     pub nt: usize,
-    /// NPI in tenths, so that it can be compared.
+    /// NPI in tenths: an integer, so that keys can be compared.
     pub npi_tenths: u32,
     /// Column.
     pub method: Method,
@@ -45,7 +45,7 @@ impl Key {
         })
     }
 
-    /// Returns whether a slip takes part in the replay of this key.
+    /// Returns whether a slip affects the replay of this estimation.
     pub fn is_touched_by(self, slip: Slip) -> bool {
         match slip {
             Slip::CentralDifferenceLead => self.method == Method::CentralDifference,
@@ -74,9 +74,9 @@ impl Key {
 pub struct Estimates {
     /// Estimates with the slips of the original programs.
     pub slipped: Vec<f64>,
-    /// Estimates of the same estimator on the same scheme, without slips.
+    /// Estimates by the same estimator, from the response of the same scheme, without slips.
     pub correct: Vec<f64>,
-    /// Our best estimator on the response without slips.
+    /// Estimates by our best estimator, from the response without slips.
     pub best: Vec<f64>,
 }
 

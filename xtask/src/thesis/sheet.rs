@@ -17,7 +17,7 @@ impl Sheet {
         Self { header: header.to_vec(), rows: Vec::new() }
     }
 
-    /// Comma-separated, quoted where a cell needs it.
+    /// Returns the table as comma-separated values, with quotes around cells that need them.
     pub fn to_csv(&self) -> String {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(&self.header).expect("memory takes all");
@@ -40,12 +40,13 @@ impl Sheet {
     }
 }
 
-/// Every digit of a number, for the files of a comparison; empty without a number.
+/// Returns all digits of a number, for files that are compared; empty if the value is not finite.
 pub fn exact(value: f64) -> String {
     if value.is_finite() { format!("{value:?}") } else { String::new() }
 }
 
-/// Enough digits for a comparison with a printed number; a dash without a number.
+/// Returns enough digits of a number for a comparison with a printed one; a dash if the value is
+/// not finite.
 pub fn short(value: f64) -> String {
     match value.abs() {
         v if !v.is_finite() => "–".to_owned(),

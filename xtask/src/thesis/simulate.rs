@@ -14,7 +14,7 @@ use super::slips::{Slip, one_sample_early, stage_loads};
 /// Input of an estimator: one period of motion and force.
 #[derive(Debug, Clone)]
 pub struct Sequences {
-    /// The machine that moved.
+    /// The simulated machine.
     pub machine: Machine,
     /// Displacement, velocity, acceleration.
     pub response: Response,
@@ -22,7 +22,8 @@ pub struct Sequences {
     pub force: Record,
 }
 
-/// The scheme behind a column, with the parameters of the dissertation.
+/// Returns the integration scheme of a column of the tables, with the parameters of the
+/// dissertation.
 pub fn scheme(method: Method) -> Box<dyn Scheme> {
     match method {
         Method::Newmark => Box::new(Newmark::AVERAGE_ACCELERATION),
@@ -48,7 +49,7 @@ pub fn correct(case: Case, method: Method) -> Result<Sequences, String> {
     Ok(Sequences { machine, response, force })
 }
 
-/// The sequences of the original programs: the same library, with the slips.
+/// Returns the sequences of the original programs, computed by this library with all slips.
 ///
 /// # Errors
 /// The message of the integrator.

@@ -9,19 +9,19 @@ use nalgebra::DMatrix;
 /// A named departure from the dissertation's own equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Slip {
-    /// x at t + Dt stored with v, a and F of t.
+    /// The displacement of t + Dt is stored with the velocity, acceleration and force of t.
     CentralDifferenceLead,
-    /// The response of t + Dt stored with index t.
+    /// The response of t + Dt is stored with the index of t.
     WilsonLoadLag,
-    /// Harmonic n given ω = (n + 1)·ω0.
+    /// Harmonic n has the frequency (n + 1)·ω0 instead of n·ω0.
     HarmonicOffset,
-    /// Four programs use +Kyx, the fifth and the step size use −Kyx.
+    /// Four programs use +Kyx; the fifth program, and the formula for the step size, use −Kyx.
     StiffnessSign,
-    /// The forces of the four Runge-Kutta stages taken at the wrong instants.
+    /// The forces of the four Runge-Kutta stages belong to wrong instants.
     RungeKuttaStageLoads,
-    /// The coefficient of the force left free in the frequency-domain fit.
+    /// The coefficient of the force is estimated in the frequency-domain fit, although it is known.
     FreeForceCoefficient,
-    /// A minus sign lost or reversed in print.
+    /// A minus sign is lost or reversed in print.
     LostSigns,
 }
 
@@ -59,7 +59,7 @@ impl Slip {
             .collect()
     }
 
-    /// The name the audit page uses.
+    /// Returns the name of the slip on the audit page.
     pub fn name(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "central-difference lead",
@@ -89,7 +89,7 @@ impl Slip {
         }
     }
 
-    /// Returns the computation of the original programs.
+    /// Returns a description of the computation in the original programs.
     pub fn done(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => {
@@ -114,7 +114,7 @@ impl Slip {
         }
     }
 
-    /// Returns the requirement of the dissertation's own equations.
+    /// Returns a description of the computation that the dissertation's own equations require.
     pub fn right(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "x, v, a and F of the same instant",

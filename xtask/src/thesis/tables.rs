@@ -17,9 +17,9 @@ use super::{interpolated, slips::Slip};
 pub struct Table {
     /// Number of the table in the dissertation.
     pub number: String,
-    /// All digits, for the golden comparison.
+    /// Table as CSV with all digits, for the comparison with the golden file.
     pub csv: String,
-    /// Page for the reader.
+    /// Table in Markdown, for readers.
     pub markdown: String,
 }
 

@@ -1,11 +1,12 @@
 //! Agreement of a computed number with the printed digits.
 
-/// Relation of a printed number to the one computed from its recipe.
+/// Agreement of a printed number with the number computed by the dissertation's method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Verdict {
     /// Truncating or rounding our value to the printed decimals gives the printed string.
     ToTheDigit,
-    /// One unit in the last printed place off: rounded twice, or formed from other printed numbers.
+    /// The printed number is wrong by one unit in its last place: it was rounded twice, or computed
+    /// from other printed numbers.
     Rounding,
     /// A known misprint; the reason is in the list of misprints.
     Misprint,
@@ -29,7 +30,7 @@ impl Verdict {
     }
 }
 
-/// A decimal number as printed: an integer count of its last place.
+/// A printed decimal number, as an integer number of units of its last place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Decimal {
     units: i64,

@@ -12,8 +12,8 @@ use super::super::{interpolated, modal_tables};
 use super::evidence::Source;
 use super::rerun::percent;
 
-/// Errors in K and C, in per cent, of Euler's estimator on a Newmark motion of 128 samples with
-/// further points in every interval.
+/// Errors in K and C, in per cent, of Euler's estimator on a Newmark motion of 128 samples, with
+/// `points` interpolated points in every interval.
 ///
 /// # Errors
 /// The message of the step that fails.

@@ -24,7 +24,7 @@ impl Counts {
         counts
     }
 
-    /// Numbers of one verdict.
+    /// Returns how many numbers have this verdict.
     pub fn with(&self, verdict: Verdict) -> usize {
         self.verdicts[verdict as usize]
     }
@@ -47,7 +47,7 @@ impl Counts {
     }
 }
 
-/// Estimates, errors and mean rows of one table.
+/// Returns the counts of estimates, of errors and of mean rows, in one table.
 pub fn for_table(evidence: &Evidence, table: &str) -> [Counts; 3] {
     let (rows, means) = (evidence.rows(table), evidence.means(table));
     let unstated = |printed: fn(&Cell) -> &str| {
@@ -61,7 +61,7 @@ pub fn for_table(evidence: &Evidence, table: &str) -> [Counts; 3] {
     ]
 }
 
-/// Estimates, errors and mean rows of all tables.
+/// Returns the counts of estimates, of errors and of mean rows, in all tables.
 pub fn in_all(evidence: &Evidence) -> [Counts; 3] {
     evidence
         .tables
@@ -70,7 +70,7 @@ pub fn in_all(evidence: &Evidence) -> [Counts; 3] {
         .fold([Counts::default(); 3], |sum, more| std::array::from_fn(|i| sum[i].plus(more[i])))
 }
 
-/// The section of the page.
+/// Returns the section of the audit page on the number of reproduced values.
 pub fn section(evidence: &Evidence) -> String {
     let row = |name: &str, counts: [Counts; 3]| {
         let numbers = counts.iter().flat_map(Counts::cells);
@@ -90,7 +90,7 @@ pub fn section(evidence: &Evidence) -> String {
          from computing with other printed numbers. A *misprint* is believed only where the number \
          that should stand there is the one we compute. What is *unexplained* stands in Appendix B, \
          which names neither the integrator nor what was interpolated.\n\n\
-         Of {} printed estimates {} come out to the digit, {} within a rounding, {} are misprints \
+         Of {} printed estimates {} are reproduced to the last digit, {} within a rounding, {} are misprints \
          and {} are unexplained. Each group of four columns reads: to the digit, \
          rounding, misprint, unexplained; first for the estimates, then for their errors in \
          per cent, then for the mean-error row.\n\n{}",

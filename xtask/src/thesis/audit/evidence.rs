@@ -13,7 +13,7 @@ pub struct Evidence<'a> {
     pub published: &'a Published,
     /// Computed values.
     pub results: &'a Results,
-    /// The numbers of the tables, in printed order.
+    /// Numbers of the tables, such as `5.6.4`, in printed order.
     pub tables: Vec<String>,
     rows: BTreeMap<String, Vec<Row>>,
     means: BTreeMap<String, Vec<Mean>>,
@@ -65,9 +65,9 @@ fn sorting(table: &str) -> Vec<(bool, u32, String)> {
 /// Numbers with which a claim is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
-    /// The printed ones (for reruns: with every slip replayed).
+    /// Printed numbers; for reruns, numbers computed with every slip.
     Printed,
-    /// The recomputed ones, without slips.
+    /// Numbers recomputed without slips.
     Corrected,
 }
 
@@ -80,7 +80,8 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// Returns the errors in % over NPI of one column, for one parameter if the table has several.
+    /// Returns the errors in % against NPI of one column, for one parameter of a table with
+    /// several.
     pub fn series_of(&self, table: &str, parameter: &str, method: Method) -> Vec<(f64, f64)> {
         self.evidence
             .rows(table)

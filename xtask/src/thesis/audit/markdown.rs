@@ -14,7 +14,8 @@ pub fn table(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Stri
     text
 }
 
-/// Three digits: enough for an argument, and independent of the rounding of the computer.
+/// Returns a number with three digits: enough for an argument, and independent of the rounding of
+/// the computer.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {

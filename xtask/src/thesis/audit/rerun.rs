@@ -111,7 +111,7 @@ fn system(listed: &[f64], machine: Machine) -> Result<SecondOrderSystem, String>
     SecondOrderSystem::new(mass, matrix(damping), matrix(stiffness)).map_err(|e| e.to_string())
 }
 
-/// Machine for the identification of a force.
+/// Machine whose parameters are used to identify a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameters {
     /// The true machine.
@@ -170,25 +170,26 @@ impl Ratios {
         Ok(Self { omega0: sampling.omega0(), ratios })
     }
 
-    /// Returns the smallest and the largest ratio.
+    /// Returns the smallest and the largest ratio |F̂_n|/|F_n|.
     pub fn range(&self) -> [f64; 2] {
         let pick = |f: fn(f64, f64) -> f64, from| self.ratios.iter().copied().fold(from, f);
         [pick(f64::min, f64::INFINITY), pick(f64::max, f64::NEG_INFINITY)]
     }
 
-    /// Returns the largest minus the smallest ratio.
+    /// Returns the difference between the largest and the smallest ratio |F̂_n|/|F_n|.
     pub fn spread(&self) -> f64 {
         let [low, high] = self.range();
         high - low
     }
 
-    /// Returns the root mean square of the distance from 1.
+    /// Returns the root mean square of the differences between the ratios |F̂_n|/|F_n| and 1.
     pub fn rms(&self) -> f64 {
         let squares: f64 = self.ratios.iter().map(|r| (r - 1.0).powi(2)).sum();
         (squares / self.ratios.len() as f64).sqrt()
     }
 
-    /// Largest distance from 1 over lines above a frequency, in rad/s.
+    /// Returns the largest difference between a ratio |F̂_n|/|F_n| and 1, over the lines above
+    /// `omega` (rad/s).
     pub fn worst_above(&self, omega: f64) -> f64 {
         let lines = self.ratios.iter().enumerate();
         lines
@@ -197,13 +198,14 @@ impl Ratios {
             .fold(0.0, f64::max)
     }
 
-    /// The range, in words.
+    /// Returns the range of the ratios |F̂_n|/|F_n| as text.
     pub fn words(&self) -> String {
         let [low, high] = self.range();
         format!("{}–{}", number(low), number(high))
     }
 
-    /// Root mean square of the distance between two spectra.
+    /// Returns the root mean square of the differences between these ratios |F̂_n|/|F_n| and those
+    /// of `other`.
     pub fn distance(&self, other: &Self) -> f64 {
         let pairs = self.ratios.iter().zip(&other.ratios);
         let squares: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();

@@ -29,15 +29,15 @@ fn explained(row: &cells::Row) -> bool {
     row.estimate.verdict != Verdict::Unexplained
 }
 
-/// Returns whether the misprint of a cell is a lost sign; the misprints of whole columns are lost
-/// signs.
+/// Returns whether the misprint of a cell is a lost sign: a misprint that is listed for the whole
+/// column.
 fn sign_is_lost(row: &cells::Row) -> bool {
     let misprint =
         misprints::find(&row.cell.table, row.cell.method, row.cell.npi, misprints::Field::Estimate);
     row.estimate.verdict == Verdict::Misprint && misprint.is_some_and(|m| m.npi.is_none())
 }
 
-/// The section of the page.
+/// Returns the section of the audit page on the slips.
 ///
 /// # Errors
 /// The message of the first estimation that fails.

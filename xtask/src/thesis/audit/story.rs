@@ -13,7 +13,7 @@ use super::markdown::{number, table};
 use super::rerun::{frequency_up_to, sdof};
 use super::slips;
 
-/// The opening of the page.
+/// Returns the first sections of the audit page.
 ///
 /// # Errors
 /// The message of the computation that fails.

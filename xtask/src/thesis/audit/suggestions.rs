@@ -11,7 +11,7 @@ use super::evidence::Source;
 use super::markdown::{number, table};
 use super::rerun::{Domain, Equation, Parameters, force, sdof};
 
-/// The section of the page.
+/// Returns the section of the audit page on the proposals for later work.
 ///
 /// # Errors
 /// The message of the computation that fails.

@@ -30,7 +30,7 @@ pub enum Holds {
 }
 
 impl Holds {
-    /// The word on the page.
+    /// Returns the word for the verdict on the audit page.
     pub fn word(self) -> &'static str {
         match self {
             Holds::Yes => "holds",
@@ -41,7 +41,7 @@ impl Holds {
     }
 }
 
-/// Number of tests of a claim that passed.
+/// Numbers of passed tests and of all tests of a claim.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
     held: usize,
@@ -117,7 +117,7 @@ pub struct Claim {
     pub section: &'static str,
     /// Statement of the claim.
     pub statement: &'static str,
-    /// Test of the claim: the question of each counted test.
+    /// Question that each counted test of the claim answers.
     pub test: &'static str,
     /// Kind of evidence that the dissertation gives for the claim.
     pub support: Support,
@@ -164,7 +164,7 @@ pub fn judge_all(evidence: &Evidence) -> Result<Vec<Judged>, String> {
         .collect()
 }
 
-/// The section of the page.
+/// Returns the section of the audit page on the claims.
 pub fn section(judged: &[Judged]) -> String {
     let count = |of: fn(&Judged) -> &Finding, holds| {
         judged.iter().filter(|j| of(j).holds() == holds).count()

@@ -23,7 +23,8 @@ pub const CLAIMS: &[Claim] = &[Claim {
     judge: direction,
 }];
 
-/// Channels along X and Y; two signals of the same lines with different phases if both act.
+/// Returns the force along X, along Y, or along both directions. A force along both directions has
+/// the same lines in both channels, with different phases.
 fn force(case: Case, along: [bool; 2]) -> Result<Record, String> {
     let sampling = case.sampling();
     let signal = |phases| {

@@ -40,7 +40,7 @@ impl Remark {
 
 const HEAD: [&str; 4] = ["Where", "Printed", "Should be", "How we know"];
 
-/// The section of the page.
+/// Returns the section of the audit page on the misprints.
 ///
 /// # Errors
 /// The message of the first computation that fails.

@@ -3,7 +3,8 @@
 use super::super::super::published::{Cell, Published};
 use super::super::evidence::Evidence;
 
-/// Pair, number of comparisons, differences.
+/// Returns a row for each pair of tables: their names, the number of comparisons, and the
+/// differences.
 pub fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
     let published = evidence.published;
     let symposium: Vec<(Cell, Cell)> =
