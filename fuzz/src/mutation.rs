@@ -127,7 +127,7 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
         8 => replace(input, at, 8, &f64::from_bits(random.random()).to_le_bytes()),
         9 => {
             let number = NUMBERS[random.random_range(0..NUMBERS.len())];
-            let at = word_from(input, at);
+            let at = digit_from(input, at);
             let len =
                 input[at..].iter().take_while(|b| b"+-.,eE".contains(b) || b.is_ascii_digit());
             let len = len.count();
@@ -168,7 +168,7 @@ fn replace(input: &mut Vec<u8>, at: usize, len: usize, by: &[u8]) {
 }
 
 /// Returns the position of the next digit from `at` on, or `at` if there is none.
-fn word_from(input: &[u8], at: usize) -> usize {
+fn digit_from(input: &[u8], at: usize) -> usize {
     let skipped = input[at..].iter().position(u8::is_ascii_digit);
     at + skipped.unwrap_or(0)
 }

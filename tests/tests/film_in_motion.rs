@@ -142,7 +142,7 @@ fn bias(lines: &[usize], amplitude: f64) -> [f64; 3] {
 
 /// Checks that the picture `name` of `theory/bearing.md` is the one drawn here; the numbers may
 /// differ by half a pixel. With `MECHID_BLESS=1` the picture is written first.
-fn is_in_the_book(name: &str, figure: &Figure) {
+fn assert_is_in_the_book(name: &str, figure: &Figure) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../docs/book/src/theory/film_in_motion")
         .join(name);
@@ -207,7 +207,7 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
             .curve(Curve::marked_line(c, &column(0), &column(2)).slot(slot).dash(Dash::Dashed));
     }
     let panel = panel.reference(Reference::vertical("0.05", 0.05));
-    is_in_the_book("bias.svg", &Figure::new("Bias of linear identification").panel(panel));
+    assert_is_in_the_book("bias.svg", &Figure::new("Bias of linear identification").panel(panel));
 }
 
 /// Motion of a rotor of `masses` times the critical mass, released at a distance of `beside`
@@ -301,5 +301,5 @@ fn the_film_in_motion_is_what_the_book_shows() {
             .reference(Reference::vertical("", 1.0));
     let figure =
         [tests, whirl, grows].into_iter().fold(Figure::new("The film in motion"), Figure::panel);
-    is_in_the_book("motion.svg", &figure.columns(3).size(1080.0, 447.0));
+    assert_is_in_the_book("motion.svg", &figure.columns(3).size(1080.0, 447.0));
 }

@@ -41,7 +41,7 @@ fn every_cell_with_known_settings_is_explained() {
 /// A verdict can be negative: without any slip, no estimate of table 5.3.1 is reproduced to the
 /// digit.
 #[test]
-fn without_the_slips_most_cells_do_not_come_out() {
+fn without_slips_no_estimate_of_table_5_3_1_is_reproduced() {
     let (_, rows) = reproduced();
     let still = |method| {
         rows.iter()

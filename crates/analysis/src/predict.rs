@@ -156,14 +156,14 @@ pub fn predict(
 const PARTS: usize = 8;
 /// Minimum ratio of the error in the first part to the error in the last part that indicates a
 /// wrong initial state.
-const DIES_AWAY: f64 = 3.0;
+const MIN_DECAY_RATIO: f64 = 3.0;
 /// Minimum number of samples in one of the [`PARTS`] parts of a record. The largest initial error
 /// is searched for in the same number of samples from the beginning.
 const SHORTEST: usize = 16;
 /// Minimum ratio of the largest initial error to the largest error of the record that indicates a
 /// wrong initial state. The ratio is smaller for an inaccurate machine, because its error grows
 /// with the response.
-const AT_ONCE: f64 = 0.5;
+const MIN_INITIAL_SHARE: f64 = 0.5;
 
 /// Returns whether the error of a channel decays from the beginning of a record, as a free response
 /// does.
@@ -175,7 +175,8 @@ fn is_in_motion(measured: &[f64], predicted: &[f64]) -> bool {
     }
     let [first, last] = [&error[..part], &error[error.len() - part..]].map(measures::rms);
     let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, e| most.max(e.abs()));
-    first > DIES_AWAY * last && largest(&error[..SHORTEST]) > AT_ONCE * largest(&error)
+    first > MIN_DECAY_RATIO * last
+        && largest(&error[..SHORTEST]) > MIN_INITIAL_SHARE * largest(&error)
 }
 
 /// Returns the number of samples used to estimate the initial state; 0 for a start at rest.

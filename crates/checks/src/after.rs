@@ -55,11 +55,17 @@ pub fn after_fit(
         let (residual, test) =
             (Residual::Samples { residual: channel }, CorrelationTest::new(&white, rounding));
         findings.push(Finding::Whiteness(Whiteness { residual, test, span }));
-        let colour = colour(e, lags, noise_span, [&white, &beyond].map(is_noise))?;
+        let residual_autocorrelation =
+            residual_autocorrelation(e, lags, noise_span, [&white, &beyond].map(is_noise))?;
         let acts =
             |input: &usize| force.channel(*input).iter().any(|f| *f != force.data()[(0, *input)]);
         for input in (0..force.channels()).filter(acts) {
-            let cross = cross_correlation_of_coloured(e, force.channel(input), lags, &colour)?;
+            let cross = cross_correlation_of_coloured(
+                e,
+                force.channel(input),
+                lags,
+                &residual_autocorrelation,
+            )?;
             let test = CorrelationTest::new(&cross, rounding);
             findings.push(Finding::CrossCorrelation(CrossCorrelation {
                 residual: channel,
@@ -76,7 +82,7 @@ fn is_noise(correlation: &Correlation) -> bool {
 }
 
 /// Returns the autocorrelation of a residual from lag 0 to its largest relevant lag.
-fn colour(
+fn residual_autocorrelation(
     residual: &[f64],
     lags: usize,
     span: usize,

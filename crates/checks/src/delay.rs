@@ -125,8 +125,8 @@ pub fn delay_of_open_records(
         }
     };
     let cost = |samples: f64| likelihood.cost(&late(samples));
-    let promises = |delayed: f64, _| follows_force || is_significant(delayed);
-    let (samples, delayed) = minimum_near(near, [reach, DELAY_RESOLVED], cost, promises)?;
+    let is_promising = |delayed: f64, _| follows_force || is_significant(delayed);
+    let (samples, delayed) = minimum_near(near, [reach, DELAY_RESOLVED], cost, is_promising)?;
     let remaining = delayed / undelayed;
     if !is_significant(delayed) {
         return None;
@@ -211,7 +211,7 @@ fn on_fewer_lines<'a>(
         }
         let freedom = fewer.spare() as f64;
         let cost = |samples: f64| fewer.cost(&late(samples));
-        let promises = |delayed: f64, decrease: Option<f64>| {
+        let is_promising = |delayed: f64, decrease: Option<f64>| {
             // Each later step decreases the power by less than this step. Therefore the power
             // `without_other` is out of reach if a second decrease of this size would not reach it.
             let is_out_of_reach =
@@ -222,7 +222,7 @@ fn on_fewer_lines<'a>(
             is_excluded.set(is_out_of_reach && is_above);
             !is_excluded.get()
         };
-        let (samples, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, promises)?;
+        let (samples, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, is_promising)?;
         Some(OnFewer::Found(samples, Box::new(fewer)))
     });
     match searched {

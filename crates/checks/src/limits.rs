@@ -274,7 +274,7 @@ pub(crate) const FIT_RANK: f64 = 1e-12;
 pub(crate) const FIT_DECIDES: f64 = 10.0;
 
 /// Number of transient terms of each channel of a record.
-pub(crate) const FIT_LOADS: f64 = 6.0;
+pub(crate) const TRANSIENT_TERMS: f64 = 6.0;
 
 /// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
 pub(crate) const FIT_STEPS: usize = 8;

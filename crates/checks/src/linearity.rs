@@ -131,14 +131,14 @@ impl Tested {
         }
     }
 
-    /// Returns orthonormal columns that span the sensitivities, weighted with `sizes` as in
+    /// Returns orthonormal columns that span the sensitivities, weighted with `residual_spectrum` as in
     /// [`weighted`].
-    fn explained(&self, sizes: &[Vec<f64>]) -> DMatrix<f64> {
+    fn explained(&self, residual_spectrum: &[Vec<f64>]) -> DMatrix<f64> {
         let columns: Vec<DVector<f64>> = self
             .sensitivities
             .iter()
             .map(|sensitivity| {
-                let column = weighted(sensitivity, sizes);
+                let column = weighted(sensitivity, residual_spectrum);
                 let length = column.norm();
                 if length > 0.0 { column / length } else { column }
             })
@@ -162,14 +162,14 @@ impl Tested {
     ) -> Result<Finding, EstimateError> {
         let system = estimate.system()?;
         let (n, predicted) = (system.dof(), predict_periodic(&system, force)?);
-        let sizes: Vec<Vec<f64>> = self
+        let residual_spectrum: Vec<Vec<f64>> = self
             .residual
             .row_iter()
             .map(|e| around(&e.iter().map(|e| e.norm_sqr()).collect::<Vec<_>>()))
             .collect();
         // Errors of the estimate also cause a residual that follows the force: this part is
         // projected out.
-        let explained = self.explained(&sizes);
+        let explained = self.explained(&residual_spectrum);
         let mut least = (1.0, Power::ALL[0], 0);
         for dof in 0..n {
             for power in Power::ALL {
@@ -178,10 +178,10 @@ impl Tested {
                     |at: usize| self.receptances[at].column(dof) * forces.line(lines[at], 0);
                 let responses: Vec<_> = (0..lines.len()).map(response).collect();
                 let responses = DMatrix::from_columns(&responses);
-                let mut remainder = weighted(&responses, &sizes);
+                let mut remainder = weighted(&responses, &residual_spectrum);
                 remainder -= &explained * explained.tr_mul(&remainder);
-                let responses = unweighted(&remainder, &sizes);
-                let p_value = p_value(&self.residual, &sizes, &responses, correlation);
+                let responses = unweighted(&remainder, &residual_spectrum);
+                let p_value = p_value(&self.residual, &residual_spectrum, &responses, correlation);
                 if p_value < least.0 {
                     least = (p_value, power, dof);
                 }
@@ -225,13 +225,13 @@ fn sensitivities(estimate: &Estimate, data: &FrequencyData) -> Option<Vec<DMatri
 }
 
 /// Returns real and imaginary parts of values, channels × lines, each divided by the square root of
-/// the entry of `sizes` for its channel and line.
-fn weighted(values: &DMatrix<Complex<f64>>, sizes: &[Vec<f64>]) -> DVector<f64> {
+/// the entry of `residual_spectrum` for its channel and line.
+fn weighted(values: &DMatrix<Complex<f64>>, residual_spectrum: &[Vec<f64>]) -> DVector<f64> {
     let mut parts = DVector::zeros(2 * values.len());
     for ((channel, at), pair) in
         places(values.shape()).zip(parts.as_mut_slice().chunks_exact_mut(2))
     {
-        let size = sizes[channel][at];
+        let size = residual_spectrum[channel][at];
         let value = values[(channel, at)] * if size > 0.0 { size.sqrt().recip() } else { 0.0 };
         (pair[0], pair[1]) = (value.re, value.im);
     }
@@ -239,10 +239,11 @@ fn weighted(values: &DMatrix<Complex<f64>>, sizes: &[Vec<f64>]) -> DVector<f64> 
 }
 
 /// Returns the values, channels × lines, from the result of [`weighted`].
-fn unweighted(parts: &DVector<f64>, sizes: &[Vec<f64>]) -> DMatrix<Complex<f64>> {
-    let mut values = DMatrix::zeros(sizes.len(), sizes[0].len());
+fn unweighted(parts: &DVector<f64>, residual_spectrum: &[Vec<f64>]) -> DMatrix<Complex<f64>> {
+    let mut values = DMatrix::zeros(residual_spectrum.len(), residual_spectrum[0].len());
     for ((channel, at), pair) in places(values.shape()).zip(parts.as_slice().chunks_exact(2)) {
-        values[(channel, at)] = Complex::new(pair[0], pair[1]) * sizes[channel][at].sqrt();
+        values[(channel, at)] =
+            Complex::new(pair[0], pair[1]) * residual_spectrum[channel][at].sqrt();
     }
     values
 }
@@ -272,7 +273,7 @@ fn without_linear_part(
     Ok(Record::from_channel(motion.sampling(), values)?.without_mean())
 }
 
-/// Returns the probability that noise with the spectra of the residual (channels × lines, `sizes`
+/// Returns the probability that noise with the spectra of the residual (channels × lines, `residual_spectrum`
 /// averaged over neighbouring lines) has at least as much correlation with the responses as the
 /// residual has; `correlation` is the correlation of neighbouring lines.
 ///
@@ -284,12 +285,12 @@ fn without_linear_part(
 /// White (1980), Econometrica 48, 817–838, for the variance.
 fn p_value(
     residual: &DMatrix<Complex<f64>>,
-    sizes: &[Vec<f64>],
+    residual_spectrum: &[Vec<f64>],
     responses: &DMatrix<Complex<f64>>,
     correlation: &[f64],
 ) -> f64 {
     let weighted = DMatrix::from_fn(responses.nrows(), responses.ncols(), |channel, at| {
-        let size = sizes[channel][at];
+        let size = residual_spectrum[channel][at];
         if size > 0.0 { responses[(channel, at)] / size } else { Complex::ZERO }
     });
     let product = |e: usize, g: usize| residual.column(e).dotc(&weighted.column(g));

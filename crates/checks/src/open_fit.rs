@@ -29,14 +29,14 @@ pub(super) fn joined(records: &[FrequencyData]) -> Option<FrequencyData> {
 
 /// Returns the position of the minimum of a `cost` near `start`, and the cost there. The search
 /// uses parabolas with a half width that decreases from the first of `widths` to the last. `None`
-/// if a cost cannot be computed, or if `promises` returns false after a step. The arguments of
-/// `promises` are the cost after the step and the decrease of the cost by this step, which is
+/// if a cost cannot be computed, or if `is_promising` returns false after a step. The arguments of
+/// `is_promising` are the cost after the step and the decrease of the cost by this step, which is
 /// `None` if the length of the step was limited.
 pub(super) fn minimum_near(
     start: f64,
     widths: [f64; 2],
     mut cost: impl FnMut(f64) -> Option<f64>,
-    promises: impl Fn(f64, Option<f64>) -> bool,
+    is_promising: impl Fn(f64, Option<f64>) -> bool,
 ) -> Option<(f64, f64)> {
     let ([mut width, resolved], mut place) = (widths, start);
     let mut least = cost(place)?;
@@ -53,7 +53,7 @@ pub(super) fn minimum_near(
         let lower = cost(place)?;
         let decrease = (step.abs() < LONGEST_STEP).then_some(least - lower);
         least = lower;
-        if !promises(least, decrease) {
+        if !is_promising(least, decrease) {
             return None;
         }
         width *= f64::clamp(step.abs(), LEAST_WIDTH_RATIO, 1.0);

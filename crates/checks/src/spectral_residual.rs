@@ -34,7 +34,7 @@ pub struct SpectralResidual {
     /// Weighted residual, and Q of its covariance I − QQᵀ, before the transients are projected out,
     /// for the power test; `None` unless the noise is the response to an unmeasured force, whose
     /// stated power includes the transients.
-    with_ends: Option<(DVector<f64>, DMatrix<f64>)>,
+    for_power_test: Option<(DVector<f64>, DMatrix<f64>)>,
     /// Standard deviation of every residual before the fit of the parameters, estimated from the
     /// magnitude of this residual.
     deviations: DVector<f64>,
@@ -95,7 +95,7 @@ impl SpectralResidual {
             deviations,
             values,
             explained,
-            with_ends: None,
+            for_power_test: None,
             rounding: false,
             force_decides: None,
             concentration: None,
@@ -106,8 +106,11 @@ impl SpectralResidual {
     /// Sets the weighted residual and the explained columns Q for the power test, without a
     /// projection of the transients; `None` if the power test uses the same residual and Q as the
     /// other tests.
-    pub(super) fn with_ends(self, with_ends: Option<(DVector<f64>, DMatrix<f64>)>) -> Self {
-        Self { with_ends, ..self }
+    pub(super) fn for_power_test(
+        self,
+        for_power_test: Option<(DVector<f64>, DMatrix<f64>)>,
+    ) -> Self {
+        Self { for_power_test, ..self }
     }
 
     /// Sets whether the residual is rounding.
@@ -188,15 +191,15 @@ impl SpectralResidual {
         Some(Part {
             omega: self.data.omega(),
             dof: self.data.dof(),
-            values: self.whole().0,
-            explained: self.whole().1,
+            values: self.power_test_residual().0,
+            explained: self.power_test_residual().1,
             unit: if nu > n + 1.0 && nu.is_finite() { nu / (nu - n) } else { 1.0 },
         })
     }
 
     /// Returns the weighted residual and the explained columns for the power test.
-    fn whole(&self) -> (&DVector<f64>, &DMatrix<f64>) {
-        match &self.with_ends {
+    fn power_test_residual(&self) -> (&DVector<f64>, &DMatrix<f64>) {
+        match &self.for_power_test {
             Some((values, explained)) => (values, explained),
             None => (&self.values, &self.explained),
         }
@@ -260,17 +263,17 @@ impl SpectralResidual {
             let power = 0.5 * values.norm_squared();
             (power, mean * free, probability_above_of(power, mean * free, 0.5 * variance * spread))
         };
-        let (values, explained) = self.whole();
+        let (values, explained) = self.power_test_residual();
         let (power, mean, above) = power_of(values, explained);
         // If the noise power is estimated from the scatter of the periods, a residual power far
         // below the noise power is also significant: the periods then differ by more than noise.
-        let below = match &self.with_ends {
+        let below = match &self.for_power_test {
             // A power somewhat below the noise is no fault here, because the noise estimate from
             // few periods also contains the transients of an unmeasured force.
             Some(_) if power > SPECTRAL_LEAKED * mean => 1.0,
             _ => 1.0 - above,
         };
-        let above = match &self.with_ends {
+        let above = match &self.for_power_test {
             Some(_) => power_of(&self.values, &self.explained).2,
             None => above,
         };

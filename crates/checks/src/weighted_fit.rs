@@ -19,8 +19,8 @@ use super::concentration::{Part, concentration};
 use super::finding::Finding;
 use super::limits::ROUNDING;
 use super::limits::{
-    FIT_DECIDES, FIT_LOADS, FIT_PRODUCTS, FIT_RANK, FIT_SETTLED, FIT_STEPS, FREE_RESIDUALS,
-    MAX_SENSITIVITIES,
+    FIT_DECIDES, FIT_PRODUCTS, FIT_RANK, FIT_SETTLED, FIT_STEPS, FREE_RESIDUALS, MAX_SENSITIVITIES,
+    TRANSIENT_TERMS,
 };
 use super::p_value::PValue;
 use super::spectral_residual::SpectralResidual;
@@ -154,7 +154,7 @@ impl<'a> Weighing<'a> {
         let relations = Relations::from_unknowns(estimate.unknowns());
         let mut weighing =
             Self { records, estimate, relations, noise, levels, small: false, extent };
-        let unknowns = weighing.start().len();
+        let unknowns = weighing.estimated_parameters().len();
         let sensitivities = weighing.rows() * unknowns;
         weighing.small =
             sensitivities <= MAX_SENSITIVITIES && sensitivities * unknowns <= FIT_PRODUCTS;
@@ -171,7 +171,7 @@ impl<'a> Weighing<'a> {
     }
 
     /// Returns the estimated parameters.
-    fn start(&self) -> DVector<f64> {
+    fn estimated_parameters(&self) -> DVector<f64> {
         match &self.relations {
             None => DVector::from_vec(self.entries()),
             Some(relations) => relations.unknowns(&self.entries()),
@@ -236,7 +236,7 @@ impl<'a> Weighing<'a> {
     /// Returns the parameters after some Gauss–Newton steps, and the residuals with these
     /// parameters.
     fn settled(&self) -> Option<(DVector<f64>, Linearised)> {
-        let mut values = self.start();
+        let mut values = self.estimated_parameters();
         let mut linear = self.linearised(&values)?;
         for _ in 0..FIT_STEPS {
             let unit = (linear.power() / self.rows() as f64).max(f64::MIN_POSITIVE);
@@ -269,7 +269,7 @@ impl<'a> Weighing<'a> {
         let end_effects: Vec<FrequencyData> = match self.extent {
             Extent::Open => channels.map(|channel| record.step_data(channel)).collect(),
             Extent::WholePeriod if has_unmeasured_force(record) => {
-                let loads = |dof| (0..FIT_LOADS as usize).map(move |power| (dof, power));
+                let loads = |dof| (0..TRANSIENT_TERMS as usize).map(move |power| (dof, power));
                 channels.flat_map(loads).map(|(dof, power)| record.load_data(dof, power)).collect()
             }
             Extent::WholePeriod => Vec::new(),
@@ -288,13 +288,13 @@ impl<'a> Weighing<'a> {
     ) -> SpectralResidual {
         let (data, is_stated) = (&self.records[at], self.noise.is_some());
         let is_noise = self.extent == Extent::WholePeriod && has_unmeasured_force(data);
-        let with_ends = is_noise.then(|| (values.clone(), explained.clone()));
-        let (values, explained) = without(end_effects, values, explained);
+        let for_power_test = is_noise.then(|| (values.clone(), explained.clone()));
+        let (values, explained) = project_out(end_effects, values, explained);
         let force_noise = if is_stated { None } else { force_decides(data, self.estimate) };
         let likely =
             system.and_then(|system| likely_force(data, system, |row| self.covariance(at, row)));
         SpectralResidual::new(data.clone(), is_stated, values, explained)
-            .with_ends(with_ends)
+            .for_power_test(for_power_test)
             .with_rounding(is_rounding(data, &self.levels))
             .with_force_decides(force_noise)
             .with_likely_force(likely)
@@ -429,7 +429,7 @@ fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)
     }
     let residuals = residuals(std::slice::from_ref(data), estimate)?;
     let channels = residuals.len() as f64;
-    let fitted = estimate.parameters().len() as f64 / channels + FIT_LOADS;
+    let fitted = estimate.parameters().len() as f64 / channels + TRANSIENT_TERMS;
     let channel_test = |pairs: Vec<(f64, f64)>| {
         let level = motion_level(pairs.iter().copied()).powi(2);
         let decided = pairs.iter().filter(|(_, known)| *known > FIT_DECIDES * level);
@@ -519,7 +519,7 @@ fn has_unmeasured_force(data: &FrequencyData) -> bool {
 
 /// Projects the columns `parts` out of the `values`, and adds these columns, orthonormalised, to
 /// the `explained` columns.
-fn without(
+fn project_out(
     parts: &[DVector<f64>],
     mut values: DVector<f64>,
     mut explained: DMatrix<f64>,

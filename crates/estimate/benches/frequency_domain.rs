@@ -91,7 +91,7 @@ fn many_degrees_of_freedom(_: &mut Criterion) {
     const LINES: usize = 500;
     let mut before: Option<(usize, f64)> = None;
     for (dof, goal) in [(2, ""), (5, ""), (10, ", 2 s at most"), (20, ", 20 s at most")] {
-        let system = machines::chain(dof, Support::Held, 0.02, 1);
+        let system = machines::chain(dof, Support::Fixed, 0.02, 1);
         let test = machines::steady_test("held chain", system, false, LINES, 1).unwrap();
         let response = machines::repeated(&test.displacement, 4).unwrap();
         let response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), 1).unwrap();

@@ -136,7 +136,7 @@ impl Machine {
     }
 
     fn test(&self) -> Result<Test> {
-        let system = chain(self.dof(), Support::Held, 0.03, 7);
+        let system = chain(self.dof(), Support::Fixed, 0.03, 7);
         let lines = if let Self::TwoModes = self { 120 } else { 100 };
         let test = steady_test("", system, false, lines, 7)?;
         let Self::LowMode = self else { return Ok(test) };
@@ -240,7 +240,7 @@ impl Study {
                     return Ok(fit);
                 }
                 // The command `identify` estimates the noise in the same way.
-                let noise = periods.noise_beside(pooling, &fit.estimate.system()?)?;
+                let noise = periods.noise_with_system(pooling, &fit.estimate.system()?)?;
                 match noise.models() {
                     [NoiseModel::UnmeasuredForce { .. }] => {
                         output_error(&periods.mean()?.with_noise(noise)?, &self.unknowns)?

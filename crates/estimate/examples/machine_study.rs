@@ -46,8 +46,8 @@ type Study = (
 fn row(name: &str, seeds: u64, start: Instant, judged: &Judged) {
     println!(
         "{name:<46} {seeds:>4} {:>7.3} {:>7.3} {:>8.3} {:>8.3} {:>6.2} {:>6} {:>8.1}",
-        judged.held,
-        judged.worst,
+        judged.coverage,
+        judged.worst_coverage,
         judged.scatter,
         judged.worst_scatter,
         judged.bias,

@@ -104,7 +104,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn time() -> Result<(), Box<dyn std::error::Error>> {
     println!("\n| Held chain, masses | Unknowns | Searches | Seconds |\n|---|---|---|---|");
     for dof in [10, 20] {
-        let system = chain(dof, Support::Held, 0.02, 1);
+        let system = chain(dof, Support::Fixed, 0.02, 1);
         let test = steady_test("held chain", system, false, TIMED_LINES, 1)?;
         let data = measure(&test, ResponseQuantity::Displacement, TIMED_NOISE, 1)?;
         let start = Instant::now();

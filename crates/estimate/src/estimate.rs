@@ -260,13 +260,16 @@ impl Estimate {
     }
 
     /// Returns the same estimate with a mean square error of the model added to its covariance.
-    /// Each entry of `beside` is in the product of the units of its two parameters.
+    /// Each entry of `mean_square_error` is in the product of the units of its two parameters.
     ///
     /// # Errors
     /// [`NumericsError::Size`] for another number of parameters.
-    pub fn with_mean_square(mut self, beside: &DMatrix<f64>) -> Result<Self, EstimateError> {
-        check_size("parameters", self.parameters.len(), beside.nrows())?;
-        self.covariance = (self.covariance.full() + beside).into();
+    pub fn with_mean_square(
+        mut self,
+        mean_square_error: &DMatrix<f64>,
+    ) -> Result<Self, EstimateError> {
+        check_size("parameters", self.parameters.len(), mean_square_error.nrows())?;
+        self.covariance = (self.covariance.full() + mean_square_error).into();
         Ok(self)
     }
 

@@ -24,17 +24,17 @@ enum Source {
     /// The entry is an unknown, given by its index.
     Shared(usize),
     /// Entry α m + β k of the damping matrix.
-    Damping { mass: Part, stiffness: Part },
+    Damping { mass: MatrixEntry, stiffness: MatrixEntry },
 }
 
 /// An entry of the mass matrix or of the stiffness matrix.
 #[derive(Debug, Clone, Copy)]
-enum Part {
+enum MatrixEntry {
     Known(f64),
     Shared(usize),
 }
 
-impl Part {
+impl MatrixEntry {
     fn value(self, unknowns: &[f64]) -> f64 {
         match self {
             Self::Known(value) => value,
@@ -76,8 +76,8 @@ impl Relations {
             .collect();
         for (entry, p) in entries.iter_mut().zip(&free) {
             let mut part = |matrix| match unknowns.fixed(matrix, p.row(), p.column()) {
-                Some(value) => Part::Known(value),
-                None => Part::Shared(index(matrix, p.row(), p.column())),
+                Some(value) => MatrixEntry::Known(value),
+                None => MatrixEntry::Shared(index(matrix, p.row(), p.column())),
             };
             entry.get_or_insert_with(|| Source::Damping {
                 mass: part(Matrix::Mass),
@@ -131,7 +131,7 @@ impl Relations {
                 Source::Damping { mass, stiffness } => {
                     for (factor, part) in [(self.shared, mass), (self.shared + 1, stiffness)] {
                         tangent[(row, factor)] = part.value(unknowns);
-                        if let Part::Shared(at) = part {
+                        if let MatrixEntry::Shared(at) = part {
                             tangent[(row, *at)] += unknowns[factor];
                         }
                     }
@@ -192,7 +192,7 @@ impl Relations {
                 gradient[*entry] += weight;
                 let Source::Damping { mass, stiffness } = &self.entries[*entry] else { continue };
                 for (part, factor) in [mass, stiffness].into_iter().zip(factors) {
-                    let Part::Shared(at) = part else { continue };
+                    let MatrixEntry::Shared(at) = part else { continue };
                     let same = |s: &Source| matches!(s, Source::Shared(of) if of == at);
                     let index = self.entries.iter().position(same).expect("a free entry");
                     gradient[index] -= factor * weight;

@@ -52,7 +52,7 @@ impl Posterior {
         for best in
             bests.iter().filter(|best| best.likelihood > greatest - limits::NEGLIGIBLE_LIKELIHOOD)
         {
-            best.beside(components, noise, greatest, &mut near);
+            best.add_neighbouring_reaches(components, noise, greatest, &mut near);
         }
         let weight =
             |(steps, evidence): &(f64, Evidence)| steps * (evidence.likelihood - greatest).exp();
@@ -101,7 +101,8 @@ impl Posterior {
     pub fn seen_from_hz(&self, components: &Components) -> Option<f64> {
         let endless = Evidence { reach: components.singular.len(), ..self.best };
         components.lowest_hz(|i| {
-            endless.driven(components, i) * components.singular[i].powi(2) >= self.best.noise
+            endless.force_variance(components, i) * components.singular[i].powi(2)
+                >= self.best.noise
         })
     }
 }
@@ -137,7 +138,7 @@ impl Evidence {
 
     /// Adds this reach and the neighbouring reaches whose likelihood is not negligible. The weight
     /// of a reach is the number of reaches that it represents.
-    fn beside(
+    fn add_neighbouring_reaches(
         self,
         components: &Components,
         noise: Option<f64>,
@@ -207,7 +208,7 @@ impl Evidence {
     }
 
     /// Returns the variance τ² g_i of the force in component i, if this component carries a force.
-    fn driven(&self, components: &Components, i: usize) -> f64 {
+    fn force_variance(&self, components: &Components, i: usize) -> f64 {
         if i >= self.reach {
             return 0.0;
         }
@@ -218,7 +219,7 @@ impl Evidence {
         if i >= self.reach {
             return 0.0;
         }
-        let shown = self.driven(components, i) * components.singular[i].powi(2);
+        let shown = self.force_variance(components, i) * components.singular[i].powi(2);
         let (_, probability) = self.component(components, i);
         probability * shown / (shown + self.noise)
     }
@@ -228,7 +229,7 @@ impl Evidence {
             return 0.0;
         }
         let (s, energy) = (components.singular[i], components.energy[i] / components.weight[i]);
-        let force = self.driven(components, i);
+        let force = self.force_variance(components, i);
         let shown = force * s * s;
         let gain = shown / (shown + self.noise);
         let (_, probability) = self.component(components, i);
@@ -247,7 +248,9 @@ impl Evidence {
         };
         let mut starts = vec![blank.white(components, noise)];
         let head = |i: usize| {
-            components.weight[i] * components.singular[i].powi(2) * blank.driven(components, i)
+            components.weight[i]
+                * components.singular[i].powi(2)
+                * blank.force_variance(components, i)
         };
         let gain: f64 = (0..reach).map(head).sum();
         let energy: f64 = components.energy[..reach].iter().sum();
@@ -287,8 +290,9 @@ impl Evidence {
     /// and gives both variances.
     fn white(self, components: &Components, noise: Option<f64>) -> Self {
         let (data, tail) = (components.data(), tail_energy(components, self.reach));
-        let shown =
-            |i: usize| components.singular[i].powi(2) * self.driven(components, i) / self.force;
+        let shown = |i: usize| {
+            components.singular[i].powi(2) * self.force_variance(components, i) / self.force
+        };
         let largest = (0..self.reach).map(shown).fold(0.0, f64::max);
         let within: f64 = components.weight[..self.reach].iter().sum();
         let mut best = (f64::INFINITY, self);
@@ -354,7 +358,7 @@ impl Evidence {
             let (s, weight) = (components.singular[i], components.weight[i]);
             let energy = components.energy[i];
             let (_, probability) = self.component(components, i);
-            let variance = self.driven(components, i);
+            let variance = self.force_variance(components, i);
             let gain = variance * s * s / (variance * s * s + self.noise);
             let spread = variance * (1.0 - gain) * weight;
             driven += probability;
@@ -378,7 +382,7 @@ impl Evidence {
         let log = |share: f64, variance: f64| {
             share.ln() - 0.5 * weight * variance.ln() - energy / (2.0 * variance)
         };
-        let shown = self.driven(components, i) * components.singular[i].powi(2);
+        let shown = self.force_variance(components, i) * components.singular[i].powi(2);
         let driven = log(self.share, shown + self.noise);
         let silent = log(1.0 - self.share, self.noise);
         let larger = driven.max(silent);

@@ -74,7 +74,7 @@ pub fn frequency_domain(
         .exceeds(forced)
         .then(|| Residual::from_lines(system, measured, forced, &force, lines, level));
     let residual = residual.transpose()?.map(|residual| {
-        if variance.is_known { residual.with_machine(&variance.residual) } else { residual }
+        if variance.is_known { residual.with_system_variance(&variance.residual) } else { residual }
     });
     let standard_error = (level.is_some() || variance.is_known).then(|| {
         let noise = |dof: usize| if level.is_some() { variance.noise[dof] } else { 0.0 };

@@ -142,16 +142,16 @@ struct Side {
     /// previous step.
     step: isize,
     /// Weights of the states at the two ends of the step, n × 2n each.
-    of_ends: [DMatrix<f64>; 2],
+    end_weights: [DMatrix<f64>; 2],
 }
 
 fn sides(solution: &Solution) -> Vec<Side> {
     let (start, end) = solution.inputs(-&solution.state);
     let (order, _) = solution.state.shape();
     let (next_start, next_end) = solution.inputs(DMatrix::identity(order, order));
-    let mut sides = vec![Side { step: 0, of_ends: [start, next_start] }];
+    let mut sides = vec![Side { step: 0, end_weights: [start, next_start] }];
     if let (Some(end), Some(next)) = (end, next_end) {
-        sides.push(Side { step: -1, of_ends: [end, next] });
+        sides.push(Side { step: -1, end_weights: [end, next] });
     }
     sides
 }
@@ -175,7 +175,7 @@ fn error(
     // contributions are added before they are squared.
     let mut parts: BTreeMap<isize, DMatrix<f64>> = BTreeMap::new();
     for side in &sides {
-        for (sample, part) in (k as isize + side.step..).zip(&side.of_ends) {
+        for (sample, part) in (k as isize + side.step..).zip(&side.end_weights) {
             let sum = parts.entry(sample.rem_euclid(len)).or_insert(DMatrix::zeros(n, 2 * n));
             *sum += part / sides.len() as f64;
         }

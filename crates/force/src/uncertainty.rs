@@ -124,7 +124,7 @@ fn propagate(
     let error = Record::new(force.record().sampling(), variance.map(f64::sqrt))?;
     let residual = force.residual().cloned().map(|residual| {
         let variance = propagated(covariance, residual.matrix().shape(), &rests);
-        residual.with_machine(&variance)
+        residual.with_system_variance(&variance)
     });
     Ok(force.with_standard_error(Some(error)).with_residual(residual))
 }

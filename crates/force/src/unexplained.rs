@@ -181,7 +181,7 @@ impl Residual {
 
     /// Returns the same residual, with the variance of each entry due to the uncertainty of the
     /// system.
-    pub fn with_machine(mut self, variance: &DMatrix<f64>) -> Self {
+    pub fn with_system_variance(mut self, variance: &DMatrix<f64>) -> Self {
         for (channel, variance) in self.channels.iter_mut().zip(variance.column_iter()) {
             channel.system = Some(rms(variance.sum(), variance.len()));
         }

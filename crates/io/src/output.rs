@@ -184,7 +184,7 @@ impl BegunFile {
         };
         let (file, stage) = stage(destination)?;
         if let Some(permissions) = permissions {
-            keep(&file, permissions)?;
+            set_permissions(&file, permissions)?;
         }
         Ok((file, stage))
     }
@@ -275,7 +275,7 @@ fn stage(destination: PathBuf) -> io::Result<(File, Stage)> {
 
 /// Gives a new file the permissions of the file that it replaces. A file system that does not
 /// support permissions is not an error.
-fn keep(file: &File, permissions: Permissions) -> io::Result<()> {
+fn set_permissions(file: &File, permissions: Permissions) -> io::Result<()> {
     match file.set_permissions(permissions) {
         Err(e) if e.kind() == io::ErrorKind::Unsupported => Ok(()),
         other => other,

@@ -19,7 +19,7 @@ use crate::mode_parameters::ModeParameters;
 use crate::model::Model;
 use crate::noise::{Noise, noise_window};
 use crate::normal::{
-    NormalEquations, ShapeProducts, block_pairs, parameter_scale, turn, whitened_shapes,
+    NormalEquations, ShapeProducts, block_pairs, congruence_sum, parameter_scale, whitened_shapes,
 };
 use crate::projection::{BlockArrays, Projection};
 use crate::scores::{BlockProducts, ProcessEffect, Scores};
@@ -66,7 +66,7 @@ impl Covariance {
         // The weights include the responses to unmeasured forces, which are far above the sensor
         // noise near a resonance.
         let mean = mean_sensor(fit, noise);
-        let weights = mean.iter().zip(&fit.weights.shape);
+        let weights = mean.iter().zip(&fit.weights.spectrum_shape);
         let deviation: Vec<f64> = weights.map(|(mean, shape)| mean.sqrt() / shape).collect();
         let products = |(block, arrays): (&Block, &BlockArrays)| {
             let deviation = &deviation[block.rows.clone()];
@@ -206,7 +206,8 @@ impl Covariance {
             values.rows_mut(first, size_of_mode).copy_from(&part.values);
             response.rows_mut(first, size_of_mode).copy_from(&part.response);
             cross.rows_mut(first, size_of_mode).copy_from(&part.cross);
-            let by_force = &part.common * &self.process[mode].own * part.common.transpose();
+            let by_force =
+                &part.common * &self.process[mode].shape_covariance * part.common.transpose();
             scatter.view_mut((first, first), (size_of_mode, size_of_mode)).copy_from(&by_force);
         }
         for output in 0..outputs {
@@ -349,7 +350,8 @@ fn sensor_variance(
         let ratios = noise_ratios(fit, noise, mean, block);
         let weighted: Vec<f64> =
             shapes.iter().enumerate().map(|(k, x)| x * ratios[k % outputs].sqrt()).collect();
-        let turned = turn(&products.gram, pairs, &ShapeProducts::new(&weighted, modes), scale);
+        let turned =
+            congruence_sum(&products.gram, pairs, &ShapeProducts::new(&weighted, modes), scale);
         score_variance.iter_mut().zip(&turned).for_each(|(to, part)| *to += part);
         for (unknowns, ratio) in unknowns.iter_mut().zip(&ratios) {
             unknowns.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);

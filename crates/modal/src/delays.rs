@@ -54,7 +54,7 @@ pub(crate) fn apparent_delays(lines: &Lines, poles: &[C]) -> Option<Vec<f64>> {
         powers: first_powers(lines),
         reference: lines.band().1,
     };
-    let weights = Weights { shape: vec![1.0; lines.len()], level: vec![1.0; outputs] };
+    let weights = Weights { spectrum_shape: vec![1.0; lines.len()], level: vec![1.0; outputs] };
     let trial = Trial { lines, design: FreeResidues { model: &model }, weights: &weights };
     let delays = trial.refined(vec![trial.common_delay(); outputs], ROUGH_DELAY_STEPS)?;
     let before = trial.residuals(trial.advanced(&vec![0.0; outputs]));
@@ -119,7 +119,10 @@ impl<D: Design> Trial<'_, D> {
         let mut residuals = vec![Vec::with_capacity(2 * self.lines.len()); outputs.len()];
         let lines = Lines { outputs, ..self.lines.clone() };
         let mut projection = Projection::default();
-        projection.whiten(&lines, &Weights { shape: self.weights.shape.clone(), level });
+        projection.whiten(
+            &lines,
+            &Weights { spectrum_shape: self.weights.spectrum_shape.clone(), level },
+        );
         projection.solve(&lines, &self.design);
         for (arrays, block) in projection.blocks.iter().zip(&lines.blocks) {
             let columns = arrays.residual.chunks_exact(2 * block.len());

@@ -441,7 +441,7 @@ fn explained(fit: &Fit<'_>) -> Vec<f64> {
 pub(crate) fn log_likelihood(fit: &Fit<'_>) -> f64 {
     let outputs = fit.weights.level.len() as f64;
     let lines = fit.lines.len() as f64;
-    let shapes: f64 = fit.weights.shape.iter().map(|value| value.ln()).sum();
+    let shapes: f64 = fit.weights.spectrum_shape.iter().map(|value| value.ln()).sum();
     let levels: f64 = fit.weights.level.iter().map(|value| value.ln()).sum();
     -(fit.cost() / 2.0 + 2.0 * (outputs * shapes + lines * levels))
 }

@@ -222,7 +222,7 @@ impl<'a> Identification<'a> {
             0.1 * (power / output.len() as f64).sqrt()
         };
         let level = lines.outputs.iter().map(level).collect();
-        let weights = Weights { shape: vec![1.0; lines.len()], level };
+        let weights = Weights { spectrum_shape: vec![1.0; lines.len()], level };
         let model = with_participations(lines, poles, &powers, &weights);
         let mut fit = Fit::new(lines, model, weights);
         fit.search_roughly();

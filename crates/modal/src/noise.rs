@@ -84,7 +84,7 @@ impl Noise {
             }
             (sum / level.len() as f64 * factor).sqrt()
         };
-        Weights { shape: (0..lines.len()).into_par_iter().map(value).collect(), level }
+        Weights { spectrum_shape: (0..lines.len()).into_par_iter().map(value).collect(), level }
     }
 
     /// Returns φᴴ D⁻¹ φ on a line.

@@ -106,7 +106,7 @@ impl NormalEquations {
         products: &ShapeProducts,
     ) -> Self {
         let scale = parameter_scale(pairs, model);
-        let curvature = turn(projected, pairs, products, &scale);
+        let curvature = congruence_sum(projected, pairs, products, &scale);
         descent.iter_mut().zip(&scale).for_each(|(value, scale)| *value *= scale);
         Self { size: 2 * pairs.len(), curvature, descent }
     }
@@ -145,7 +145,7 @@ impl ShapeProducts {
 
 /// Returns Σ_i T_iᵀ G T_i as a full symmetric matrix; each entry is multiplied by the scales of its
 /// row and its column. `lower` is the lower triangle of G.
-pub(crate) fn turn(
+pub(crate) fn congruence_sum(
     lower: &[f64],
     pairs: &[(usize, Option<usize>)],
     products: &ShapeProducts,
@@ -304,8 +304,8 @@ mod tests {
             powers: ResidualPowers { forces: vec![-2, 0, 2], transients: vec![0, 1] },
             reference: 12.0,
         };
-        let shape = lines.omega.iter().map(|omega| 0.5 + 0.02 * omega).collect();
-        Fit::new(lines, model, Weights { shape, level: vec![1.0, 0.7, 1.3] })
+        let spectrum_shape = lines.omega.iter().map(|omega| 0.5 + 0.02 * omega).collect();
+        Fit::new(lines, model, Weights { spectrum_shape, level: vec![1.0, 0.7, 1.3] })
     }
 
     /// Reference: central differences of the projected cost, which do not use any of the formulas

@@ -9,16 +9,16 @@ use crate::lines::{Block, Lines};
 /// shape, which all outputs share, and a level of each output: E|n_i(ω)|² = (shape(ω) level_i)².
 #[derive(Debug, Clone)]
 pub(crate) struct Weights {
-    pub(crate) shape: Vec<f64>,
+    pub(crate) spectrum_shape: Vec<f64>,
     pub(crate) level: Vec<f64>,
 }
 
 impl Weights {
-    /// Returns √2/`shape` on the lines of a block. If an output is divided by its level and
+    /// Returns √2/`spectrum_shape` on the lines of a block. If an output is divided by its level and
     /// multiplied by this factor, the real and imaginary parts of its noise have variance 1.
     pub(crate) fn block_weights(&self, block: &Block) -> Vec<f64> {
         let whiten = |shape: &f64| std::f64::consts::SQRT_2 / shape;
-        self.shape[block.rows.clone()].iter().map(whiten).collect()
+        self.spectrum_shape[block.rows.clone()].iter().map(whiten).collect()
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) struct BlockProducts {
 #[derive(Debug, Clone)]
 pub(crate) struct ProcessEffect {
     /// Covariance of the two unknowns of the shape, 2 × 2.
-    pub(crate) own: DMatrix<f64>,
+    pub(crate) shape_covariance: DMatrix<f64>,
     /// Covariance of the two unknowns of the shape with the score, `2 × parameters`, for a shape of
     /// phase zero.
     pub(crate) cross: DMatrix<C>,
@@ -109,8 +109,10 @@ impl Scores<'_> {
     ) -> ProcessEffect {
         let (lines, size) = (fit.lines, 2 * self.pairs.len());
         let (along, direction) = self.along(mode, lines.outputs.len());
-        let mut effect =
-            ProcessEffect { own: DMatrix::zeros(2, 2), cross: DMatrix::zeros(2, size) };
+        let mut effect = ProcessEffect {
+            shape_covariance: DMatrix::zeros(2, 2),
+            cross: DMatrix::zeros(2, size),
+        };
         if noise.process[mode] <= 0.0 {
             return effect;
         }
@@ -119,7 +121,7 @@ impl Scores<'_> {
             let gain = |line: usize| {
                 let row = block.rows.start + line;
                 let gain = modal_gain(fit.model.poles[mode], lines.omega[row]);
-                gain * (noise.process[mode].sqrt() / fit.weights.shape[row])
+                gain * (noise.process[mode].sqrt() / fit.weights.spectrum_shape[row])
             };
             let share = |line: &usize| gain(*line).norm_sqr() * direction;
             let active: Vec<usize> =
@@ -181,7 +183,7 @@ impl ProcessEffect {
     fn add_line(&mut self, unknowns: [C; 2], scores: &[f64], rows: usize, line: usize) {
         for (a, value) in unknowns.iter().enumerate() {
             for (b, other) in unknowns.iter().enumerate() {
-                self.own[(a, b)] += (value * other.conj()).re;
+                self.shape_covariance[(a, b)] += (value * other.conj()).re;
             }
             for (parameter, score) in scores.chunks_exact(rows).enumerate() {
                 let score = C::new(score[2 * line], -score[2 * line + 1]);

@@ -182,16 +182,16 @@ fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind
     let mut kinds = Vec::new();
     for (at, (term, name)) in terms.iter().zip(names).enumerate() {
         let (after, _) = chance.with(at)?;
-        let fall = (chance.without - after).max(0.0);
+        let fall = (chance.linear_residual - after).max(0.0);
         let ratio = if after > 0.0 { fall / after * residual_freedom } else { 0.0 };
         let p_value = (terms.len() as f64 * fisher.sf(ratio)).min(1.0);
         let (after, coefficient) = size.with(at)?;
-        let before = size.without;
+        let before = size.linear_residual;
         let explained = if before > 0.0 { (1.0 - after / before).max(0.0) } else { 0.0 };
         kinds.push(Kind { term: term.clone(), name, coefficient, explained, p_value });
     }
     kinds.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    Ok(((size.without / size.total).sqrt(), kinds))
+    Ok(((size.linear_residual / size.total).sqrt(), kinds))
 }
 
 /// Linear fit to which one term at a time is added.
@@ -201,9 +201,9 @@ struct OneByOne {
     rows: LeastSquares,
     linear: Vec<usize>,
     /// Sum of the weighted squares of the force (`total`), and of the residual of the linear fit
-    /// (`without`).
+    /// (`linear_residual`).
     total: f64,
-    without: f64,
+    linear_residual: f64,
     /// Number of equations minus number of parameters, in a fit with one term.
     residual_freedom: usize,
 }
@@ -233,8 +233,8 @@ impl OneByOne {
         let linear: Vec<usize> = (0..equations.free.len()).collect();
         let total = rows.triangle().column(equations.count()).norm_squared();
         let residual_freedom = equations.equations().saturating_sub(linear.len() + 1).max(1);
-        let mut sizes = Self { rows, linear, total, without: 0.0, residual_freedom };
-        sizes.without = sizes.solve(&sizes.linear)?.0;
+        let mut sizes = Self { rows, linear, total, linear_residual: 0.0, residual_freedom };
+        sizes.linear_residual = sizes.solve(&sizes.linear)?.0;
         Ok(sizes)
     }
 

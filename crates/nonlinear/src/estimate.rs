@@ -228,14 +228,17 @@ impl NonlinearEstimate {
     /// # Errors
     /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of
     /// parameters.
-    pub fn with_mean_square(mut self, beside: &DMatrix<f64>) -> Result<Self, EstimateError> {
-        check_size("parameters", self.parameters.len(), beside.nrows())?;
-        self.covariance += beside;
+    pub fn with_mean_square(
+        mut self,
+        mean_square_error: &DMatrix<f64>,
+    ) -> Result<Self, EstimateError> {
+        check_size("parameters", self.parameters.len(), mean_square_error.nrows())?;
+        self.covariance += mean_square_error;
         for (at, parameter) in self.parameters.iter_mut().enumerate() {
             parameter.estimate.standard_error = self.covariance[(at, at)].sqrt();
         }
         let free = self.linear.unknowns().free().len();
-        let of_linear = beside.view((0, 0), (free, free)).into_owned();
+        let of_linear = mean_square_error.view((0, 0), (free, free)).into_owned();
         self.linear = self.linear.with_mean_square(&of_linear)?;
         Ok(self)
     }

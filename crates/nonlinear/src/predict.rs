@@ -49,7 +49,7 @@ pub fn predict(
         Extent::Open => start.clone(),
         Extent::WholePeriod => steady_start(system, force, &fine, start)?,
     };
-    let course = Tangent::new(system, &[]).run(&fine, &start);
+    let course = Tangent::new(system, &[]).simulate(&fine, &start);
     let Course { state, .. } = course.ok_or(EstimateError::Diverged { len: force.len() })?;
     let record =
         |part: usize| Record::new(force.sampling(), state.columns(part * n, n).into_owned());
@@ -73,7 +73,7 @@ fn steady_start(
         start.displacement().iter().chain(start.velocity().iter()).copied(),
     );
     for _ in 0..PREDICTION_SHOTS {
-        let Some(course) = tangent.run(fine, &initial(&state)?) else { return Err(none) };
+        let Some(course) = tangent.simulate(fine, &initial(&state)?) else { return Err(none) };
         let end = course.end.column(0).into_owned();
         let gap = &end - &state;
         let size = course.state.amax();
@@ -159,7 +159,7 @@ impl Residuals for Start<'_> {
 
     fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
         let Ok(start) = initial(theta) else { return false };
-        let course = Tangent::new(self.system, self.directions).run(self.fine, &start);
+        let course = Tangent::new(self.system, self.directions).simulate(self.fine, &start);
         let Some(course) = course else { return false };
         let mut at = 0;
         for (column, samples, scale) in self.channels() {

@@ -57,7 +57,7 @@ impl<'a> Propagation<'a> {
     }
 
     /// Returns the change of the state due to half of a force sample, 2n × n.
-    pub(super) fn half_push(&self) -> DMatrix<f64> {
+    pub(super) fn half_sample_input(&self) -> DMatrix<f64> {
         let n = self.dof();
         let mut push = DMatrix::zeros(2 * n, n);
         push.rows_mut(n, n).copy_from(&(self.inverse_mass * (0.5 * self.dt)));

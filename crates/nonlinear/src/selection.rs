@@ -190,7 +190,7 @@ struct Misfit {
     /// them together.
     fitted: f64,
     /// Sum of squared residuals of all experiments if all coefficients are zero.
-    all: f64,
+    total_sum: f64,
     /// Sum of squares of each experiment, with the coefficients that were fitted to all other
     /// experiments; used only with [`Criterion::HeldOut`], otherwise empty.
     held_out: Vec<f64>,
@@ -243,7 +243,7 @@ impl Judge {
                 held_out.push(on(*at, &self.fit(chosen, &remaining)?));
             }
         }
-        Ok(Misfit { fitted, all: total, held_out })
+        Ok(Misfit { fitted, total_sum: total, held_out })
     }
 
     fn fit(&self, chosen: &[usize], experiments: &[usize]) -> Result<Vec<f64>, EstimateError> {
@@ -283,7 +283,8 @@ impl Judge {
             Criterion::Information => self.information(misfit, parameters),
             Criterion::HeldOut => misfit.held_out.iter().sum::<f64>() / self.equations as f64,
         };
-        let unexplained = if misfit.all > 0.0 { (misfit.fitted / misfit.all).sqrt() } else { 0.0 };
+        let unexplained =
+            if misfit.total_sum > 0.0 { (misfit.fitted / misfit.total_sum).sqrt() } else { 0.0 };
         SelectionStep { added, score, unexplained }
     }
 }

@@ -56,10 +56,10 @@ impl FineForce {
         };
         let mut grid = Self::new(force.len(), &period, FEWEST_STEPS.max(needed as usize))?;
         let mut tangent = Tangent::new(system, &[]);
-        let mut before = tangent.run(&grid, start);
+        let mut before = tangent.simulate(&grid, start);
         while 2 * grid.steps <= MOST_STEPS {
             grid = Self::new(force.len(), &period, 2 * grid.steps)?;
-            let after = tangent.run(&grid, start);
+            let after = tangent.simulate(&grid, start);
             if let (Some(before), Some(after)) = (&before, &after) {
                 let n = system.dof();
                 let displacement = |course: &Course| course.state.columns(0, n).into_owned();
@@ -224,7 +224,7 @@ impl<'a> Tangent<'a> {
     }
 
     /// Returns the response from an initial state; `None` if it overflows.
-    pub(super) fn run(&mut self, force: &FineForce, start: &InitialState) -> Option<Course> {
+    pub(super) fn simulate(&mut self, force: &FineForce, start: &InitialState) -> Option<Course> {
         let (n, width) = (self.system.dof(), self.width());
         let mut z = self.initial(start);
         let mut state = DMatrix::zeros(force.samples, 3 * n);

@@ -58,10 +58,10 @@ pub(super) struct NoiseVariances {
 
 impl NoisePath {
     pub(super) fn new(motion: &Propagation<'_>) -> Self {
-        let (half, at_once) = (motion.half_push(), motion.direct());
+        let (half, feedthrough) = (motion.half_sample_input(), motion.direct());
         let step = |sample: usize| {
             let (state, output) = (motion.transition(sample).clone(), motion.output(sample));
-            let (input, direct) = (&state * &half * 2.0, &output * &half + &at_once);
+            let (input, direct) = (&state * &half * 2.0, &output * &half + &feedthrough);
             NoiseStep { state, input, output, direct }
         };
         Self((0..motion.len()).map(step).collect())
@@ -81,23 +81,23 @@ impl NoisePath {
             log_determinant: 0.0,
         };
         let zeros = DMatrix::zeros;
-        let (mut seen, mut cross) = (zeros(2 * n, n), zeros(2 * n, n));
-        let (mut pushed, mut at_once) = (zeros(2 * n, n), zeros(n, n));
+        let (mut buffer, mut cross) = (zeros(2 * n, n), zeros(2 * n, n));
+        let (mut scaled_input, mut scaled_direct) = (zeros(2 * n, n), zeros(n, n));
         let (mut covariance, mut gain) = (zeros(n, n), zeros(2 * n, n));
-        let (mut spread, mut next) = (zeros(2 * n, 2 * n), zeros(2 * n, 2 * n));
+        let (mut state_covariance, mut next) = (zeros(2 * n, 2 * n), zeros(2 * n, 2 * n));
         for (sample, NoiseStep { state, input, output, direct }) in self.0.iter().enumerate() {
-            // `pushed` and `at_once` are G and H; each column is multiplied by the standard
+            // `scaled_input` and `scaled_direct` are G and H; each column is multiplied by the standard
             // deviation of the noise on its force.
-            pushed.copy_from(input);
-            at_once.copy_from(direct);
+            scaled_input.copy_from(input);
+            scaled_direct.copy_from(direct);
             for (force, variance) in variances.force.iter().enumerate() {
-                pushed.column_mut(force).scale_mut(variance.sqrt());
-                at_once.column_mut(force).scale_mut(variance.sqrt());
+                scaled_input.column_mut(force).scale_mut(variance.sqrt());
+                scaled_direct.column_mut(force).scale_mut(variance.sqrt());
             }
-            seen.fill(0.0);
-            add_product(&mut seen, 1.0, &spread, output);
-            covariance.gemm(1.0, output, &seen, 0.0);
-            add_product(&mut covariance, 1.0, &at_once, &at_once);
+            buffer.fill(0.0);
+            add_product(&mut buffer, 1.0, &state_covariance, output);
+            covariance.gemm(1.0, output, &buffer, 0.0);
+            add_product(&mut covariance, 1.0, &scaled_direct, &scaled_direct);
             for (channel, variance) in variances.response.iter().enumerate() {
                 covariance[(channel, channel)] += variance;
             }
@@ -107,19 +107,19 @@ impl NoisePath {
             factor.l_dirty().solve_lower_triangular_mut(&mut inverse);
             filter.log_determinant -= 2.0 * inverse.diagonal().map(f64::ln).sum();
             covariance = factor.unpack_dirty();
-            cross.gemm(1.0, state, &seen, 0.0);
-            add_product(&mut cross, 1.0, &pushed, &at_once);
+            cross.gemm(1.0, state, &buffer, 0.0);
+            add_product(&mut cross, 1.0, &scaled_input, &scaled_direct);
             // K = (cross L⁻ᵀ) L⁻¹.
             let inverse = filter.inverses.columns(sample * n, n);
-            seen.fill(0.0);
-            add_product(&mut seen, 1.0, &cross, &inverse);
-            gain.gemm(1.0, &seen, &inverse, 0.0);
+            buffer.fill(0.0);
+            add_product(&mut buffer, 1.0, &cross, &inverse);
+            gain.gemm(1.0, &buffer, &inverse, 0.0);
             filter.gains.columns_mut(sample * n, n).copy_from(&gain);
-            next.gemm(1.0, state, &spread, 0.0);
-            spread.fill(0.0);
-            add_product(&mut spread, 1.0, &next, state);
-            add_product(&mut spread, 1.0, &pushed, &pushed);
-            add_product(&mut spread, -1.0, &seen, &seen);
+            next.gemm(1.0, state, &state_covariance, 0.0);
+            state_covariance.fill(0.0);
+            add_product(&mut state_covariance, 1.0, &next, state);
+            add_product(&mut state_covariance, 1.0, &scaled_input, &scaled_input);
+            add_product(&mut state_covariance, -1.0, &buffer, &buffer);
         }
         filter.log_determinant.is_finite().then_some(filter)
     }
@@ -128,13 +128,14 @@ impl NoisePath {
     /// force.
     fn mean_square(&self, force: usize) -> DVector<f64> {
         let n = self.channels();
-        let mut spread = DMatrix::zeros(2 * n, 2 * n);
+        let mut state_covariance = DMatrix::zeros(2 * n, 2 * n);
         let mut sum = DVector::zeros(n);
         for NoiseStep { state, input, output, direct } in &self.0 {
-            sum += (output * &spread * output.transpose()).diagonal();
+            sum += (output * &state_covariance * output.transpose()).diagonal();
             sum += direct.column(force).component_mul(&direct.column(force));
             let push = input.column(force);
-            spread = state * spread * state.transpose() + push * push.transpose();
+            state_covariance =
+                state * state_covariance * state.transpose() + push * push.transpose();
         }
         sum / self.0.len().max(1) as f64
     }

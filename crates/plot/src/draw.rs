@@ -213,7 +213,7 @@ fn axes(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {
         sheet.text((left - TICK, top - 6.0), factor, &small.anchored(Anchor::Start));
     }
     let vertical = TextStyle { vertical: true, ..caption };
-    sheet.text((layout.y_caption, top + height / 2.0), &panel.y.caption(), &vertical);
+    sheet.text((layout.y_caption_x, top + height / 2.0), &panel.y.caption(), &vertical);
     if layout.titled {
         let above = if layout.place == Place::Above {
             legend::strip_height(&layout.entries, width)

@@ -56,7 +56,7 @@ pub(crate) struct PanelLayout {
     /// `true` if the title of the panel is written above it.
     pub(crate) titled: bool,
     /// Abscissa of the centre line of the ordinate's caption, px.
-    pub(crate) y_caption: f64,
+    pub(crate) y_caption_x: f64,
     pub(crate) entries: Vec<Entry>,
     pub(crate) place: Place,
 }
@@ -173,13 +173,13 @@ impl<'a> Planner<'a> {
             .map(|(index, y_ticks)| {
                 let column = index % self.columns;
                 let corner = (lefts[column], tops[index / self.columns]);
-                let y_caption = corner.0 - TICK - TICK_GAP - label_widths[column] - 10.0;
+                let y_caption_x = corner.0 - TICK - TICK_GAP - label_widths[column] - 10.0;
                 self.panel(
                     index,
                     corner,
                     (frame_width, frame_height),
                     y_ticks,
-                    y_caption,
+                    y_caption_x,
                     above[index],
                 )
             })
@@ -286,7 +286,7 @@ impl<'a> Planner<'a> {
         corner: Point,
         size: Point,
         y_ticks: Ticks,
-        y_caption: f64,
+        y_caption_x: f64,
         above: bool,
     ) -> PanelLayout {
         let panel = &self.figure.panels[index];
@@ -317,7 +317,7 @@ impl<'a> Planner<'a> {
             y_ticks,
             labels_x: self.labels_x(index),
             titled: self.titled(index),
-            y_caption,
+            y_caption_x,
             entries,
             place: legend_place,
         }

@@ -16,7 +16,7 @@ use crate::random::random_stable;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
     /// Springs at both ends, as stiff as the springs between the masses.
-    Held,
+    Fixed,
     /// Springs at both ends, with 1/500 of the stiffness of the springs between the masses.
     Soft,
     /// No support: the chain has a rigid-body mode.
@@ -37,7 +37,7 @@ pub fn chain(dof: usize, support: Support, damping: f64, seed: u64) -> SecondOrd
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let masses = DVector::from_fn(dof, |_, _| rng.random_range(1.0..4.0));
     let ends = match support {
-        Support::Held => 1.0,
+        Support::Fixed => 1.0,
         Support::Soft => 2e-3,
         Support::Free => 0.0,
     };
@@ -94,10 +94,10 @@ pub fn series(index: u64) -> Result<Test, ProblemError> {
     let dof = 1 + (index % 10) as usize;
     let damping = 10f64.powf(rng.random_range(-2.5..-1.3));
     let (name, system, one_force) = match index / 10 % 5 {
-        0 => ("held chain, all forced", chain(dof, Support::Held, damping, index), false),
+        0 => ("held chain, all forced", chain(dof, Support::Fixed, damping, index), false),
         1 => ("soft chain, all forced", chain(dof, Support::Soft, damping, index), false),
         2 => ("free chain, all forced", chain(dof, Support::Free, damping, index), false),
-        3 => ("held chain, one force", chain(dof, Support::Held, damping, index), true),
+        3 => ("held chain, one force", chain(dof, Support::Fixed, damping, index), true),
         _ => ("fully coupled", random_stable(dof, index), false),
     };
     steady_test(name, system, one_force, 60 + 20 * dof, index)

@@ -26,7 +26,7 @@ pub struct ModalSystem(pub mechid::ModalSystem);
 
 /// Machine, or modes of a test, for the computation of responses to forces.
 #[derive(FromPyObject)]
-pub enum Answering<'py> {
+pub enum ForcedSystem<'py> {
     Machine(PyRef<'py, Machine>),
     Modes(PyRef<'py, ModalSystem>),
 }

@@ -6,7 +6,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Named};
-use crate::machine::Answering;
+use crate::machine::ForcedSystem;
 use crate::measurement::Measurement;
 use crate::{failure, work};
 
@@ -19,18 +19,18 @@ pub struct Predicted(mechid::Predicted);
 pub fn predict_record(
     py: Python<'_>,
     record: PyRef<'_, Measurement>,
-    system: Answering<'_>,
+    system: ForcedSystem<'_>,
     settings: &str,
 ) -> PyResult<Predicted> {
     let how: Predict = failure::settings(py, settings)?;
     let record = record.0.clone();
     let predicted = match system {
-        Answering::Machine(machine) => {
+        ForcedSystem::Machine(machine) => {
             let machine = machine.0.clone();
             let find = move || mechid::predict(&record, &machine, &how);
             work::watched(py, None, || Ok(()), find)
         }
-        Answering::Modes(modes) => {
+        ForcedSystem::Modes(modes) => {
             let modes = modes.0.clone();
             let find = move || mechid::predict_with_modes(&record, &modes, &how);
             work::watched(py, None, || Ok(()), find)

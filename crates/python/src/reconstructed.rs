@@ -10,7 +10,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::answer::{self, ResultOutput as _};
-use crate::machine::Answering;
+use crate::machine::ForcedSystem;
 use crate::measurement::Measurement;
 use crate::page::PageTexts;
 use crate::{arrays, failure, work};
@@ -25,7 +25,7 @@ pub struct Reconstructed(Arc<mechid::Reconstructed>);
 pub fn reconstruct(
     py: Python<'_>,
     record: PyRef<'_, Measurement>,
-    system: Answering<'_>,
+    system: ForcedSystem<'_>,
     settings: &str,
     time_limit: Option<f64>,
     threads: Option<usize>,
@@ -33,12 +33,12 @@ pub fn reconstruct(
     let how: Reconstruct = failure::settings(py, settings)?;
     let record = record.0.clone();
     let force = match system {
-        Answering::Machine(machine) => {
+        ForcedSystem::Machine(machine) => {
             let machine = machine.0.clone();
             let find = move || within(time_limit, || mechid::reconstruct(&record, &machine, &how));
             work::watched(py, threads, || Ok(()), find)
         }
-        Answering::Modes(modes) => {
+        ForcedSystem::Modes(modes) => {
             let modes = modes.0.clone();
             let find =
                 move || mechid::reconstruct_with_modes(&record, &modes, &how, &mut |_| Ok(()));

@@ -265,7 +265,7 @@ mod tests {
     /// agree, but the fortieth does not; at multiples of 761 samples all periods agree. The result
     /// must be a whole number of periods, within 0.01 periods.
     #[test]
-    fn a_period_that_only_neighbours_share_is_none() {
+    fn a_fractional_period_is_found_at_a_multiple() {
         let turn = |k: usize| std::f64::consts::TAU * k as f64 / 76.1;
         let sampling = Sampling::new(1.0, 8000).unwrap();
         let sine = Record::from_channel(sampling, (0..8000).map(|k| turn(k).sin()).collect());

@@ -215,7 +215,7 @@ pub(crate) const SINUSOID_FITTED: usize = 4;
 
 /// Number of lines on either side of a peak over which a sinusoid must explain the power above the
 /// level.
-pub(crate) const SINUSOID_EXPLAINED: usize = 8;
+pub(crate) const SINUSOID_CHECKED_LINES: usize = 8;
 
 /// Maximum fraction of the power above the level that a sinusoid may leave unexplained. A band of
 /// noise, or a sinusoid of changing frequency, exceeds this fraction.

@@ -160,7 +160,7 @@ impl RepeatedPeriods {
             for (mut column, samples) in both.column_iter_mut().zip(channels.clone()) {
                 reader.read(|input| input.copy_from_slice(samples), column.iter_mut());
             }
-            self.together.hold(channels);
+            self.together.buffer(channels);
             self.add(&both);
         }
         Ok(())
@@ -279,7 +279,7 @@ impl RepeatedPeriods {
     ///
     /// # Source
     /// As [`RepeatedPeriods::noise`].
-    pub fn noise_beside(
+    pub fn noise_with_system(
         &self,
         pooling: Pooling,
         machine: &SecondOrderSystem,

@@ -15,8 +15,8 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::frequency_data::FrequencyData;
 use crate::limits::{
-    GAINS_PER_LINE, MAX_CANDIDATES, SINUSOID_AROUND, SINUSOID_BESIDE, SINUSOID_CONSPICUOUS,
-    SINUSOID_EXPLAINED, SINUSOID_FEWEST, SINUSOID_FITTED, SINUSOID_FREQUENCIES, SINUSOID_LEFT,
+    GAINS_PER_LINE, MAX_CANDIDATES, SINUSOID_AROUND, SINUSOID_BESIDE, SINUSOID_CHECKED_LINES,
+    SINUSOID_CONSPICUOUS, SINUSOID_FEWEST, SINUSOID_FITTED, SINUSOID_FREQUENCIES, SINUSOID_LEFT,
     SINUSOID_MOST, SINUSOID_NEXT, SINUSOID_ROUNDS, SINUSOID_SECTIONS,
 };
 use crate::open_record::OpenRecord;
@@ -132,7 +132,7 @@ struct Search<'a> {
     sampling: Sampling,
     first: usize,
     /// `true` for each line that is in the data together with the lines before and after it.
-    whole: Vec<bool>,
+    has_both_neighbours: Vec<bool>,
     /// Residual in the measured quantity, lines × channels.
     residual: DMatrix<Complex<f64>>,
     /// Mean power around each line under Hann's window, lines × channels; infinite if there are too
@@ -141,7 +141,7 @@ struct Search<'a> {
     /// `true` for each line whose level includes the factor for the receptance.
     is_resonant: Vec<bool>,
     /// `true` for each line that is excluded from the search.
-    done: Vec<bool>,
+    is_excluded: Vec<bool>,
 }
 
 impl<'a> Search<'a> {
@@ -164,35 +164,45 @@ impl<'a> Search<'a> {
             own.row_mut(line - first).copy_from(&(residual.row(row) * unit));
             force.row_mut(line - first).copy_from(&data.force().row(row));
         }
-        let whole = (0..count)
+        let has_both_neighbours = (0..count)
             .map(|at| at > 0 && at + 1 < count && there[at - 1] && there[at] && there[at + 1]);
-        let whole: Vec<bool> = whole.collect();
-        let level = levels(&hann(&own), &whole);
+        let has_both_neighbours: Vec<bool> = has_both_neighbours.collect();
+        let level = levels(&hann(&own), &has_both_neighbours);
         let force = hann(&force);
-        let of_force = levels(&force, &whole);
+        let of_force = levels(&force, &has_both_neighbours);
         let stands_out = |at: usize| {
             (0..n).any(|c| force[(at, c)].norm_sqr() > SINUSOID_CONSPICUOUS * of_force[(at, c)])
         };
-        let mut done = vec![false; count];
+        let mut is_excluded = vec![false; count];
         for at in (0..count).filter(|at| stands_out(*at)) {
-            done[around(at, SINUSOID_NEXT, count)].fill(true);
+            is_excluded[around(at, SINUSOID_NEXT, count)].fill(true);
         }
         let is_resonant = vec![false; count];
         let measured = data.measured();
-        Self { system, measured, sampling, first, whole, residual: own, level, is_resonant, done }
+        Self {
+            system,
+            measured,
+            sampling,
+            first,
+            has_both_neighbours,
+            residual: own,
+            level,
+            is_resonant,
+            is_excluded,
+        }
     }
 
     fn sinusoids(mut self, known: &[Sinusoid]) -> Vec<Sinusoid> {
         let mut sinusoids = known.to_vec();
-        sinusoids.iter().for_each(|sinusoid| self.put(sinusoid, -1.0));
+        sinusoids.iter().for_each(|sinusoid| self.add_scaled(sinusoid, -1.0));
         self.refine(&mut sinusoids);
         sinusoids.retain(|sinusoid| {
-            self.put(sinusoid, 1.0);
+            self.add_scaled(sinusoid, 1.0);
             let at = sinusoid.line - self.first;
             self.allow_for_receptance(at);
-            let stands_out = self.stands_out(&hann(&self.residual), at) > SINUSOID_CONSPICUOUS;
+            let stands_out = self.power_ratio(&hann(&self.residual), at) > SINUSOID_CONSPICUOUS;
             if stands_out {
-                self.put(sinusoid, -1.0);
+                self.add_scaled(sinusoid, -1.0);
             }
             stands_out
         });
@@ -208,7 +218,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             let sinusoid = self.fit(&windowed, at);
-            self.put(&sinusoid, -1.0);
+            self.add_scaled(&sinusoid, -1.0);
             let less = hann(&self.residual);
             let [before, after] = [&windowed, &less].map(|of| self.excess(of, at));
             if after <= SINUSOID_LEFT * before {
@@ -216,9 +226,9 @@ impl<'a> Search<'a> {
                 sinusoids.push(sinusoid);
                 windowed = less;
             } else {
-                self.put(&sinusoid, 1.0);
-                let count = self.done.len();
-                self.done[around(at, SINUSOID_EXPLAINED, count)].fill(true);
+                self.add_scaled(&sinusoid, 1.0);
+                let count = self.is_excluded.len();
+                self.is_excluded[around(at, SINUSOID_CHECKED_LINES, count)].fill(true);
             }
         }
         self.refine(&mut sinusoids);
@@ -229,9 +239,9 @@ impl<'a> Search<'a> {
     fn refine(&mut self, found: &mut [Sinusoid]) {
         for _ in 0..SINUSOID_ROUNDS {
             for sinusoid in &mut *found {
-                self.put(sinusoid, 1.0);
+                self.add_scaled(sinusoid, 1.0);
                 *sinusoid = self.fit(&hann(&self.residual), sinusoid.line - self.first);
-                self.put(sinusoid, -1.0);
+                self.add_scaled(sinusoid, -1.0);
             }
         }
     }
@@ -252,7 +262,7 @@ impl<'a> Search<'a> {
         let steps = 1..2 * GAINS_PER_LINE;
         let near = steps.map(|step| line - 1.0 + step as f64 / GAINS_PER_LINE as f64);
         let near: Vec<f64> = near.filter(|place| *place > 0.0).collect();
-        let around_it: Vec<f64> = around(at, SINUSOID_AROUND, self.done.len())
+        let around_it: Vec<f64> = around(at, SINUSOID_AROUND, self.is_excluded.len())
             .filter(|row| row.abs_diff(at) > SINUSOID_NEXT)
             .map(|row| (self.first + row) as f64)
             .collect();
@@ -270,7 +280,7 @@ impl<'a> Search<'a> {
 
     /// Returns the power of a line relative to the level around it, in the channel with the largest
     /// ratio.
-    fn stands_out(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
+    fn power_ratio(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
         let of = |c: usize| windowed[(at, c)].norm_sqr() / self.level[(at, c)];
         (0..windowed.ncols()).map(of).fold(0.0, f64::max)
     }
@@ -278,15 +288,16 @@ impl<'a> Search<'a> {
     /// Returns the largest ratio of the power of a line to the level around it, and the index of
     /// this line. Excluded lines are ignored.
     fn most_conspicuous(&self, windowed: &DMatrix<Complex<f64>>) -> Option<(f64, usize)> {
-        let open = (0..self.done.len()).filter(|at| !self.done[*at]);
-        let ratios = open.map(|at| (self.stands_out(windowed, at), at));
+        let open = (0..self.is_excluded.len()).filter(|at| !self.is_excluded[*at]);
+        let ratios = open.map(|at| (self.power_ratio(windowed, at), at));
         ratios.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// Returns the sum, over the lines around a line and over all channels, of the power above the
     /// level, relative to the level.
     fn excess(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
-        let rows = around(at, SINUSOID_EXPLAINED, self.done.len()).filter(|row| self.whole[*row]);
+        let rows = around(at, SINUSOID_CHECKED_LINES, self.is_excluded.len())
+            .filter(|row| self.has_both_neighbours[*row]);
         let of = |row: usize| -> f64 {
             let channels = (0..windowed.ncols()).filter(|c| self.level[(row, *c)].is_finite());
             channels.map(|c| windowed[(row, c)].norm_sqr() / self.level[(row, c)] - 1.0).sum()
@@ -297,7 +308,8 @@ impl<'a> Search<'a> {
     /// Returns the sinusoid that leads to the smallest residual around a line. The frequency of the
     /// sinusoid is between the two neighbours of this line.
     fn fit(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> Sinusoid {
-        let rows = around(at, SINUSOID_FITTED, self.done.len()).filter(|row| self.whole[*row]);
+        let rows = around(at, SINUSOID_FITTED, self.is_excluded.len())
+            .filter(|row| self.has_both_neighbours[*row]);
         let rows: Vec<usize> = rows.collect();
         let channels = windowed.ncols();
         let parts = DMatrix::from_fn(2 * rows.len(), channels, |part, c| {
@@ -358,8 +370,8 @@ impl<'a> Search<'a> {
     }
 
     /// Adds a sinusoid to the residual, or subtracts it.
-    fn put(&mut self, sinusoid: &Sinusoid, sign: f64) {
-        for row in 0..self.done.len() {
+    fn add_scaled(&mut self, sinusoid: &Sinusoid, sign: f64) {
+        for row in 0..self.is_excluded.len() {
             for channel in 0..sinusoid.amplitude.len() {
                 let read = sinusoid.read(self.sampling, self.first + row, channel);
                 self.residual[(row, channel)] += read.scale(sign);
@@ -384,14 +396,15 @@ fn hann(lines: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
 
 /// Returns, for each line and channel, the mean power that follows from the median power of the
 /// lines around this line; infinite if there are too few such lines.
-fn levels(windowed: &DMatrix<Complex<f64>>, whole: &[bool]) -> DMatrix<f64> {
+fn levels(windowed: &DMatrix<Complex<f64>>, has_both_neighbours: &[bool]) -> DMatrix<f64> {
     let mut powers = Vec::with_capacity(2 * SINUSOID_AROUND);
     DMatrix::from_fn(windowed.nrows(), windowed.ncols(), |at, channel| {
-        if !whole[at] {
+        if !has_both_neighbours[at] {
             return f64::INFINITY;
         }
-        let neighbours = around(at, SINUSOID_AROUND, whole.len());
-        let neighbours = neighbours.filter(|row| whole[*row] && row.abs_diff(at) > SINUSOID_NEXT);
+        let neighbours = around(at, SINUSOID_AROUND, has_both_neighbours.len());
+        let neighbours =
+            neighbours.filter(|row| has_both_neighbours[*row] && row.abs_diff(at) > SINUSOID_NEXT);
         powers.clear();
         powers.extend(neighbours.map(|row| windowed[(row, channel)].norm_sqr()));
         if powers.len() < SINUSOID_FEWEST {

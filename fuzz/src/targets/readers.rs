@@ -255,7 +255,7 @@ fn shown(text: &str) -> Result<(), String> {
 }
 
 /// Returns the value, if any, and checks the message of an error.
-fn told<T>(result: Result<T, IoError>) -> Result<Option<T>, String> {
+fn checked<T>(result: Result<T, IoError>) -> Result<Option<T>, String> {
     match result {
         Ok(value) => Ok(Some(value)),
         Err(error) => shown(&error.to_string()).map(|()| None),
@@ -268,7 +268,7 @@ fn ensure(holds: bool, what: &str) -> Result<(), String> {
 
 /// Reads a matrix and checks its shape and its number of entries.
 fn matrix(bytes: &[u8]) -> Result<(), String> {
-    let Some(matrix) = told(parse_matrix_market("k\u{1b}.mtx", bytes, &OPTIONS.limits))? else {
+    let Some(matrix) = checked(parse_matrix_market("k\u{1b}.mtx", bytes, &OPTIONS.limits))? else {
         return Ok(());
     };
     reached(Depth::Fitted);
@@ -278,7 +278,7 @@ fn matrix(bytes: &[u8]) -> Result<(), String> {
 
 /// Reads a record and calls all methods of its table.
 fn record(bytes: &[u8]) -> Result<(), String> {
-    let Some(table) = told(Table::parse_with("a\u{1b}.csv", bytes, &OPTIONS))? else {
+    let Some(table) = checked(Table::parse_with("a\u{1b}.csv", bytes, &OPTIONS))? else {
         return Ok(());
     };
     reached(Depth::Read);
@@ -297,26 +297,26 @@ fn record(bytes: &[u8]) -> Result<(), String> {
         shown(&table.label(column))?;
         let _ = (table.unit(column), table.about(column), table.says_unit_of_time(column));
         let _ = table.stated_unit(column, Some(Quantity::Force));
-        if let Some(values) = told(table.values(column))? {
+        if let Some(values) = checked(table.values(column))? {
             ensure(values.iter().all(|v| v.is_finite()), "a column is not finite")?;
             good.push((column + 1).to_string());
         }
         let number = (column + 1).to_string();
         for axis in axes.iter().flatten() {
-            if let Some(record) = told(table.record(axis, &[&number]))? {
+            if let Some(record) = checked(table.record(axis, &[&number]))? {
                 reached(Depth::Fitted);
                 ensure(record.sampling().dt() > 0.0, "the time step is not positive")?;
             }
         }
     }
     for name in table.names() {
-        told(table.column(name))?;
+        checked(table.column(name))?;
     }
     for axis in axes.iter().flatten() {
-        told(table.record(axis, &good))?;
-        told(table.sampling(axis, &[] as &[&str]))?;
+        checked(table.record(axis, &good))?;
+        checked(table.sampling(axis, &[] as &[&str]))?;
     }
-    told(table.common_length(&good))?;
+    checked(table.common_length(&good))?;
     shown(&table.position(0).to_string())
 }
 
@@ -325,10 +325,10 @@ fn identifiers(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let path = folder.path().join("a.parquet");
     fs::write(&path, bytes).map_err(|e| e.to_string())?;
-    let Some(file) = told(ParquetFile::open(&path, &OPTIONS.limits))? else { return Ok(()) };
+    let Some(file) = checked(ParquetFile::open(&path, &OPTIONS.limits))? else { return Ok(()) };
     reached(Depth::Read);
     for column in 0..file.head().width() {
-        let Some(records) = told(file.records(&(column + 1).to_string()))? else { continue };
+        let Some(records) = checked(file.records(&(column + 1).to_string()))? else { continue };
         reached(Depth::Reached);
         let ends = records.iter().scan(0, |end, record| {
             let follows = record.rows.start == *end && record.rows.end > *end;
@@ -336,7 +336,7 @@ fn identifiers(bytes: &[u8]) -> Result<(), String> {
             Some(follows)
         });
         ensure(ends.into_iter().all(|follows| follows), "the records leave rows out")?;
-        if told(file.tables(None, &records[..records.len().min(3)]))?.is_some() {
+        if checked(file.tables(None, &records[..records.len().min(3)]))?.is_some() {
             reached(Depth::Fitted);
         }
     }
@@ -349,7 +349,7 @@ fn chunks(bytes: &[u8]) -> Result<(), String> {
     let path = folder.path().join("a.csv");
     fs::write(&path, bytes).map_err(|e| e.to_string())?;
     let open = |held| RecordFile::open(&path, &OPTIONS, held);
-    let (Some(held), Some(part)) = (told(open(usize::MAX))?, told(open(1))?) else {
+    let (Some(held), Some(part)) = (checked(open(usize::MAX))?, checked(open(1))?) else {
         return Ok(());
     };
     reached(Depth::Read);
@@ -373,7 +373,7 @@ fn chunks(bytes: &[u8]) -> Result<(), String> {
                         all.extend(block.iter().map(|v| v.to_bits()));
                         Ok::<_, IoError>(())
                     });
-                    told(read)?;
+                    checked(read)?;
                     ensure(all.len() == len, "the blocks have a different number of samples")?;
                     sums.push(format!("{all:?}"));
                 }
@@ -405,21 +405,21 @@ fn descriptions(bytes: &[u8]) -> Result<(), String> {
 }
 
 fn described(path: &Path) -> Result<(), String> {
-    if let Some(covariance) = told(read_covariance(path))?.flatten() {
+    if let Some(covariance) = checked(read_covariance(path))?.flatten() {
         let n = covariance.parameters.len();
         ensure(covariance.matrix().shape() == (n, n), "the covariance is not square")?;
     }
-    if let Some(system) = told(read_system(path))? {
+    if let Some(system) = checked(read_system(path))? {
         reached(Depth::Fitted);
         ensure(system.stiffness().iter().all(|k| k.is_finite()), "the system is not finite")?;
     }
-    let Some(experiment) = told(Experiment::read(path))? else { return Ok(()) };
+    let Some(experiment) = checked(Experiment::read(path))? else { return Ok(()) };
     reached(Depth::Fitted);
-    told(experiment.system())?;
-    told(experiment.initial_state())?;
+    checked(experiment.system())?;
+    checked(experiment.initial_state())?;
     if experiment.samples() <= MOST_SAMPLES && experiment.periods <= 4 {
         for force in [experiment.force(), experiment.force_within_steps(0.5)] {
-            if let Some(force) = told(force)? {
+            if let Some(force) = checked(force)? {
                 ensure(force.len() == experiment.samples(), "the force has a different length")?;
             }
         }
@@ -430,12 +430,12 @@ fn described(path: &Path) -> Result<(), String> {
 /// Parses a choice of spectral lines.
 fn lines(bytes: &[u8]) -> Result<(), String> {
     let text = String::from_utf8_lossy(bytes);
-    let Some(lines) = told(text.parse::<LineSpec>())? else { return Ok(()) };
+    let Some(lines) = checked(text.parse::<LineSpec>())? else { return Ok(()) };
     reached(Depth::Fitted);
     ensure(lines.to_string() == text, "the choice is written differently from how it was read")?;
     for len in [1, 2, 3, 16, 1000] {
         let period = Sampling::new(0.01, len).map_err(|e| e.to_string())?;
-        if let Some(lines) = told(lines.lines(period))? {
+        if let Some(lines) = checked(lines.lines(period))? {
             ensure(
                 lines.is_sorted() && lines.iter().all(|n| 2 * n < len),
                 "the lines are not sorted, or one is not below the Nyquist frequency",

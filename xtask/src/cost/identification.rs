@@ -53,7 +53,7 @@ fn least_squares_time(n: usize, seconds: f64) -> Result<f64, String> {
 }
 
 fn likelihood_time(n: usize, seconds: f64) -> Result<f64, Box<dyn std::error::Error>> {
-    let test = steady_test("held chain", chain(n, Support::Held, 0.02, 1), false, LINES, 1)?;
+    let test = steady_test("held chain", chain(n, Support::Fixed, 0.02, 1), false, LINES, 1)?;
     let response = repeated(&test.displacement, PERIODS)?;
     let response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), 1)?;
     let lines = Lines::new(test.force.sampling(), test.lines.iter().copied())?;

@@ -127,7 +127,7 @@ fn cases(folder: &Path) -> Result<Vec<Case>, String> {
 
 /// Writes a random test of a chain, with 0.3 % noise on the force and 1 % on the displacements.
 fn shaken(path: &Path, dof: usize, driven: &[usize], samples: usize) -> Result<(), String> {
-    let system = chain(dof, Support::Held, 0.02, 1);
+    let system = chain(dof, Support::Fixed, 0.02, 1);
     // The response to a whole period is computed exactly; the open record is a part of this period.
     let period = Sampling::from_rate_hz(128.0, samples + 1536).map_err(|e| e.to_string())?;
     let white = noise::white(period, driven.len(), 50.0, 1).map_err(|e| e.to_string())?;

@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use super::measure::{Growth, shortest};
 
 /// Number of rows that the reader of a text file buffers.
-const HELD: usize = 1 << 18;
+const BUFFERED_ROWS: usize = 1 << 18;
 
 pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     let [mut step, mut read, mut solve] =
@@ -70,7 +70,7 @@ fn reading(path: &Path, force: &Record, response: &Response, seconds: f64) -> Re
     ];
     fs::write(path, csv_text(force.sampling(), &columns)).map_err(|e| e.to_string())?;
     let read = || {
-        let file = RecordFile::open(path, &ReadOptions::default(), HELD)?;
+        let file = RecordFile::open(path, &ReadOptions::default(), BUFFERED_ROWS)?;
         file.survey(&TimeAxis::Column("time"), &["force", "x", "y"])
     };
     read().map_err(|e| e.to_string())?;

@@ -46,7 +46,7 @@ impl Key {
     }
 
     /// Returns whether a slip affects the replay of this estimation.
-    pub fn is_touched_by(self, slip: Slip) -> bool {
+    pub fn is_affected_by(self, slip: Slip) -> bool {
         match slip {
             Slip::CentralDifferenceLead => self.method == Method::CentralDifference,
             Slip::WilsonLoadLag => self.method == Method::WilsonTheta,
@@ -121,7 +121,7 @@ impl Results {
             .par_iter()
             .map(|(key, estimates)| {
                 let mut estimates = estimates.clone();
-                if key.is_touched_by(slip) {
+                if key.is_affected_by(slip) {
                     estimates.slipped = replay(*key, Some(slip))?;
                 }
                 Ok((*key, estimates))

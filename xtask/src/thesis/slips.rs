@@ -90,7 +90,7 @@ impl Slip {
     }
 
     /// Returns a description of the computation in the original programs.
-    pub fn done(self) -> &'static str {
+    pub fn original_computation(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => {
                 "the displacement at t + Dt is stored with the velocity, acceleration and force of t"
@@ -115,7 +115,7 @@ impl Slip {
     }
 
     /// Returns a description of the computation that the dissertation's own equations require.
-    pub fn right(self) -> &'static str {
+    pub fn required_computation(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "x, v, a and F of the same instant",
             Slip::WilsonLoadLag => "response and force of the same instant",

@@ -77,7 +77,7 @@ impl BearingData {
         check_distinct(tests)?;
         let data = tests.iter().map(|test| Self::from_record(test, how));
         let data = data.collect::<Result<Vec<_>, _>>()?.into_iter();
-        data.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
+        data.map(Ok).reduce(|a, b| a?.concatenate(b?)).ok_or(AnalysisError::NoRecord)?
     }
 
     /// Reads tables of frequency responses per shaker force. Each test has two tables at the same
@@ -107,7 +107,7 @@ impl BearingData {
             ))),
         });
         let data = tests.collect::<Result<Vec<_>, _>>()?.into_iter();
-        data.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
+        data.map(Ok).reduce(|a, b| a?.concatenate(b?)).ok_or(AnalysisError::NoRecord)?
     }
 
     fn from_tables(
@@ -204,7 +204,7 @@ impl BearingData {
     }
 
     /// Returns these data followed by the rows of `other`.
-    fn and(mut self, other: Self) -> Result<Self, AnalysisError> {
+    fn concatenate(mut self, other: Self) -> Result<Self, AnalysisError> {
         self.data = self.data.and(&other.data)?;
         self.noise = self.noise.and(other.noise);
         self.largest_displacement = match (self.largest_displacement, other.largest_displacement) {

@@ -44,14 +44,14 @@ pub(super) fn stated(
     let covariance = entries.filter(|_| system.is_some()).map(|entries| {
         let UncertainEntries { entries, covariance } = entries;
         let names = entries.iter().map(Parameter::to_string).collect();
-        ParameterCovariance::new(names, &covariance, freedom(estimate, equations))
+        ParameterCovariance::new(names, &covariance, degrees_of_freedom(estimate, equations))
     });
     Ok(StatedMachine { system, covariance, notes })
 }
 
 /// Returns the degrees of freedom of the covariance. If the noise is exactly known, this is the
 /// number of equations minus the number of parameters.
-pub(super) fn freedom(estimate: &MachineEstimate, equations: usize) -> usize {
+pub(super) fn degrees_of_freedom(estimate: &MachineEstimate, equations: usize) -> usize {
     let spare = equations.saturating_sub(estimate.likelihood.parameters.len()).max(1);
     match estimate.likelihood.degrees_of_freedom {
         known if known.is_infinite() => spare,
@@ -79,7 +79,7 @@ pub(super) fn machine(
     Ok(Machine {
         name: "the identified machine".into(),
         uncertain: UncertainSystem::new(system, entries, covariance)?,
-        degrees_of_freedom: freedom(estimate, equations),
+        degrees_of_freedom: degrees_of_freedom(estimate, equations),
         nonlinear: None,
         names: Channels { force: dofs.clone(), displacement: dofs, ..Channels::default() },
     })

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::data::TestRow;
-use super::machine::{self, StatedMachine, freedom};
+use super::machine::{self, StatedMachine, degrees_of_freedom};
 use super::notes::ElementNote;
 use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
@@ -247,7 +247,7 @@ fn parameter_covariance(estimate: &MachineEstimate, equations: usize) -> Paramet
         }
     }
     let names = parameters.iter().map(|parameter| parameter.name.clone()).collect();
-    ParameterCovariance::new(names, &covariance, freedom(estimate, equations))
+    ParameterCovariance::new(names, &covariance, degrees_of_freedom(estimate, equations))
 }
 
 fn candidates(

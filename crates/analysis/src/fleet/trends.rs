@@ -177,7 +177,7 @@ impl Trends {
             }
         }
         let tests = series.len();
-        series.iter_mut().for_each(|one| one.judge(tests));
+        series.iter_mut().for_each(|one| one.detect_changes_and_outliers(tests));
         let analyses: BTreeSet<_> =
             rows.iter().map(|row| (&row.analysis_hash, &row.version)).collect();
         Self {
@@ -197,7 +197,7 @@ impl Trends {
 impl TrendSeries {
     /// Detects changes, computes median and spread, and marks the outliers: values that are far
     /// from the baseline, which follows the changes.
-    fn judge(&mut self, tests: usize) {
+    fn detect_changes_and_outliers(&mut self, tests: usize) {
         let values: Vec<f64> = self.points.iter().map(|point| point.value).collect();
         self.median = median(values.clone());
         let changes = changes::find(&values, tests);

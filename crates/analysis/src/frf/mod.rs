@@ -107,7 +107,7 @@ pub fn frf_of_records(
         return Ok(FrfTable::interleaved(&records, &responses, how));
     }
     let chosen = match records.iter().min_by_key(|recorded| recorded.held.force.len()) {
-        Some(shortest) if !period_given && !whole::close(&records) => {
+        Some(shortest) if !period_given && !whole::have_no_transients(&records) => {
             how.segments.chosen(shortest, lines)?
         }
         _ => None,

@@ -15,7 +15,7 @@ const SAME_FORCE: f64 = 0.1;
 /// the end, or successive periods of the same force.
 ///
 /// A single record is always cut into segments, because an average needs several.
-pub(super) fn close(records: &[Windowed]) -> bool {
+pub(super) fn have_no_transients(records: &[Windowed]) -> bool {
     records.len() > 1 && (records.iter().all(ends_at_rest) || repeat(records))
 }
 

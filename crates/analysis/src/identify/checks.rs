@@ -201,7 +201,7 @@ impl CheckRow {
     }
 
     /// Returns whether `other` is the same kind of finding in another record.
-    pub(crate) fn is_of_other_record(&self, other: &Self) -> bool {
+    pub(crate) fn has_same_kind_in_other_record(&self, other: &Self) -> bool {
         let kind = |row: &Self| (row.subject, std::mem::discriminant(&row.finding));
         self.record != other.record && kind(self) == kind(other)
     }

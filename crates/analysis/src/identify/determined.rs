@@ -53,7 +53,7 @@ pub(super) fn check(
         return refused(check.sentence());
     }
     let frequencies = determined(modes);
-    if is_open(estimate) && (estimate.dof() == 1 || frequencies.is_empty()) {
+    if all_intervals_contain_zero(estimate) && (estimate.dof() == 1 || frequencies.is_empty()) {
         let modes = if frequencies.is_empty() {
             "and so do the intervals of all natural frequencies".to_owned()
         } else {
@@ -111,7 +111,7 @@ pub(super) fn check_nonlinear(fit: &NonlinearEstimate) -> Result<(), AnalysisErr
 /// Returns the remark on a fit that determines modes but no parameter.
 pub(super) fn modes_alone(estimate: &Estimate, modes: &[IdentifiedMode]) -> Option<String> {
     let frequencies = determined(modes);
-    (is_open(estimate) && !frequencies.is_empty()).then(|| {
+    (all_intervals_contain_zero(estimate) && !frequencies.is_empty()).then(|| {
         let [named, open] = [message::list(&frequencies, ", ", NAMED), intervals(estimate)];
         format!("the data determine modes ({named}), but no parameter: {open} contain zero")
     })
@@ -119,7 +119,7 @@ pub(super) fn modes_alone(estimate: &Estimate, modes: &[IdentifiedMode]) -> Opti
 
 /// Returns whether the interval of every parameter contains zero; `false` if the fit has no
 /// statistical degrees of freedom for an interval.
-fn is_open(estimate: &Estimate) -> bool {
+fn all_intervals_contain_zero(estimate: &Estimate) -> bool {
     estimate.parameters().len() > 0
         && estimate.parameters().all(|p| {
             let interval = p.interval(CONFIDENCE);

@@ -78,7 +78,7 @@ impl Disagreement {
 
     /// Returns only those additions to the covariance for which a check warns, together with the
     /// scale that the checks determine. The residual has `spare` degrees of freedom.
-    pub(super) fn warned_of(self, checks: &[CheckRow], spare: usize) -> Self {
+    pub(super) fn with_warnings_only(self, checks: &[CheckRow], spare: usize) -> Self {
         let warns = |is_of: fn(&CheckRow) -> bool| {
             checks.iter().any(|check| check.is_conspicuous() && is_of(check))
         };
@@ -152,7 +152,7 @@ impl Disagreement {
 
 /// Returns the square of the change from one estimate to another, in the product of the units of
 /// two parameters.
-pub(super) fn squared_change(from: &Estimate, to: &Estimate) -> DMatrix<f64> {
+pub(super) fn outer_product_of_change(from: &Estimate, to: &Estimate) -> DMatrix<f64> {
     let pairs = from.parameters().zip(to.parameters());
     let change: Vec<f64> = pairs.map(|(from, to)| to.value - from.value).collect();
     let change = DVector::from_vec(change);

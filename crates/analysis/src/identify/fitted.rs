@@ -210,7 +210,7 @@ impl Fitted {
     /// already follow from the residual.
     pub(super) fn count_disagreement(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
         let unjudged = std::mem::take(&mut self.disagreement);
-        let judged = unjudged.warned_of(checks, self.estimate.degrees_of_freedom());
+        let judged = unjudged.with_warnings_only(checks, self.estimate.degrees_of_freedom());
         match &mut self.nonlinear {
             Some(fitted) => {
                 self.disagreement = judged.without_scale();

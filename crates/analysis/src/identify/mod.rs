@@ -165,7 +165,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     if !period_given && is_linear && !matches!(how.source, Source::Hits(_)) {
         summary.remarks.extend(hits::uncut(&records));
         if !matches!(how.source, Source::Segments(_) | Source::Samples(_)) {
-            summary.remarks.extend(records.iter().find_map(spectra::unsaid_period));
+            summary.remarks.extend(records.iter().find_map(spectra::unstated_period));
         }
     }
     summary.checks.extend(time_limit::check());

@@ -161,13 +161,14 @@ pub(super) fn fit(
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let tested =
         Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
-    let (likelier, compared) = time_limit::join(
+    let (better_explanation, compared) = time_limit::join(
         || tested.cause(dt, unknowns, noise.response, excitation),
         || agreement(&data, &fit, &residuals, excitation),
     );
-    let likelier = likelier?;
-    let (likelier, explained) = likelier.unzip();
-    let Compared { parts, omitted } = compared?.beside(likelier.as_ref().map(remaining));
+    let better_explanation = better_explanation?;
+    let (better_explanation, explained) = better_explanation.unzip();
+    let Compared { parts, omitted } =
+        compared?.without_unlikely_term(better_explanation.as_ref().map(remaining));
     let sinusoids = sinusoid_rows(records, &fit);
     let joint = joined(&closed)?;
     let between = acquisition.between_samples.unwrap_or(Discretisation::FirstOrderHold);
@@ -178,7 +179,7 @@ pub(super) fn fit(
         before: vec![Vec::new(); records.len()],
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
         frequency: lines.into_iter().next().map(|lines| (lines, joint)),
-        after_all: bias.into_iter().chain(likelier).chain(parts).collect(),
+        after_all: bias.into_iter().chain(better_explanation).chain(parts).collect(),
         disagreement: Disagreement::new(omitted, explained.flatten()),
         residuals: Residual::from_lines(residuals),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
@@ -373,12 +374,12 @@ impl Tested<'_> {
         let fault = fault.filter(|fault| remaining(&fault.finding) < 1.0);
         let explains = |b: &BetweenSamples| b.leaves_noise || b.remaining < DELAY_REMAINING;
         let between = between.filter(explains);
-        Ok(likelier(fault, between.map(BetweenSamples::explanation)))
+        Ok(better_explanation(fault, between.map(BetweenSamples::explanation)))
     }
 }
 
 /// Returns the explanation that reduces the power of a residual most.
-fn likelier(one: Option<Explanation>, other: Option<Explanation>) -> Option<Explanation> {
+fn better_explanation(one: Option<Explanation>, other: Option<Explanation>) -> Option<Explanation> {
     let power = |of: &Explanation| remaining(&of.finding);
     one.into_iter().chain(other).min_by(|a, b| power(a).total_cmp(&power(b)))
 }

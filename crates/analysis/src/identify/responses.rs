@@ -32,7 +32,7 @@ use crate::text::significant;
 
 /// Minimum change of a parameter, in standard errors, for a remark on the correction of the window
 /// bias that caused the change.
-const BLUNTED: f64 = 0.5;
+const NOTED_WINDOW_CORRECTION: f64 = 0.5;
 
 /// Remark on records that are not whole periods, and that are too long to be fitted as open records
 /// by default.
@@ -193,7 +193,7 @@ fn estimated(
 
 /// Returns a remark on a correction of the window that changes a parameter.
 pub(super) fn blunted(found: &ResponseEstimate) -> Option<String> {
-    (found.blunted > BLUNTED).then(|| {
+    (found.blunted > NOTED_WINDOW_CORRECTION).then(|| {
         format!(
             "the bias of the window of the segments was subtracted from the responses; \
              this changes a parameter by up to {} standard errors",

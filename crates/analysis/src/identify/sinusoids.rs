@@ -27,12 +27,12 @@ pub struct SinusoidRow {
     pub share: f64,
     /// Index of the record; several records may have the same name.
     #[serde(skip)]
-    place: usize,
+    record_index: usize,
 }
 
 impl SinusoidRow {
-    /// Lists the sinusoids of the record with the index `place`.
-    pub(super) fn all(place: usize, held: &Block, sinusoids: &[Sinusoid]) -> Vec<Self> {
+    /// Lists the sinusoids of the record with the index `record_index`.
+    pub(super) fn all(record_index: usize, held: &Block, sinusoids: &[Sinusoid]) -> Vec<Self> {
         let deviations: Vec<f64> =
             held.response().0.data().column_iter().map(|x| x.variance().sqrt()).collect();
         let row = |sinusoid: &Sinusoid| {
@@ -44,7 +44,7 @@ impl SinusoidRow {
                 frequency_hz: sinusoid.omega() / TAU,
                 share: shares.map(|(a, s)| a.abs() / s).fold(0.0, f64::max) / 2_f64.sqrt(),
                 amplitudes,
-                place,
+                record_index,
             }
         };
         sinusoids.iter().map(row).collect()
@@ -59,7 +59,7 @@ impl SinusoidRow {
         for one in by_size {
             // Records of one test contain the same sinusoids.
             let known = |other: &&Self| {
-                other.place != one.place
+                other.record_index != one.record_index
                     && (other.frequency_hz / one.frequency_hz - 1.0).abs() < SAME
             };
             if !named.iter().any(known) {

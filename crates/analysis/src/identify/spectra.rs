@@ -51,7 +51,7 @@ const EXCESS: f64 = 10.0;
 
 /// Ratio of the residual of least squares to the residual of maximum likelihood. At or above it,
 /// least squares counts as biased even if the residual of maximum likelihood is more than noise.
-const MUCH: f64 = 2.0;
+const BIASED_RATIO: f64 = 2.0;
 
 /// Returns the pooling of the noise for an estimator.
 fn pooling_of(estimator: Option<PeriodEstimator>) -> Pooling {
@@ -285,7 +285,7 @@ fn nonlinear_term(
 
 /// Returns a remark on a window that was used as one period although it contains several. The
 /// scatter of these periods shows the noise, but was not used.
-pub(super) fn unsaid_period(record: &Windowed) -> Option<String> {
+pub(super) fn unstated_period(record: &Windowed) -> Option<String> {
     let (held, len) = (&record.held, record.held.force.len());
     let force = held.force.channel(*held.driven.first()?);
     let Repetition { period, mismatch } = repetition(force).filter(|_| held.period == len)?;
@@ -449,7 +449,7 @@ fn likelihood(
 
 /// Returns least squares if it explains the response as well as maximum likelihood. Also returns
 /// least squares if the residual of maximum likelihood is more than noise, and the residual of
-/// least squares is less than [`MUCH`] times the residual of maximum likelihood. Otherwise noise
+/// least squares is less than [`BIASED_RATIO`] times the residual of maximum likelihood. Otherwise noise
 /// has biased least squares: returns maximum likelihood with this reason.
 fn preferred(
     data: &FrequencyData,
@@ -478,7 +478,7 @@ fn preferred(
     let fit_findings =
         after_spectral_fit(std::slice::from_ref(data), &likely.estimate, Extent::WholePeriod)?;
     let is_noise = |finding: &Finding| finding.verdict() == Verdict::Good;
-    if of_plain < MUCH * of_likely
+    if of_plain < BIASED_RATIO * of_likely
         && !fit_findings.records.iter().flat_map(SpectralResidual::findings).all(|f| is_noise(&f))
     {
         return Ok(plain);
@@ -547,7 +547,7 @@ fn with_noise(
     // If the periods differ by rounding only, their noise spectrum cannot be estimated.
     match periods.mean_with_noise(Pooling::AllLines)?.noise_above_rounding() {
         Some(_) => match machine {
-            Some(machine) => periods.mean()?.with_noise(periods.noise_beside(noise, machine)?),
+            Some(machine) => periods.mean()?.with_noise(periods.noise_with_system(noise, machine)?),
             None => periods.mean_with_noise(noise),
         },
         None => periods.mean(),

@@ -373,7 +373,7 @@ pub(crate) fn verdict(checks: &[CheckRow]) -> String {
         some => format!("{some} of {}: warning\n", message::count(total, "check")),
     };
     for (at, check) in warnings.iter().enumerate() {
-        let is_alike = |other: &&&CheckRow| check.is_of_other_record(other);
+        let is_alike = |other: &&&CheckRow| check.has_same_kind_in_other_record(other);
         if warnings[..at].iter().any(|other| is_alike(&other)) {
             continue;
         }

@@ -197,7 +197,7 @@ impl CheckedFit {
         let is_biased = fit.method == Some(Method::LeastSquares);
         determined::check(&fit.of_machine, &fit.of_machine.modes()?, &checks, is_biased)?;
         let spare = fit.estimate.degrees_of_freedom();
-        let disagreement = disagreement.warned_of(&checks, spare);
+        let disagreement = disagreement.with_warnings_only(&checks, spare);
         let estimate = disagreement.included_in(fit.of_machine.clone())?;
         Ok(Self { checks, disagreement, unexplained, estimate })
     }
@@ -285,7 +285,7 @@ impl Scope<'_> {
             .flatten();
         let remaining = better.as_ref().map(|better| better.remaining);
         let compared = fit.compared(self.data, self.measured)?;
-        let Compared { parts, omitted } = compared.beside(remaining);
+        let Compared { parts, omitted } = compared.without_unlikely_term(remaining);
         let (finding, change) = better.map(|better| (better.finding, better.change)).unzip();
         let unknowns = fit.estimate.unknowns();
         let of_one = unknowns.independent().div_ceil(unknowns.dof().max(1));

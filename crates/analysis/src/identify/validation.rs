@@ -179,16 +179,20 @@ fn in_stretches(
 struct Level {
     measured: RunningStatistics,
     /// Sum of the squares of the residual.
-    left: f64,
+    residual_sum_of_squares: f64,
 }
 
 impl Level {
     fn add(&mut self, measured: &[f64], predicted: &[f64]) -> Result<(), SignalError> {
-        self.left += measured.iter().zip(predicted).map(|(x, p)| (x - p).powi(2)).sum::<f64>();
+        self.residual_sum_of_squares +=
+            measured.iter().zip(predicted).map(|(x, p)| (x - p).powi(2)).sum::<f64>();
         self.measured.push(measured)
     }
 
     fn fit_percent(&self) -> f64 {
-        100.0 * (1.0 - self.left.sqrt() / self.measured.centred_sum_of_squares().sqrt())
+        100.0
+            * (1.0
+                - self.residual_sum_of_squares.sqrt()
+                    / self.measured.centred_sum_of_squares().sqrt())
     }
 }

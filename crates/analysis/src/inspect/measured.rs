@@ -14,7 +14,7 @@ use crate::measurement::IN_MEMORY_SAMPLES;
 #[derive(Debug, Clone, Copy)]
 pub struct Shown {
     /// Index among the requested columns, counted from 0.
-    pub place: usize,
+    pub index: usize,
     pub column: usize,
     pub offset: f64,
     /// `true` if lines and a period are to be detected; a column of instants has none.
@@ -62,7 +62,7 @@ impl Span {
 
     /// Returns a sentence that states which samples were used for period and lines; `None` if all
     /// samples were used.
-    pub fn looked_at(self, file: &str) -> Option<String> {
+    pub fn spectral_samples_text(self, file: &str) -> Option<String> {
         let end = self.start + self.len;
         self.held().map(|(first, last)| {
             format!(
@@ -101,9 +101,12 @@ impl ReadingStatistics {
     }
 
     /// Returns the statistics of the shown columns, by their indices among the requested ones.
-    fn statistics(self, places: impl Iterator<Item = usize>) -> Result<Vec<Gathered>, SignalError> {
+    fn statistics(
+        self,
+        indices: impl Iterator<Item = usize>,
+    ) -> Result<Vec<Gathered>, SignalError> {
         let mut columns: Vec<_> = self.gathered.into_iter().map(Some).collect();
-        places.filter_map(|place| columns[place].take()).collect()
+        indices.filter_map(|index| columns[index].take()).collect()
     }
 }
 
@@ -128,7 +131,7 @@ pub fn measured(
     for together in shown.chunks(at_once) {
         let gathered = match while_reading.take() {
             Some(while_reading) => {
-                while_reading.statistics(together.iter().map(|shown| shown.place))?
+                while_reading.statistics(together.iter().map(|shown| shown.index))?
             }
             None => gathered(file, together, window)?,
         };

@@ -148,7 +148,7 @@ impl Inspection<'_> {
         summary.remarks.extend(signals.filter_map(|column| doubtful_unit(table, *column)));
         let mut drawn = Vec::new();
         if let (Some(window), false) = (window, shown.is_empty()) {
-            summary.remarks.extend(window.looked_at(table.file()));
+            summary.remarks.extend(window.spectral_samples_text(table.file()));
             summary.remarks.extend(self.choose_drawn(table, &mut shown));
             let period = self.window.period;
             (summary.channels, drawn) = measured(&file, &shown, while_reading, window, dt, period)?;
@@ -229,12 +229,12 @@ impl Inspection<'_> {
             Detrend::None => 0.0,
         };
         let (mut shown, mut len, mut left_out) = (Vec::new(), inventory.samples, Vec::new());
-        for (place, (&column, tally)) in asked.iter().zip(inventory.columns).enumerate() {
+        for (index, (&column, tally)) in asked.iter().zip(inventory.columns).enumerate() {
             match tally {
                 Ok(tally) if !self.columns.is_empty() || tally.samples == inventory.samples => {
                     len = tally.samples;
                     let (offset, spectral) = (offset(tally.mean), self.is_signal(column, instants));
-                    shown.push(Shown { place, column, offset, spectral, drawn: false });
+                    shown.push(Shown { index, column, offset, spectral, drawn: false });
                 }
                 Ok(tally) => left_out.push(format!(
                     "column {} has {}, but most columns have {}",

@@ -275,7 +275,7 @@ mod tests {
     /// The expected uncertainty is half a unit of the last digit at each end, divided by the
     /// duration of the record.
     #[test]
-    fn instants_that_leave_the_rate_open_are_told() {
+    fn coarse_instants_are_reported() {
         // The instants have three decimals, so the uncertainty is one millisecond in 7.8125 s.
         let coarse = told(512.0, 4000, 3).unwrap();
         assert!(coarse.contains("0.013 %"), "{coarse}");

@@ -128,7 +128,7 @@ fn modes_of_records(
     let checks = checks::channel_checks(measurements)?;
     let is_one_point = settings.places.forces.is_empty() && recorded.inputs.len() == 1;
     let struck_apart = (is_one_point && measurements.len() > 1)
-        .then(|| Recorded::struck_apart(measurements, hits.as_ref()))
+        .then(|| Recorded::with_first_force_separate(measurements, hits.as_ref()))
         .transpose()?;
     Test { recorded, struck_apart, band_hz }.modes(records, checks, settings)
 }

@@ -102,7 +102,7 @@ impl Recorded {
 
     /// Reads records like [`Recorded::from_forced`], but treats the force of the first record and
     /// the force of all other records as two inputs.
-    pub fn struck_apart(
+    pub fn with_first_force_separate(
         measurements: &[Measurement],
         rule: Option<&HitRule>,
     ) -> Result<Self, AnalysisError> {

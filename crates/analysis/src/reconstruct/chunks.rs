@@ -15,7 +15,7 @@ use crate::measurement::CHUNK_SAMPLES;
 
 /// Returns whether a method reconstructs each sample of an open record from neighbouring samples
 /// only.
-pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> bool {
+pub fn supports_chunks(method: Method, request: &Request, machine: &Machine) -> bool {
     // The correction of the channels' phase needs the whole record.
     let phase = machine.nonlinear.as_ref().is_some_and(|p| p.channels != ChannelPhase::default());
     let whole = request.periodic || request.band_hz.is_some();

@@ -22,7 +22,7 @@ struct Pair {
 pub struct KinematicConsistency(Vec<Pair>);
 
 /// Minimum correlation for a comparison of magnitudes; below it noise may explain a difference.
-const ALIKE: f64 = 0.7;
+const MIN_CORRELATION: f64 = 0.7;
 
 /// Ratio of the integrated rate to the measured change, or its inverse, above which a remark is
 /// made; the error of the trapezoidal rule alone gives such a ratio only with fewer than 2.4
@@ -66,7 +66,7 @@ impl KinematicConsistency {
             let correlation = pair.product / (pair.changes * pair.by_rate).sqrt();
             let ratio = (pair.by_rate / pair.changes).sqrt() * correlation.signum();
             let right = (1.0 / ANOTHER_UNIT..ANOTHER_UNIT).contains(&ratio);
-            (correlation.abs() > ALIKE && !right).then(|| {
+            (correlation.abs() > MIN_CORRELATION && !right).then(|| {
                 format!(
                     "{} is {} times the rate of {}: one of them has a wrong unit or \
                      sign, or is the wrong column",

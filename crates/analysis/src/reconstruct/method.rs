@@ -352,7 +352,7 @@ fn in_band_of(motion: &Measurement, force: &IdentifiedForce) -> Result<Measureme
 
 /// Minimum share of the power of a response that must be on the given lines; below it, a remark is
 /// made.
-const FEW: f64 = 0.5;
+const MIN_SHARE_ON_LINES: f64 = 0.5;
 
 /// Returns a remark about the channel with the smallest share of its power on the given lines, if
 /// the share is small: the lines may refer to a period other than the window's.
@@ -367,7 +367,8 @@ fn little_power_remark(motion: &Measurement, request: &Request) -> Option<String
         let on_lines = power(&mut lines.iter().copied(), channel);
         (channel, if total > 0.0 { on_lines / total } else { 1.0 })
     });
-    let (channel, share) = shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < FEW)?;
+    let (channel, share) =
+        shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < MIN_SHARE_ON_LINES)?;
     let (samples, step) = (motion.sampling().len(), motion.sampling().omega0() / TAU);
     Some(format!(
         "the given lines contain only {} % of the power of channel {} (without its mean); no force is computed on other lines. A line number is the number of cycles in {samples} samples, so the line spacing is {} Hz",

@@ -219,7 +219,8 @@ impl Task {
         let mut tally = Tally::new(recorded.sampling, dofs, request.periodic, take)?;
         let (method, why) = method::choose(request, machine, &recorded.channels)?;
         let mut rates = KinematicConsistency::new(&recorded.channels);
-        let (mut how, force) = if !all_at_once && chunks::are_enough_for(method, request, machine) {
+        let (mut how, force) = if !all_at_once && chunks::supports_chunks(method, request, machine)
+        {
             chunks::find(request, machine, recorded, method, &mut |chunk, force, kept| {
                 rates.push(chunk);
                 tally.push(force, kept, !request.noise.is_empty())

@@ -6,7 +6,7 @@ use super::motion::{Held, Recorded};
 use crate::text::significant;
 
 /// Largest ratio of the scatter of periods to their mean that counts as equal periods.
-const ALIKE: f64 = 0.1;
+const MAX_SCATTER: f64 = 0.1;
 
 /// Minimum correlation between successive samples that indicates a response rather than noise:
 /// white noise does not reach it, the response of a machine with at least five samples per period
@@ -22,7 +22,7 @@ pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     let scatter = held.scatter.iter().flatten().enumerate();
     let correlated = scatter.filter(|(_, scatter)| scatter.correlation.abs() > NOT_WHITE);
     let shares = correlated.map(|(channel, scatter)| (channel, scatter.deviation / size(channel)));
-    let far = shares.filter(|(_, share)| *share > ALIKE);
+    let far = shares.filter(|(_, share)| *share > MAX_SCATTER);
     let (channel, share) = far.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "the periods of {samples} samples differ from their mean by {} % of its RMS ({}), and the \

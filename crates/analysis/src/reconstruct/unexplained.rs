@@ -24,14 +24,14 @@ pub struct Measured {
 
 /// Minimum ratio of the unexplained part to its expectation for a remark. One complex line of noise
 /// exceeds three times its level with probability e⁻⁹, several lines even more rarely.
-const TOO_MUCH: f64 = 3.0;
+const REMARKED_RATIO: f64 = 3.0;
 
 /// Maximum unexplained share without a remark; its effect on the force is negligible against the
 /// uncertainty of any machine.
-const LITTLE: f64 = 0.01;
+const MAX_SHARE: f64 = 0.01;
 
 /// Maximum unexplained share without a remark if the noise of a sensor is unknown.
-const SELDOM_NOISE: f64 = 0.1;
+const MAX_SHARE_UNKNOWN_NOISE: f64 = 0.1;
 
 impl Measured {
     /// Creates the row of every measured channel.
@@ -68,8 +68,11 @@ fn expected(unexplained: &Unexplained) -> Option<f64> {
 
 fn is_too_much(unexplained: &Unexplained) -> bool {
     let system = unexplained.system.unwrap_or(0.0);
-    let known = unexplained.residual > TOO_MUCH * unexplained.noise.unwrap_or(0.0).hypot(system);
-    known && unexplained.share() > if unexplained.noise.is_some() { LITTLE } else { SELDOM_NOISE }
+    let known =
+        unexplained.residual > REMARKED_RATIO * unexplained.noise.unwrap_or(0.0).hypot(system);
+    known
+        && unexplained.share()
+            > if unexplained.noise.is_some() { MAX_SHARE } else { MAX_SHARE_UNKNOWN_NOISE }
 }
 
 fn percent(share: f64) -> String {

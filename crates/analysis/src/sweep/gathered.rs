@@ -62,7 +62,7 @@ impl Estimator {
 
 /// Sums of an estimator over the processed samples.
 #[derive(Debug)]
-pub(crate) enum Gathered {
+pub(crate) enum EstimatorSums {
     /// Sums over the steps from sample to sample, for the estimators in the time domain.
     Steps(Discretisation, Transitions),
     /// Sums over the samples, for the equation of motion.
@@ -71,7 +71,7 @@ pub(crate) enum Gathered {
     Periods(Estimator, Box<RepeatedPeriods>),
 }
 
-impl Gathered {
+impl EstimatorSums {
     /// Creates empty sums; `beginning` are the first samples, and the record has `periods` periods
     /// of `period` samples.
     pub(crate) fn new(
@@ -142,7 +142,7 @@ pub struct Decimated {
     skip: usize,
     /// The last used sample, if it is fitted together with the next used sample.
     last: Option<Samples<'static>>,
-    gathered: Gathered,
+    gathered: EstimatorSums,
 }
 
 impl Decimated {
@@ -162,7 +162,7 @@ impl Decimated {
             return Err(AnalysisError::DecimatedPeriod { period, factor });
         }
         let beginning = beginning.every(factor, 0)?;
-        let gathered = Gathered::new(estimator, &beginning, period.div_ceil(factor), periods)?;
+        let gathered = EstimatorSums::new(estimator, &beginning, period.div_ceil(factor), periods)?;
         Ok(Self { factor, skip: 0, last: None, gathered })
     }
 
@@ -179,7 +179,7 @@ impl Decimated {
             taken = last.followed_by(&taken)?;
         }
         self.gathered.push(&taken)?;
-        if matches!(self.gathered, Gathered::Steps(..)) {
+        if matches!(self.gathered, EstimatorSums::Steps(..)) {
             self.last = Some(taken.last()?);
         }
         Ok(())

@@ -17,7 +17,7 @@ use mechid_signal::Record;
 use serde::{Deserialize, Serialize};
 
 pub use self::gathered::Estimator;
-use self::gathered::{Decimated, Gathered};
+use self::gathered::{Decimated, EstimatorSums};
 use self::samples::Samples;
 pub use self::settings::{Kind, Settings};
 pub use self::summary::SweepSummary;
@@ -88,7 +88,7 @@ pub fn sweep_experiment(
     let run = |setting: &f64| {
         let at = experiment.clone().with_rate_hz(rate_hz(*setting));
         let measured = Samples::simulated(simulate(&at).map_err(AnalysisError::Simulation)?);
-        let mut gathered = Gathered::new(how.estimator, &measured, samples, 1)?;
+        let mut gathered = EstimatorSums::new(how.estimator, &measured, samples, 1)?;
         gathered.push(&measured)?;
         gathered.solve(&unknowns)
     };

@@ -18,7 +18,7 @@ const PERIOD: usize = 256;
 /// both channels have noise of `level` times the force.
 fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
-    let system = chain(2, Support::Held, 0.02, 3);
+    let system = chain(2, Support::Fixed, 0.02, 3);
     let lines: Vec<usize> =
         if periodic { (32..=2240).step_by(32).collect() } else { (32..=2240).collect() };
     let one = Multisine::flat(lines, 10.0, Phases::Random { seed }).unwrap();
@@ -40,7 +40,7 @@ fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -
 /// to the noise, and would be a hundred times too large.
 #[test]
 fn a_force_that_follows_another_has_no_responses_and_is_told() {
-    let system = chain(2, Support::Held, 0.02, 3);
+    let system = chain(2, Support::Fixed, 0.02, 3);
     for (periodic, level) in [(true, 0.01), (true, 0.001), (false, 0.01), (false, 0.001)] {
         for seed in 1..6 {
             let measured = one_shaker_and_its_shadow(periodic, 0.02, level, seed);
@@ -76,7 +76,7 @@ fn a_force_that_follows_another_has_no_responses_and_is_told() {
 #[test]
 fn a_weak_shaker_of_its_own_is_kept() {
     let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
-    let system = chain(2, Support::Held, 0.02, 3);
+    let system = chain(2, Support::Fixed, 0.02, 3);
     let random = |seed| {
         let drawn = Multisine::flat(32..=2240, 10.0, Phases::Random { seed }).unwrap();
         drawn.sample(sampling).unwrap()
@@ -109,7 +109,7 @@ fn a_weak_shaker_of_its_own_is_kept() {
 /// All channels have noise of `level` times the RMS value.
 fn interleaved_shakers(crosstalk: f64, level: f64, seed: u64) -> (SecondOrderSystem, FrfTable) {
     let period = Sampling::new(0.008, PERIOD).unwrap();
-    let system = chain(2, Support::Held, 0.02, 3);
+    let system = chain(2, Support::Fixed, 0.02, 3);
     let shaker = |first: usize| {
         let lines = (first..=70).step_by(2);
         Multisine::flat(lines, 10.0, Phases::Random { seed: 4 }).unwrap().sample(period).unwrap()

@@ -171,7 +171,7 @@ fn a_term_that_the_model_leaves_out_is_named_and_counted() {
 /// Chain of three masses with a force on the first, and an additional damper from the first mass to
 /// the third.
 fn bridged_chain(damper: f64, seed: u64) -> (SecondOrderSystem, Measurement) {
-    let held = chain(3, Support::Held, 0.02, 1);
+    let held = chain(3, Support::Fixed, 0.02, 1);
     let mut damping = held.damping().clone();
     for (row, column) in [(0, 2), (2, 0)] {
         damping[(row, row)] += damper;

@@ -19,7 +19,7 @@ const PERIOD: usize = 256;
 const PERIODS: usize = 4;
 
 fn machine() -> SecondOrderSystem {
-    chain(DOFS, Support::Held, 0.02, 3)
+    chain(DOFS, Support::Fixed, 0.02, 3)
 }
 
 /// One period of the force at one degree of freedom, and the steady response in closed form.

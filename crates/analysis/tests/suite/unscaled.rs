@@ -20,7 +20,7 @@ const PERIOD: usize = 256;
 const PERIODS: usize = 8;
 
 fn machine() -> SecondOrderSystem {
-    chain(DOFS, Support::Held, 0.02, 3)
+    chain(DOFS, Support::Fixed, 0.02, 3)
 }
 
 /// Exact steady displacements under a multisine force on the first mass; `on_response` is the ratio

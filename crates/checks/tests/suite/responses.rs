@@ -204,7 +204,7 @@ fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
 /// is simulated to first order. At the RMS displacement of the first mass, the stiffness of this
 /// spring is `cubic` times the first diagonal entry of the stiffness matrix.
 fn eight_sensors(cubic: f64, seed: u64) -> Finding {
-    let system = chain(8, Support::Held, 0.02, 5);
+    let system = chain(8, Support::Fixed, 0.02, 5);
     let sampling = Sampling::new(0.01, 1 << 12).unwrap();
     let drive = noise::white(sampling, 2, 100.0, 3 * seed).unwrap();
     let on_all = |drive: &Record| {

@@ -32,7 +32,7 @@ pub(super) struct Layout {
 struct Equation {
     row: usize,
     /// Indices of the unknowns of this equation among all unknowns.
-    places: Vec<usize>,
+    unknown_indices: Vec<usize>,
     /// Indices, in [`Layout::columns`], of the columns for the unknowns of this equation.
     columns: Vec<usize>,
 }
@@ -56,7 +56,7 @@ struct Related {
 
 struct Block {
     row: usize,
-    places: Vec<usize>,
+    unknown_indices: Vec<usize>,
     /// Orthonormal basis of the columns for the unknowns of this equation; `None` if the equation
     /// has all columns.
     basis: Option<Rc<DMatrix<f64>>>,
@@ -97,11 +97,11 @@ impl Layout {
             // The unknowns are sorted in the order of `columns`, so that an equation with all
             // columns needs no selection of columns.
             both.sort_unstable_by_key(|(_, column)| *column);
-            let (places, columns) = both.into_iter().unzip();
-            Equation { row, places, columns }
+            let (unknown_indices, columns) = both.into_iter().unzip();
+            Equation { row, unknown_indices, columns }
         };
         let equations: Vec<Equation> =
-            (0..n).map(equation).filter(|e| !e.places.is_empty()).collect();
+            (0..n).map(equation).filter(|e| !e.unknown_indices.is_empty()).collect();
         Self { dof: n, unknowns: free.len() + n * ends.len(), columns, equations }
     }
 
@@ -198,8 +198,8 @@ impl Layout {
                     (Some(Rc::new(q)), Rc::new(r))
                 }
             };
-            let (row, places) = (equation.row, equation.places.clone());
-            blocks.push(Block { row, places, basis, triangle });
+            let (row, unknown_indices) = (equation.row, equation.unknown_indices.clone());
+            blocks.push(Block { row, unknown_indices, basis, triangle });
         }
         blocks
     }
@@ -245,7 +245,7 @@ impl Layout {
                         pair += 1;
                     }
                 }
-                let (rows, columns) = (left.places.len(), right.places.len());
+                let (rows, columns) = (left.unknown_indices.len(), right.unknown_indices.len());
                 let mut to = gram.view_mut((row, column), (rows, columns));
                 match (&left.basis, &right.basis) {
                     (None, None) => to.copy_from(&part),
@@ -255,7 +255,7 @@ impl Layout {
                 }
                 row += rows;
             }
-            column += right.places.len();
+            column += right.unknown_indices.len();
         }
         gram
     }
@@ -378,7 +378,7 @@ impl Coordinates {
         let mut projected = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
             let column = products.column(block.row);
-            let mut to = projected.rows_mut(start, block.places.len());
+            let mut to = projected.rows_mut(start, block.unknown_indices.len());
             match &block.basis {
                 None => to.copy_from(&column),
                 Some(basis) => to.copy_from(&basis.tr_mul(&column)),
@@ -407,7 +407,7 @@ impl Coordinates {
         }
         let mut unknowns = coordinates.clone();
         for (block, start) in self.starts() {
-            let len = block.places.len();
+            let len = block.unknown_indices.len();
             let mut block_rows = coordinates.rows(start, len).into_owned();
             for (mut row, scale) in
                 block_rows.row_iter_mut().zip(self.scale.rows(start, len).iter())
@@ -416,7 +416,7 @@ impl Coordinates {
             }
             let solved = block.triangle.solve_upper_triangular_mut(&mut block_rows);
             debug_assert!(solved, "independent regressors");
-            for (at, row) in block.places.iter().zip(block_rows.row_iter()) {
+            for (at, row) in block.unknown_indices.iter().zip(block_rows.row_iter()) {
                 unknowns.row_mut(*at).copy_from(&row);
             }
         }
@@ -430,8 +430,8 @@ impl Coordinates {
         }
         let mut coordinates = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
-            let values = block.places.iter().map(|at| unknowns[*at]);
-            let values = DVector::from_iterator(block.places.len(), values);
+            let values = block.unknown_indices.iter().map(|at| unknowns[*at]);
+            let values = DVector::from_iterator(block.unknown_indices.len(), values);
             coordinates.rows_mut(start, values.len()).copy_from(&(&*block.triangle * values));
         }
         coordinates.component_mul_assign(&self.scale);
@@ -446,8 +446,12 @@ impl Coordinates {
         let mut unknowns = DVector::zeros(self.scale.len());
         let scaled = coordinates.component_mul(&self.scale);
         for (block, start) in self.starts() {
-            let values = block.triangle.tr_mul(&scaled.rows(start, block.places.len()));
-            block.places.iter().zip(values.iter()).for_each(|(at, value)| unknowns[*at] = *value);
+            let values = block.triangle.tr_mul(&scaled.rows(start, block.unknown_indices.len()));
+            block
+                .unknown_indices
+                .iter()
+                .zip(values.iter())
+                .for_each(|(at, value)| unknowns[*at] = *value);
         }
         unknowns
     }
@@ -462,13 +466,13 @@ impl Coordinates {
         }
         let mut lengths = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
-            let len = block.places.len();
+            let len = block.unknown_indices.len();
             let mut root = (*block.triangle).clone();
             for (mut row, scale) in root.row_iter_mut().zip(self.scale.rows(start, len).iter()) {
                 row.scale_mut(*scale);
             }
             let inner = gram.view((start, start), (len, len)) * &root;
-            for (at, place) in block.places.iter().enumerate() {
+            for (at, place) in block.unknown_indices.iter().enumerate() {
                 lengths[*place] = root.column(at).dot(&inner.column(at)).sqrt();
             }
         }
@@ -478,7 +482,7 @@ impl Coordinates {
     fn starts(&self) -> impl Iterator<Item = (&Block, usize)> {
         self.blocks.iter().scan(0, |next, block| {
             let start = *next;
-            *next += block.places.len();
+            *next += block.unknown_indices.len();
             Some((block, start))
         })
     }

@@ -71,10 +71,10 @@ pub(super) fn with_unknown_noise(
             reweighted(&reduced, unknowns, &white, next)?
         }
     };
-    let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
+    let sinusoid_unknowns = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
     let (weighted, is_white) = coloured.map_or((white, true), |coloured| (coloured, false));
     let Some(WithoutPulses { amplitudes, .. }) = &pulses else {
-        let subtracted = Subtracted { of_sinusoids, pulses: None };
+        let subtracted = Subtracted { sinusoid_unknowns, pulses: None };
         let fit = finished(&reduced, unknowns, (weighted, is_white), subtracted)?;
         return Ok(OutputErrorFit { sinusoids, ..fit });
     };
@@ -84,7 +84,7 @@ pub(super) fn with_unknown_noise(
     let (pulses, data, weighted) = with_pulse_fit(&with_pulses, unknowns, weighted, amplitudes)?
         .ok_or(EstimateError::NotConverged { searches, steps })?;
     let pulse_amplitudes = pulses.amplitudes.clone();
-    let subtracted = Subtracted { of_sinusoids, pulses: Some(pulses) };
+    let subtracted = Subtracted { sinusoid_unknowns, pulses: Some(pulses) };
     let fit = finished(&data, unknowns, (weighted, is_white), subtracted)?;
     Ok(OutputErrorFit { sinusoids, pulse_amplitudes, ..fit })
 }
@@ -92,7 +92,7 @@ pub(super) fn with_unknown_noise(
 /// Errors of data that were estimated and subtracted before the last fit.
 struct Subtracted {
     /// Number of unknowns of the sinusoids.
-    of_sinusoids: usize,
+    sinusoid_unknowns: usize,
     pulses: Option<PulseFit>,
 }
 
@@ -173,7 +173,7 @@ pub(super) fn with_response_noise(
     let next = |before: &Weighted| response_noise(data, unknowns, before);
     let proportional = if is_rounding { None } else { reweighted(data, unknowns, &white, next)? };
     let weighted = proportional.map_or((white, true), |proportional| (proportional, false));
-    finished(data, unknowns, weighted, Subtracted { of_sinusoids: 0, pulses: None })
+    finished(data, unknowns, weighted, Subtracted { sinusoid_unknowns: 0, pulses: None })
 }
 
 /// Chooses the noise of each channel from the residual of a fit; `None` if the noise of all
@@ -224,13 +224,13 @@ fn finished(
     data: &FrequencyData,
     unknowns: &Unknowns,
     (Weighted { fit, noise }, is_white): (Weighted, bool),
-    Subtracted { of_sinusoids, pulses }: Subtracted,
+    Subtracted { sinusoid_unknowns, pulses }: Subtracted,
 ) -> Result<OutputErrorFit, EstimateError> {
     let mut misfit = Misfit::new(data, unknowns, &noise)?;
     misfit.try_at(&fit.minimum.parameters).ok_or(NumericsError::Overflow)?;
     misfit.accept();
     let of_pulses = pulses.as_ref().map_or(0.0, |pulses| pulses.determined.round());
-    let free = spare(data, unknowns).saturating_sub(of_sinusoids + of_pulses as usize);
+    let free = spare(data, unknowns).saturating_sub(sinusoid_unknowns + of_pulses as usize);
     let level = fit.minimum.cost / free.max(1) as f64;
     let inflation = if is_white {
         1.0

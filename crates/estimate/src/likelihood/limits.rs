@@ -33,7 +33,7 @@ pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 /// of the search with the lowest minimum. Both sums are those after the first steps. A search above
 /// the limit ends. With the noise of [`FIRST_RELATIVE_NOISE`], the result of such a search is less
 /// likely by a factor e²⁵; most measurements have less noise.
-pub(super) const HOPELESS_RISE: f64 = 50.0;
+pub(super) const MAX_EXCESS_COST: f64 = 50.0;
 
 /// Number of measured values (real and imaginary parts) per unknown in the first steps of every
 /// search. With this number the minimum is near the minimum for all lines; the search then

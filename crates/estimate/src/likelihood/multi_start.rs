@@ -5,7 +5,7 @@ use mechid_signal::{Sampling, noise};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::LikelihoodError;
-use super::limits::{HOPELESS_RISE, SAME_MINIMUM, SAME_PARAMETER, STEPS};
+use super::limits::{MAX_EXCESS_COST, SAME_MINIMUM, SAME_PARAMETER, STEPS};
 use super::search::{Bounds, Effort, LeastSquaresProblem, Minimum, minimise};
 
 /// A minimum, and the number of searches that ended at it.
@@ -123,13 +123,13 @@ impl Minima {
 
     /// Returns whether, after the first steps, the sum of squares of a search is far above that of
     /// the search with the lowest minimum. Such a search is very unlikely to end lower. The limit
-    /// [`HOPELESS_RISE`] is multiplied by the mean square of the residual of the search with the
+    /// [`MAX_EXCESS_COST`] is multiplied by the mean square of the residual of the search with the
     /// lowest minimum, in units of the noise, if this mean square is above 1.
     fn is_hopeless(&self, near: &Minimum) -> bool {
         let best = self.ends.first().and_then(|end| end.near.first());
         best.is_some_and(|best| {
             let misfit = (best.cost / best.numbers as f64).max(1.0);
-            near.cost > best.cost + HOPELESS_RISE * misfit
+            near.cost > best.cost + MAX_EXCESS_COST * misfit
         })
     }
 

@@ -201,7 +201,7 @@ fn an_unmeasured_force_is_found_and_is_no_cause_for_warnings() {
             let first = periods.mean_with_noise(Pooling::Automatic).unwrap();
             let fit = output_error(&first, &unknowns).unwrap();
             let machine = fit.estimate.system().unwrap();
-            let noise = periods.noise_beside(Pooling::Automatic, &machine).unwrap();
+            let noise = periods.noise_with_system(Pooling::Automatic, &machine).unwrap();
             let is_found = matches!(noise.models(), [NoiseModel::UnmeasuredForce { .. }]);
             let again = periods.mean().unwrap().with_noise(noise).unwrap();
             let warns = |data: &FrequencyData| {

@@ -241,12 +241,12 @@ fn hardening(force: &Record, cubic: f64) -> Response {
         let k4 = rate(along(z, k3, h), f(2));
         z = [0, 1].map(|c| z[c] + h / 6.0 * (k1[c] + 2.0 * (k2[c] + k3[c]) + k4[c]));
     }
-    of_columns(force, &motion)
+    response_from_columns(force, &motion)
 }
 
 /// Creates a response from the two columns of `motion`, displacement and velocity. The acceleration
 /// is not needed and is zero.
-fn of_columns(force: &Record, motion: &DMatrix<f64>) -> Response {
+fn response_from_columns(force: &Record, motion: &DMatrix<f64>) -> Response {
     let record = |data| Record::new(force.sampling(), data).unwrap();
     let [x, v] = [0, 1].map(|c| record(motion.columns(c, 1).into_owned()));
     let none = record(DMatrix::zeros(force.len(), 1));
@@ -264,7 +264,7 @@ fn with_a_second_mass(force: &Record) -> Response {
     let motion = exact_harmonic_periodic(&system.unwrap(), &both).unwrap();
     let first = |record: &Record| record.column(0).into_owned();
     let data = DMatrix::from_columns(&[first(motion.displacement()), first(motion.velocity())]);
-    of_columns(force, &data)
+    response_from_columns(force, &data)
 }
 
 /// A wrong mass, a cubic spring and a second mode are each reported in more than 95 % of the

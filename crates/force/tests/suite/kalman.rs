@@ -41,7 +41,7 @@ fn walk(found: &KalmanForce, force: usize) -> f64 {
 }
 
 /// Mean square of the ratio of the error to the stated standard error, for one degree of freedom.
-fn surprise(found: &KalmanForce, truth: &Record, dof: usize) -> f64 {
+fn normalised_mean_square_error(found: &KalmanForce, truth: &Record, dof: usize) -> f64 {
     let (record, error) = (found.force.record(), found.force.standard_error().unwrap());
     let parts = (0..truth.len()).map(|k| {
         ((record.channel(dof)[k] - truth.channel(dof)[k]) / error.channel(dof)[k]).powi(2)
@@ -73,8 +73,11 @@ fn likelihood_finds_the_walk_the_noise_and_an_honest_error() {
         }
         // The errors of neighbouring samples are correlated, so some hundred independent errors
         // remain.
-        let surprise = surprise(&found, &truth, forced);
-        assert!((0.75..1.3).contains(&surprise), "{surprise:.3}");
+        let normalised_mean_square_error = normalised_mean_square_error(&found, &truth, forced);
+        assert!(
+            (0.75..1.3).contains(&normalised_mean_square_error),
+            "{normalised_mean_square_error:.3}"
+        );
         // The smoothed motion is nearer to the truth than the measurement.
         let moved = relative_error(&found.displacement, response.displacement()).unwrap();
         assert!(moved < 0.01, "{moved:.4}");
@@ -98,8 +101,11 @@ fn two_forces_have_walks_of_their_own() {
     }
     assert!(found.force.record().column(1).amax() == 0.0);
     for dof in [0, 2] {
-        let surprise = surprise(&found, &truth, dof);
-        assert!((0.6..1.5).contains(&surprise), "degree of freedom {dof}: {surprise:.3}");
+        let normalised_mean_square_error = normalised_mean_square_error(&found, &truth, dof);
+        assert!(
+            (0.6..1.5).contains(&normalised_mean_square_error),
+            "degree of freedom {dof}: {normalised_mean_square_error:.3}"
+        );
     }
 }
 

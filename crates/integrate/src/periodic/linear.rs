@@ -148,13 +148,13 @@ fn by_products(
 ) -> Result<Response, IntegrateError> {
     let rounding = f64::EPSILON * table.sampling().len() as f64;
     let mut shooting = Shooting::new(scheme, system, table)?;
-    let mut start = shooting.last_step()?;
+    let mut start = shooting.state_after_last_step_from_rest()?;
     shooting.measure(&start)?;
     let most = shooting.most_vectors();
     let (mut missed_before, mut products) = (f64::INFINITY, 0);
     for _ in 0..limits::PERIODIC_SEARCHES {
         let gap = shooting.gap(&start)?;
-        if !Shooting::missed(&gap).is_finite() {
+        if !Shooting::largest_modulus(&gap).is_finite() {
             // `response` returns the error that names the sample at which the motion overflows.
             return shooting.response(&start, motion);
         }
@@ -175,8 +175,8 @@ fn by_products(
             });
         }
         start += solution.vector.component_mul(&shooting.scales);
-        let size = Shooting::missed(&start.component_div(&shooting.scales));
-        let missed = Shooting::missed(&solution.vector) / size;
+        let size = Shooting::largest_modulus(&start.component_div(&shooting.scales));
+        let missed = Shooting::largest_modulus(&solution.vector) / size;
         // A correction of more than a tenth of the previous correction is only rounding.
         let solved = solution.residual <= limits::PERIODIC_GMRES_RESIDUAL;
         if solved
@@ -188,7 +188,7 @@ fn by_products(
         }
         missed_before = missed;
     }
-    let missed = Shooting::missed(&shooting.gap(&start)?);
+    let missed = Shooting::largest_modulus(&shooting.gap(&start)?);
     Err(IntegrateError::PeriodNotClosed { period: shooting.period(), missed, products })
 }
 

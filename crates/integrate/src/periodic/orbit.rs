@@ -210,7 +210,7 @@ fn by_whole_derivative(
     let mut monodromy = None;
     let mut gap = shooting.gap(&state)?;
     for _ in 0..limits::ORBIT_NEWTON_STEPS {
-        let missed = Shooting::missed(&gap);
+        let missed = Shooting::largest_modulus(&gap);
         if missed <= limits::ORBIT_GAP && monodromy.is_some() {
             break;
         }
@@ -220,7 +220,7 @@ fn by_whole_derivative(
         let Some([next, next_gap]) = nearer(shooting, &state, &step, missed)? else { break };
         (state, gap) = (next, next_gap);
     }
-    let missed = Shooting::missed(&gap);
+    let missed = Shooting::largest_modulus(&gap);
     let Some(monodromy) = monodromy.filter(|_| missed <= limits::ORBIT_GAP_ROUNDING) else {
         return Err(IntegrateError::NoOrbit { period: shooting.period(), missed });
     };
@@ -284,7 +284,7 @@ fn nearer(
     while part >= limits::ORBIT_NEWTON_FRACTION {
         let next = state + step.component_mul(&shooting.scales) * part;
         match shooting.gap(&next) {
-            Ok(gap) if Shooting::missed(&gap) < missed => return Ok(Some([next, gap])),
+            Ok(gap) if Shooting::largest_modulus(&gap) < missed => return Ok(Some([next, gap])),
             // The new state is too far away if the equation of a step has no solution.
             Ok(_) | Err(IntegrateError::NotSolved { .. }) => part *= 0.5,
             Err(other) => return Err(other),
@@ -303,7 +303,7 @@ fn by_products(
     let most = shooting.most_vectors();
     let mut gap = shooting.gap(&state)?;
     for _ in 0..limits::ORBIT_NEWTON_STEPS {
-        let missed = Shooting::missed(&gap);
+        let missed = Shooting::largest_modulus(&gap);
         if missed <= limits::ORBIT_GAP {
             break;
         }
@@ -327,7 +327,7 @@ fn by_products(
         let Some([next, next_gap]) = nearer(shooting, &state, &step.vector, missed)? else { break };
         (state, gap) = (next, next_gap);
     }
-    let missed = Shooting::missed(&gap);
+    let missed = Shooting::largest_modulus(&gap);
     if missed <= limits::ORBIT_GAP_ROUNDING {
         return Ok(state);
     }

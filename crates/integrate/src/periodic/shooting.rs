@@ -100,7 +100,9 @@ impl<'a> Shooting<'a> {
 
     /// Takes only the last step of a period, from a state of zero, and returns the state after this
     /// step.
-    pub(crate) fn last_step(&mut self) -> Result<DVector<f64>, IntegrateError> {
+    pub(crate) fn state_after_last_step_from_rest(
+        &mut self,
+    ) -> Result<DVector<f64>, IntegrateError> {
         self.simulation.step(&self.table, self.samples() - 1)?;
         Ok(DVector::from_column_slice(&self.simulation.state))
     }
@@ -112,7 +114,7 @@ impl<'a> Shooting<'a> {
     }
 
     /// Returns the largest modulus of the entries of a gap, or NaN if an entry is NaN.
-    pub(crate) fn missed(gap: &DVector<f64>) -> f64 {
+    pub(crate) fn largest_modulus(gap: &DVector<f64>) -> f64 {
         // `amax` would ignore NaN.
         gap.iter().fold(0.0, |most, r| if r.abs() <= most { most } else { r.abs() })
     }

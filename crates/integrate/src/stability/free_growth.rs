@@ -171,7 +171,7 @@ mod tests {
     /// The motion decreases to a fifteenth in each step, and in a period below the smallest
     /// positive number. The test expects that no growth is found.
     #[test]
-    fn a_motion_of_which_nothing_is_left_does_not_grow() {
+    fn a_vanished_motion_does_not_grow() {
         let n = 100;
         let across = band(n, &[(-1, -1.0), (0, 2500.0), (1, 1.0)]);
         let system = SparseSystem::new(band(n, &[(0, 1.0)]), band(n, &[(0, 100.0)]), across);

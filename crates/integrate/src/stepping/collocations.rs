@@ -54,7 +54,7 @@ struct Collocation {
 /// Forces at a collocation in the previous steps, and the ratio of the last correction of the force
 /// to the residual.
 #[derive(Debug, Clone, Copy)]
-struct Before {
+struct ForceHistory {
     /// The forces, latest first, in N.
     forces: [f64; 3],
     /// Ratio of the last correction of the force to the residual.
@@ -77,7 +77,8 @@ impl Collocations {
         let probed = SystemWithForces::new(&linear).with(probe.clone()).ok()?;
         let mut stepper = scheme.prepare_unchecked(&probed, dt).ok()?;
         let mut columns = Vec::new();
-        let transition = Transition::read(stepper.as_mut(), || columns.push(probe.asked()));
+        let transition =
+            Transition::read(stepper.as_mut(), || columns.push(probe.take_evaluations()));
         let count = columns.iter().map(Vec::len).max()?;
         if ![1, 2, MOST].contains(&count)
             || columns.iter().any(|asked| asked.len() != count)
@@ -97,9 +98,9 @@ impl Collocations {
             .collect();
         let (rest, zeros) = (vec![0.0; stepper.state_len()], vec![0.0; n]);
         for r in 0..count {
-            probe.give(r);
+            probe.set_unit_force(r);
             stepper.change(&rest, &Loads::none(&zeros), &mut collocations[r].change).ok()?;
-            for (s, Asked { motion, .. }) in probe.asked().iter().enumerate() {
+            for (s, Asked { motion, .. }) in probe.take_evaluations().iter().enumerate() {
                 (0..2).for_each(|part| collocations[r].moves[part][s] = motion[part]);
             }
             let [x, v] = collocations[r].moves.map(|moved| moved[r].abs());
@@ -213,7 +214,7 @@ impl Collocations {
     }
 }
 
-impl Before {
+impl ForceHistory {
     /// Returns the solution of g = `force(g)`; `None` if the search does not converge. The
     /// tolerance is the larger of `enough` and [`limits::STEP_RESIDUAL`] times |g|.
     ///
@@ -255,7 +256,7 @@ struct FixedCollocation<const S: usize, const Q: usize> {
     /// Tolerance of the nonlinear force, in N per m/s² of acceleration; it follows from the
     /// relative tolerance of the accelerations.
     tolerance: f64,
-    before: Before,
+    before: ForceHistory,
 }
 
 impl<const S: usize, const Q: usize> FixedCollocation<S, Q> {
@@ -267,7 +268,7 @@ impl<const S: usize, const Q: usize> FixedCollocation<S, Q> {
             change: std::array::from_fn(|i| one.change[i]),
             is_explicit: !one.per_acceleration.is_finite(),
             tolerance: limits::STEP_RESIDUAL * one.per_acceleration,
-            before: Before { forces: [0.0; 3], correction: 1.0 },
+            before: ForceHistory { forces: [0.0; 3], correction: 1.0 },
         }
     }
 }
@@ -333,13 +334,13 @@ impl Probe {
     }
 
     /// Makes the force 1 N at one collocation.
-    fn give(&self, unit: usize) {
+    fn set_unit_force(&self, unit: usize) {
         self.state().unit = Some(unit);
     }
 
     /// Returns the instants and motions of the evaluations since the last call, collocation by
     /// collocation.
-    fn asked(&self) -> Vec<Asked> {
+    fn take_evaluations(&self) -> Vec<Asked> {
         std::mem::take(&mut self.state().asked)
     }
 }

@@ -352,7 +352,7 @@ fn every_size_from_1_to_50_follows_its_transition() {
 /// Two degrees of freedom use the loop of fixed size, and four use the stepper itself; both give
 /// the same response.
 #[test]
-fn two_uncoupled_halves_take_both_loops() {
+fn fixed_size_loop_and_stepper_agree() {
     let one = mechid_problems::random_stable(2, 3);
     let twice = |m: &DMatrix<f64>| {
         let mut big = DMatrix::zeros(4, 4);

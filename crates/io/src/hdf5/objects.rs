@@ -53,7 +53,7 @@ pub(super) struct Objects {
     names: Vec<String>,
     classes: Vec<u32>,
     /// Properties of objects whose class has its own save function.
-    saved: Vec<u32>,
+    saved_properties: Vec<u32>,
     objects: Vec<u32>,
     properties: Vec<u32>,
 }
@@ -85,7 +85,7 @@ impl Objects {
             cells: Vec::new(),
             names: names.map(|name| String::from_utf8_lossy(name).into_owned()).collect(),
             classes: region(0)?,
-            saved: region(1)?,
+            saved_properties: region(1)?,
             objects: region(2)?,
             properties: region(3)?,
         })
@@ -113,7 +113,7 @@ impl Objects {
         let words = self.object(object)?;
         let properties = match words[3] {
             0 => record(&self.properties, words[4]),
-            number => record(&self.saved, number),
+            number => record(&self.saved_properties, number),
         };
         let is_wanted =
             |words: &&[u32]| self.name(words[0]) == Some(property) && words[1] == IN_CELL;

@@ -66,7 +66,7 @@ struct Filled {
     /// Number of fields in the first row; a comment in the row does not count.
     first: usize,
     /// Smallest number of fields in the rows after the first.
-    usual: usize,
+    smallest: usize,
     /// `true` if all rows after the first have the same number of fields.
     is_uniform: bool,
 }
@@ -78,17 +78,17 @@ impl Filled {
     /// in all but the first row, whose extra field is a comment.
     fn new(above: &[Beginning<'_>], table: &[Beginning<'_>]) -> Self {
         let first = table[0].fields.filled();
-        let usual = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(first);
-        let is_uniform = table[1..].iter().all(|row| row.fields.filled() == usual);
-        let has_comment = usual + 1 == first
+        let smallest = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(first);
+        let is_uniform = table[1..].iter().all(|row| row.fields.filled() == smallest);
+        let has_comment = smallest + 1 == first
             && above.iter().flat_map(texts).any(|name| name.eq_ignore_ascii_case("comment"));
-        let first = if has_comment && is_uniform { usual } else { first };
-        Self { first, usual, is_uniform }
+        let first = if has_comment && is_uniform { smallest } else { first };
+        Self { first, smallest, is_uniform }
     }
 
     /// Returns whether a row has one field more than the rows of numbers.
     fn is_longer(&self, row: &Beginning<'_>) -> bool {
-        self.is_uniform && row.fields.filled() == self.usual + 1
+        self.is_uniform && row.fields.filled() == self.smallest + 1
     }
 }
 
@@ -202,7 +202,7 @@ impl NamesAndUnits {
     fn find(above: &[Beginning<'_>], filled: &Filled, layout: Layout) -> Option<Self> {
         match above {
             [names] => {
-                let is_longer = filled.is_longer(names) && filled.usual == filled.first;
+                let is_longer = filled.is_longer(names) && filled.smallest == filled.first;
                 let is_unusual = is_longer || names.fields.is_joined;
                 (is_unusual && numbers(names, layout) == 0)
                     .then_some(Self { names: 0, units: None })

@@ -238,7 +238,7 @@ fn broken_tables_are_refused() {
 
 /// Averaging segments with impossible settings are ignored and reported.
 #[test]
-fn impossible_segments_are_told() {
+fn impossible_segments_are_reported() {
     let table = |segments: [&str; 5]| {
         let names = AveragedSegments::COLUMNS.join(",");
         let row = |hz: u32| format!("\n{hz},1,0,{}", segments.join(","));

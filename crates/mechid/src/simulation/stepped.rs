@@ -79,7 +79,7 @@ pub(super) fn stepped(
                     periodic_orbit_selected(scheme, &system, dofs, force, &at_rest, SETTLING)
                 }
             };
-            stayed_on(&orbit.map_err(SimulateError::from_orbit)?)
+            stable_orbit_response(&orbit.map_err(SimulateError::from_orbit)?)
         }
         ResponseKind::FromRest | ResponseKind::From(_) => {
             let initial = experiment.initial_state()?;
@@ -93,7 +93,7 @@ pub(super) fn stepped(
 
 /// Returns the response of an orbit, or an error if its largest multiplier shows that the orbit is
 /// unstable.
-fn stayed_on(orbit: &PeriodicOrbit) -> Result<Stepped, SimulateError> {
+fn stable_orbit_response(orbit: &PeriodicOrbit) -> Result<Stepped, SimulateError> {
     let multiplier = match orbit.multipliers().first() {
         Some(value) => Multiplier {
             value: *value,

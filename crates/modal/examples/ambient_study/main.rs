@@ -226,7 +226,7 @@ struct ModeResult {
     decay_times: f64,
     found: usize,
     /// Percentages of intervals that contain the true value: f, ζ and shape.
-    held: [f64; 3],
+    coverage: [f64; 3],
     /// Ratio of scatter to standard error, for f and ζ.
     scatter: [f64; 2],
     /// Ratio of bias to scatter, for f and ζ.
@@ -281,9 +281,9 @@ impl<'a> Study<'a> {
             "| {} | {} | {} | {} | {} | {} | {} | {} | {:.2} | {} |",
             self.case.name,
             self.seeds,
-            range(&|mode| mode.held[0], 1),
-            range(&|mode| mode.held[1], 1),
-            range(&|mode| mode.held[2], 1),
+            range(&|mode| mode.coverage[0], 1),
+            range(&|mode| mode.coverage[1], 1),
+            range(&|mode| mode.coverage[2], 1),
             range(&|mode| mode.scatter[0], 2),
             range(&|mode| mode.scatter[1], 2),
             range(&|mode| mode.subspace[1].rms / mode.rms[1], 2),
@@ -302,9 +302,9 @@ impl<'a> Study<'a> {
                 truth.frequencies_hz[r],
                 truth.dampings[r],
                 mode.decay_times,
-                mode.held[0],
-                mode.held[1],
-                mode.held[2],
+                mode.coverage[0],
+                mode.coverage[1],
+                mode.coverage[2],
                 mode.scatter[0],
                 mode.scatter[1],
                 mode.bias[0],
@@ -390,7 +390,7 @@ impl Tally {
         ModeResult {
             decay_times,
             found: self.found,
-            held: [
+            coverage: [
                 percent(self.covered[0], self.intervals),
                 percent(self.covered[1], self.intervals),
                 percent(self.shapes[0], self.shapes[1]),
@@ -411,17 +411,17 @@ const BLOCK_ROWS: [usize; 3] = [20, 40, 80];
 const ROWS: usize = 1 + BLOCK_ROWS.len();
 
 /// Largest half order of a subspace model.
-const HALF_ORDERS: usize = 24;
+const MAX_HALF_ORDER: usize = 24;
 
 /// Squared relative errors of f and ζ by mode, setting and half order, with their number.
 struct SubspaceErrors {
-    sums: Vec<[[[f64; 3]; HALF_ORDERS]; ROWS]>,
+    sums: Vec<[[[f64; 3]; MAX_HALF_ORDER]; ROWS]>,
     records: usize,
 }
 
 impl SubspaceErrors {
     fn new(modes: usize) -> Self {
-        Self { sums: vec![[[[0.0; 3]; HALF_ORDERS]; ROWS]; modes], records: 0 }
+        Self { sums: vec![[[[0.0; 3]; MAX_HALF_ORDER]; ROWS]; modes], records: 0 }
     }
 
     /// Adds the subspace models of a record: the models of the estimate, and models with other
@@ -443,7 +443,7 @@ impl SubspaceErrors {
         self.records += usize::from(row == 0);
         let all = truth.poles();
         for (r, exact) in all.iter().copied().enumerate() {
-            for half in 0..HALF_ORDERS {
+            for half in 0..MAX_HALF_ORDER {
                 let poles = models.poles().iter().filter(|p| p.order == 2 * half + 2);
                 let distance = |p: Complex<f64>| (p - exact).norm();
                 let nearest = poles

@@ -65,7 +65,7 @@ pub enum FreeDecayError {
     /// A response returns to rest without oscillation.
     #[error(
         "the response does not oscillate: {} the response better than oscillations",
-        returns(rates)
+        describe_decays(rates)
     )]
     NoOscillation {
         /// One or two decay rates, in rising order, each with its standard error, in 1/s.
@@ -117,7 +117,7 @@ impl FreeDecayError {
 }
 
 /// Describes decays without oscillation in words.
-fn returns(rates: &[[f64; 2]]) -> String {
+fn describe_decays(rates: &[[f64; 2]]) -> String {
     let rounded = |value: f64, digits: usize| {
         let rounded = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
         message::number(rounded).to_string()

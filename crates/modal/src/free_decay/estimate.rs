@@ -162,8 +162,8 @@ impl<'a> Spread<'a> {
             let deviation = (of.square / degrees).sqrt();
             let rows = stacked.nrows();
             stacked = stacked.resize_vertically(rows + nonlinear, 0.0);
-            stacked.rows_mut(rows, nonlinear).copy_from(&(&of.across / deviation));
-            slopes.push(-of.factor.solve_upper_triangular(&of.along)?);
+            stacked.rows_mut(rows, nonlinear).copy_from(&(&of.orthogonal / deviation));
+            slopes.push(-of.factor.solve_upper_triangular(&of.parallel)?);
             let inverse = of.factor.solve_upper_triangular(&DMatrix::identity(linear, linear))?;
             known_poles.push(&inverse * inverse.transpose() * (deviation * deviation));
         }

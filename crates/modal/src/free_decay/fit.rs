@@ -42,11 +42,11 @@ pub(super) struct ChannelFit {
     pub factor: DMatrix<f64>,
     /// Components of the derivatives in the space of the linear columns. The derivatives are those
     /// with respect to N·`growth` and N·`turn` of each pole, for N samples.
-    pub along: DMatrix<f64>,
+    pub parallel: DMatrix<f64>,
     /// Components of the derivatives orthogonal to the linear columns.
-    pub across: DMatrix<f64>,
-    /// Components of the residual in the same orthogonal directions as the rows of `across`.
-    pub side: DVector<f64>,
+    pub orthogonal: DMatrix<f64>,
+    /// Components of the residual in the same orthogonal directions as the rows of `orthogonal`.
+    pub projected_residual: DVector<f64>,
 }
 
 impl Data {
@@ -230,9 +230,9 @@ impl Data {
             let floor = (POLE_ROUNDING * POLE_ROUNDING) * self.len() as f64;
             Some(ChannelFit {
                 square: column.rows_range(linear..).norm_squared() + floor,
-                along: upper.view((0, linear), (linear, nonlinear)) * &combination,
-                across: upper.view((linear, linear), (nonlinear, nonlinear)) * &combination,
-                side: column.rows(linear, nonlinear).into_owned(),
+                parallel: upper.view((0, linear), (linear, nonlinear)) * &combination,
+                orthogonal: upper.view((linear, linear), (nonlinear, nonlinear)) * &combination,
+                projected_residual: column.rows(linear, nonlinear).into_owned(),
                 linear: solved,
                 factor,
             })
@@ -262,14 +262,14 @@ impl Data {
             if time_limit::is_over() {
                 break;
             }
-            let (jacobian, side) = fit.weighted(self.len());
+            let (jacobian, projected_residual) = fit.weighted(self.len());
             let scale: Vec<f64> =
                 jacobian.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
             let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |i, j| {
                 jacobian[(i, j)] / scale[j]
             });
             loop {
-                let (step, expected) = damped_step(&scaled, &side, damping)?;
+                let (step, expected) = damped_step(&scaled, &projected_residual, damping)?;
                 if expected < tolerance || damping > MAX_DAMPING {
                     return Some(fit);
                 }
@@ -310,13 +310,15 @@ impl Fit {
     fn weighted(&self, len: usize) -> (DMatrix<f64>, DVector<f64>) {
         let columns = 2 * self.poles.len();
         let mut jacobian = DMatrix::zeros(columns * self.channels.len(), columns);
-        let mut side = DVector::zeros(columns * self.channels.len());
+        let mut projected_residual = DVector::zeros(columns * self.channels.len());
         for (at, of) in self.channels.iter().enumerate() {
             let deviation = (of.square / len as f64).sqrt();
-            jacobian.rows_mut(at * columns, columns).copy_from(&(&of.across / deviation));
-            side.rows_mut(at * columns, columns).copy_from(&(&of.side / deviation));
+            jacobian.rows_mut(at * columns, columns).copy_from(&(&of.orthogonal / deviation));
+            projected_residual
+                .rows_mut(at * columns, columns)
+                .copy_from(&(&of.projected_residual / deviation));
         }
-        (jacobian, side)
+        (jacobian, projected_residual)
     }
 }
 
@@ -375,13 +377,13 @@ fn slopes(linear: &DVector<f64>, nonlinear: usize) -> DMatrix<f64> {
 /// Returns the minimiser y of ‖J y − r‖² + damping·‖y‖², and the predicted decrease of ‖J y − r‖².
 fn damped_step(
     jacobian: &DMatrix<f64>,
-    side: &DVector<f64>,
+    projected_residual: &DVector<f64>,
     damping: f64,
 ) -> Option<(DVector<f64>, f64)> {
     let (rows, columns) = jacobian.shape();
     let mut stacked = DMatrix::zeros(rows + columns, columns + 1);
     stacked.view_mut((0, 0), (rows, columns)).copy_from(jacobian);
-    stacked.view_mut((0, columns), (rows, 1)).copy_from(side);
+    stacked.view_mut((0, columns), (rows, 1)).copy_from(projected_residual);
     // A minimum Levenberg–Marquardt damping keeps the diagonal of the factor away from zero.
     for j in 0..columns {
         stacked[(rows + j, j)] = damping.max(1e-14).sqrt();
@@ -389,7 +391,8 @@ fn damped_step(
     let upper = stacked.qr().unpack_r();
     let right = upper.column(columns).rows(0, columns).into_owned();
     let step = upper.view((0, 0), (columns, columns)).solve_upper_triangular(&right)?;
-    let expected = side.norm_squared() - (side - jacobian * &step).norm_squared();
+    let expected =
+        projected_residual.norm_squared() - (projected_residual - jacobian * &step).norm_squared();
     step.iter().all(|v| v.is_finite()).then_some((step, expected))
 }
 

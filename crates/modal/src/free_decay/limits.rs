@@ -136,7 +136,7 @@ pub(crate) const RATE_REFINEMENTS: usize = 40;
 
 /// Number of samples at which a second excitation is tested: once over the whole record, and once
 /// near the best of these samples.
-pub(crate) const RESTART_PLACES: usize = 64;
+pub(crate) const RESTART_SAMPLES: usize = 64;
 
 /// Minimum decrease of the Bayesian information criterion at which a backbone replaces linear
 /// modes: very strong evidence according to Kass & Raftery (1995), Journal of the American

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::autoregression::Autoregression;
 use super::fit::{Data, Fit};
-use super::limits::{FALSE_DECAY, RESTART_PLACES};
+use super::limits::{FALSE_DECAY, RESTART_SAMPLES};
 use super::poles::linear_columns;
 use super::select::Search;
 
@@ -18,10 +18,10 @@ use super::select::Search;
 /// (1978), Annals of Statistics 6, 461–464.
 pub(super) fn restart(data: &Data, fit: &Fit) -> Option<(usize, f64)> {
     let len = data.len();
-    let coarse = (len / RESTART_PLACES).max(1);
+    let coarse = (len / RESTART_SAMPLES).max(1);
     let (_, sample) = best(data, fit, (coarse..len).step_by(coarse).collect())?;
     let around = sample.saturating_sub(coarse) + 1..(sample + coarse).min(len);
-    let fine = (around.len() / RESTART_PLACES).max(1);
+    let fine = (around.len() / RESTART_SAMPLES).max(1);
     let (gain, sample) = best(data, fit, around.step_by(fine).collect())?;
     let unknowns = linear_columns(&fit.poles, data.constant) * data.channels() + 1;
     let decrease = gain - unknowns as f64 * (len as f64).ln();

@@ -101,14 +101,14 @@ impl<'a> Search<'a> {
     pub(super) fn best(&self, most: usize) -> Option<Selected> {
         let per_decay = least_gain(self.data.len(), self.data.channels());
         let cost = |of: &Candidate| of.cost + per_decay * of.fit.poles.len() as f64;
-        let nothing = self.nothing()?;
-        let (mut last, mut best) = (nothing.clone(), nothing.clone());
+        let without_decays = self.without_decays()?;
+        let (mut last, mut best) = (without_decays.clone(), without_decays.clone());
         let (mut idle, mut first_gain) = ([0; 2], 0.0);
         let is_idle = |idle: &[usize; 2]| idle.iter().all(|idle| *idle >= SELECTION_PATIENCE);
         while last.decays() < most && !is_idle(&idle) && !time_limit::is_over() {
             let Some(next) = self.one_more(&last) else { break };
             if last.decays() == 0 {
-                first_gain = nothing.better().cost - next.better().cost;
+                first_gain = without_decays.better().cost - next.better().cost;
             }
             let tracks = [(&next.white, &mut best.white), (&next.coloured, &mut best.coloured)];
             for ((next, best), idle) in tracks.into_iter().zip(&mut idle) {
@@ -137,7 +137,7 @@ impl<'a> Search<'a> {
         Some(self.candidate(fit))
     }
 
-    fn nothing(&self) -> Option<Pair> {
+    fn without_decays(&self) -> Option<Pair> {
         let fit = self.data.refined(&[], &self.white(), COARSE)?;
         Some(Pair { white: self.rated(&fit), coloured: self.candidate(fit) })
     }

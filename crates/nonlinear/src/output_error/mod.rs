@@ -476,7 +476,7 @@ impl Residuals for Problem<'_> {
         let directions = self.directions();
         let run = |(at, record): (usize, &Prepared)| {
             let start = self.initial(theta, at)?;
-            Tangent::new(&system, &directions).run(&record.force, &start)
+            Tangent::new(&system, &directions).simulate(&record.force, &start)
         };
         let courses: Option<Vec<Course>> = self.records.par_iter().enumerate().map(run).collect();
         let Some(courses) = courses else { return false };

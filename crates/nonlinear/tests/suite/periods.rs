@@ -62,7 +62,7 @@ impl Oscillator {
 
     /// Returns the force and the response, with noise, of the linear part with friction. The
     /// friction force has the size `friction` (N) and is smoothed below 0.1 m/s.
-    fn rubbing(&self, friction: f64, seed: u64) -> [Record; 2] {
+    fn with_friction(&self, friction: f64, seed: u64) -> [Record; 2] {
         let lines = random_phases(1..=self.last, 10.0, seed);
         let (force, response) = steady_after(6, self.sampling, &[lines], |x, v, f| {
             let rubbed = friction * (v[0] / 0.1).tanh();
@@ -74,7 +74,7 @@ impl Oscillator {
     /// Returns the force that a prescribed motion of the oscillator needs, in closed form, and this
     /// motion. The motion is the response of the linear part to a force with the same amplitude on
     /// all lines. The lines of the returned force end at three times the last line of the motion.
-    fn moved(&self, levels: [f64; 2], seed: u64) -> [Record; 2] {
+    fn prescribed_motion(&self, levels: [f64; 2], seed: u64) -> [Record; 2] {
         let phases = random_phases(8..=self.last, 3.5, seed);
         let record = |order: i32| {
             let mut lines = DMatrix::zeros(self.sampling.lines(), 1);
@@ -185,7 +185,7 @@ fn a_true_term_is_kept_and_a_false_one_is_not() {
     let chosen: Vec<String> = (0..runs)
         .into_par_iter()
         .map(|seed| {
-            let data = test.data(&test.moved([0.01, 0.01], 900 + seed));
+            let data = test.data(&test.prescribed_motion([0.01, 0.01], 900 + seed));
             let (given, weighting) = (Terms::none(), Weighting::Automatic);
             let by = Criterion::Information;
             let found = select_terms(&data, &unknowns, &given, &candidates, by, weighting).unwrap();
@@ -211,7 +211,7 @@ fn friction_is_present_only_where_it_acts() {
         let each: Vec<([usize; 2], String)> = (0..runs)
             .into_par_iter()
             .map(|seed| {
-                let data = test.data(&test.rubbing(truth, 300 + seed));
+                let data = test.data(&test.with_friction(truth, 300 + seed));
                 let options = EquationErrorOptions::default();
                 let fit = equation_error(&data, &unknowns, &friction, &options).unwrap();
                 let holds = |(name, truth): (&str, f64)| {

@@ -103,7 +103,7 @@ struct CurveData<'a> {
     marker: Option<&'static str>,
     /// Number of points before thinning; `None` if the curve is not thinned.
     #[serde(rename = "of", skip_serializing_if = "Option::is_none")]
-    thinned: Option<usize>,
+    len_before_thinning: Option<usize>,
 }
 
 #[derive(Serialize)]
@@ -230,7 +230,7 @@ fn curve_data<'a>(
         width: style.width,
         dash: if curve.has_line() { style.dash.array(style.width) } else { None },
         marker: curve.has_markers().then(|| marker_name(style.marker)),
-        thinned: thinned.is_some().then_some(curve.x.len()),
+        len_before_thinning: thinned.is_some().then_some(curve.x.len()),
     }
 }
 

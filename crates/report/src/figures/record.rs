@@ -13,10 +13,10 @@ const FAINTEST: f64 = 1e-5;
 
 /// The lower end of an amplitude axis, without the margin, is at most this fraction of the largest
 /// amplitude.
-const REACH: f64 = 1e-2;
+const MAX_LOWER_END: f64 = 1e-2;
 
 /// Maximum number of characters of a title above a panel.
-const ROOM: usize = 40;
+const TITLE_LENGTH: usize = 40;
 
 /// Returns a row of panels for each column: the whole window on the left, amplitudes on the right.
 ///
@@ -105,7 +105,7 @@ fn amplitude_range(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let amplitudes = points.iter().map(|(_, amplitude)| *amplitude);
     let strongest = amplitudes.clone().reduce(f64::max)?;
     let faintest =
-        amplitudes.filter(|a| *a > FAINTEST * strongest).fold(REACH * strongest, f64::min);
+        amplitudes.filter(|a| *a > FAINTEST * strongest).fold(MAX_LOWER_END * strongest, f64::min);
     Some((faintest / 1.5, strongest * 1.5))
 }
 
@@ -114,9 +114,9 @@ fn unit(column: &Drawn) -> &str {
 }
 
 fn shortened(name: &str) -> String {
-    if name.chars().count() <= ROOM {
+    if name.chars().count() <= TITLE_LENGTH {
         name.to_owned()
     } else {
-        name.chars().take(ROOM - 1).chain(['…']).collect()
+        name.chars().take(TITLE_LENGTH - 1).chain(['…']).collect()
     }
 }

@@ -51,7 +51,7 @@ impl Trace {
         points: impl Iterator<Item = (f64, Complex<f64>)>,
     ) -> Self {
         let mut previous = 0.0;
-        Self::with_phase(style, name, points, |_, angle| {
+        Self::from_points(style, name, points, |_, angle| {
             previous = next_to(previous, angle);
             previous
         })
@@ -64,7 +64,7 @@ impl Trace {
         name: String,
         points: impl Iterator<Item = (f64, Complex<f64>)>,
     ) -> Self {
-        Self::with_phase(style, name, points, |frequency_hz, angle| {
+        Self::from_points(style, name, points, |frequency_hz, angle| {
             let right = curve.frequency_hz.partition_point(|f| *f < frequency_hz);
             let at = right.min(curve.phase_deg.len().saturating_sub(1));
             next_to(curve.phase_deg.get(at).copied().unwrap_or(0.0), angle)
@@ -100,7 +100,7 @@ impl Trace {
 
     /// Creates a curve without the points that an axis cannot show: zero magnitudes, and 0 Hz on a
     /// logarithmic axis.
-    fn with_phase(
+    fn from_points(
         style: FigureStyle,
         name: String,
         points: impl Iterator<Item = (f64, Complex<f64>)>,

@@ -13,7 +13,7 @@ pub(super) const SHAPES: &str = "Mode shapes: the structure at its largest defle
                                  the points reach their largest deflections at different times.";
 
 /// Caption of the modal assurance criterion.
-pub(super) const LIKENESS: &str = "Similarity of the mode shapes (modal assurance criterion): 1 for the same shape, \
+pub(super) const ASSURANCE_CAPTION: &str = "Similarity of the mode shapes (modal assurance criterion): 1 for the same shape, \
                                    0 for orthogonal ones.";
 
 /// Returns a page of named figures and, if there are any, of mode shapes, as HTML that loads no
@@ -53,7 +53,7 @@ pub fn figure_page(
 /// Returns the deflected lines and the modal assurance criterion of the shapes.
 pub(super) fn shape_figures(shapes: &ModeShapes) -> [Drawn; 2] {
     let drawn = shapes.draw(SHAPES);
-    let matrix = matrix_of_squares(&shapes.assurance(), LIKENESS);
+    let matrix = matrix_of_squares(&shapes.assurance(), ASSURANCE_CAPTION);
     [
         Drawn {
             id: "shapes".into(),
@@ -66,7 +66,7 @@ pub(super) fn shape_figures(shapes: &ModeShapes) -> [Drawn; 2] {
             id: "assurance".into(),
             svg: matrix,
             map: Vec::new(),
-            caption: LIKENESS.into(),
+            caption: ASSURANCE_CAPTION.into(),
             is_wide: false,
         },
     ]

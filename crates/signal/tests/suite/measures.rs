@@ -99,7 +99,7 @@ fn flatness_by_hand() {
 /// (2d/π) |cos(π f d)| / |1 − (2 f d)²|. With increasing f, the magnitude first reaches a tenth of
 /// the value for f = 0 at f d = 1.3033, found by bisection.
 #[test]
-fn effective_band_of_a_hammer_blow() {
+fn effective_band_of_a_half_sine() {
     let s = Sampling::new(1e-5, 100_000).unwrap(); // lines every 1 Hz
     let blow = HalfSine::new(1.0, 0.0, 0.005).unwrap().sample(s).unwrap();
     let band = effective_band(&Spectrum::from_record(&blow), 0, 20.0).unwrap();

@@ -220,7 +220,7 @@ impl FrequencyData {
             later.force.row_mut(row).apply(|f| *f *= turn);
         }
         later.noise = self.noise.as_ref().map(|noise| noise.with_later_force(delay));
-        later.pulses = self.pulses.iter().map(|pulse| pulse.later(delay)).collect();
+        later.pulses = self.pulses.iter().map(|pulse| pulse.delayed(delay)).collect();
         later
     }
 }

@@ -120,7 +120,7 @@ impl Coupling {
             let variance = &mut of_driver.variance[at];
             for motion in 0..response.nrows() {
                 response[(motion, 0)] -= ratio * there.response[motion];
-                let missed = there.variance[motion] + there.missed[motion].powi(2);
+                let missed = there.variance[motion] + there.interpolation_error[motion].powi(2);
                 variance[(motion, 0)] += ratio.norm_sqr() * missed;
             }
         }
@@ -135,7 +135,7 @@ struct Between {
     /// between their neighbours, over twice the distance; the larger of the two errors is used. If
     /// there is a resonance between the two lines, this error has the size of the actual
     /// interpolation error; otherwise it is four times the actual error.
-    missed: DVector<f64>,
+    interpolation_error: DVector<f64>,
 }
 
 impl Between {
@@ -149,14 +149,18 @@ impl Between {
         let lengths = |vector: DVector<Complex<f64>>| vector.map(|z| z.norm());
         if last == 0 {
             let response = value(0).into_owned();
-            return Self { missed: lengths(response.clone()), response, variance: variance(0) };
+            return Self {
+                interpolation_error: lengths(response.clone()),
+                response,
+                variance: variance(0),
+            };
         }
         if after == 0 || after > last {
             let (end, next) = if after == 0 { (0, 1) } else { (last, last - 1) };
             return Self {
                 response: value(end).into_owned(),
                 variance: variance(end),
-                missed: lengths(value(end) - value(next)),
+                interpolation_error: lengths(value(end) - value(next)),
             };
         }
         let straight = |from: usize, to: usize, line: usize| {
@@ -168,11 +172,12 @@ impl Between {
             lengths(straight(middle - 1, middle + 1, lines[middle]) - value(middle))
         };
         let inside = [before, after].into_iter().filter(|at| (1..last).contains(at));
-        let missed = inside.map(apart).reduce(|a, b| a.sup(&b));
+        let interpolation_error = inside.map(apart).reduce(|a, b| a.sup(&b));
         Self {
             response: straight(before, after, line),
             variance: variance(before).sup(&variance(after)),
-            missed: missed.unwrap_or_else(|| lengths(value(after) - value(before))),
+            interpolation_error: interpolation_error
+                .unwrap_or_else(|| lengths(value(after) - value(before))),
         }
     }
 }

@@ -19,7 +19,7 @@ pub(crate) struct BetweenLines {
     /// Number of periods taken as one record; with one period there are no lines between its lines.
     periods: usize,
     /// Number of buffered periods.
-    held: usize,
+    buffered: usize,
     /// Buffered samples × channels; empty if one period is taken as one record.
     samples: DMatrix<f64>,
 }
@@ -42,13 +42,13 @@ pub(crate) fn periods_as_one(remaining: usize, period: usize, channels: usize) -
 impl BetweenLines {
     pub(crate) fn new(periods: usize, period: usize, channels: usize) -> Self {
         let samples = if periods > 1 { periods * period } else { 0 };
-        Self { period, periods, held: 0, samples: DMatrix::zeros(samples, channels) }
+        Self { period, periods, buffered: 0, samples: DMatrix::zeros(samples, channels) }
     }
 
     /// Buffers the next period, its channels in their order.
-    pub(crate) fn hold<'a>(&mut self, channels: impl Iterator<Item = &'a [f64]>) {
-        let start = self.held * self.period;
-        self.held += 1;
+    pub(crate) fn buffer<'a>(&mut self, channels: impl Iterator<Item = &'a [f64]>) {
+        let start = self.buffered * self.period;
+        self.buffered += 1;
         if self.periods == 1 {
             return;
         }
@@ -60,7 +60,7 @@ impl BetweenLines {
     /// Returns the number of buffered periods if all periods of the group are buffered; otherwise
     /// `None`.
     pub(crate) fn complete(&self) -> Option<usize> {
-        (self.held == self.periods).then_some(self.periods)
+        (self.buffered == self.periods).then_some(self.periods)
     }
 
     /// Adds B Σ z zᴴ to the scatter of each line of a period, where z are the amplitudes between

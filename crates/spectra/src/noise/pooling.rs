@@ -187,7 +187,7 @@ pub(crate) fn pooled(
             white(mean_covariance, nu, lines)
         }
         Pooling::Neighbours(half_width) => {
-            let places = Places::new(omega);
+            let places = FrequencyOrder::new(omega);
             let means = Neighbours::new(&places.sorted(&covariance)).means(half_width);
             let model = NoiseModel::Neighbours { half_width: half_width.min(lines) };
             let freedom = nu * window(0, half_width, lines).len() as f64;
@@ -210,9 +210,9 @@ fn white(covariance: DMatrix<Complex<f64>>, nu: f64, lines: usize) -> Pooled {
 }
 
 /// Indices of lines in rising order of frequency.
-struct Places(Vec<usize>);
+struct FrequencyOrder(Vec<usize>);
 
-impl Places {
+impl FrequencyOrder {
     fn new(omega: &[f64]) -> Self {
         let mut places: Vec<usize> = (0..omega.len()).collect();
         places.sort_by(|a, b| omega[*a].total_cmp(&omega[*b]));
@@ -234,7 +234,7 @@ impl Places {
 
 /// Sample covariances in rising order of frequency, and the smooth spectrum fitted to them.
 struct Candidate {
-    places: Places,
+    places: FrequencyOrder,
     omega: Vec<f64>,
     covariance: Covariances,
     nu: f64,
@@ -253,7 +253,7 @@ impl Candidate {
         nu: f64,
         relative: Option<&DMatrix<f64>>,
     ) -> Self {
-        let places = Places::new(omega);
+        let places = FrequencyOrder::new(omega);
         let (omega, covariance) = (places.sorted(omega), places.sorted(&covariance));
         let channels = 0..covariance.first().map_or(0, DMatrix::nrows);
         let power = |channel: usize| covariance.iter().map(move |c| c[(channel, channel)].re);

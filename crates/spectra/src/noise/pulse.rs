@@ -98,7 +98,7 @@ impl PulseErrors {
     }
 
     /// Returns the errors of an input that is delayed by `delay` seconds.
-    pub(crate) fn later(&self, delay: f64) -> Self {
+    pub(crate) fn delayed(&self, delay: f64) -> Self {
         Self { start: self.start + delay, ..self.clone() }
     }
 

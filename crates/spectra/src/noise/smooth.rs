@@ -169,11 +169,11 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let per_term = (nu * lines as f64).max(2.0).ln();
     // In the information criterion, the position of a bump counts as the logarithm of the number of
     // bands that are tried.
-    let per_place = ((lines * widths(lines).count()).max(2) as f64).ln();
+    let per_position = ((lines * widths(lines).count()).max(2) as f64).ln();
     let cost = |trial: &Trial| {
         2.0 * nu * trial.misfit
             + channels * trial.form.terms() as f64 * per_term
-            + 2.0 * trial.form.bumps.len() as f64 * per_place
+            + 2.0 * trial.form.bumps.len() as f64 * per_position
     };
     let of_order = |order: usize| {
         let mut trial = Trial::new(order, omega, variances);

@@ -45,7 +45,9 @@ pub fn section(evidence: &Evidence) -> Result<String, String> {
     let row = |slip: &Slip| {
         let needed = needed_for(*slip, evidence)?.to_string();
         let name = format!("**{}**", slip.name());
-        let words = [slip.printed_numbers(), slip.done(), slip.right()].map(str::to_owned);
+        let words =
+            [slip.printed_numbers(), slip.original_computation(), slip.required_computation()]
+                .map(str::to_owned);
         Ok([vec![name], words.to_vec(), vec![needed]].concat())
     };
     let rows: Result<Vec<Vec<String>>, String> = Slip::ALL.iter().map(row).collect();

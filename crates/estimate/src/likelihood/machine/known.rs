@@ -76,7 +76,7 @@ struct Freed {
     model: MachineModel,
     space: ParameterSpace,
     /// Index, among the parameters, of the known coefficient that became an unknown.
-    further: usize,
+    freed_index: usize,
 }
 
 impl Freed {
@@ -92,14 +92,14 @@ impl Freed {
         let size = if open { assembly.dof() } else { joints(&assembly) };
         (data.len() as f64 * (size as f64).powi(3) <= FREED_WORK).then_some(())?;
         let known = |name: &str| estimate.likelihood.parameter(name).map(|known| known.value);
-        let further = assembly.parameters().iter().position(|p| known(&p.name).is_none())?;
+        let freed_index = assembly.parameters().iter().position(|p| known(&p.name).is_none())?;
         let start = assembly.parameters().iter().map(|p| known(&p.name).unwrap_or(p.start));
         let start: Vec<f64> = start.collect();
         let assembly = assembly.with_start(&start);
         let part = part.map(|part| checked_part(data, &assembly, part)).transpose().ok()?;
         let model = MachineModel::new(&assembly, data.omega(), part.as_ref(), open).ok()?;
         let space = parameter_space(&assembly);
-        Some(Self { assembly, model, space, further })
+        Some(Self { assembly, model, space, freed_index })
     }
 
     /// Returns the first-order rise of twice the logarithm of the likelihood. It is the square of
@@ -120,7 +120,7 @@ impl Freed {
             Residual { model: &self.model, data, weights: &weights, priors: &self.space.priors };
         let Linearisation { residual, mut jacobian } = residual.linearise(&self.space.start)?;
         let last = jacobian.ncols() - 1;
-        jacobian.swap_columns(self.further, last);
+        jacobian.swap_columns(self.freed_index, last);
         for mut column in jacobian.column_iter_mut() {
             let length = column.norm();
             if length > 0.0 {
@@ -150,13 +150,13 @@ impl Freed {
         let changes = parameters.iter().zip(values).filter_map(|(parameter, value)| {
             Some(value - before.parameter(&parameter.name)?.value)
         });
-        let MachineParameter { name, unit, start, .. } = &parameters[self.further];
+        let MachineParameter { name, unit, start, .. } = &parameters[self.freed_index];
         Some(FreedCoefficient {
             name: name.clone(),
             unit,
             known: *start,
-            value: values[self.further],
-            standard_error: fit.information.standard_error(self.further)? * fit.error_scale(),
+            value: values[self.freed_index],
+            standard_error: fit.information.standard_error(self.freed_index)? * fit.error_scale(),
             p_value: p_value.min(1.0),
             misfit_ratio: fit.misfit_ratio,
             misfit_p_value: fit.misfit_p_value,

@@ -117,7 +117,7 @@ pub fn machine_with_prior(away: f64) -> Machine {
 fn a_bound_is_active_in_half_of_the_experiments() {
     let estimates: Vec<_> = (0..20).into_par_iter().map(fit_with_bound).collect();
     let judged = judge(&truth_with_bound(), 20, |seed| estimates[seed as usize].clone());
-    assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.9, "{judged:?}");
     let is_active = |estimate: &Option<LikelihoodEstimate>| {
         estimate.as_ref().unwrap().parameter("absent").unwrap().at_bound
     };
@@ -142,9 +142,9 @@ fn a_prior_that_is_wrong_by_five_standard_deviations_is_told() {
 #[test]
 fn intervals_of_springs_and_dampers_hold() {
     let judged = judge(&truth(), 20, |seed| fit(seed, &Settings::default()));
-    assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.9, "{judged:?}");
     // The probability that at most 14 of 20 intervals contain the truth is 3e-4.
-    assert!(judged.worst >= 0.7 && judged.worst_scatter < 1.6, "{judged:?}");
+    assert!(judged.worst_coverage >= 0.7 && judged.worst_scatter < 1.6, "{judged:?}");
     assert!((0.85..1.15).contains(&judged.scatter), "{judged:?}");
 }
 
@@ -156,7 +156,7 @@ fn unknown_noise_is_found_from_the_residual() {
     for noise in [NoiseSource::WhiteResidual, NoiseSource::SmoothResidual] {
         let settings = Settings { noise, ..Settings::default() };
         let judged = judge(&truth(), 8, |seed| fit(seed, &settings));
-        assert!(judged.failed == 0 && judged.held >= 0.87, "{noise:?} {judged:?}");
+        assert!(judged.failed == 0 && judged.coverage >= 0.87, "{noise:?} {judged:?}");
         assert!((0.8..1.2).contains(&judged.scatter), "{noise:?} {judged:?}");
     }
 }
@@ -242,6 +242,6 @@ pub fn three_masses_truth() -> Vec<(String, f64)> {
 #[test]
 fn masses_springs_and_dampers_of_a_chain_with_an_unmeasured_mass() {
     let judged = judge(&three_masses_truth(), 12, three_masses);
-    assert!(judged.failed == 0 && judged.held >= 0.89, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.89, "{judged:?}");
     assert!((0.82..1.18).contains(&judged.scatter), "{judged:?}");
 }

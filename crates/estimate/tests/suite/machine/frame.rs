@@ -91,7 +91,7 @@ fn absolute_and_relative_accelerations_give_the_frame() {
     for is_relative in [[false, false], [true, true], [true, false]] {
         let judged = judge(&truth(), 12, |seed| fit(is_relative, seed));
         // The probability that fewer than 51 of 60 intervals of 95 % contain the truth is 0.002.
-        assert!(judged.failed == 0 && judged.held >= 0.85, "{is_relative:?} {judged:?}");
+        assert!(judged.failed == 0 && judged.coverage >= 0.85, "{is_relative:?} {judged:?}");
         assert!((0.75..1.3).contains(&judged.scatter), "{is_relative:?} {judged:?}");
     }
 }
@@ -104,7 +104,7 @@ fn the_delay_of_a_logger_with_a_clock_of_its_own_is_found() {
     let truth = [truth(), vec![("roof.delay".to_owned(), DELAY)]].concat();
     let judged = judge(&truth, 12, |seed| fit_of_clocks([false; 2], Some(delay()), seed));
     // The probability that fewer than 61 of 72 intervals of 95 % contain the truth is 0.001.
-    assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.85, "{judged:?}");
     let error = fit_of_clocks([false; 2], Some(delay()), 0).unwrap();
     assert!(error.parameter("roof.delay").unwrap().standard_error.unwrap() < 1e-4);
 }

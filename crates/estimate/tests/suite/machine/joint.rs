@@ -126,7 +126,7 @@ pub fn truth() -> Vec<(String, f64)> {
 fn the_joint_of_two_measured_beams_is_found() {
     let judged = judge(&truth(), 10, fit);
     // The probability that fewer than 16 of 20 intervals of 95 % contain the truth is 0.003.
-    assert!(judged.failed == 0 && judged.held >= 0.8, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.8, "{judged:?}");
     assert!((0.6..1.5).contains(&judged.scatter) && judged.bias < 4.0, "{judged:?}");
     let estimate = fit(3).unwrap();
     let stiffness = estimate.parameter("joint.k").unwrap();

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 #[derive(Debug)]
 pub struct Judged {
     /// Share of the intervals that contain the truth, over all parameters.
-    pub held: f64,
+    pub coverage: f64,
     /// Smallest share, among the parameters, of intervals that contain the truth.
-    pub worst: f64,
+    pub worst_coverage: f64,
     /// Root mean square, over all parameters, of the ratio of RMS error to RMS standard error.
     pub scatter: f64,
     /// Largest ratio of RMS error to RMS standard error of a parameter.
@@ -31,7 +31,7 @@ pub fn judge(
     let failed = estimates.iter().filter(|estimate| estimate.is_none()).count();
     let estimates: Vec<LikelihoodEstimate> = estimates.into_iter().flatten().collect();
     let runs = estimates.len() as f64;
-    let (mut held, mut scatter): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let (mut coverage, mut scatter): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut bias = 0.0_f64;
     for (name, truth) in truth {
         let (mut inside, mut errors, mut variances, mut sum) = (0.0, 0.0_f64, 0.0_f64, 0.0_f64);
@@ -42,14 +42,14 @@ pub fn judge(
             sum += p.value - truth;
             variances += p.standard_error.map_or(0.0, |error| error * error);
         }
-        held.push(inside / runs);
+        coverage.push(inside / runs);
         scatter.push((errors / variances).sqrt());
         bias = bias.max((sum / variances.sqrt()).abs());
     }
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
     Judged {
-        held: mean(&held),
-        worst: held.iter().copied().fold(1.0, f64::min),
+        coverage: mean(&coverage),
+        worst_coverage: coverage.iter().copied().fold(1.0, f64::min),
         scatter: mean(&scatter.iter().map(|s| s * s).collect::<Vec<_>>()).sqrt(),
         worst_scatter: scatter.iter().copied().fold(0.0, f64::max),
         bias,

@@ -101,7 +101,7 @@ fn an_open_record_of_a_large_machine_is_identified() {
     let estimates: Vec<_> = (0..3).into_par_iter().map(fit).collect();
     let judged = judge(&truth(), 3, |seed| estimates[seed as usize].clone());
     // The probability that fewer than 9 of 12 intervals of 95 % contain the truth is 0.002.
-    assert!(judged.failed == 0 && judged.held >= 0.75, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.75, "{judged:?}");
     assert!((0.4..1.8).contains(&judged.scatter) && judged.bias < 4.0, "{judged:?}");
     let stiffness = estimates[0].as_ref().unwrap().parameter("s30.k").unwrap();
     assert!(stiffness.standard_error.unwrap() < 0.02 * STIFFNESS, "{stiffness:?}");

@@ -136,9 +136,9 @@ fn noise_of_a_hammer_is_common_to_all_lines() {
     // The probability that fewer than 33 of 40 intervals of 95 % contain the truth is 0.001. If the
     // fit ignores the noise of the force, about 55 % of the intervals contain the truth.
     let [of_known, of_ignored] = [judged(&known), judged(&ignored)];
-    assert!(of_known.held >= 0.825 && of_known.failed == 0, "{of_known:?}");
+    assert!(of_known.coverage >= 0.825 && of_known.failed == 0, "{of_known:?}");
     assert!((0.75..1.3).contains(&of_known.scatter), "{of_known:?}");
-    assert!(of_ignored.held < 0.8 && of_ignored.scatter > 1.6, "{of_ignored:?}");
+    assert!(of_ignored.coverage < 0.8 && of_ignored.scatter > 1.6, "{of_ignored:?}");
     let warned = |of: &[(LikelihoodEstimate, usize)]| of.iter().filter(|(_, n)| *n > 0).count();
     // An experiment has about four p-values, each with a limit of 1 %. The probability that at
     // least three of ten experiments warn is 0.007.

@@ -202,7 +202,7 @@ fn sixteen_coefficients_from_four_probes() {
         judge(&truth(), 6, |seed| Some(fit(&shaken(&rotor, 120, seed), &rotor).ok()?.likelihood));
     // The errors of the coefficients in one experiment are correlated, so 96 intervals have less
     // information than 96 independent intervals.
-    assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.85, "{judged:?}");
     assert!((0.75..1.25).contains(&judged.scatter), "{judged:?}");
 }
 
@@ -231,7 +231,7 @@ fn a_wrong_modulus_is_found_and_allowed_for() {
         assert!(freed.p_value < 1e-6 && freed.misfit_p_value.unwrap() > 1e-3, "{freed:?}");
         Some(estimate.with_parameter_errors(&freed.changes).likelihood)
     });
-    assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.85, "{judged:?}");
 }
 
 /// Residual unbalance in kg·m, in addition to the trial weights.
@@ -291,7 +291,7 @@ pub fn truth_of_unbalance() -> Vec<(String, f64)> {
 fn bearings_and_residual_unbalance_from_eight_speeds() {
     let rotor = Rotor::new(13, 1.0);
     let judged = judge(&truth_of_unbalance(), 6, |seed| fit_unbalance(&rotor, seed));
-    assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
+    assert!(judged.failed == 0 && judged.coverage >= 0.85, "{judged:?}");
     let estimate = fit_unbalance(&rotor, 0).unwrap();
     for (name, truth) in [("residual.real", RESIDUAL.re), ("residual.imaginary", RESIDUAL.im)] {
         let p = estimate.parameter(name).unwrap();
