@@ -123,8 +123,8 @@ fn continuation(parts: [&[f64]; 2]) -> f64 {
         equal += x.windows(2).filter(|x| x[0] == x[1]).count();
         twice += x.windows(3).filter(|x| x[0] == x[1] && x[1] == x[2]).count();
     }
-    // One additional run is counted, which continues at the overall rate of equal neighbours; this
-    // avoids a rate of zero.
+    // One pair of equal neighbours is added to the counts. The probability that this pair continues
+    // is `rate`, the fraction of equal neighbours. So the result is never zero.
     let rate = (equal as f64 + 1.0) / (pairs as f64 + 1.0);
     (twice as f64 + rate) / (equal as f64 + 1.0)
 }

@@ -131,8 +131,8 @@ impl Tested {
         }
     }
 
-    /// Returns orthonormal columns that span the sensitivities, weighted with `residual_spectrum` as in
-    /// [`weighted`].
+    /// Returns orthonormal columns that span the sensitivities, weighted with `residual_spectrum`
+    /// as in [`weighted`].
     fn explained(&self, residual_spectrum: &[Vec<f64>]) -> DMatrix<f64> {
         let columns: Vec<DVector<f64>> = self
             .sensitivities
@@ -150,9 +150,10 @@ impl Tested {
         }
     }
 
-    /// Returns the finding for one power (square, cube or sign) of displacement or velocity. The
-    /// response to this power, applied as a force, has the strongest correlation with the residual.
-    /// `correlation` is the correlation of neighbouring lines.
+    /// Applies each power (square, cube or sign) of displacement and velocity as a force, and
+    /// returns the finding for the power whose response has the strongest correlation with the
+    /// residual. Entry k of `correlation` is the correlation between two lines of the noise at a
+    /// distance of k lines.
     fn finding(
         &self,
         estimate: &Estimate,
@@ -273,9 +274,9 @@ fn without_linear_part(
     Ok(Record::from_channel(motion.sampling(), values)?.without_mean())
 }
 
-/// Returns the probability that noise with the spectra of the residual (channels × lines, `residual_spectrum`
-/// averaged over neighbouring lines) has at least as much correlation with the responses as the
-/// residual has; `correlation` is the correlation of neighbouring lines.
+/// Returns the probability that noise with the spectra of the residual (channels × lines,
+/// `residual_spectrum` averaged over neighbouring lines) has at least as much correlation with the
+/// responses as the residual has; `correlation` is the correlation of neighbouring lines.
 ///
 /// For given magnitudes the phases of the noise are random from line to line. The sum over the
 /// channels of a line has one phase, because noise on a force, or an unmeasured force, affects all

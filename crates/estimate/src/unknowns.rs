@@ -76,7 +76,8 @@ impl Unknowns {
         Ok(Self { dof, fixed, symmetric: [false; 3], proportional: false })
     }
 
-    /// Returns the same unknowns with one entry (counted from 0) known: kg, N·s/m or N/m.
+    /// Returns the same unknowns with one entry known; `row` and `column` are counted from 0, and
+    /// `value` is in kg, N·s/m or N/m.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if there is no such entry, [`EstimateError::FixedValue`] unless

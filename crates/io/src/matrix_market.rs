@@ -354,7 +354,7 @@ mod tests {
             ),
             ("%%MatrixMarket matrix coordinate real hermitian\n".into(), "the symmetry"),
             (banner.into(), "line 2: the line with the size"),
-            (format!("{banner}2 3 1\n"), "line 2: the matrix of a machine has as many rows"),
+            (format!("{banner}2 3 1\n"), "line 2: the matrix of a machine must have as many rows"),
             (format!("{banner}2 2\n"), "line 2: rows, columns and number"),
             (format!("{banner}2 2 -1\n"), "line 2: rows, columns and number"),
             (format!("{banner}2 2 1\n3 1 1.0\n"), "line 3: row 3, column 1"),

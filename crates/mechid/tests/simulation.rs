@@ -183,8 +183,8 @@ fn a_free_motion_starts_where_it_is_told_to() {
         let simulation = simulated(scheme, from).unwrap();
         let x = simulation.response.displacement();
         for (k, t) in x.sampling().times().enumerate() {
-            // The error is of second order: (ωΔt)² = 4e-4 per unit of time and amplitude, for 0.64
-            // s and 1.6 m.
+            // The error is of second order: (ωΔt)² = 4e-4, times the duration of 0.64 s and the
+            // amplitude of 1.6 m, whose product is about 1.
             assert!((x.channel(0)[k] - truth(t)).abs() < 4e-4, "{scheme} at {t} s");
         }
     }

@@ -14,8 +14,8 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    /// Returns √2/`spectrum_shape` on the lines of a block. If an output is divided by its level and
-    /// multiplied by this factor, the real and imaginary parts of its noise have variance 1.
+    /// Returns √2/`spectrum_shape` on the lines of a block. If an output is divided by its level
+    /// and multiplied by this factor, the real and imaginary parts of its noise have variance 1.
     pub(crate) fn block_weights(&self, block: &Block) -> Vec<f64> {
         let whiten = |shape: &f64| std::f64::consts::SQRT_2 / shape;
         self.spectrum_shape[block.rows.clone()].iter().map(whiten).collect()

@@ -86,8 +86,8 @@ impl NoisePath {
         let (mut covariance, mut gain) = (zeros(n, n), zeros(2 * n, n));
         let (mut state_covariance, mut next) = (zeros(2 * n, 2 * n), zeros(2 * n, 2 * n));
         for (sample, NoiseStep { state, input, output, direct }) in self.0.iter().enumerate() {
-            // `scaled_input` and `scaled_direct` are G and H; each column is multiplied by the standard
-            // deviation of the noise on its force.
+            // `scaled_input` and `scaled_direct` are G and H; each column is multiplied by the
+            // standard deviation of the noise on its force.
             scaled_input.copy_from(input);
             scaled_direct.copy_from(direct);
             for (force, variance) in variances.force.iter().enumerate() {

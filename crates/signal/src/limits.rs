@@ -137,7 +137,7 @@ pub(crate) const GROWTH_FRACTION: f64 = 0.01;
 /// Number of samples examined for the step of a converter.
 pub(crate) const QUANTISATION_SAMPLES: usize = 8192;
 
-/// Minimum number of different values in a channel from which the step of a converter is
+/// Minimum number of different values in a channel for which the step of a converter is
 /// determined; a signal may have fewer values for other reasons.
 pub(crate) const QUANTISATION_LEVELS: usize = 16;
 

@@ -50,7 +50,7 @@ fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// Returns the comments of a source; `mod tests` is the last item of its file.
+/// Returns the comments of a source up to `mod tests`, which is the last item of its file.
 pub fn read(text: &str, file: &str) -> Vec<Comment> {
     let mut comments: Vec<Comment> = Vec::new();
     let (mut before, mut is_code) = (None, false);

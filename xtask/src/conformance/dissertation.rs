@@ -60,8 +60,9 @@ pub(super) fn means(published: &Published, results: &Results) -> Judge {
     }
 }
 
-/// Compares the printed modes of the two-mass system with the computed ones; the settings of the
-/// identified modes are not printed.
+/// Compares the printed modes of the two-mass system with the computed ones. The dissertation does
+/// not print the settings of the identified modes, so only the theoretical modes can be judged to
+/// the digit.
 pub(super) fn modes(published: &Published) -> Result<Judge, String> {
     let mut rows = Vec::new();
     for number in published.tables().filter(|number| MODAL.contains(number)) {

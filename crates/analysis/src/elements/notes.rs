@@ -48,8 +48,8 @@ pub enum ElementNote {
         /// Maximum number of uncertain entries for which the covariance is computed.
         most: usize,
     },
-    /// Standard errors and intervals include the change of the parameters by the delay that the
-    /// residual shows.
+    /// Standard errors and intervals include the change that a delay of the sensors causes in the
+    /// parameters; the residual shows this delay.
     Delayed,
     /// A coefficient that is stated as known may be wrong: as a further unknown, the coefficient
     /// raises the likelihood significantly. Standard errors and intervals include the changes that

@@ -449,8 +449,8 @@ fn likelihood(
 
 /// Returns least squares if it explains the response as well as maximum likelihood. Also returns
 /// least squares if the residual of maximum likelihood is more than noise, and the residual of
-/// least squares is less than [`BIASED_RATIO`] times the residual of maximum likelihood. Otherwise noise
-/// has biased least squares: returns maximum likelihood with this reason.
+/// least squares is less than [`BIASED_RATIO`] times the residual of maximum likelihood. Otherwise
+/// noise has biased least squares: returns maximum likelihood with this reason.
 fn preferred(
     data: &FrequencyData,
     plain: SpectralEstimate,
@@ -484,8 +484,8 @@ fn preferred(
         return Ok(plain);
     }
     let reason = format!(
-        "maximum likelihood was used: least squares is biased by noise and does not explain {} % of the motion; \
-         maximum likelihood does not explain {} %",
+        "maximum likelihood was used: least squares is biased by noise and leaves {} % of the motion unexplained; \
+         maximum likelihood leaves {} %",
         significant(100.0 * of_plain, 3),
         significant(100.0 * of_likely, 3)
     );

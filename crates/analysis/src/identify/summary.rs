@@ -242,7 +242,7 @@ impl IdentificationSummary {
         if let Some(part) = unexplained {
             let model = if self.nonlinear.is_some() { "model" } else { "linear model" };
             doubts.push(format!(
-                "the {model} does not explain {:.1} % of the motion: noise, a nonlinearity, a \
+                "{:.1} % of the motion is not explained by the {model}: noise, a nonlinearity, a \
                  missing degree of freedom, or a record that is not periodic",
                 100.0 * part
             ));

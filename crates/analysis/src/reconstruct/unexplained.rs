@@ -105,7 +105,7 @@ pub fn remark(
         ""
     };
     Some(format!(
-        "the identified force does not explain {}: {unless}{}; the standard error of the force is not reliable",
+        "the identified force leaves {} unexplained: {unless}{}; the standard error of the force is not reliable",
         listed(&named.collect::<Vec<_>>()),
         causes(request, dofs).join(", or ")
     ))

@@ -136,7 +136,7 @@ fn one_of_the_forces_is_found_from_some_of_the_responses() {
     // A force at the wrong position cannot explain the responses.
     let how = Reconstruct { at_rest: true, ..Reconstruct::default().forced([1]) };
     let wrong = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
-    assert!(wrong.to_string().contains("force does not explain"), "{wrong}");
+    assert!(wrong.to_string().contains("the identified force leaves"), "{wrong}");
 }
 
 #[test]

@@ -159,7 +159,8 @@ fn a_late_response_is_told_by_its_delay() {
     };
     one(-2.0, 0);
     one(0.1, 1);
-    // The intervals include the change of the parameters by the delay.
+    // The intervals include the difference between the parameters with and without a correction of
+    // the delay.
     let found = one(3.3, 0);
     let system = rig().system;
     let truth = [system.mass(), system.damping(), system.stiffness()];

@@ -40,7 +40,7 @@ use crate::outcome::{Files, Outcome};
                   Parquet, or any of\nthem in gzip.\n\n\
                   A file called - is standard input where it is read, standard output where it is written; the\n\
                   text report then goes to the error stream.\n\n\
-                  Exit codes:\n  0    success\n  1    fleet: some of the records have no result\n  2    every failure, wrong options included: one message on \
+                  Exit codes:\n  0    success\n  1    fleet: some of the records have no result\n  2    any other failure, wrong options included: one message on \
                   the error stream, no file written\n  141  the reader of standard output has closed it"
 )]
 pub struct Cli {

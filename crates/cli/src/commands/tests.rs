@@ -111,6 +111,6 @@ fn value_name(arg: &Arg) -> String {
 #[test]
 fn the_exit_codes_are_documented() {
     let help = Cli::command().render_long_help().to_string();
-    let codes = "Exit codes:\n  0    success\n  1    fleet: some of the records have no result\n  2    every failure";
+    let codes = "Exit codes:\n  0    success\n  1    fleet: some of the records have no result\n  2    any other failure";
     assert!(help.contains(codes), "{help}");
 }

@@ -105,7 +105,7 @@ fn a_force_that_explains_the_motion_is_not_doubted() {
     for way in ways() {
         let found = report(folder.path(), &way);
         let told = remarks(&found);
-        assert!(!told.contains("does not explain"), "{way}: {told}");
+        assert!(!told.contains("the identified force leaves"), "{way}: {told}");
         for share in unexplained(&found) {
             assert!(share.unwrap() < 0.03, "{way}: {share:?}");
         }
@@ -177,7 +177,7 @@ fn what_the_machine_is_known_to_is_expected() {
                 );
                 continue;
             }
-            assert_eq!(told.contains("does not explain"), doubted, "{way}, {found}");
+            assert_eq!(told.contains("the identified force leaves"), doubted, "{way}, {found}");
         }
     }
 }

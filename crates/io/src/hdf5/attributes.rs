@@ -96,7 +96,7 @@ impl Attributes {
             None => Ok(default),
             Some((_, Value::Number(number))) if *number != 0.0 || default == 0.0 => Ok(*number),
             Some((name, _)) => Err(format!(
-                "numbers whose attribute {name} is not a single number, or is a factor of 0"
+                "numbers whose attribute {name} cannot be used (it must be a single number, and a factor must not be 0)"
             )),
         };
         let (factor, offset) = (number(&FACTORS, 1.0)?, number(&[OFFSET], 0.0)?);

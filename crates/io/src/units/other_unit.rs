@@ -105,8 +105,8 @@ fn is_named(word: &str, wanted: Quantity) -> bool {
 }
 
 impl Separator {
-    /// Returns the separator before a word; `None` if the word before it shows that a unit would
-    /// belong to a condition (`acc 50 Hz`, `gain per mm`).
+    /// Returns the separator before a word. Returns `None` if the previous word shows that this
+    /// word is not the unit of the column, but part of a condition (`acc 50 Hz`, `gain per mm`).
     fn before(name: &str, words: &[Range<usize>], word: usize) -> Option<Self> {
         let previous = words[word - 1].clone();
         let between = &name[previous.end..words[word].start];

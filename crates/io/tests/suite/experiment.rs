@@ -162,7 +162,7 @@ fn listed(size: usize, entries: &[(usize, usize, f64)]) -> serde_json::Value {
 fn sparse_matrices_stand_in_the_description() {
     let described = |size: usize| {
         let one: Vec<_> = (1..=size).map(|i| (i, i, 1.0)).collect();
-        // One entry of the stiffness is given in two parts, and one only above the diagonal.
+        // One entry of the stiffness is given in two parts, and one only below the diagonal.
         let more = [(1, 1, 2.0), (2, 1, -0.5)];
         let k: Vec<_> = one.iter().copied().chain(more).collect();
         let system = serde_json::json!({

@@ -449,8 +449,9 @@ impl SubspaceErrors {
                 let nearest = poles
                     .map(|p| &p.pole)
                     .min_by(|a, b| distance(a.pole).total_cmp(&distance(b.pole)));
-                // A pole that is farther away, nearer to another mode or has another shape is not
-                // an estimate of this mode: below the true order, one pole represents two modes.
+                // A pole is not an estimate of this mode if its distance is at least three times
+                // the decay rate, if it is nearer to another mode, or if it has another shape:
+                // below the true order, one pole represents two modes.
                 let shape = truth.shapes.column(r).into_owned();
                 let is_mode = |p: &&Pole| {
                     let gap = distance(p.pole);

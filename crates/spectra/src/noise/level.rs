@@ -92,8 +92,8 @@ impl ResponseNoise {
     /// one of the variances is not positive.
     fn scored(mut self, residuals: &[(f64, f64)]) -> Option<Self> {
         for _ in 0..LEVEL_ROUNDS {
-            // These sums are the entries of the weighted normal equations for s² and r², where the
-            // powers have the expected values s² + r² |x|².
+            // The sums are the entries of the weighted normal equations for s² and r². The powers
+            // have the expected values s² + r² |x|².
             let [mut ss, mut sr, mut rr, mut sp, mut rp] = [0.0; 5];
             for (power, response) in residuals {
                 let weight = self.variance(*response).powi(-2);

@@ -114,7 +114,8 @@ fn leakage(
     })
 }
 
-/// Maximum relative difference of the line spacings of even frequencies: the rounding of a file.
+/// Maximum relative difference between line spacings that count as equal. It allows for the
+/// rounding of the frequencies in a file.
 const EVEN: f64 = 1e-2;
 
 /// Returns the line spacing, in Hz, if it is even.

@@ -21,7 +21,7 @@ use crate::likelihood::{LikelihoodError, Settings};
 pub struct MeasuredReceptance {
     /// Receptance, d × d, in m/N, one for each line of the data.
     pub receptance: Vec<DMatrix<Complex<f64>>>,
-    /// Mean square error E|ΔH|² of each entry, in m²/N²; `None` if it is unknown.
+    /// Mean square error E|ΔH|² of each entry, in (m/N)²; `None` if it is unknown.
     pub variance: Option<Vec<DMatrix<f64>>>,
 }
 
