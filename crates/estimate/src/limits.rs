@@ -11,6 +11,9 @@ pub(crate) const DELAY_STEPS: usize = 30;
 /// Maximum number of Gauss–Newton steps of the first search by maximum likelihood.
 pub(crate) const SEARCH_STEPS: usize = 200;
 
+/// Maximum number of continuations of the best search if no search has converged.
+pub(crate) const SEARCHES_CONTINUED: usize = 2;
+
 /// Maximum number of Gauss–Newton steps of each search after the first one; these searches confirm
 /// the minimum of the first.
 pub(crate) const STEPS_MORE: usize = 60;
@@ -19,7 +22,8 @@ pub(crate) const STEPS_MORE: usize = 60;
 /// converges.
 pub(crate) const STEPS_RESAMPLED: usize = 15;
 
-/// Minimum number of lines per parameter on which searches begin.
+/// Minimum number of values per parameter on which searches begin; a line has one value for each
+/// response.
 pub(crate) const THIN_LINES: usize = 20;
 
 /// Largest ratio of the number of all lines to the number of lines on which searches begin.

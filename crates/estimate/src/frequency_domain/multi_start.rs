@@ -10,7 +10,8 @@ use super::search::Restartable;
 use crate::limits::{
     CONFIRMED_OTHERWISE, LINEAR_ROUNDS, MAX_RESTARTS, RESTART_ALIKE, RESTART_CONFIRMED,
     RESTART_EXACT, RESTART_RESTARTED, RESTART_RESTARTS, RESTART_SAME, RESTARTS_AMONG_MANY,
-    SEARCH_STEPS, STEPS_MORE, STEPS_RESAMPLED, THIN_LINES, THIN_NEAR, THIN_STEP,
+    SEARCH_STEPS, SEARCHES_CONTINUED, STEPS_MORE, STEPS_RESAMPLED, THIN_LINES, THIN_NEAR,
+    THIN_STEP,
 };
 use crate::{EstimateError, Unknowns};
 
@@ -43,8 +44,10 @@ pub(super) struct GlobalMinimum {
 /// hardly moves.
 ///
 /// If `thin`, the same problem with fewer lines, is given, each search begins there. The first
-/// search continues on all lines; a later search continues only if it ends near the best minimum so
-/// far, or below this minimum.
+/// search continues on all lines if it has converged on fewer lines; a later search continues only
+/// if it ends near the best point so far, or below this point. If no search has converged, the best
+/// one is continued, and the search fails if this does not lead to a minimum: a restart could not
+/// either.
 ///
 /// After the end of a time limit, the result is the lowest sum of squares so far, which may not be
 /// a minimum.
@@ -71,25 +74,25 @@ pub(super) fn search<P: Restartable>(
         let best = ends.distinct.first().map(|end| end.minimum.clone());
         let steps = if best.is_none() { SEARCH_STEPS } else { STEPS_MORE };
         let start = match (&mut thin, best) {
-            (Some(thin), Some(best)) => search_thin(*thin, start, &best, &plausible),
-            (Some(thin), None) => Some(Start::Near(end_on_fewer(*thin, start, &plausible))),
+            (Some(thin), Some(best)) => linear_rounds(*thin, start, &plausible)
+                .and_then(|start| search_thin(*thin, start, &best)),
+            (Some(thin), None) => first_on_fewer(problem, *thin, start, &plausible),
             _ => linear_rounds(problem, start, &plausible).map(Start::Near),
         };
-        ends.push(match start {
-            Some(Start::Near(start)) => minimise(problem, start, steps),
-            Some(Start::Far(end)) => Some(end),
-            None => None,
-        });
+        ends.push(start.and_then(|start| start.followed(problem, steps)));
         let needed = if ends.explained() { RESTART_CONFIRMED } else { CONFIRMED_OTHERWISE };
         if (ends.searches >= needed && !ends.is_ambiguous()) || time_limit::is_over() {
             break;
         }
     }
-    if !ends.all_agree() {
-        restart(problem, &mut ends);
+    if !ends.has_minimum() {
+        follow_best(problem, &mut thin, &mut ends);
     }
-    if let Some(unconverged) = ends.unconverged() {
-        ends.push(minimise(problem, unconverged, SEARCH_STEPS));
+    if ends.has_minimum() && !ends.all_agree() {
+        restart(problem, thin, &mut ends);
+        if let Some(unconverged) = ends.unconverged() {
+            ends.push(minimise(problem, unconverged, SEARCH_STEPS));
+        }
     }
     let failed = EstimateError::NotConverged { searches: ends.searches, steps: SEARCH_STEPS };
     let is_result = |end: &End| end.minimum.converged || time_limit::is_over();
@@ -102,33 +105,68 @@ pub(super) fn search<P: Restartable>(
 /// Start of a search on all lines.
 enum Start {
     Near(DVector<f64>),
-    /// Minimum on fewer lines, far above the best minimum. Its sum of squares is scaled to the
-    /// number of all lines.
+    /// End of a search on fewer lines that does not continue on all lines. Its sum of squares is
+    /// scaled to the number of all lines.
     Far(Minimum),
 }
 
-/// Returns the parameters at which a search on fewer lines ends, or `start` if the search fails.
-fn end_on_fewer(
+/// Searches on fewer lines for the first time. A search that has not converged there is not
+/// continued on all lines; a search that fails there is repeated on all lines.
+fn first_on_fewer(
+    problem: &mut impl Restartable,
     thin: &mut impl Restartable,
     start: DVector<f64>,
-    plausible: &Plausible,
-) -> DVector<f64> {
-    let end = linear_rounds(thin, start.clone(), plausible)
-        .and_then(|start| minimise(thin, start, SEARCH_STEPS));
-    end.map_or(start, |end| end.parameters)
-}
-
-/// Searches for a minimum on fewer lines than the data have; `None` if the search fails.
-fn search_thin(
-    thin: &mut impl Restartable,
-    start: DVector<f64>,
-    best: &Minimum,
     plausible: &Plausible,
 ) -> Option<Start> {
+    let end = linear_rounds(thin, start.clone(), plausible)
+        .and_then(|start| minimise(thin, start, SEARCH_STEPS));
+    match end {
+        None => Some(Start::Near(start)),
+        Some(end) if end.converged => Some(Start::Near(end.parameters)),
+        Some(end) => {
+            let cost = problem.try_at(&end.parameters)?;
+            Some(Start::Far(Minimum { cost, ..end }))
+        }
+    }
+}
+
+/// Continues the best search if no search has converged: on fewer lines and, if it converges there,
+/// on all lines.
+fn follow_best<P: Restartable>(
+    problem: &mut impl Restartable,
+    thin: &mut Option<&mut P>,
+    ends: &mut Ends,
+) {
+    for _ in 0..SEARCHES_CONTINUED {
+        let Some(from) = ends.unconverged() else { return };
+        let start = match thin {
+            Some(thin) => first_on_fewer(problem, *thin, from, &ends.plausible),
+            None => Some(Start::Near(from)),
+        };
+        ends.push(start.and_then(|start| start.followed(problem, SEARCH_STEPS)));
+        if ends.has_minimum() {
+            return;
+        }
+    }
+}
+
+impl Start {
+    /// Returns the point at which a search on all lines ends.
+    fn followed(self, problem: &mut impl Restartable, steps: usize) -> Option<Minimum> {
+        match self {
+            Self::Near(start) => minimise(problem, start, steps),
+            Self::Far(end) => Some(end),
+        }
+    }
+}
+
+/// Searches on fewer lines. The search continues on all lines if it ends near the best point so
+/// far, and if one of the two is a minimum.
+fn search_thin(thin: &mut impl Restartable, start: DVector<f64>, best: &Minimum) -> Option<Start> {
     let of_best = thin.try_at(&best.parameters)?;
-    let start = linear_rounds(thin, start, plausible)?;
     let end = minimise(thin, start, STEPS_MORE)?;
-    Some(if end.cost <= THIN_NEAR * of_best {
+    let is_near = end.cost <= THIN_NEAR * of_best;
+    Some(if is_near && (end.converged || best.converged) {
         Start::Near(end.parameters)
     } else {
         let cost = end.cost * best.cost / of_best;
@@ -154,28 +192,46 @@ pub(super) fn thinned(
 /// Ours.
 pub fn thin_step(data: &FrequencyData, unknowns: &Unknowns) -> usize {
     let parameters = unknowns.independent() + transient::len(data);
-    (data.len() / (THIN_LINES * parameters).max(1)).min(THIN_STEP)
+    (data.len() * data.dof() / (THIN_LINES * parameters).max(1)).min(THIN_STEP)
 }
 
-/// Restarts the search from the best minima so far, moved by a few steps in resampled data.
-fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
+/// Restarts the search from the best minima so far, moved by a few steps in resampled data. With
+/// `thin`, both are on fewer lines, and only a search that ends there near the best minimum
+/// continues on all lines.
+fn restart<P: Restartable>(
+    problem: &mut impl Restartable,
+    mut thin: Option<&mut P>,
+    ends: &mut Ends,
+) {
     let mut without_gain = 0;
     for seed in 0..MAX_RESTARTS {
         if time_limit::is_over() {
             return;
         }
-        let Some(from) = ends.turn(seed as usize) else { return };
+        let Some(from) = ends.restart_point(seed as usize) else { return };
         log::debug!("search {}", ends.searches + 1);
-        problem.resample(Some(seed));
-        let moved = minimise(problem, from, STEPS_RESAMPLED);
-        problem.resample(None);
-        let gained = ends.push(moved.and_then(|m| minimise(problem, m.parameters, STEPS_MORE)));
+        let best = ends.distinct.first().map(|end| end.minimum.clone());
+        let start = match (&mut thin, best) {
+            (Some(thin), Some(best)) => {
+                moved(*thin, from, seed).and_then(|start| search_thin(*thin, start, &best))
+            }
+            _ => moved(problem, from, seed).map(Start::Near),
+        };
+        let gained = ends.push(start.and_then(|start| start.followed(problem, STEPS_MORE)));
         without_gain = if gained { 0 } else { without_gain + 1 };
         let enough = if ends.is_ambiguous() { RESTARTS_AMONG_MANY } else { RESTART_RESTARTS };
         if without_gain >= enough {
             return;
         }
     }
+}
+
+/// Returns the parameters after a few steps in resampled data.
+fn moved(problem: &mut impl Restartable, from: DVector<f64>, seed: u64) -> Option<DVector<f64>> {
+    problem.resample(Some(seed));
+    let moved = minimise(problem, from, STEPS_RESAMPLED);
+    problem.resample(None);
+    moved.map(|moved| moved.parameters)
 }
 
 /// Returns the best result of some rounds of linear least squares, each with the weights of the
@@ -255,6 +311,11 @@ impl Ends {
         self.distinct.first().is_some_and(|end| self.plausible.explains(end.minimum.cost))
     }
 
+    /// Returns whether a search has converged.
+    fn has_minimum(&self) -> bool {
+        self.distinct.iter().any(|end| end.minimum.converged)
+    }
+
     /// Returns whether every search has led to the same minimum.
     fn all_agree(&self) -> bool {
         matches!(&self.distinct[..], [end] if end.count == self.searches && end.minimum.converged)
@@ -277,7 +338,7 @@ impl Ends {
 
     /// Returns the point at which restart number `at` begins: the best points in turn if the best
     /// minimum is ambiguous, otherwise the best point.
-    fn turn(&self, at: usize) -> Option<DVector<f64>> {
+    fn restart_point(&self, at: usize) -> Option<DVector<f64>> {
         let count =
             if self.is_ambiguous() { RESTART_RESTARTED.min(self.distinct.len()) } else { 1 };
         let end = self.distinct.get(at.checked_rem(count)?)?;
