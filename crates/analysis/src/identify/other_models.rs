@@ -6,16 +6,16 @@ use std::f64::consts::PI;
 use mechid_checks::{
     Alternative, Cause, Finding, ModelledResponses, better_model, delay_of_responses,
 };
-use mechid_estimate::Estimate;
 use mechid_estimate::frequency_domain::{
-    output_error_of_table, output_error_pooling, structural_damping,
+    equation_error, output_error_of_table, output_error_pooling, structural_damping,
 };
+use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_io::FrequencyResponses;
 use mechid_model::ResponseQuantity;
 use mechid_spectra::{FrequencyData, Pooling};
 use nalgebra::{Complex, DMatrix};
 
-use super::disagreement::squared_change;
+use super::disagreement::outer_product_of_change;
 use super::response_settings::IdentifyResponses;
 use super::tabulated::{Tabulated, joined};
 use super::thinned;
@@ -50,6 +50,35 @@ pub(super) fn better_model_of(
     better_model_on(tables, how, data, result)
 }
 
+/// Returns the failure of a search with the model that explains the responses far better than least
+/// squares as a reason, if there is such a model; it is fitted to fewer lines if the tables have
+/// many.
+pub(super) fn with_better_model(
+    failure: AnalysisError,
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+) -> AnalysisError {
+    let AnalysisError::Estimate(error @ EstimateError::NotConverged { .. }) = failure else {
+        return failure;
+    };
+    let fewer = thinned::for_models(tables, how, data, unknowns)
+        .and_then(|fewer| Some((on_lines_of(&fewer, how).ok()?, fewer)));
+    let (data, tables) = match &fewer {
+        Some((data, fewer)) => (data, &fewer[..]),
+        None => (data, tables),
+    };
+    let plain = equation_error(data, unknowns).ok();
+    match plain.and_then(|plain| other_model(tables, how, data, &plain)) {
+        Some(Other { cause, remaining, .. }) => {
+            let finding = Finding::Alternative(Alternative { cause, remaining });
+            AnalysisError::Unfit { error, reasons: finding.to_string() }
+        }
+        None => error.into(),
+    }
+}
+
 /// Returns the responses of tables as data for a fit.
 fn on_lines_of(
     tables: &[FrequencyResponses],
@@ -68,6 +97,33 @@ fn better_model_on(
 ) -> Option<BetterModel> {
     let likely = output_error_pooling(data, result.unknowns(), Pooling::AllLines).ok();
     let estimate = likely.as_ref().map_or(result, |likely| &likely.estimate);
+    let Other { cause, remaining, mut estimate } = other_model(tables, how, data, estimate)?;
+    if let Cause::Delay { seconds } = cause {
+        // The fit keeps the weights of the result, so that only the delay changes the parameters.
+        let late = data.with_later_force(seconds);
+        estimate = output_error_of_table(&late, result.unknowns()).ok().map(|fit| fit.estimate);
+    }
+    let change = estimate.map(|estimate| outer_product_of_change(result, &estimate));
+    let finding = Finding::Alternative(Alternative { cause, remaining });
+    Some(BetterModel { finding, remaining, change })
+}
+
+/// A model that explains the responses far better than an estimate.
+struct Other {
+    cause: Cause,
+    /// Fraction of the residual power that remains with this model.
+    remaining: f64,
+    /// Estimate with this model; `None` if the parameters have another meaning, or for a delay.
+    estimate: Option<Estimate>,
+}
+
+/// Returns the model that explains the `data` far better than an `estimate` from them.
+fn other_model(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+    data: &FrequencyData,
+    estimate: &Estimate,
+) -> Option<Other> {
     let fitted = modelled(data, data, estimate)?;
     let (mut others, mut models) = (Vec::new(), Vec::new());
     let mut add = |cause, model, estimate: Option<Estimate>| {
@@ -99,15 +155,8 @@ fn better_model_on(
     }
     let deviation = deviation(data);
     let (best, remaining) = better_model(data.omega(), deviation.as_ref(), &fitted, &models)?;
-    let (cause, mut other) = others.swap_remove(best);
-    if let Cause::Delay { seconds } = cause {
-        // The fit keeps the weights of the result, so that only the delay changes the parameters.
-        let late = data.with_later_force(seconds);
-        other = output_error_of_table(&late, result.unknowns()).ok().map(|fit| fit.estimate);
-    }
-    let change = other.map(|other| squared_change(result, &other));
-    let finding = Finding::Alternative(Alternative { cause, remaining });
-    Some(BetterModel { finding, remaining, change })
+    let (cause, estimate) = others.swap_remove(best);
+    Some(Other { cause, remaining, estimate })
 }
 
 /// A model that explains the responses far better.
@@ -115,9 +164,9 @@ pub(super) struct BetterModel {
     pub(super) finding: Finding,
     /// Fraction of the residual power that remains with this model.
     pub(super) remaining: f64,
-    /// Vector of the parameter changes by this model times its transpose (parameters × parameters),
-    /// in the product of the units of two parameters. `None` if the parameters of this model have
-    /// another meaning.
+    /// Outer product Δ Δᵀ of the vector Δ of the parameter changes that this model causes
+    /// (parameters × parameters), in the product of the units of two parameters. `None` if the
+    /// parameters of this model have another meaning.
     pub(super) change: Option<DMatrix<f64>>,
 }
 

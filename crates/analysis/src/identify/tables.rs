@@ -10,6 +10,7 @@ use mechid_spectra::FrequencyData;
 use serde::Serialize;
 
 use super::checks::CheckRow;
+use super::other_models::with_better_model;
 use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
 use super::rows::{
@@ -53,7 +54,8 @@ pub fn identify_responses(
     let fit =
         |unknowns: &Unknowns| TableFit::new(&data, unknowns, &measured, added_decay, how.method);
     let unknowns = how.structure.apply(how.mass.unknowns(data.dof())?)?;
-    let (fit, unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
+    let (fit, unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)
+        .map_err(|failure| with_better_model(failure, tables, how, &data, &unknowns))?;
     if let Some(of_segments) = &fit.averaged {
         let mut responses = of_segments.responses.iter().cloned();
         measured.iter_mut().try_for_each(|one| one.replace(&mut responses))?;

@@ -3,11 +3,12 @@
 
 use std::f64::consts::TAU;
 
-use mechid_analysis::{IdentifyResponses, ResponseQuantity, identify_responses};
+use mechid_analysis::{AnalysisError, IdentifyResponses, ResponseQuantity, identify_responses};
 use mechid_checks::{Alternative, Cause, Finding, Subject};
 use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use mechid_model::SecondOrderSystem;
 use mechid_signal::{Sampling, noise};
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 
 type Receptance<'a> = dyn Fn(f64) -> Complex<f64> + 'a;
 
@@ -222,6 +223,49 @@ fn long_tables_are_told_apart_too() {
         assert!(matches!(long(&late, is_stated).cause(), Some(Cause::Delay { .. })));
         let of_velocity = long(&velocity, is_stated).cause();
         assert!(matches!(of_velocity, Some(Cause::Quantity { .. })), "{of_velocity:?}");
+    }
+}
+
+/// Receptances of a chain of three masses with 1 % noise, stated as another quantity: the search
+/// fails, and the error must name the quantity of the table. With the right quantity, no check
+/// warns.
+#[test]
+fn another_quantity_is_named_if_the_search_fails() {
+    let mass = DMatrix::from_diagonal(&DVector::from_vec(vec![1.1, 2.3, 0.7]));
+    let stiffness = dmatrix![2.1e4, -9e3, 0.0; -9e3, 2.4e4, -1.5e4; 0.0, -1.5e4, 1.5e4];
+    let damping = &stiffness * 2e-4 + &mass * 0.3;
+    let system = SecondOrderSystem::new(mass, damping, stiffness).unwrap();
+    let frequency_hz: Vec<f64> = (1..=300).map(|line| 0.12 * line as f64).collect();
+    let exact: Vec<DMatrix<Complex<f64>>> =
+        frequency_hz.iter().map(|hz| system.receptance(TAU * hz).unwrap()).collect();
+    let function = |response: usize, force: usize| {
+        let sampling = Sampling::new(1.0, exact.len()).unwrap();
+        let level = exact.iter().map(|h| h[(response, force)].norm()).sum::<f64>() / 300.0;
+        let seed = (3 * response + force) as u64;
+        let noise = noise::white(sampling, 2, 0.01 * level / 2_f64.sqrt(), seed).unwrap();
+        let noise = |row: usize| Complex::new(noise.channel(0)[row], noise.channel(1)[row]);
+        let values = exact.iter().enumerate();
+        ResponseFunction {
+            response: (response + 1).to_string(),
+            reference: (force + 1).to_string(),
+            quantity: None,
+            values: values.map(|(row, h)| h[(response, force)] + noise(row)).collect(),
+            standard_error: None,
+        }
+    };
+    let functions = (0..9).map(|at| function(at / 3, at % 3)).collect();
+    let table =
+        FrequencyResponses { file: "table".into(), frequency_hz, functions, ..Default::default() };
+    let stated = |quantity: ResponseQuantity| {
+        let how = IdentifyResponses { quantity: Some(quantity), ..Default::default() };
+        identify_responses(std::slice::from_ref(&table), &how)
+    };
+    let right = stated(ResponseQuantity::Displacement).unwrap();
+    assert!(right.summary().checks.iter().all(|check| !check.is_conspicuous()), "{right}");
+    for quantity in [ResponseQuantity::Velocity, ResponseQuantity::Acceleration] {
+        let error = stated(quantity).unwrap_err();
+        assert!(matches!(error, AnalysisError::Unfit { .. }), "{error:?}");
+        assert!(error.to_string().contains("displacement per force"), "{error}");
     }
 }
 
