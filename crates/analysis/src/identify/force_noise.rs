@@ -42,6 +42,9 @@ pub enum ForceNoiseSource {
     AboveBand,
     /// Samples between the hits of a hammer.
     BetweenHits,
+    /// Residual of the fit, which shows that the lines above the driven band contain more than
+    /// noise.
+    Residual,
 }
 
 impl ForceNoise {
@@ -83,6 +86,15 @@ impl ForceNoise {
             (levels_n, ForceNoiseSource::AboveBand)
         };
         Ok(Self { levels_n, source, rms, pulses })
+    }
+
+    /// Multiplies the levels by a factor of at most 1 that follows from the residual of a fit.
+    pub(super) fn reduced(mut self, factor: f64) -> Self {
+        if factor < 1.0 {
+            self.levels_n.iter_mut().flatten().for_each(|level| *level *= factor);
+            self.source = ForceNoiseSource::Residual;
+        }
+        self
     }
 
     /// Returns the standard deviation of the noise of a force, in N; 0 if it is not known.
@@ -136,6 +148,9 @@ impl ForceNoise {
         let of = match source {
             Some(ForceNoiseSource::Stated) => "as stated",
             Some(ForceNoiseSource::BetweenHits) => "estimated between the hits",
+            Some(ForceNoiseSource::Residual) => {
+                "estimated from the residual; the force has a further signal above the excited band"
+            }
             Some(ForceNoiseSource::AboveBand) | None => "estimated above the excited band",
         };
         let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
@@ -143,6 +158,10 @@ impl ForceNoise {
         if high == 0.0 {
             return match source {
                 Some(ForceNoiseSource::Stated) => "the force was assumed exact, as stated".into(),
+                Some(ForceNoiseSource::Residual) => {
+                    "the force was assumed exact: the residual of the fit shows that the force has a signal, not noise, above the excited band"
+                        .into()
+                }
                 _ => "the force shows no noise and was assumed exact".into(),
             };
         }

@@ -5,9 +5,9 @@ use std::sync::OnceLock;
 
 use mechid_checks::limits::DELAY_REMAINING;
 use mechid_checks::{
-    AfterSpectralFit, Alternative, Cause, Finding, Quantity, RowParts, SpectralResidual,
-    after_spectral_fit, before_spectral_fit, delay_of_failed_search, delay_of_lines,
-    delay_of_open_records, fault_of_acquisition, fault_of_hits, fitted_band,
+    AfterSpectralFit, Alternative, Cause, Finding, Misfit, NoiseSource, Quantity, RowParts,
+    SpectralResidual, Verdict, after_spectral_fit, before_spectral_fit, delay_of_failed_search,
+    delay_of_lines, delay_of_open_records, fault_of_acquisition, fault_of_hits, fitted_band,
     forces_between_samples, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
@@ -102,9 +102,12 @@ struct OpenSpectra {
 }
 
 impl OpenSpectra {
+    /// Reads the records; the standard deviation of the noise of their forces is multiplied by
+    /// `reduction`.
     fn read(
         records: &[Windowed],
         How { rule, noise, acquisition, excitation }: How<'_>,
+        reduction: f64,
     ) -> Result<Self, AnalysisError> {
         let force = noise.force.as_deref();
         let (mut spectra, mut of_force) = (Vec::new(), Vec::new());
@@ -115,7 +118,8 @@ impl OpenSpectra {
                 Excitation::Lasting => None,
                 Excitation::Hits(noise) => noise.get(at),
             };
-            let force_noise = ForceNoise::from_record(held, &held.driven, force, hit)?;
+            let force_noise =
+                ForceNoise::from_record(held, &held.driven, force, hit)?.reduced(reduction);
             let data = FrequencyData::read(&lines, &held.force, motion, kind)?
                 .as_open_record(held.force.sampling());
             let data = acquisition.uncoupled(force_noise.known_to(data, held)?, held)?;
@@ -138,6 +142,81 @@ impl OpenSpectra {
     }
 }
 
+/// Fit of open records with its residuals, before the search for causes of the residuals.
+struct LinesFit {
+    fit: OutputErrorFit,
+    lines: Vec<Lines>,
+    force_noise: Vec<ForceNoise>,
+    /// Data without sinusoids.
+    with_pulses: Vec<FrequencyData>,
+    /// Data without sinusoids and without the errors of pulses.
+    data: Vec<FrequencyData>,
+    /// Data also without transients.
+    closed: Vec<FrequencyData>,
+    /// Data with the measured forces and only the responses to them.
+    alone: Vec<FrequencyData>,
+    checks: AfterSpectralFit,
+}
+
+impl LinesFit {
+    /// Fits the records with the standard deviation of the noise of their forces times `reduction`.
+    fn new(
+        records: &[Windowed],
+        unknowns: &Unknowns,
+        how: How<'_>,
+        reduction: f64,
+    ) -> Result<Self, AnalysisError> {
+        let How { noise, acquisition, .. } = how;
+        let mut spectra = OpenSpectra::read(records, how, reduction)?;
+        let dt = records[0].held.force.sampling().dt();
+        let joint = joined(&spectra.data)?;
+        let fit = output_error_pooling(&joint, unknowns, noise.response)
+            .map_err(|error| with_delay(error, &spectra.data, dt, unknowns, noise.response))?;
+        let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
+        spectra.data = data;
+        spectra.without_sinusoids(&fit);
+        let OpenSpectra { data: with_pulses, lines, force_noise } = spectra;
+        let data = fit.without_pulse_errors(&with_pulses)?;
+        let (closed, alone) = without_transients(&fit, &data)?;
+        let checks = after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
+        Ok(Self { fit, lines, force_noise, with_pulses, data, closed, alone, checks })
+    }
+
+    /// Fits the records. If the residuals show that the noise of the forces is less than estimated
+    /// above the driven band, the level is reduced to that of the residuals and, if this is still
+    /// too much, to zero: the force then has a signal above the band.
+    fn with_likely_force_noise(
+        records: &[Windowed],
+        unknowns: &Unknowns,
+        how: How<'_>,
+    ) -> Result<Self, AnalysisError> {
+        let first = Self::new(records, unknowns, how, 1.0)?;
+        let is_estimated =
+            how.noise.force.is_none() && matches!(how.excitation, Excitation::Lasting);
+        let Some(ratio) = first.less_force_noise().filter(|_| is_estimated) else {
+            return Ok(first);
+        };
+        let reduced = Self::new(records, unknowns, how, ratio.sqrt());
+        match reduced {
+            Ok(reduced) if reduced.less_force_noise().is_none() => Ok(reduced),
+            _ => Self::new(records, unknowns, how, 0.0).or(Ok(first)),
+        }
+    }
+
+    /// Returns the ratio of residual power to noise power where the noise of the forces dominates;
+    /// `None` if it is not significantly below 1.
+    fn less_force_noise(&self) -> Option<f64> {
+        let findings = self.checks.records.iter().flat_map(SpectralResidual::findings);
+        let ratios = findings.filter_map(|finding| match &finding {
+            Finding::Misfit(Misfit { ratio, source: NoiseSource::Force, .. }) => {
+                (finding.verdict() > Verdict::Good && *ratio < 1.0).then_some(*ratio)
+            }
+            _ => None,
+        });
+        ratios.min_by(f64::total_cmp)
+    }
+}
+
 /// Fits all lines of the excited band by maximum likelihood, together with the transient of every
 /// record.
 pub(super) fn fit(
@@ -146,19 +225,10 @@ pub(super) fn fit(
     how: How<'_>,
 ) -> Result<OpenFit, AnalysisError> {
     let How { noise, acquisition, excitation, .. } = how;
-    let mut spectra = OpenSpectra::read(records, how)?;
     let dt = records[0].held.force.sampling().dt();
-    let joint = joined(&spectra.data)?;
-    let fit = output_error_pooling(&joint, unknowns, noise.response)
-        .map_err(|error| with_delay(error, &spectra.data, dt, unknowns, noise.response))?;
-    let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
-    spectra.data = data;
-    spectra.without_sinusoids(&fit);
-    let OpenSpectra { data: with_pulses, lines, force_noise } = spectra;
-    let data = fit.without_pulse_errors(&with_pulses)?;
-    let (closed, alone) = without_transients(&fit, &data)?;
-    let AfterSpectralFit { records: residuals, bias } =
-        after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
+    let LinesFit { fit, lines, force_noise, with_pulses, data, closed, alone, checks } =
+        LinesFit::with_likely_force_noise(records, unknowns, how)?;
+    let AfterSpectralFit { records: residuals, bias } = checks;
     let tested =
         Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
     let (better_explanation, compared) = time_limit::join(

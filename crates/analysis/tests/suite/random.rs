@@ -2,7 +2,7 @@
 //! period.
 
 use mechid_analysis::frf::{Estimator, frf};
-use mechid_analysis::identify::{Method, OpenFit, OpenNoise, Source};
+use mechid_analysis::identify::{ForceNoiseSource, Method, OpenFit, OpenNoise, Source};
 use mechid_analysis::sweep::{self, Kind};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identified, Identify, IdentifyResponses, Machine, Measurement,
@@ -211,6 +211,43 @@ fn a_delay_that_stops_the_search_is_named() {
     assert!(late.iter().filter(|(failed, _)| *failed).count() >= 1, "{late:?}");
     let right: Vec<_> = (0..8).into_par_iter().map(|seed| told(0.0, seed)).collect();
     assert!(right.iter().all(|told| *told == (false, None)), "{right:?}");
+}
+
+/// Reference: the generator. A signal of 0.2 % of the force acts above the band, too, and moves the
+/// machine: it is no noise of the force. The level of the noise must come from the residual, and
+/// the intervals must hold. With true noise of the same size, the level above the band must remain.
+#[test]
+fn a_signal_above_the_band_is_no_noise() {
+    const RUNS: u64 = 20;
+    let rig = rig();
+    let told = |seed: u64, is_signal: bool| {
+        let [force, response] = rig.period(seed).unwrap();
+        let level = NoiseLevel::FractionOfRms(0.002);
+        let more = noise::add_white(&force, level, seed + 300_000).unwrap();
+        let response = if is_signal {
+            exact_harmonic_periodic(&rig.system, &more).unwrap().displacement().clone()
+        } else {
+            response
+        };
+        let level = NoiseLevel::FractionOfRms(0.0003);
+        let noisy = noise::add_white(&response, level, seed + 400_000).unwrap();
+        let [force, noisy] = [more, noisy].map(|all| all.window(SAMPLES / 2, SAMPLES).unwrap());
+        let test = Measurement::from_records(&force, &[(KIND, &noisy)]).unwrap();
+        let found = identify(&[test], &Identify::default()).unwrap();
+        let held = ["m", "c", "k"].iter().filter(|name| holds(&found, name)).count();
+        let is_reduced = found.summary().fit.force_noise[0].source == ForceNoiseSource::Residual;
+        (is_reduced, held, warns(&found))
+    };
+    let count = |is_signal: bool| {
+        let all: Vec<_> = (0..RUNS).into_par_iter().map(|seed| told(seed, is_signal)).collect();
+        let reduced = all.iter().filter(|(is_reduced, ..)| *is_reduced).count();
+        let held: usize = all.iter().map(|(_, held, _)| held).sum();
+        (reduced, held, all.iter().filter(|(.., warns)| *warns).count())
+    };
+    let (reduced, held, warned) = count(true);
+    assert!(reduced >= 18 && held >= 53 && warned <= 2, "{reduced} {held} {warned}");
+    let (reduced, held, warned) = count(false);
+    assert!(reduced <= 1 && held >= 53 && warned <= 2, "{reduced} {held} {warned}");
 }
 
 #[test]
