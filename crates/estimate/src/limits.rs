@@ -8,6 +8,9 @@ pub(crate) const WEIGHTING_CLEAR: f64 = 0.1;
 /// the force.
 pub(crate) const DELAY_STEPS: usize = 30;
 
+/// Significance level of the test whether the noise of the forces is less than stated.
+pub(crate) const FORCE_NOISE_LEVEL: f64 = 0.01;
+
 /// Maximum number of Gauss–Newton steps of the first search by maximum likelihood.
 pub(crate) const SEARCH_STEPS: usize = 200;
 

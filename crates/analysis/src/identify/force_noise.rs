@@ -88,13 +88,10 @@ impl ForceNoise {
         Ok(Self { levels_n, source, rms, pulses })
     }
 
-    /// Multiplies the levels by a factor of at most 1 that follows from the residual of a fit.
-    pub(super) fn reduced(mut self, factor: f64) -> Self {
-        if factor < 1.0 {
-            self.levels_n.iter_mut().flatten().for_each(|level| *level *= factor);
-            self.source = ForceNoiseSource::Residual;
-        }
-        self
+    /// Multiplies the levels by a factor that follows from the residual of a fit.
+    pub(super) fn reduce(&mut self, factor: f64) {
+        self.levels_n.iter_mut().flatten().for_each(|level| *level *= factor);
+        self.source = ForceNoiseSource::Residual;
     }
 
     /// Returns the standard deviation of the noise of a force, in N; 0 if it is not known.

@@ -5,14 +5,14 @@ use std::sync::OnceLock;
 
 use mechid_checks::limits::DELAY_REMAINING;
 use mechid_checks::{
-    AfterSpectralFit, Alternative, Cause, Finding, Misfit, NoiseSource, Quantity, RowParts,
-    SpectralResidual, Verdict, after_spectral_fit, before_spectral_fit, delay_of_failed_search,
-    delay_of_lines, delay_of_open_records, fault_of_acquisition, fault_of_hits, fitted_band,
+    AfterSpectralFit, Alternative, Cause, Finding, Quantity, RowParts, SpectralResidual,
+    after_spectral_fit, before_spectral_fit, delay_of_failed_search, delay_of_lines,
+    delay_of_open_records, fault_of_acquisition, fault_of_hits, fitted_band,
     forces_between_samples, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, Refit, SampledRows, Split, equivalent_force,
-    output_error_pooling, with_noise_of,
+    force_noise_factor, output_error_from, output_error_pooling, with_noise_of,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{Discretisation, ResponseQuantity};
@@ -25,7 +25,7 @@ use super::acquisition::{Acquisition, BandLimitedFit, BetweenSamples, Explanatio
 use super::compared::{Compared, rows_of};
 use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Residual};
-use super::force_noise::ForceNoise;
+use super::force_noise::{ForceNoise, ForceNoiseSource};
 use super::keywords::Domain;
 use super::left_out::LineRule;
 use super::lines::LineChoice;
@@ -44,6 +44,9 @@ const LEVEL: f64 = 1e-3;
 /// Ratio of transient power to force power that counts as rounding; a larger ratio shows a
 /// transient.
 const ROUNDING: f64 = 1e-20;
+
+/// Maximum number of reductions of the noise of the forces.
+const FORCE_NOISE_ROUNDS: usize = 8;
 
 /// Maximum number of lines for which a record without settings is tried as an open record. As an
 /// example of the time: a fit with two forces takes ten seconds on one processor if its product of
@@ -102,12 +105,9 @@ struct OpenSpectra {
 }
 
 impl OpenSpectra {
-    /// Reads the records; the standard deviation of the noise of their forces is multiplied by
-    /// `reduction`.
     fn read(
         records: &[Windowed],
         How { rule, noise, acquisition, excitation }: How<'_>,
-        reduction: f64,
     ) -> Result<Self, AnalysisError> {
         let force = noise.force.as_deref();
         let (mut spectra, mut of_force) = (Vec::new(), Vec::new());
@@ -118,8 +118,7 @@ impl OpenSpectra {
                 Excitation::Lasting => None,
                 Excitation::Hits(noise) => noise.get(at),
             };
-            let force_noise =
-                ForceNoise::from_record(held, &held.driven, force, hit)?.reduced(reduction);
+            let force_noise = ForceNoise::from_record(held, &held.driven, force, hit)?;
             let data = FrequencyData::read(&lines, &held.force, motion, kind)?
                 .as_open_record(held.force.sampling());
             let data = acquisition.uncoupled(force_noise.known_to(data, held)?, held)?;
@@ -128,6 +127,35 @@ impl OpenSpectra {
         }
         let (data, lines) = spectra.into_iter().unzip();
         Ok(Self { data, lines, force_noise: of_force })
+    }
+
+    /// Reduces the noise of the forces, if it was estimated above the driven band, as long as the
+    /// residual of the fit shows that it is less: the force then has a signal above the band. The
+    /// machine is fitted again after each reduction. Returns the last fit.
+    fn with_likely_force_noise(
+        &mut self,
+        mut fit: OutputErrorFit,
+        unknowns: &Unknowns,
+        noise: &OpenNoise,
+    ) -> Result<OutputErrorFit, AnalysisError> {
+        let is_above_band = |noise: &ForceNoise| noise.source == ForceNoiseSource::AboveBand;
+        if !self.force_noise.iter().all(is_above_band) {
+            return Ok(fit);
+        }
+        for _ in 0..FORCE_NOISE_ROUNDS {
+            let joint = joined(&self.data)?.without_sinusoids(&fit.sinusoids);
+            let Some(factor) = force_noise_factor(&joint, unknowns, &fit) else { break };
+            let reduced: Vec<FrequencyData> =
+                self.data.iter().map(|data| data.with_reduced_force_noise(factor)).collect();
+            // If the search fails, the noise of the last fit remains.
+            let Ok(next) = output_error_from(&joined(&reduced)?, unknowns, &fit, noise.response)
+            else {
+                break;
+            };
+            (fit, self.data) = (next, reduced);
+            self.force_noise.iter_mut().for_each(|noise| noise.reduce(factor.sqrt()));
+        }
+        Ok(fit)
     }
 
     /// Subtracts the estimated sinusoids.
@@ -142,81 +170,6 @@ impl OpenSpectra {
     }
 }
 
-/// Fit of open records with its residuals, before the search for causes of the residuals.
-struct LinesFit {
-    fit: OutputErrorFit,
-    lines: Vec<Lines>,
-    force_noise: Vec<ForceNoise>,
-    /// Data without sinusoids.
-    with_pulses: Vec<FrequencyData>,
-    /// Data without sinusoids and without the errors of pulses.
-    data: Vec<FrequencyData>,
-    /// Data also without transients.
-    closed: Vec<FrequencyData>,
-    /// Data with the measured forces and only the responses to them.
-    alone: Vec<FrequencyData>,
-    checks: AfterSpectralFit,
-}
-
-impl LinesFit {
-    /// Fits the records with the standard deviation of the noise of their forces times `reduction`.
-    fn new(
-        records: &[Windowed],
-        unknowns: &Unknowns,
-        how: How<'_>,
-        reduction: f64,
-    ) -> Result<Self, AnalysisError> {
-        let How { noise, acquisition, .. } = how;
-        let mut spectra = OpenSpectra::read(records, how, reduction)?;
-        let dt = records[0].held.force.sampling().dt();
-        let joint = joined(&spectra.data)?;
-        let fit = output_error_pooling(&joint, unknowns, noise.response)
-            .map_err(|error| with_delay(error, &spectra.data, dt, unknowns, noise.response))?;
-        let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
-        spectra.data = data;
-        spectra.without_sinusoids(&fit);
-        let OpenSpectra { data: with_pulses, lines, force_noise } = spectra;
-        let data = fit.without_pulse_errors(&with_pulses)?;
-        let (closed, alone) = without_transients(&fit, &data)?;
-        let checks = after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
-        Ok(Self { fit, lines, force_noise, with_pulses, data, closed, alone, checks })
-    }
-
-    /// Fits the records. If the residuals show that the noise of the forces is less than estimated
-    /// above the driven band, the level is reduced to that of the residuals and, if this is still
-    /// too much, to zero: the force then has a signal above the band.
-    fn with_likely_force_noise(
-        records: &[Windowed],
-        unknowns: &Unknowns,
-        how: How<'_>,
-    ) -> Result<Self, AnalysisError> {
-        let first = Self::new(records, unknowns, how, 1.0)?;
-        let is_estimated =
-            how.noise.force.is_none() && matches!(how.excitation, Excitation::Lasting);
-        let Some(ratio) = first.less_force_noise().filter(|_| is_estimated) else {
-            return Ok(first);
-        };
-        let reduced = Self::new(records, unknowns, how, ratio.sqrt());
-        match reduced {
-            Ok(reduced) if reduced.less_force_noise().is_none() => Ok(reduced),
-            _ => Self::new(records, unknowns, how, 0.0).or(Ok(first)),
-        }
-    }
-
-    /// Returns the ratio of residual power to noise power where the noise of the forces dominates;
-    /// `None` if it is not significantly below 1.
-    fn less_force_noise(&self) -> Option<f64> {
-        let findings = self.checks.records.iter().flat_map(SpectralResidual::findings);
-        let ratios = findings.filter_map(|finding| match &finding {
-            Finding::Misfit(Misfit { ratio, source: NoiseSource::Force, .. }) => {
-                (finding.verdict() > Verdict::Good && *ratio < 1.0).then_some(*ratio)
-            }
-            _ => None,
-        });
-        ratios.min_by(f64::total_cmp)
-    }
-}
-
 /// Fits all lines of the excited band by maximum likelihood, together with the transient of every
 /// record.
 pub(super) fn fit(
@@ -225,10 +178,20 @@ pub(super) fn fit(
     how: How<'_>,
 ) -> Result<OpenFit, AnalysisError> {
     let How { noise, acquisition, excitation, .. } = how;
+    let mut spectra = OpenSpectra::read(records, how)?;
     let dt = records[0].held.force.sampling().dt();
-    let LinesFit { fit, lines, force_noise, with_pulses, data, closed, alone, checks } =
-        LinesFit::with_likely_force_noise(records, unknowns, how)?;
-    let AfterSpectralFit { records: residuals, bias } = checks;
+    let joint = joined(&spectra.data)?;
+    let fit = output_error_pooling(&joint, unknowns, noise.response)
+        .map_err(|error| with_delay(error, &spectra.data, dt, unknowns, noise.response))?;
+    let fit = spectra.with_likely_force_noise(fit, unknowns, noise)?;
+    let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
+    spectra.data = data;
+    spectra.without_sinusoids(&fit);
+    let OpenSpectra { data: with_pulses, lines, force_noise } = spectra;
+    let data = fit.without_pulse_errors(&with_pulses)?;
+    let (closed, alone) = without_transients(&fit, &data)?;
+    let AfterSpectralFit { records: residuals, bias } =
+        after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let tested =
         Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
     let (better_explanation, compared) = time_limit::join(

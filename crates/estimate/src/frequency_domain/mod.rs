@@ -47,6 +47,7 @@
 mod changed_records;
 mod delayed_force;
 mod equation_error;
+mod force_noise;
 mod force_responses;
 mod initial_estimates;
 mod instrumental;
@@ -71,6 +72,7 @@ mod whitened;
 pub use changed_records::ChangedRecords;
 pub use delayed_force::DelayedForce;
 pub use equation_error::{equation_error, equation_rows};
+pub use force_noise::force_noise_factor;
 pub use instrumental::instrumental_variables;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use multi_start::thin_step;

@@ -31,9 +31,9 @@ use crate::{EstimateError, Unknowns};
 
 /// A fit and the noise of its weights.
 #[derive(Clone)]
-struct Weighted {
-    fit: GlobalMinimum,
-    noise: NoiseSpectrum,
+pub(super) struct Weighted {
+    pub(super) fit: GlobalMinimum,
+    pub(super) noise: NoiseSpectrum,
 }
 
 /// Estimates the parameters and, in alternation, the noise of each channel of the motion: white
@@ -419,7 +419,11 @@ fn spectrum_of_residual(
 
 /// Returns the leverage of each row and channel, rows × n: the fraction of the noise that the
 /// parameters fit. `None` for large fits, where the leverage is small.
-fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option<DMatrix<f64>> {
+pub(super) fn leverage(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    fit: &Weighted,
+) -> Option<DMatrix<f64>> {
     let (n, rows) = (data.dof(), data.len());
     if 2 * n * rows * unknowns.free().len() > MAX_LEVERAGES {
         return None;

@@ -43,6 +43,13 @@ impl FrequencyData {
         })
     }
 
+    /// Returns the same data with the variance of the noise of all forces, as set by
+    /// [`FrequencyData::with_force_noise`], times a factor.
+    #[must_use]
+    pub fn with_reduced_force_noise(&self, factor: f64) -> Self {
+        Self { force_variance: &self.force_variance * factor, ..self.clone() }
+    }
+
     /// Returns the same data with other forces (N), rows × n.
     #[must_use]
     pub fn with_force(&self, force: DMatrix<Complex<f64>>) -> Self {

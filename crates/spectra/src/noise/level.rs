@@ -77,9 +77,12 @@ impl ResponseNoise {
         self.white + self.relative * response
     }
 
-    /// Returns minus the log-likelihood, up to a constant; infinite if the likelihood does not
-    /// exist.
-    fn cost(&self, residuals: &[(f64, f64)]) -> f64 {
+    /// Returns minus the log-likelihood of residuals, up to a constant; infinite if the likelihood
+    /// does not exist. There is one pair for each line, as for [`ResponseNoise::choose`].
+    ///
+    /// # Source
+    /// As [`ResponseNoise::choose`].
+    pub fn cost(&self, residuals: &[(f64, f64)]) -> f64 {
         let term = |(power, response): &(f64, f64)| {
             let variance = self.variance(*response);
             variance.ln() + power / variance
