@@ -349,7 +349,7 @@ fn delay_of_samples(
         residual_power(&fit(&shifted, force.window(margin, len).ok()?).ok()?, &driven)
     };
     let longest = longest(power(0, MAX_DELAY)?, &driven);
-    // If the record is too short for a long delay, the search is limited to a shorter delay.
+    // The search is limited to a shorter delay if the record is too short for a long one.
     let longest = if power(0, longest).is_some() { longest } else { MAX_DELAY };
     let undelayed = power(0, longest)?;
     let delay = best_step(undelayed, longest, |samples| power(samples, longest));

@@ -147,8 +147,8 @@ impl ModeParameters {
     pub(crate) fn modal_mass(&self, point: DrivingPoint, derivative: i32) -> Option<Uncertain> {
         let (mass, gradient) = self.complex_mass(point, derivative);
         let variance = gradient.dot(&(&self.covariance * &gradient));
-        // If the mode has no motion or no force at the point, the data do not determine its modal
-        // mass.
+        // The data do not determine the modal mass of a mode that has no motion or no force at the
+        // point.
         let size = mass.norm();
         (size.is_finite() && variance.is_finite()).then(|| Uncertain {
             value: size.copysign(mass.re),

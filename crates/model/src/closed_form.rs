@@ -132,8 +132,8 @@ impl Sdof {
     /// Returns x and ẋ at `t` of the free response from the displacement `x0` and the velocity
     /// `v0`.
     pub(crate) fn free_motion(&self, t: f64, x0: f64, v0: f64) -> (f64, f64) {
-        // If the poles are real, the first pole is the faster pole. This order avoids cancellation
-        // in the two sums below.
+        // The first of two real poles is the faster pole. This order avoids cancellation in the two
+        // sums below.
         let [fast, slow] = self.poles();
         let h = t * phi_divided(0, fast * t, slow * t);
         let h_dot = (fast * t).exp() + slow * h;

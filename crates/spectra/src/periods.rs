@@ -139,7 +139,7 @@ impl RepeatedPeriods {
     pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), SpectraError> {
         force.check_same_sampling(motion)?;
         let period = self.lines.sampling().len();
-        // If the record is shorter than a period, `window` returns an error.
+        // The function `window` returns an error if the record is shorter than a period.
         check_sampling(self.lines.sampling(), force.window(0, period)?.sampling())?;
         let dof = self.dof.max(1);
         for (what, got) in [

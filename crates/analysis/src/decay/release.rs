@@ -40,7 +40,7 @@ pub(super) fn release(record: &Record) -> usize {
     if trend(&energies) < 0.0 && falls_throughout(&energies) {
         return first;
     }
-    // If an amplitude grows exponentially, its logarithm rises linearly.
+    // The logarithm of an amplitude that grows exponentially rises linearly.
     let logarithms: Vec<f64> = crests(&sums[..=last]).iter().map(|crest| crest.ln()).collect();
     let rises = (sums.len() - last) * PARTS < sums.len() && trend(&logarithms) > 0.0;
     if rises { 0 } else { last }

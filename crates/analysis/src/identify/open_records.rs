@@ -147,7 +147,7 @@ impl OpenSpectra {
             let Some(factor) = force_noise_factor(&joint, unknowns, &fit) else { break };
             let reduced: Vec<FrequencyData> =
                 self.data.iter().map(|data| data.with_reduced_force_noise(factor)).collect();
-            // If the search fails, the noise of the last fit remains.
+            // The noise of the last fit remains if the search fails.
             let Ok(next) = output_error_from(&joined(&reduced)?, unknowns, &fit, noise.response)
             else {
                 break;

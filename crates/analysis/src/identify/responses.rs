@@ -84,8 +84,8 @@ pub fn fit(
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
-    // If a parameter is undetermined, the fit ends here with an error that names this parameter.
-    // Without this check, a later step would fail with a less useful error.
+    // The fit ends here with an error that names the parameter if one is undetermined. Without
+    // this check, a later step would fail with a less useful error.
     estimate.system()?;
     let periodic = segments.are_periods();
     let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));

@@ -84,8 +84,8 @@ pub(super) fn fit(
         noise_through,
         remark,
     } = estimated(&spectra, &data, unknowns, estimator)?;
-    // If a parameter is undetermined, the fit ends here with an error that names this parameter.
-    // Without this check, a later step would fail with a less useful error.
+    // The fit ends here with an error that names the parameter if one is undetermined. Without
+    // this check, a later step would fail with a less useful error.
     estimate.system()?;
     let RecordFindings { before, after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;

@@ -38,9 +38,13 @@ pub fn force_noise_factor(
     let leverage = leverage(data, unknowns, &weighted);
     let channel_test = |channel: usize| {
         let pair = |row: usize| {
-            let own = fit.spectrum.covariance(row)[(channel, channel)].re;
-            let left = leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(NOISE_KEPT));
-            (errors[(row, channel)].norm_sqr() / (own * left), by_force[(row, channel)] / own)
+            let response_noise = fit.spectrum.covariance(row)[(channel, channel)].re;
+            let residual_share =
+                leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(NOISE_KEPT));
+            (
+                errors[(row, channel)].norm_sqr() / (response_noise * residual_share),
+                by_force[(row, channel)] / response_noise,
+            )
         };
         let pairs: Vec<(f64, f64)> = (0..data.len()).map(pair).collect();
         let stated =

@@ -367,8 +367,8 @@ fn reweighted(
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         match before.fit.clone().followed(&mut misfit) {
             Ok(fit) => last = Some(Weighted { fit, noise }),
-            // If this round fails, the result is the fit of the previous round, with the noise of
-            // that round.
+            // The result is the fit of the previous round, with the noise of that round, if this
+            // round fails.
             Err(_) => break,
         }
     }

@@ -128,7 +128,7 @@ impl FrequencyData {
     ) -> Self {
         let mut alone = self.clone();
         for (row, omega) in self.omega.iter().enumerate() {
-            // At an undamped resonance the receptance is infinite, so the displacement on this line
+            // The receptance is infinite at an undamped resonance, so the displacement on this line
             // is not changed.
             if let Ok(receptance) = system.receptance(*omega) {
                 let load = (closed.row(row) - self.force.row(row)).transpose();

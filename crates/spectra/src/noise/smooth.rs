@@ -167,8 +167,8 @@ pub(crate) fn choose_beside(
 fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let (lines, channels) = (omega.len(), variances.ncols() as f64);
     let per_term = (nu * lines as f64).max(2.0).ln();
-    // In the information criterion, the position of a bump counts as the logarithm of the number of
-    // bands that are tried.
+    // The position of a bump counts, in the information criterion, as the logarithm of the number
+    // of bands that are tried.
     let per_position = ((lines * widths(lines).count()).max(2) as f64).ln();
     let cost = |trial: &Trial| {
         2.0 * nu * trial.misfit

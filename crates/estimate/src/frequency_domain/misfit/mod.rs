@@ -92,7 +92,7 @@ impl<'a> Misfit<'a> {
         };
         let rows = vec![Line::new(data.dof()); data.len()];
         let layout = Layout::new(unknowns, data.transient().ncols());
-        // On a spectral line, only the transient of the record with this line is nonzero.
+        // Only the transient of the record with a spectral line is nonzero on this line.
         let is_used = |line: usize, at: usize| match layout.columns()[at].1.checked_sub(data.dof())
         {
             None => true,
