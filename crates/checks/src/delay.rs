@@ -10,6 +10,7 @@ use mechid_estimate::frequency_domain::{
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Response;
+use mechid_numerics::time_limit;
 use mechid_signal::{Extent, Record};
 use mechid_spectra::{FrequencyData, Pooling};
 use nalgebra::DMatrix;
@@ -141,10 +142,11 @@ pub fn delay_of_open_records(
 }
 
 /// Finds a delay of the responses of open records without which the maximum-likelihood search fails
-/// ([`Finding::Delay`]): with the delay the search succeeds, and its residual is uncorrelated with
-/// the forces. The finding states the remaining fraction of the residual power of the equations of
-/// motion. `dt` is the sampling interval in s. `None` if no delay of up to 16 samples (64 if the
-/// response hardly follows the force) satisfies this.
+/// ([`Finding::Delay`]): with the delay the search succeeds, its residual is uncorrelated with the
+/// forces, and it is significantly smaller than without the delay. The finding states the remaining
+/// fraction of the residual power of the equations of motion. `dt` is the sampling interval in s.
+/// `None` if no delay of up to 16 samples (64 if the response hardly follows the force) satisfies
+/// this.
 ///
 /// # Source
 /// As [`delay_of_open_records`].
@@ -168,12 +170,21 @@ pub fn delay_of_failed_search(
         let fit = output_error_pooling(&late(near), unknowns, noise).ok()?;
         let mut likelihood = ChangedRecords::from_fit(&late(near), unknowns, &fit)?;
         let cost = |samples: f64| likelihood.cost(&late(samples));
-        let (samples, _) = minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_, _| true)?;
+        let (samples, delayed) =
+            minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_, _| true)?;
+        // A search without the delay, from the estimate with the delay, may succeed.
+        let freedom = likelihood.spare().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
+        let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
+        let undelayed = likelihood.clone().cost(&data);
+        let is_significant = undelayed.is_none_or(|undelayed| {
+            distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE
+        });
         let late = |record: &FrequencyData| record.with_later_force(samples * dt);
         let delayed: Vec<FrequencyData> = records.iter().map(late).collect();
         let remaining = equations.residual_power(samples * dt)? / equations.residual_power(0.0)?;
+        let is_delayed = is_significant && remaining < 1.0 && !time_limit::is_over();
         let delay = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
-        is_uncorrelated(&residuals_of_fit(&delayed, &likelihood)?).then(delay)
+        (is_delayed && is_uncorrelated(&residuals_of_fit(&delayed, &likelihood)?)).then(delay)
     })
 }
 

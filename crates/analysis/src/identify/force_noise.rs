@@ -42,8 +42,8 @@ pub enum ForceNoiseSource {
     AboveBand,
     /// Samples between the hits of a hammer.
     BetweenHits,
-    /// Residual of the fit, which shows that the lines above the driven band contain more than
-    /// noise.
+    /// Residual of the fit, which shows that the noise in the band is less than the level on the
+    /// lines above the driven band.
     Residual,
 }
 
@@ -90,8 +90,10 @@ impl ForceNoise {
 
     /// Multiplies the levels by a factor that follows from the residual of a fit.
     pub(super) fn reduce(&mut self, factor: f64) {
-        self.levels_n.iter_mut().flatten().for_each(|level| *level *= factor);
-        self.source = ForceNoiseSource::Residual;
+        if self.levels_n.iter().flatten().any(|level| *level > 0.0) {
+            self.levels_n.iter_mut().flatten().for_each(|level| *level *= factor);
+            self.source = ForceNoiseSource::Residual;
+        }
     }
 
     /// Returns the standard deviation of the noise of a force, in N; 0 if it is not known.
@@ -146,7 +148,7 @@ impl ForceNoise {
             Some(ForceNoiseSource::Stated) => "as stated",
             Some(ForceNoiseSource::BetweenHits) => "estimated between the hits",
             Some(ForceNoiseSource::Residual) => {
-                "estimated from the residual; the force has a further signal above the excited band"
+                "estimated from the residual, which shows less than the level above the excited band"
             }
             Some(ForceNoiseSource::AboveBand) | None => "estimated above the excited band",
         };
@@ -156,7 +158,7 @@ impl ForceNoise {
             return match source {
                 Some(ForceNoiseSource::Stated) => "the force was assumed exact, as stated".into(),
                 Some(ForceNoiseSource::Residual) => {
-                    "the force was assumed exact: the residual of the fit shows that the force has a signal, not noise, above the excited band"
+                    "the force was assumed exact: the residual of the fit shows that its noise is less than the level above the excited band"
                         .into()
                 }
                 _ => "the force shows no noise and was assumed exact".into(),

@@ -338,13 +338,14 @@ fn spectral(
         return Ok(fitted);
     }
     let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
-    let fitted = spectra::fit(records, unknowns, lines.rule(), estimator)?;
-    // The failed fit as open records may have shown a delay. If the fit of whole periods does not
-    // report a delay, the failure is returned.
-    let names_delay = |finding: &Finding| finding.subject() == Subject::Delay;
+    let fitted = spectra::fit(records, unknowns, lines.rule(), estimator);
+    // The failed fit as open records may have shown a delay. The failure is returned if the fit of
+    // whole periods does not report a delay.
+    let is_delay = |finding: &Finding| finding.subject() == Subject::Delay;
+    let names_delay = |fitted: &Fitted| fitted.after.iter().flatten().any(is_delay);
     match delayed {
-        Some(error) if !fitted.after.iter().flatten().any(names_delay) => Err(error),
-        _ => Ok(fitted),
+        Some(error) if !fitted.as_ref().is_ok_and(names_delay) => Err(error),
+        _ => fitted,
     }
 }
 

@@ -152,6 +152,10 @@ impl OpenSpectra {
             else {
                 break;
             };
+            // The noise of a fit that the time limit ended may be incomplete.
+            if time_limit::is_over() {
+                break;
+            }
             (fit, self.data) = (next, reduced);
             self.force_noise.iter_mut().for_each(|noise| noise.reduce(factor.sqrt()));
         }

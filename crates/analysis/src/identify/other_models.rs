@@ -50,9 +50,9 @@ pub(super) fn better_model_of(
     better_model_on(tables, how, data, result)
 }
 
-/// Returns the failure of a search with the model that explains the responses far better than least
-/// squares as a reason, if there is such a model; it is fitted to fewer lines if the tables have
-/// many.
+/// Returns the failure of a search. If the responses of another quantity, or of levels in dB, are
+/// explained far better than those of the tables by least squares, this is added as a reason. The
+/// models are fitted to fewer lines if the tables have many.
 pub(super) fn with_better_model(
     failure: AnalysisError,
     tables: &[FrequencyResponses],
@@ -71,11 +71,15 @@ pub(super) fn with_better_model(
     };
     let plain = equation_error(data, unknowns).ok();
     match plain.and_then(|plain| other_model(tables, how, data, &plain)) {
-        Some(Other { cause, remaining, .. }) => {
+        Some(Other {
+            cause: cause @ (Cause::Quantity { .. } | Cause::Decibels),
+            remaining,
+            ..
+        }) => {
             let finding = Finding::Alternative(Alternative { cause, remaining });
             AnalysisError::Unfit { error, reasons: finding.to_string() }
         }
-        None => error.into(),
+        _ => error.into(),
     }
 }
 

@@ -37,7 +37,8 @@ use crate::{AnalysisError, time_limit};
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoResponse`] if a response is missing,
 /// [`AnalysisError::Setting`] for settings that are missing or that contradict the table,
 /// [`AnalysisError::Memory`] if the fit needs more memory than the files may use,
-/// [`AnalysisError::EmptyBand`], and [`AnalysisError::Estimate`] if the fit fails.
+/// [`AnalysisError::EmptyBand`], and [`AnalysisError::Estimate`] or [`AnalysisError::Unfit`] if the
+/// fit fails.
 ///
 /// # Source
 /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance from the coherence).
@@ -51,11 +52,12 @@ pub fn identify_responses(
     let mut measured: Vec<Tabulated> = measured.collect::<Result<_, _>>()?;
     let mut data = joined(&measured)?;
     let driven: Vec<usize> = measured.iter().flat_map(|m| m.driven.iter().copied()).collect();
-    let fit =
-        |unknowns: &Unknowns| TableFit::new(&data, unknowns, &measured, added_decay, how.method);
+    let fit = |unknowns: &Unknowns| {
+        TableFit::new(&data, unknowns, &measured, added_decay, how.method)
+            .map_err(|failure| with_better_model(failure, tables, how, &data, unknowns))
+    };
     let unknowns = how.structure.apply(how.mass.unknowns(data.dof())?)?;
-    let (fit, unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)
-        .map_err(|failure| with_better_model(failure, tables, how, &data, &unknowns))?;
+    let (fit, unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
     if let Some(of_segments) = &fit.averaged {
         let mut responses = of_segments.responses.iter().cloned();
         measured.iter_mut().try_for_each(|one| one.replace(&mut responses))?;

@@ -49,7 +49,7 @@ pub fn force_noise_factor(
         let pairs: Vec<(f64, f64)> = (0..data.len()).map(pair).collect();
         let stated =
             ResponseNoise { white: motion_level(pairs.iter().copied()).powi(2), relative: 1.0 };
-        let likely = ResponseNoise::choose(&pairs);
+        let likely = ResponseNoise::most_likely(&pairs);
         let deviance = 2.0 * (stated.cost(&pairs) - likely.cost(&pairs));
         (likely.relative < 1.0 && deviance > 0.0).then_some((deviance, likely.relative))
     };

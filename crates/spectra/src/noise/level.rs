@@ -53,6 +53,21 @@ impl ResponseNoise {
     /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring);
     /// Schwarz (1978), Annals of Statistics 6, 461–464.
     pub fn choose(residuals: &[(f64, f64)]) -> Self {
+        Self::with_penalty(residuals, 0.5 * (residuals.len().max(1) as f64).ln())
+    }
+
+    /// Returns the most likely noise of residuals, from the pairs of [`ResponseNoise::choose`], one
+    /// for each line, without a penalty for the second unknown.
+    ///
+    /// # Source
+    /// As [`ResponseNoise::choose`].
+    pub fn most_likely(residuals: &[(f64, f64)]) -> Self {
+        Self::with_penalty(residuals, 0.0)
+    }
+
+    /// Returns the most likely noise; the logarithm of the likelihood of the sum of both parts is
+    /// reduced by a penalty.
+    fn with_penalty(residuals: &[(f64, f64)], penalty: f64) -> Self {
         let count = residuals.len().max(1) as f64;
         let white = residuals.iter().map(|(power, _)| power).sum::<f64>() / count;
         let white = Self { white: white.max(f64::MIN_POSITIVE), relative: 0.0 };
@@ -65,7 +80,6 @@ impl ResponseNoise {
             white
         };
         let both = Self { white: 0.5 * white.white, relative: 0.5 * white.white / largest };
-        let penalty = 0.5 * count.ln();
         match both.scored(residuals) {
             Some(both) if both.cost(residuals) + penalty < one.cost(residuals) => both,
             _ => one,
