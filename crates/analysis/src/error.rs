@@ -366,7 +366,7 @@ pub enum AnalysisError {
     Unfit {
         /// The failure.
         error: EstimateError,
-        /// Findings of the checks before the fit.
+        /// Findings of the checks, or of a fit with another model that succeeds.
         reasons: String,
     },
     /// The data determine neither a parameter nor a mode of the machine.

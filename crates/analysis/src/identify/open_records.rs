@@ -130,8 +130,8 @@ impl OpenSpectra {
     }
 
     /// Reduces the noise of the forces, if it was estimated above the driven band, as long as the
-    /// residual of the fit shows that it is less: the force then has a signal above the band. The
-    /// machine is fitted again after each reduction. Returns the last fit.
+    /// residual of the fit shows that it is less, for example because the force has a signal above
+    /// the band. The machine is fitted again after each reduction. Returns the last fit.
     fn with_likely_force_noise(
         &mut self,
         mut fit: OutputErrorFit,
