@@ -8,6 +8,7 @@ mod derivatives;
 mod equation_error;
 mod equation_of_motion;
 mod extremes;
+mod force_noise;
 mod frequency_invariance;
 mod frf;
 mod line_correlation;

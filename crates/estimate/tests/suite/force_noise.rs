@@ -1,0 +1,62 @@
+//! Level of the force noise from the residual; the reference is the generator.
+
+use std::f64::consts::TAU;
+
+use mechid_estimate::Unknowns;
+use mechid_estimate::frequency_domain::{force_noise_factor, output_error_pooling};
+use mechid_model::{ResponseQuantity, Sdof};
+use mechid_signal::{Sampling, noise};
+use mechid_spectra::{FrequencyData, Lines, Pooling};
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+const SAMPLES: usize = 4096;
+/// Stated standard deviation of the noise of a force of 1 N (RMS), in N.
+const STATED: f64 = 0.03;
+
+/// Returns the factor for one period of a random force that drives an oscillator at line 400 with a
+/// damping ratio of 0.02. The variance of the force noise is `ratio` times the stated one; the noise
+/// of the response is white.
+fn factor(ratio: f64, seed: u64) -> Option<f64> {
+    let sampling = Sampling::new(1.0 / SAMPLES as f64, SAMPLES).unwrap();
+    let natural = TAU * 400.0;
+    let system = Sdof::new(1.0, 0.04 * natural, natural * natural).unwrap().system();
+    let lines = Lines::new(sampling, 1..=1200).unwrap();
+    let read = |level: f64, seed: u64| {
+        lines.read(&noise::white(sampling, 1, level, seed).unwrap()).unwrap()
+    };
+    let force = read(1.0, 3 * seed);
+    let pairs = lines.omega().into_iter().zip(force.iter());
+    let response: Vec<Complex<f64>> =
+        pairs.map(|(omega, f)| system.receptance(omega).unwrap()[(0, 0)] * f).collect();
+    let measured = &force + read(STATED * ratio.sqrt(), 3 * seed + 1);
+    let response =
+        DMatrix::from_vec(1200, 1, response) + read(0.02 / (natural * natural), 3 * seed + 2);
+    let data = FrequencyData::from_amplitudes(
+        lines.omega(),
+        measured,
+        response,
+        ResponseQuantity::Displacement,
+    );
+    let data = data.unwrap().with_force_noise(&[STATED], SAMPLES).unwrap();
+    let unknowns = Unknowns::unknown_mass(1).unwrap();
+    let fit = output_error_pooling(&data, &unknowns, Pooling::AllLines).unwrap();
+    force_noise_factor(&data, &unknowns, &fit)
+}
+
+/// The test has a level of 1 %: the probability that more than 3 of 60 factors of the right level
+/// are below 1 is 0.003. For less noise, the mean of the factors is its ratio to the stated one.
+#[test]
+fn the_factor_is_the_ratio_of_the_variances() {
+    let all = |ratio: f64| -> Vec<Option<f64>> {
+        (0..60).into_par_iter().map(|seed| factor(ratio, seed)).collect()
+    };
+    let reduced = all(1.0).iter().flatten().count();
+    assert!(reduced <= 3, "{reduced} of 60");
+    for ratio in [0.3, 0.1, 0.0] {
+        let factors: Vec<f64> = all(ratio).into_iter().flatten().collect();
+        let mean = factors.iter().sum::<f64>() / factors.len() as f64;
+        assert!(factors.len() >= 57, "{ratio}: {} of 60", factors.len());
+        assert!((mean - ratio).abs() < 0.05, "{ratio}: {mean}");
+    }
+}
