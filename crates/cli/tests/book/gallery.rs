@@ -11,8 +11,8 @@ use super::session::Session;
 /// Largest figure of a page of the gallery, in bytes.
 const LARGEST_FIGURE: u64 = 100_000;
 
-/// Returns the folder of a page's record, which has the page's name; `None` for pages without a
-/// record.
+/// Returns the folder with the record of a page; the folder has the same name as the page. Returns
+/// `None` for pages without a record.
 fn record_of(page: &Path) -> Option<PathBuf> {
     let folder = page.parent()?;
     let name = page.file_stem()?;

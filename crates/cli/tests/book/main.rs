@@ -2,9 +2,9 @@
 //! link has a target.
 //!
 //! The commands in a page's `console` blocks are run in order; a chapter and the pages below it in
-//! the book's summary share one folder. `MECHID_BLESS=1 cargo test -p mechid-cli --test book`
-//! writes the answers and pictures anew. Pages of the gallery are tested only if their records are
-//! present.
+//! the book's summary share one folder. The summary's groups without a page share none.
+//! `MECHID_BLESS=1 cargo test -p mechid-cli --test book` writes the answers and pictures anew.
+//! Pages of the gallery are tested only if their records are present.
 
 mod commands;
 mod gallery;
@@ -46,12 +46,20 @@ fn whole(path: &Path) -> String {
 }
 
 /// Returns the pages of the book in groups that share a folder: a chapter with the pages below it.
+/// An entry of the summary without a page is only a heading; the pages directly below it are
+/// separate chapters.
 fn chapters() -> Vec<Vec<PathBuf>> {
     let source = root().join("docs/book/src");
     let mut chapters: Vec<Vec<PathBuf>> = Vec::new();
+    let mut chapter_depth = 1;
     for (depth, target) in Page::parse(&read(&source.join("SUMMARY.md"))).links {
+        if target.is_empty() {
+            chapter_depth = depth + 1;
+            continue;
+        }
+        chapter_depth = chapter_depth.min(depth.max(1));
         match chapters.last_mut() {
-            Some(chapter) if depth > 1 => chapter.push(source.join(target)),
+            Some(chapter) if depth > chapter_depth => chapter.push(source.join(target)),
             _ => chapters.push(vec![source.join(target)]),
         }
     }
@@ -390,8 +398,8 @@ fn the_reference_has_every_subcommand() {
     assert!(commands > 8, "{list}");
 }
 
-/// The page on the reproduction of the dissertation has the same sentence with counts as the
-/// generated audit.
+/// The page on the reproduction of the dissertation and the generated audit contain the same
+/// sentence with counts.
 #[test]
 fn the_book_counts_as_the_audit_does() {
     let audit = read(&root().join("docs/thesis/audit.md"));

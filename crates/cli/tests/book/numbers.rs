@@ -37,8 +37,8 @@ pub fn written(text: &str) -> Vec<Written> {
         .collect()
 }
 
-/// Returns every number in a block without its sign; for a number with a power of ten, also the
-/// number without this power.
+/// Returns every number in a block, without its sign. A number with a power of ten is also returned
+/// without this power.
 pub fn all(block: &str) -> Vec<f64> {
     let part = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-');
     let mut found = Vec::new();

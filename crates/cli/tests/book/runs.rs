@@ -57,8 +57,8 @@ impl Run {
 }
 
 impl Programs {
-    /// Builds the programs of these runs, which `cargo test --workspace` has already done in most
-    /// cases.
+    /// Builds the programs of these runs. In most cases `cargo test --workspace` has already built
+    /// them.
     pub fn of(root: &Path, runs: &BTreeSet<Run>) -> Self {
         let mut build = Command::new(env!("CARGO"));
         build.current_dir(root).args(["build", "--workspace", "--locked", "--offline"]);
