@@ -16,23 +16,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ._doors import bearing as bearing
-    from ._doors import bearing_campaign as bearing_campaign
-    from ._doors import compare_modes as compare_modes
-    from ._doors import decay as decay
-    from ._doors import frf as frf
-    from ._doors import identify as identify
-    from ._doors import identify_elements as identify_elements
-    from ._doors import identify_responses as identify_responses
-    from ._doors import inspect as inspect
-    from ._doors import integrate as integrate
-    from ._doors import modes as modes
-    from ._doors import multisine as multisine
-    from ._doors import predict as predict
-    from ._doors import reconstruct as reconstruct
-    from ._doors import selected_modes as selected_modes
-    from ._doors import simulate as simulate
-    from ._doors import sweep as sweep
+    from ._analyses import bearing as bearing
+    from ._analyses import bearing_campaign as bearing_campaign
+    from ._analyses import compare_modes as compare_modes
+    from ._analyses import decay as decay
+    from ._analyses import frf as frf
+    from ._analyses import identify as identify
+    from ._analyses import identify_elements as identify_elements
+    from ._analyses import identify_responses as identify_responses
+    from ._analyses import inspect as inspect
+    from ._analyses import integrate as integrate
+    from ._analyses import modes as modes
+    from ._analyses import multisine as multisine
+    from ._analyses import predict as predict
+    from ._analyses import reconstruct as reconstruct
+    from ._analyses import selected_modes as selected_modes
+    from ._analyses import simulate as simulate
+    from ._analyses import sweep as sweep
     from ._errors import MechidError as MechidError
     from ._mechid import __version__ as __version__
     from ._records import Measurement as Measurement
@@ -63,23 +63,23 @@ if TYPE_CHECKING:
 
 # Module of each name; it is imported when the name is used, so that the program starts without NumPy.
 _HOMES = {
-    "bearing": "_doors",
-    "bearing_campaign": "_doors",
-    "compare_modes": "_doors",
-    "decay": "_doors",
-    "frf": "_doors",
-    "identify": "_doors",
-    "identify_elements": "_doors",
-    "identify_responses": "_doors",
-    "inspect": "_doors",
-    "integrate": "_doors",
-    "modes": "_doors",
-    "multisine": "_doors",
-    "predict": "_doors",
-    "reconstruct": "_doors",
-    "selected_modes": "_doors",
-    "simulate": "_doors",
-    "sweep": "_doors",
+    "bearing": "_analyses",
+    "bearing_campaign": "_analyses",
+    "compare_modes": "_analyses",
+    "decay": "_analyses",
+    "frf": "_analyses",
+    "identify": "_analyses",
+    "identify_elements": "_analyses",
+    "identify_responses": "_analyses",
+    "inspect": "_analyses",
+    "integrate": "_analyses",
+    "modes": "_analyses",
+    "multisine": "_analyses",
+    "predict": "_analyses",
+    "reconstruct": "_analyses",
+    "selected_modes": "_analyses",
+    "simulate": "_analyses",
+    "sweep": "_analyses",
     "MechidError": "_errors",
     "__version__": "_mechid",
     "Measurement": "_records",

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mechid
-from mechid._doors import Scheme
+from mechid._analyses import Scheme
 
 FILE, EXPERIMENT = "examples/machine.csv", "examples/machine.json"
 COLUMNS = {"force": "force", "displacement": "displacement"}

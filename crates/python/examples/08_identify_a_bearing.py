@@ -1,8 +1,11 @@
-"""A rotor in its bearing: eight coefficients, and the modes that follow from them.
+"""Identifies the eight coefficients of a bearing and the modes of its rotor.
 
 The film couples two directions, and its matrices are not symmetric. The test excites both
 directions with multisines on different lines, so that one experiment determines all entries of C
 and K; the mass is known from a balance.
+
+Prints the result with its checks, each coefficient with its distance from the truth in standard
+errors, and the natural frequency and the damping ratio of each mode.
 """
 
 # %% The rig, in the form that `mechid simulate` reads, too.

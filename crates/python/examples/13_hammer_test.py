@@ -1,5 +1,8 @@
-"""A hammer test: averaged frequency responses of five hits, the machine, and one hit
-reconstructed."""
+"""Identifies a machine from a hammer test, and reconstructs a hit.
+
+Prints the averaged frequency response of five hits, the machine that fits it with the warnings of
+the checks, the reconstructed force of a sixth hit, and its true and reconstructed peak.
+"""
 
 # %% Five hits on one mass; every record begins a little before the hit and ends at rest.
 import numpy as np

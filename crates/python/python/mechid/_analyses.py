@@ -206,7 +206,7 @@ def identify(
         ``settings`` of another result, instead of the options above; the keys are those options.
     time_limit : float, optional
         Time in s after which all searches end at their best points so far; the result then says
-        that it is not final. Default: no limit.
+        that it is not final. Default: a limit of the work that grows with the size of the data.
     threads : int, optional
         Number of threads. Default: one per processor.
     **record
@@ -311,7 +311,7 @@ def identify_elements(
         Confidence level of the intervals, between 0 and 1.
     time_limit : float, optional
         Time in s after which all searches end at their best points so far; the result then says
-        that it is not final. Default: no limit.
+        that it is not final. Default: a limit of the work that grows with the size of the data.
     threads : int, optional
         Number of threads. Default: one per processor.
     **record
@@ -416,7 +416,7 @@ def identify_responses(
         Estimator. Default: maximum likelihood.
     time_limit : float, optional
         Time in s after which all searches end at their best points so far; the result then says
-        that it is not final. Default: no limit.
+        that it is not final. Default: a limit of the work that grows with the size of the data.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -514,7 +514,7 @@ def bearing(
         ``settings`` of another result, instead of the options above.
     time_limit : float, optional
         Time in s after which all searches end at their best points so far; the result then says
-        that it is not final. Default: no limit.
+        that it is not final. Default: a limit of the work that grows with the size of the data.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -700,7 +700,7 @@ def decay(
         ``settings`` of another result, instead of the options above.
     time_limit : float, optional
         Time in s after which all searches end at their best points so far; the result then says
-        that it is not final. Default: no limit.
+        that it is not final. Default: a limit of the work that grows with the size of the data.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -797,7 +797,7 @@ def modes(
         ``settings`` of another result, instead of the options above.
     time_limit : float, optional
         Time in s after which all searches end at their best points so far; the result then says
-        that it is not final. Default: no limit.
+        that it is not final. Default: a limit of the work that grows with the size of the data.
     threads : int, optional
         Number of threads. Default: one per processor.
 
@@ -956,7 +956,7 @@ def reconstruct(
         ``settings`` of another result, instead of the options above.
     time_limit : float, optional
         Time in s after which all searches end at their best points so far; the result then says
-        that it is not final. Default: no limit.
+        that it is not final. Default: a limit of the work that grows with the size of the data.
     threads : int, optional
         Number of threads. Default: one per processor.
 
