@@ -200,6 +200,10 @@ pub(crate) const PARTS: usize = 4;
 /// information of all data; with less information the part does not determine the combination.
 pub(crate) const PART_INFORMS: f64 = 1e-9;
 
+/// Number of omitted terms that are tested at once: enough for products at the speed of the
+/// processor, few enough for their memory.
+pub(crate) const TERMS_AT_ONCE: usize = 8;
+
 /// Largest distance, in lines, between lines whose errors are correlated by Hann's window, the
 /// usual window of analysers.
 pub(crate) const CORRELATED_DISTANCES: usize = 2;

@@ -9,7 +9,7 @@ use super::comparison::pseudo_inverse;
 use super::terms::{LikelyMotion, OmittedTerm, SampledRows};
 use crate::frequency_domain::force_responses::remove;
 use crate::frequency_responses::covariance_of_errors;
-use crate::limits::PART_INFORMS;
+use crate::limits::{PART_INFORMS, TERMS_AT_ONCE};
 
 /// Terms that a model leaves out: the most likely one, and the effect of all these terms together
 /// on the parameters.
@@ -65,10 +65,12 @@ impl PartsOfFit<'_> {
     pub fn omitted(&self, records: &[SampledRows]) -> Option<OmittedTerms> {
         let motion = LikelyMotion::new(self, records)?;
         let terms = motion.terms();
-        let explained: Vec<Explained> = terms
-            .par_iter()
-            .filter_map(|term| self.explained(*term, motion.columns(*term)?))
-            .collect();
+        let of_chunk = |terms: &[OmittedTerm]| {
+            let columns = terms.iter().filter_map(|term| Some((*term, motion.columns(*term)?)));
+            self.explained(columns.collect())
+        };
+        let explained: Vec<Explained> =
+            terms.par_chunks(TERMS_AT_ONCE).flat_map_iter(of_chunk).collect();
         let best = explained.iter().min_by(|a, b| a.evidence(self).total_cmp(&b.evidence(self)))?;
         let least = explained.iter().map(|one| one.p_value).fold(1.0, f64::min);
         let weight = |one: &Explained| (best.evidence(self) - one.evidence(self)).exp();
@@ -91,26 +93,52 @@ impl PartsOfFit<'_> {
         })
     }
 
-    /// Returns the test of a term, with the fraction of the residual power that the term explains.
-    /// `columns` are the weighted changes of the response by the term.
-    fn explained(&self, term: OmittedTerm, mut columns: DMatrix<f64>) -> Option<Explained> {
+    /// Returns the tests of terms, each with the weighted changes of the response by the term as
+    /// columns. One product with the transients and one with the sensitivities serve all terms,
+    /// because such a product is limited by the memory that it reads.
+    fn explained(&self, terms: Vec<(OmittedTerm, Vec<DVector<f64>>)>) -> Vec<Explained> {
+        let counts: Vec<_> = terms.iter().map(|(term, columns)| (*term, columns.len())).collect();
+        let all: Vec<_> = terms.into_iter().flat_map(|(_, columns)| columns).collect();
+        if all.is_empty() {
+            return Vec::new();
+        }
+        let mut columns = DMatrix::from_columns(&all);
+        drop(all);
         remove(&self.linear.transients, &mut columns);
+        let lengths: Vec<f64> = columns.column_iter().map(|c| c.norm_squared()).collect();
         let by_parameters = self.linear.effect_of(&columns);
-        let beyond = &columns - &self.linear.basis * &by_parameters;
-        let informing: Vec<usize> = (0..columns.ncols())
-            .filter(|at| {
-                beyond.column(*at).norm_squared()
-                    > PART_INFORMS * columns.column(*at).norm_squared()
-            })
-            .collect();
-        let (beyond, by_parameters) =
-            (beyond.select_columns(&informing), by_parameters.select_columns(&informing));
-        if informing.is_empty() {
+        let mut beyond = columns;
+        beyond.gemm(-1.0, &self.linear.basis, &by_parameters, 1.0);
+        let mut first = 0;
+        let of_term = |(term, count): (OmittedTerm, usize)| {
+            let own = first..first + count;
+            first = own.end;
+            let informing: Vec<usize> = own
+                .filter(|at| beyond.column(*at).norm_squared() > PART_INFORMS * lengths[*at])
+                .collect();
+            let [beyond, by_parameters] =
+                [&beyond, &by_parameters].map(|all| all.select_columns(&informing));
+            self.explained_by(term, &beyond, by_parameters)
+        };
+        counts.into_iter().filter_map(of_term).collect()
+    }
+
+    /// Returns the test of a term, with the fraction of the residual power that the term explains.
+    /// `beyond` are the weighted changes of the response by the term that neither the transients
+    /// nor the parameters explain; `by_parameters` has the coefficients of the changes that the
+    /// parameters explain. `None` without any column.
+    fn explained_by(
+        &self,
+        term: OmittedTerm,
+        beyond: &DMatrix<f64>,
+        by_parameters: DMatrix<f64>,
+    ) -> Option<Explained> {
+        if beyond.ncols() == 0 {
             return None;
         }
         let covariance = match self.responses {
-            Some(records) => covariance_of_errors(records, self.data.dof(), &beyond).0,
-            None => self.linear.covariance_of_products(&beyond),
+            Some(records) => covariance_of_errors(records, self.data.dof(), beyond).0,
+            None => self.linear.covariance_of_products(beyond),
         };
         let scores = beyond.tr_mul(&self.linear.residual);
         let (inverse, rank) = pseudo_inverse(&covariance)?;
@@ -122,7 +150,7 @@ impl PartsOfFit<'_> {
         let solve = if self.linear.is_without_pulses() {
             inverse
         } else {
-            pseudo_inverse(&beyond.tr_mul(&beyond))?.0
+            pseudo_inverse(&beyond.tr_mul(beyond))?.0
         };
         let to_parameters = -&self.linear.root * by_parameters * solve;
         let changes = &to_parameters * scores;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use mechid_model::{Parameter, SecondOrderSystem};
 use mechid_signal::{Record, Sampling, Spectrum};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::PartsOfFit;
 use crate::frequency_domain::whitened::{WeightedLines, Whitened};
@@ -161,9 +161,9 @@ impl<'a> LikelyMotion<'a> {
         known.map(|entry| OmittedTerm::KnownEntry { entry })
     }
 
-    /// Returns the weighted changes of the response by a term, each of unit length, one below the
-    /// other; `None` if the response does not change.
-    pub(super) fn columns(&self, term: OmittedTerm) -> Option<DMatrix<f64>> {
+    /// Returns the weighted changes of the response by a term, each of unit length; `None` if the
+    /// response does not change.
+    pub(super) fn columns(&self, term: OmittedTerm) -> Option<Vec<DVector<f64>>> {
         let changes = self.changes(term)?;
         let mut columns = Vec::new();
         for Change { force, displacement } in changes {
@@ -173,7 +173,7 @@ impl<'a> LikelyMotion<'a> {
                 columns.push(white / length);
             }
         }
-        (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
+        (!columns.is_empty()).then_some(columns)
     }
 
     fn changes(&self, term: OmittedTerm) -> Option<Vec<Change>> {
