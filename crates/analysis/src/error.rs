@@ -211,7 +211,7 @@ pub enum AnalysisError {
         /// The file.
         file: String,
     },
-    /// The modes in a JSON file are not modes of a result.
+    /// A JSON file that should contain saved modes is not a result with modes.
     #[error("{file} is not a result with modes: {why}")]
     SavedModes {
         /// The file.
@@ -531,7 +531,7 @@ pub enum AnalysisError {
         "a decimation takes every n-th sample of a record: n must be a whole number, got {value}"
     )]
     Decimation {
-        /// Number of samples asked for, a pure number.
+        /// Given value of n, a pure number: every n-th sample is to be taken.
         value: f64,
     },
     /// A period is not a whole number of decimated samples.
@@ -590,7 +590,7 @@ pub enum AnalysisError {
     Memory {
         /// The record.
         file: String,
-        /// Numbers that the computation stores.
+        /// Quantity of numbers that the computation stores at once.
         numbers: usize,
         /// Estimate of the required memory, in units of GB.
         needed_gb: f64,
@@ -621,7 +621,19 @@ pub enum AnalysisError {
         /// Failure with which the work ended after the time limit, in a sentence.
         failure: String,
     },
-    /// The process for a record of a fleet has ended.
+    /// The searches reached the limit of the work before there was a result.
+    #[error(
+        "the searches reached the limit of the work for a file of this size ({operations:.1e} operations) before \
+         there was a result ({failure}): a time (`time_limit`) replaces this limit"
+    )]
+    WorkLimit {
+        /// The limit, a number of operations (pure number).
+        operations: f64,
+        /// Failure with which the work ended at the limit, in a sentence.
+        failure: String,
+    },
+    /// The process that analysed a record of a fleet ended without a usable result, or could not be
+    /// started.
     #[error("the process that worked on the record has ended: {how}")]
     RecordProcess {
         /// Exit status of the process and its message, in words.
@@ -669,8 +681,8 @@ impl From<mechid_modal::indicators::IndicatorError> for AnalysisError {
 
 impl AnalysisError {
     /// Returns a stable identifier of the failure for programs, such as `io.missing-column` or
-    /// `analysis.window`. The first word is the crate of the innermost failure, the second its
-    /// variant.
+    /// `analysis.window`. The first word names a part of the library, and the second is the variant
+    /// of the innermost failure.
     ///
     /// ```
     /// use mechid_analysis::{AnalysisError, Machine};
@@ -705,8 +717,8 @@ impl AnalysisError {
     }
 }
 
-/// Returns the part of the library with which the code of a failure begins. A failure that moves to
-/// another crate keeps its code.
+/// Returns the first part of an error code, which names a part of the library. An error that has
+/// moved to another crate keeps its code.
 fn part_of_library<'a>(part: &'a str, name: &str) -> &'a str {
     match (part, name) {
         ("Numerics", "EntryNotFinite" | "ExponentialOverflow" | "NotConverged" | "NotSquare") => {
@@ -752,7 +764,7 @@ fn unclear_time(unclear: Option<&(String, String)>) -> String {
     })
 }
 
-/// Returns advice if a response is named as a force, otherwise an empty text.
+/// Returns advice if the column of a response was given as a force, otherwise an empty text.
 fn support_advice(measures: Quantity, wanted: Quantity) -> &'static str {
     if wanted == Quantity::Force && matches!(measures, Quantity::Response(_)) {
         return "; the motion of a support is an input of a machine of named elements (`machine`)";

@@ -1,4 +1,5 @@
-//! Limits on the memory of an analysis, and limits that decide about the modes of a test.
+//! Limits on the memory and the work of an analysis, and limits that decide about the modes of a
+//! test.
 //!
 //! An analysis is refused before it allocates memory if its numbers, times the bytes for each, need
 //! more than the memory allowed for a file of this size ([`mechid_io::Limits::memory`]). The
@@ -69,6 +70,11 @@ pub const MODAL_TABLE_BYTES: usize = 3200;
 /// Bytes of memory per pair of unknowns of a fit of modes: 40 and 51 modes of 40 and 60 points took
 /// 24 and 36 bytes.
 pub const MODAL_PAIR_BYTES: usize = 40;
+
+/// Number of operations of the searches of an analysis for each byte of memory that its files may
+/// use, without a time limit. For a file of 1 MB it is more than twice what nine degrees of freedom
+/// took with a right model, and half a minute on two processors with a wrong one.
+pub const OPERATIONS_PER_BYTE: f64 = 40.0;
 
 /// Maximum number of initial estimates of modes. The check of the memory first assumes this number
 /// of modes. It determines the actual number only if the assumed number needs too much memory.
@@ -226,9 +232,9 @@ pub const ACQUISITION_ROUNDS: usize = 8;
 pub const ACQUISITION_SETTLED: f64 = 0.02;
 
 /// Maximum number of effects of the noise of pulses (lines × patterns × outputs, real and imaginary
-/// parts) that the fit of a machine stores if hits without a gap are one record: 256 MiB. With more
-/// effects, every hit is a separate record with its own transient; this loses up to half of the
-/// information about light damping.
+/// parts) that the fit of a machine stores: 256 MiB. Up to this number, hits without a gap are
+/// joined into one record. With more effects, every hit is a separate record with its own
+/// transient; this loses up to half of the information about light damping.
 pub(crate) const PULSE_EFFECTS: usize = 1 << 25;
 
 /// Number of periods of the slowest mode, at each end of a record, that decide whether the record

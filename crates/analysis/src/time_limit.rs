@@ -1,20 +1,23 @@
-//! Time limit of an analysis.
+//! Limits of the time and of the work of an analysis.
 
 use std::fmt::Display;
 
-use mechid_checks::{Finding, TimeLimit};
-use mechid_numerics::time_limit;
+use mechid_checks::{Finding, TimeLimit, WorkLimit};
+use mechid_numerics::time_limit::{self, Ended};
 
 use crate::AnalysisError;
 use crate::identify::checks::{CheckRow, When};
+use crate::limits::OPERATIONS_PER_BYTE;
 use crate::measurement::Channels;
 use crate::modes::ModalCheck;
 
 /// Runs an analysis with a limit of its time, in s; `None`: without a limit.
 ///
-/// After the end of the limit, every search stops at its best point so far, and the analysis ends
-/// with the work that a result needs. The result has a bad check of the kind `time_limit`, or a
-/// remark if this kind of result has no checks.
+/// When the limit is reached, every search stops at its best point so far. The analysis then does
+/// only the work that is still necessary for a result. The result has a bad check of the kind
+/// `time_limit`, or a remark if this kind of result has no checks. Without this limit, an analysis
+/// has a limit of its work in proportion to the memory that its file may use
+/// ([`mechid_io::Limits::memory`]).
 ///
 /// ```
 /// use mechid_analysis::{AnalysisError, Channels, Identify, Measurement, ResponseQuantity};
@@ -45,38 +48,60 @@ pub fn within<T, E: From<AnalysisError> + Display>(
     time_limit::within(limit.transpose()?, || work().map_err(with_limit))
 }
 
-/// Returns the failure of an analysis. If the time limit has ended a search, the failure names the
-/// limit.
+/// Runs an analysis of files that may use `memory` bytes together, with a limit of its work in
+/// proportion to this memory ([`OPERATIONS_PER_BYTE`]); if the caller has a limit, that limit
+/// remains.
+pub(crate) fn bounded<T>(
+    memory: usize,
+    work: impl FnOnce() -> Result<T, AnalysisError>,
+) -> Result<T, AnalysisError> {
+    let limit = time_limit::TimeLimit::from_operations(OPERATIONS_PER_BYTE * memory as f64);
+    time_limit::within_default(limit, || work().map_err(with_limit))
+}
+
+/// Returns the failure of an analysis. If a limit has ended a search, the failure names the limit.
 fn with_limit<E: From<AnalysisError> + Display>(failure: E) -> E {
+    let reason = || failure.to_string();
     match time_limit::ended() {
-        Some(seconds) => AnalysisError::TimeLimit { seconds, failure: failure.to_string() }.into(),
+        Some(Ended::AfterSeconds(seconds)) => {
+            AnalysisError::TimeLimit { seconds, failure: reason() }.into()
+        }
+        Some(Ended::AfterOperations(operations)) => {
+            AnalysisError::WorkLimit { operations, failure: reason() }.into()
+        }
         None => failure,
     }
 }
 
-/// Returns the finding that the time limit has ended a search of this analysis.
+/// Returns the finding that a limit has ended a search of this analysis.
 fn finding() -> Option<Finding> {
-    time_limit::ended().map(|seconds| Finding::TimeLimit(TimeLimit { seconds }))
+    time_limit::ended().map(|ended| match ended {
+        Ended::AfterSeconds(seconds) => Finding::TimeLimit(TimeLimit { seconds }),
+        Ended::AfterOperations(operations) => Finding::WorkLimit(WorkLimit { operations }),
+    })
 }
 
-/// Returns the check that fails if the time limit has ended a search of this analysis; `None` if
+/// Returns the check that fails if a limit has ended a search of this analysis; `None` if
 /// all searches have run to their ends.
 pub(crate) fn check() -> Option<CheckRow> {
     finding().map(|finding| CheckRow::new(When::After, None, &finding, &Channels::default()))
 }
 
-/// Returns the failed check of a modal test if the time limit has ended a search; `None` if all
-/// searches have run to their ends.
+/// Returns the failed check of a modal test if a limit has ended a search; `None` if all searches
+/// have run to their ends.
 pub(crate) fn check_of_modes() -> Option<ModalCheck> {
     finding().map(|finding| ModalCheck {
-        code: "time_limit",
+        code: match finding {
+            Finding::WorkLimit(_) => "work_limit",
+            _ => "time_limit",
+        },
         passed: false,
         value: finding.value(),
         text: finding.to_string(),
     })
 }
 
-/// Returns a remark if the time limit has ended a search; `None` if all searches have run to their
+/// Returns a remark if a limit has ended a search; `None` if all searches have run to their
 /// ends.
 pub(crate) fn remark() -> Option<String> {
     finding().map(|finding| finding.to_string())

@@ -121,7 +121,7 @@ findings! {
     Bias in bias,
     /// A free response of the identified system grows.
     Instability in instability,
-    /// Difference of two mirrored entries of M, which are equal in the kinetic energy.
+    /// Difference of two mirrored entries of M; the mass matrix of a kinetic energy is symmetric.
     MassSymmetry in symmetry,
     /// Inertia of the fluid in a bearing whose reported coefficients do not include it.
     FluidInertia in fluid_inertia,
@@ -146,6 +146,8 @@ findings! {
     SearchAgreement in search,
     /// A search that the time limit has ended before it reached a minimum.
     TimeLimit in time_limit,
+    /// A search that the limit of the work has ended before it reached a minimum.
+    WorkLimit in work_limit,
     /// Residual of a fit that is attributed to unmeasured forces.
     UnmeasuredForce in unmeasured_force,
     /// The response does not follow the force.

@@ -77,6 +77,7 @@ mod unmeasured_force;
 mod unrelated;
 mod weighted_fit;
 mod whiteness;
+mod work_limit;
 
 use std::fmt;
 
@@ -147,6 +148,7 @@ pub use unmeasured_force::UnmeasuredForce;
 pub use unrelated::{Unrelated, unrelated_response};
 pub use weighted_fit::{AfterSpectralFit, after_spectral_fit};
 pub use whiteness::{NoiseSpan, Residual, Whiteness};
+pub use work_limit::WorkLimit;
 
 /// Maximum number of samples used by a check that takes much time or memory per sample.
 const MAX_SAMPLES: usize = 1 << 15;

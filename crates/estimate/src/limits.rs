@@ -17,6 +17,10 @@ pub(crate) const SEARCH_STEPS: usize = 200;
 /// Maximum number of continuations of the best search if no search has converged.
 pub(crate) const SEARCHES_CONTINUED: usize = 2;
 
+/// Number of operations of a pass over one line, in addition to those of its matrices; it counts
+/// for a limit of the work.
+pub(crate) const PASS_OPERATIONS: f64 = 200.0;
+
 /// Maximum number of Gauss–Newton steps of each search after the first one; these searches confirm
 /// the minimum of the first.
 pub(crate) const STEPS_MORE: usize = 60;

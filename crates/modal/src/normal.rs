@@ -7,6 +7,7 @@
 //! # Source
 //! Kaufman, BIT 15 (1975) 49.
 
+use mechid_numerics::time_limit;
 use rayon::prelude::*;
 
 use crate::dense::{add_product, gram, transposed_product};
@@ -72,6 +73,8 @@ impl NormalEquations {
     pub(crate) fn new(lines: &Lines, model: &Model, projection: &Projection) -> Self {
         let pairs = model.pairs(lines.loads.len());
         let shapes = whitened_shapes(projection, model.modes());
+        let rows: usize = lines.blocks.iter().map(Block::len).sum();
+        time_limit::spend(8.0 * (rows * pairs.len() * (pairs.len() + lines.outputs.len())) as f64);
         let work: Vec<(&Block, &BlockArrays)> =
             lines.blocks.iter().zip(&projection.blocks).collect();
         let width = work.len().div_ceil(LANES).max(1);

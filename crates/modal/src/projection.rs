@@ -1,5 +1,6 @@
 //! Least squares of the linear unknowns, for all outputs with one matrix.
 
+use mechid_numerics::time_limit;
 use rayon::prelude::*;
 
 use crate::dense::{Triangle, add_product, triangularise};
@@ -101,6 +102,8 @@ impl Projection {
     /// factor; Q is never computed.
     pub(crate) fn solve(&mut self, lines: &Lines, design: &impl Design) -> f64 {
         let (columns, outputs) = (design.columns(lines), lines.outputs.len());
+        let rows: usize = lines.blocks.iter().map(Block::len).sum();
+        time_limit::spend(2.0 * (rows * columns * (columns + 2 * outputs)) as f64);
         self.blocks.par_iter_mut().zip(&lines.blocks).for_each(|(arrays, block)| {
             arrays.reduce(lines, block, design);
         });

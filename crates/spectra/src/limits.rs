@@ -129,6 +129,10 @@ pub(crate) const QUIET_DEVIATIONS: f64 = 12.0;
 /// the polynomial at the ends of a band.
 pub(crate) const END_LEVERAGE: f64 = 0.25;
 
+/// Number of operations for each line and channel of the choice of a smooth noise spectrum; it
+/// counts for a limit of the work.
+pub(crate) const SMOOTH_OPERATIONS: f64 = 40_000.0;
+
 /// Maximum number of steps of the search for the log power of a smooth noise spectrum.
 pub(crate) const SMOOTH_STEPS: usize = 200;
 

@@ -89,6 +89,10 @@ pub struct Decayed {
 /// quantities, a period, or a beginning or end outside the window, [`AnalysisError::Window`], the
 /// errors of [`free_decay`], and an error if the file cannot be read again.
 pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, AnalysisError> {
+    time_limit::bounded(measurement.memory(), || fitted(measurement, how))
+}
+
+fn fitted(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, AnalysisError> {
     let kind = kind_of(measurement)?;
     let whole = how.part(measurement)?.whole_block()?;
     let (_, record) = responses_of(&whole, kind)?;
@@ -110,7 +114,7 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     summary.remarks.extend(last.map(|last| {
         let (column, unit) = (&summary.channels[last.channel].column, summary.unit);
         format!(
-            "only the first {} s of the decay are used: afterwards {column} moves by only a few steps of its resolution, {} {unit}, and rounding distorts it (`to` sets another end)",
+            "only the first {} s of the decay are used: afterwards {column} moves by only a few steps of its resolution (one step is {} {unit}), and rounding distorts it (`to` sets another end)",
             significant(last.samples as f64 * record.sampling().dt(), 4),
             significant(last.step, 3)
         )
@@ -228,8 +232,8 @@ impl DecaySettings {
 }
 
 impl Decayed {
-    /// Returns the same result with the points of its channels, such as `12+Z`: they name the
-    /// entries of the shapes in comparisons and in files.
+    /// Returns the same result with these points of its channels, such as `12+Z`. The points name
+    /// the entries of the mode shapes in comparisons and in files.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if the number of points differs from the number of channels.

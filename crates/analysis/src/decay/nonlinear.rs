@@ -29,7 +29,7 @@ pub struct Harmonic {
 /// Frequency and damping as functions of the amplitude (backbone curve).
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BackboneRow {
-    /// Linear modes that represent this nonlinear mode, counted from 1.
+    /// Numbers, counted from 1, of the linear modes that represent this nonlinear mode.
     pub modes: Vec<usize>,
     /// Decrease of the Bayesian information criterion from the linear modes to the backbone, a pure
     /// number.

@@ -177,7 +177,7 @@ mod tests {
         for found in [at_rest, pulled, driven] {
             assert!((1.0..1.1).contains(&found), "{found}");
         }
-        // The static load acts only for a short time before the release.
+        // The static load acts for only 0.1 s before the release, which must still be detected.
         let shortly = release_of(|t| if t < 0.1 { 1.0 } else { after(t + 0.9) });
         assert!((0.1..0.25).contains(&shortly), "{shortly}");
         assert_eq!(release_of(|_| 0.0), 0.0);

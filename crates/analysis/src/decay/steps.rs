@@ -29,8 +29,8 @@ pub(super) struct LastShown {
 /// Returns the end of the part of a decay in which all channels span more than a few quantisation
 /// steps; `None` if they always do.
 ///
-/// After this part, the rounding error is not white noise: a sinusoid of a few steps becomes a
-/// square wave that stops.
+/// After this part, the rounding error is not white noise: the converter turns a sinusoid of a few
+/// steps into a square wave, and a smaller sinusoid into a constant.
 ///
 /// # Source
 /// Widrow & Kollár, *Quantization Noise* (2008), for the conditions of a white rounding error; the
@@ -106,7 +106,8 @@ mod tests {
         for steps in [128.0, 1024.0, 8192.0] {
             let found = last_shown(&decay(steps, 0.0)).unwrap();
             assert!((found.step * steps - 1.0).abs() < 1e-6);
-            // The range is twice the amplitude.
+            // The expected end is the time at which the range, twice the amplitude, is `STEPS`
+            // steps.
             let end = (2.0 * steps / STEPS).ln() / (0.01 * TAU * 20.0);
             let found = found.samples as f64 / 512.0;
             assert!((found - end).abs() < 0.2, "{steps}: {found} {end}");

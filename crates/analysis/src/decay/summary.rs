@@ -73,14 +73,14 @@ pub struct DecayModeRow {
     /// Frequencies, damping, pole and shape.
     #[serde(flatten)]
     pub mode: ShapedMode,
-    /// Amplitude at the first sample, at the largest entry of the shape, in the unit of the
-    /// response.
+    /// Amplitude at the first sample, in the channel with the largest entry of the shape, in the
+    /// unit of the response.
     pub amplitude: Uncertain,
-    /// Phase at the first sample, at the largest entry of the shape, in degrees.
+    /// Phase at the first sample, in the channel with the largest entry of the shape, in degrees.
     pub phase_deg: f64,
     /// Ratio of the sum of squares of this mode to the sum of squares of all modes.
     pub energy_share: f64,
-    /// `false` if the interval of the growth rate is not below zero.
+    /// `true` if the whole 95 % interval of the growth rate is below zero.
     pub decays: bool,
     /// Mode that has this mode as a harmonic; `None` if this mode is not a harmonic.
     pub harmonic: Option<Harmonic>,
@@ -97,14 +97,15 @@ pub struct DecayChannelRow {
     pub noise: f64,
     /// Order of the autoregression of the noise, 0 for white noise.
     pub noise_order: usize,
-    /// Constant, in the unit of the response.
+    /// Constant component of the channel, in the unit of the response.
     pub offset: f64,
     /// P-value, a probability, of the test that the residual is white, adjusted for the number of
     /// tests.
     pub whiteness_p_value: f64,
     /// Ratio of the mean square residual of the first samples to that of the other samples.
     pub onset_ratio: f64,
-    /// Probability of a larger ratio, adjusted for the number of tests.
+    /// P-value of `onset_ratio`: probability of a larger ratio by chance, adjusted for the number
+    /// of tests.
     pub onset_p_value: f64,
 }
 

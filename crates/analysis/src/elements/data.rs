@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use mechid_checks::{Finding, NoiseSource};
 use mechid_estimate::likelihood::machine::MeasuredReceptance;
+use mechid_io::Limits;
 use mechid_model::elements::Input;
 use mechid_spectra::noise::pulse::PulseNoise;
 use mechid_spectra::{LineData, LineNoise, SpectraError};
@@ -56,7 +57,7 @@ pub struct TestRow {
     pub window: Option<WindowRow>,
 }
 
-/// Kind of the lines of a test.
+/// Kind of measurement that gave the lines of a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TestKind {
@@ -81,6 +82,12 @@ impl ElementData {
     /// Returns the tests.
     pub fn tests(&self) -> &[TestRow] {
         &self.tests
+    }
+
+    /// Returns the memory, in bytes, that a file with the numbers of these lines may use.
+    pub(super) fn memory(&self) -> usize {
+        let channels = self.channels.roles().len().max(1);
+        Limits::DEFAULT.memory(2 * size_of::<f64>() * self.lines.len() * channels)
     }
 
     /// Creates the data of one test from its lines.
@@ -117,9 +124,9 @@ impl ElementData {
         Ok(self)
     }
 
-    /// Returns the lines of one record of the `block` with the noise of its forces on the degrees
-    /// of freedom `driven`. In the window of a `hit`, only the samples of its pulses have this
-    /// noise; otherwise all samples have it.
+    /// Returns the lines of one record of the `block`, including the noise of the forces that act
+    /// on the degrees of freedom `driven`. In the window of a `hit`, only the samples of the pulses
+    /// have this noise; otherwise all samples have it.
     pub(super) fn with_force_noise(
         self,
         block: &Block,

@@ -18,7 +18,7 @@ pub(super) struct StatedMachine {
     pub notes: Vec<ElementNote>,
 }
 
-/// Returns M, C and K of an estimate, which was fitted to `equations` real equations.
+/// Returns M, C and K of an estimate, which was fitted to `equations` real-valued equations.
 pub(super) fn stated(
     estimate: &MachineEstimate,
     equations: usize,

@@ -50,6 +50,10 @@ pub fn identify_elements(
     data: &ElementData,
     how: &IdentifyElements,
 ) -> Result<IdentifiedElements, AnalysisError> {
+    time_limit::bounded(data.memory(), || fitted(data, how))
+}
+
+fn fitted(data: &ElementData, how: &IdentifyElements) -> Result<IdentifiedElements, AnalysisError> {
     let (machine, settings) = (&how.machine, how.likelihood(data));
     let (drawn, instruments) = (&machine.machine, &machine.instruments);
     let estimate = match &data.part {

@@ -19,7 +19,8 @@ pub enum ElementNote {
         /// Bound, in the unit of the parameter.
         bound: f64,
     },
-    /// Standard errors and intervals are scaled by the residual.
+    /// Standard errors and intervals are multiplied by a factor, because model and data disagree by
+    /// more than the noise explains.
     ScaledErrors {
         /// Factor.
         factor: f64,
@@ -33,7 +34,7 @@ pub enum ElementNote {
         /// Share of the prior in the information, from 0 to 1.
         share: f64,
     },
-    /// M, C and K do not make a system.
+    /// M, C and K do not form a valid system, so the result does not contain them.
     NoSystem {
         /// Reason.
         reason: String,

@@ -184,7 +184,7 @@ impl Signals {
         let chosen = rule.lines(&self.inputs, period)?;
         let lines = Lines::new(self.inputs.sampling().with_len(period)?, chosen)?;
         let (p, q) = (self.outputs.channels(), self.inputs.channels());
-        // The data of periods need the same number of forces and responses: columns of zeros are
+        // `RepeatedPeriods` needs equal numbers of forces and responses, so columns of zeros are
         // added to the record with fewer channels.
         let channels = p.max(q);
         let padded = |record: &Record| {

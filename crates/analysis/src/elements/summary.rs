@@ -270,8 +270,8 @@ fn candidates(
 /// Returns the modes of a small machine if all its entries are determined.
 fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, AnalysisError> {
     let is_small = estimate.assembly.dof() <= LISTED_MODES_DOF;
-    // The speed of a synchronous rotor differs from line to line, and the modes change with the
-    // speed.
+    // A synchronous rotor has another speed on each line. The modes change with the speed, so there
+    // is no single list of modes.
     if !is_small || estimate.assembly.speed() == Speed::Synchronous {
         return Ok(Vec::new());
     }
@@ -353,8 +353,8 @@ fn notes_of(estimate: &MachineEstimate, checks: &[CheckRow]) -> impl Iterator<It
         let mut causes: Vec<String> =
             checks.iter().filter(is_cause).map(|check| check.subject.to_string()).collect();
         causes.dedup();
-        // The misfit can scale the errors although the check `misfit` does not warn, because this
-        // check is adjusted for the number of tests.
+        // The misfit can increase the standard errors even if the check `misfit` does not warn,
+        // because that check is adjusted for the number of tests.
         if causes.is_empty() {
             causes.push(Subject::Misfit.to_string());
         }

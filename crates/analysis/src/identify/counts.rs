@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use mechid_estimate::Unknowns;
-use mechid_io::{FrequencyResponses, ResponseFunction};
+use mechid_io::{FrequencyResponses, Limits, ResponseFunction};
 use mechid_numerics::NumericsError;
 
 use super::open_records;
@@ -94,6 +94,16 @@ pub(super) fn check_tables(
     let sensitivities = if sensitivities <= TABLE_SENSITIVITIES { sensitivities } else { 0 };
     let needed = of_lines.saturating_add(sensitivities).saturating_add(of_unknowns);
     check_bytes(file, numbers, needed, allowed)
+}
+
+/// Returns the memory, in bytes, that all tables may use together. A table that is not from a file
+/// may use the memory of a file with its numbers.
+pub(crate) fn memory_of_tables(tables: &[FrequencyResponses]) -> usize {
+    let of_table = |table: &FrequencyResponses| {
+        let numbers = 2 * table.frequency_hz.len() * table.functions.len();
+        table.memory.unwrap_or_else(|| Limits::DEFAULT.memory(size_of::<f64>() * numbers))
+    };
+    tables.iter().map(of_table).sum()
 }
 
 /// Returns the largest of the memory limits of the tables, in bytes, and the name of its file;

@@ -48,6 +48,7 @@ mod open_terms;
 pub mod options;
 mod other_models;
 pub mod prediction;
+mod quantity;
 mod remarks;
 mod response_settings;
 mod responses;
@@ -119,6 +120,14 @@ pub const CONSPICUOUS: f64 = 0.05;
 /// data explain why; the error of the fit if they do not; errors of the settings, such as
 /// [`AnalysisError::TimeDomainMotions`]; and [`AnalysisError::Io`] if a file cannot be read again.
 pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identified, AnalysisError> {
+    let memory = measurements.iter().map(Measurement::memory).sum();
+    time_limit::bounded(memory, || identify_records(measurements, how))
+}
+
+fn identify_records(
+    measurements: &[Measurement],
+    how: &Identify,
+) -> Result<Identified, AnalysisError> {
     check_distinct(measurements)?;
     let hold = how.hold();
     let records = measurements.iter().map(|measured| measured.hold(hold));
@@ -325,7 +334,7 @@ fn spectral(
             excitation: Excitation::Lasting,
         };
         match open_records::fit(records, unknowns, how) {
-            Ok(open) if open.ends_show => return Ok(open.fitted),
+            Ok(open) if open.decides => return Ok(open.fitted),
             Err(error @ AnalysisError::Unfit { .. }) => delayed = Some(error),
             _ => {}
         }

@@ -10,6 +10,7 @@ use mechid_spectra::FrequencyData;
 use serde::Serialize;
 
 use super::checks::CheckRow;
+use super::counts::memory_of_tables;
 use super::other_models::with_better_model;
 use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
@@ -43,6 +44,13 @@ use crate::{AnalysisError, time_limit};
 /// # Source
 /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance from the coherence).
 pub fn identify_responses(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+) -> Result<IdentifiedResponses, AnalysisError> {
+    time_limit::bounded(memory_of_tables(tables), || identify_tables(tables, how))
+}
+
+fn identify_tables(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
 ) -> Result<IdentifiedResponses, AnalysisError> {

@@ -358,6 +358,11 @@ impl Measurement {
         &self.window
     }
 
+    /// Returns the maximum memory of an analysis of the record, in bytes.
+    pub(crate) fn memory(&self) -> usize {
+        self.source.memory
+    }
+
     pub(crate) fn source(&self) -> &Arc<RecordSource> {
         &self.source
     }

@@ -51,6 +51,7 @@ pub use self::summary::{
 };
 pub use self::system::ModalSystem;
 use self::tables::Tables;
+use crate::identify::counts::memory_of_tables;
 use crate::measurement::Measurement;
 use crate::{AnalysisError, time_limit};
 
@@ -99,9 +100,12 @@ pub fn modes(
     settings: &ModesSettings,
 ) -> Result<Modes, AnalysisError> {
     settings.check()?;
-    let mut modes = modes_of_records(measurements, settings)?;
-    modes.summary.checks.extend(time_limit::check_of_modes());
-    Ok(modes)
+    let memory = measurements.iter().map(Measurement::memory).sum();
+    time_limit::bounded(memory, || {
+        let mut modes = modes_of_records(measurements, settings)?;
+        modes.summary.checks.extend(time_limit::check_of_modes());
+        Ok(modes)
+    })
 }
 
 fn modes_of_records(
@@ -151,11 +155,14 @@ pub fn modes_of_responses(
     settings: &ModesSettings,
 ) -> Result<Modes, AnalysisError> {
     settings.check()?;
+    let memory = memory_of_tables(tables);
     let tables = Tables::new(tables, settings.quantity)?;
     let band_hz = settings.band_hz.unwrap_or_else(|| tables.range_hz());
-    let mut modes = forced::modes_of_tables(&tables, band_hz, settings)?;
-    modes.summary.checks.extend(time_limit::check_of_modes());
-    Ok(modes)
+    time_limit::bounded(memory, || {
+        let mut modes = forced::modes_of_tables(&tables, band_hz, settings)?;
+        modes.summary.checks.extend(time_limit::check_of_modes());
+        Ok(modes)
+    })
 }
 
 impl Modes {

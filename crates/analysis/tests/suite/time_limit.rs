@@ -143,7 +143,7 @@ fn a_limit_without_a_result_is_named() {
         let refused = time_limit::within(Some(seconds), || Ok::<_, AnalysisError>(()));
         assert_eq!(refused.unwrap_err().code(), "analysis.setting");
     }
-    // An error that no search caused is not due to the limit.
+    // If the file is missing, the error is the read error, not the time limit.
     let lost = time_limit::within(Some(0.0), || Measurement::open("lost.csv", &channels));
     assert_eq!(lost.unwrap_err().code(), "io.read");
 }
@@ -163,13 +163,13 @@ fn the_limit_of_a_record_is_in_its_row() {
         row.findings.into_iter().map(|finding| finding.code).collect()
     };
     assert!(codes(&limited).contains(&"time_limit".to_owned()));
-    // A time limit set by the calling code does not apply to the row of a record.
+    // `SavedAnalysis::row` ignores a time limit that the calling code sets.
     let around = within(Some(TimeLimit::from_polls(0)), || codes(&analysis));
     assert!(!around.contains(&"time_limit".to_owned()));
 }
 
-/// Forty exact periods of 250 samples, without noise. The response is the sum of its lines in
-/// closed form.
+/// The fits of forty exact periods of 250 samples, without noise, end within 300 polls of the time
+/// limit and give the exact mass. The response is the sum of its lines in closed form.
 #[test]
 fn ten_thousand_rows_without_noise_take_few_steps() {
     let (period, periods) = (250, 40);
@@ -204,4 +204,35 @@ fn ten_thousand_rows_without_noise_take_few_steps() {
             assert!((found / mass - 1.0).abs() < 1e-6, "{found}");
         }
     }
+}
+
+/// The operations of a search do not depend on the number of threads, so a limit of operations ends
+/// it at the same step.
+#[test]
+fn a_limit_of_operations_gives_the_same_result_with_any_number_of_threads() {
+    let how = Identify::spectra(Method::MaximumLikelihood);
+    let test = [machine()];
+    let with = |threads: usize, operations: f64| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let limit = Some(TimeLimit::from_operations(operations));
+            within(limit, || (identify(&test, &how).map_err(|e| e.to_string()), ended()))
+        })
+    };
+    let mut early = 0;
+    for operations in [0.0, 1e5, 1e6, 3e6, 1e7, f64::MAX] {
+        let (result, ended) = with(1, operations);
+        let (again, ended_again) = with(2, operations);
+        let json = |result: &Result<Identified, String>| match result {
+            Ok(identified) => serde_json::to_string(identified).unwrap(),
+            Err(error) => error.clone(),
+        };
+        assert_eq!((json(&result), ended), (json(&again), ended_again), "{operations}");
+        if let Ok(identified) = &result {
+            let says = json(&result).contains("the searches reached the limit of the work");
+            assert_eq!(says, ended.is_some(), "{operations}: {}", identified.summary().file);
+        }
+        early += usize::from(ended.is_some());
+    }
+    assert!((1..6).contains(&early), "{early} of 6 limits ended a search");
 }

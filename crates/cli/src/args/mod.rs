@@ -38,7 +38,7 @@ pub struct ReportArgs {
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct TimeLimitArgs {
     /// Time after which all searches end at their best points so far, in s; the result then says
-    /// that it is not final [default: none]
+    /// that it is not final [default: a limit of the work that grows with the size of the file]
     #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
     pub time_limit: Option<f64>,
 }
@@ -114,7 +114,7 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Heading of a page, and details of the measurement on it.
+/// Heading of a page, and details of the measurement that the page shows.
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub struct AboutArgs {
@@ -129,7 +129,8 @@ pub struct AboutArgs {
 }
 
 impl AboutArgs {
-    /// Returns the option that was given, if there is one.
+    /// Returns the name of the given option, `--title` or `--about`; `--title` if both are given,
+    /// and `None` if neither is given.
     pub fn given(&self) -> Option<&'static str> {
         let title = self.title.as_ref().map(|_| "--title");
         title.or(self.about.as_ref().map(|_| "--about"))
@@ -164,7 +165,7 @@ impl AboutArgs {
     }
 }
 
-/// Picture or page of a result, with the heading and the details of a page.
+/// Options that draw a result as a picture or as a page; a page also has a heading and details.
 #[derive(Debug, Default, Args)]
 pub struct FigureArgs {
     #[command(flatten)]

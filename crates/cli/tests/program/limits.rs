@@ -1,5 +1,5 @@
-//! Files that claim to hold more than they do are refused with a message. The operating system
-//! limits memory and time of the process.
+//! Input that would need too much memory or time is refused with a message. In these tests the
+//! operating system limits the memory of the process, and each run must end within a maximum time.
 #![cfg(target_os = "linux")]
 
 use std::f64::consts::PI;
@@ -69,7 +69,8 @@ fn matlab(len: u32) -> Vec<u8> {
 #[test]
 fn a_small_file_of_many_numbers_is_refused_before_they_are_held() {
     let home = tempfile::tempdir().unwrap();
-    // The file has 250 million bytes, which are 2 GB as numbers.
+    // The compressed file contains 250 million values of one byte, which need 2 GB as numbers of
+    // eight bytes.
     let file = matlab(250_000_000);
     assert!(file.len() < 300_000, "{}", file.len());
     fs::write(home.path().join("a.mat"), file).unwrap();
@@ -265,4 +266,37 @@ fn many_nonlinear_terms_are_refused_before_any_work() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("equations do not determine 8003 unknowns"), "{message}");
     assert!(begun.elapsed() < PATIENCE);
+}
+
+/// The white noise of the response has nothing to do with the force, so the searches find no
+/// machine. The limit of the work ends them: with little memory early, with a time limit not at
+/// all. Both results name the limit that ended the search, if one did.
+#[test]
+fn a_search_ends_at_the_limit_of_its_work() {
+    let home = tempfile::tempdir().unwrap();
+    let mut state = 1_u64;
+    let mut noise = || {
+        // Linear congruential generator of Knuth's MMIX.
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1 << 24) - 0.5
+    };
+    let mut rows = String::from("time,f,y1,y2\n");
+    for row in 0..1500 {
+        let [f, y1, y2] = [noise(), noise(), noise()];
+        rows.push_str(&format!("{},{f:.5},{y1:.5},{y2:.5}\n", f64::from(row) * 0.01));
+    }
+    fs::write(home.path().join("noise.csv"), rows).unwrap();
+    let of = "identify noise.csv --force f,0 --displacement y1,y2 --json";
+    let text = |arguments: &str| {
+        let output = limited(home.path(), arguments);
+        let [out, err] = [output.stdout, output.stderr].map(|o| String::from_utf8(o).unwrap());
+        out + &err
+    };
+    let ended = "reached the limit of the work for a file of this size";
+    let limited = text(&format!("{of} --memory-gb 0.006"));
+    assert!(limited.contains(ended), "{limited}");
+    assert_eq!(limited, text(&format!("{of} --memory-gb 0.006")));
+    let whole = text(&format!("{of} --memory-gb 0.006 --time-limit 1000"));
+    assert!(!whole.contains(ended) && !whole.contains("time limit of"), "{whole}");
 }

@@ -3,6 +3,7 @@
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
 
+use mechid_numerics::time_limit;
 use mechid_spectra::noise::pulse::PulseErrors;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -13,7 +14,7 @@ use super::response_model::{LineResponse, ResponseModel};
 use super::search::{LeastSquaresProblem, Linearisation};
 use super::transient::{self, LineColumns, RecordUnknowns, TransientBasis};
 use super::weights::{WeightedLine, Weights};
-use crate::limits::LINES_AT_ONCE;
+use crate::limits::{LINES_AT_ONCE, PASS_OPERATIONS};
 use crate::pulse_covariance::PulseCovariance;
 
 /// Normal prior of a parameter, as one row of the residual.
@@ -388,10 +389,22 @@ impl<L> Block<L> {
     }
 }
 
+impl<M: ResponseModel> Residual<'_, M> {
+    /// Counts the operations of one pass over all rows, with this number of products of states and
+    /// outputs for each row.
+    fn spend(&self, products: usize) {
+        let size = self.model.dimensions();
+        let of_states = (size.states * (size.states + size.outputs)) as f64;
+        let of_row = PASS_OPERATIONS + 10.0 * of_states * (size.states + products) as f64;
+        time_limit::spend(self.data.len() as f64 * of_row);
+    }
+}
+
 impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
     type Evaluation = Evaluation<'a, M::Line<'a>>;
 
     fn evaluate(&self, parameters: &[f64]) -> Option<Self::Evaluation> {
+        self.spend(1);
         let first_prior = self.len() + self.amplitudes();
         let mut residual = DVector::zeros(first_prior + self.priors.len());
         let size = self.model.dimensions();
@@ -421,6 +434,7 @@ impl<'a, M: ResponseModel> LeastSquaresProblem for Residual<'a, M> {
         parameters: &[f64],
         evaluation: Self::Evaluation,
     ) -> Option<Linearisation> {
+        self.spend(parameters.len());
         let Evaluation { records, residual } = evaluation;
         let mut jacobian = DMatrix::zeros(residual.len(), parameters.len());
         let mut records = records.map(Vec::into_iter);

@@ -3,7 +3,7 @@
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
-use super::likelihood::{TASK, noise, positive_factor};
+use super::likelihood::{TASK, noise, positive_factor, spend};
 use super::lines::PooledLines;
 use super::parameters::{Parameters, Span};
 use super::spectrum::{Coefficients, Direction, Kernels, directions};
@@ -19,6 +19,7 @@ pub(super) fn information(
     lines: &[PooledLines],
     span: Span,
 ) -> Option<DMatrix<f64>> {
+    spend(parameters, lines, parameters.layout.len());
     let coefficients = Coefficients::new(parameters);
     let directions = directions(parameters);
     let len = parameters.layout.len();

@@ -3,6 +3,8 @@
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
+use mechid_numerics::time_limit;
+
 use super::lines::PooledLines;
 use super::parameters::{Kernel, Parameters, Span};
 use super::spectrum::{Coefficients, Kernels};
@@ -27,12 +29,21 @@ pub(super) fn noise(parameters: &Parameters, terms: &[f64]) -> Vec<f64> {
     (0..parameters.layout.outputs).map(|i| parameters.log_noise(i, terms).exp()).collect()
 }
 
+/// Counts the operations of one pass over the lines with this number of products of matrices of all
+/// channels for each line.
+pub(super) fn spend(parameters: &Parameters, lines: &[PooledLines], products: usize) {
+    let (channels, modes) = (parameters.layout.outputs as f64, parameters.layout.modes as f64);
+    let of_line = channels * channels * (channels * products as f64 + modes);
+    time_limit::spend(lines.len() as f64 * (200.0 + 10.0 * of_line));
+}
+
 /// Returns −log L, Σ (ln det S + Yᴴ S⁻¹ Y) over the lines; infinite where S is not positive
 /// definite.
 ///
 /// # Source
 /// Whittle (1953), Arkiv för Matematik 2, 423–434.
 pub(super) fn cost(parameters: &Parameters, lines: &[PooledLines], span: Span) -> f64 {
+    spend(parameters, lines, 1);
     let coefficients = Coefficients::new(parameters);
     let one = |line: &PooledLines| {
         let kernels = coefficients.kernels(line.omega, span);
@@ -126,6 +137,7 @@ pub(super) fn gradient(
     lines: &[PooledLines],
     span: Span,
 ) -> Option<DVector<f64>> {
+    spend(parameters, lines, 3);
     let coefficients = Coefficients::new(parameters);
     let chunk = |chunk: &[PooledLines]| {
         let mut sums = GradientSums::zero(parameters);

@@ -205,6 +205,9 @@ impl Data {
             return None;
         }
         let (linear, nonlinear) = (linear_columns(poles, self.constant), 2 * poles.len());
+        let columns = linear + nonlinear;
+        let products = columns * (columns + 2 * self.channels());
+        time_limit::spend(2.0 * (self.len() * products) as f64);
         // One factorisation serves all channels.
         let from = noise.iter().map(Autoregression::order).max().unwrap_or(0);
         let common = self.triangle(poles, white, from)?;

@@ -474,6 +474,9 @@ impl Residuals for Problem<'_> {
     fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
         let Some(system) = self.system(theta) else { return false };
         let directions = self.directions();
+        let n = self.dof() as f64;
+        let of_number = 40.0 * n * (1.0 + directions.len() as f64);
+        time_limit::spend(self.len() as f64 * of_number);
         let run = |(at, record): (usize, &Prepared)| {
             let start = self.initial(theta, at)?;
             Tangent::new(&system, &directions).simulate(&record.force, &start)

@@ -7,11 +7,12 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
+use mechid_numerics::time_limit;
 use mechid_signal::message;
 use nalgebra::{Complex, DMatrix};
 
 use self::neighbours::Neighbours;
-use crate::limits::{POOLING_MARGIN, POOLING_SPARE};
+use crate::limits::{POOLING_MARGIN, POOLING_SPARE, SMOOTH_OPERATIONS};
 use crate::noise::smooth;
 use crate::noise::smooth::{Form, Smooth};
 
@@ -269,6 +270,7 @@ impl Candidate {
             let variances = DMatrix::from_fn(omega.len(), noisy.len(), |line, at| {
                 covariance[line][(noisy[at], noisy[at])].re
             });
+            time_limit::spend(SMOOTH_OPERATIONS * (omega.len() * noisy.len()) as f64);
             match relative {
                 None => (smooth::choose(&omega, &variances, nu), false),
                 Some(relative) => {

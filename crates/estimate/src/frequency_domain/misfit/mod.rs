@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use mechid_numerics::cholesky::Cholesky;
 use mechid_numerics::gauss_newton::SumOfSquares;
-use mechid_numerics::kronecker;
+use mechid_numerics::{kronecker, time_limit};
 use mechid_signal::{Sampling, noise};
 use mechid_spectra::transient::{self, TransientLoad, powers};
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
@@ -18,7 +18,7 @@ use super::line::{Line, lower_factor, noisy_forces};
 use super::line_block::{BlockFactors, LineBlock};
 use super::normal_equations::{Layout, NormalEquations};
 use super::search::Restartable;
-use crate::limits::LINES_AT_ONCE;
+use crate::limits::{LINES_AT_ONCE, PASS_OPERATIONS};
 use crate::relations::Relations;
 use crate::{EstimateError, Unknowns};
 
@@ -29,7 +29,8 @@ type ComplexVector = DVector<Complex<f64>>;
 enum Noise<'a> {
     /// Exact force; the factor L of the covariance L Lᴴ of the displacement.
     Output(Vec<ComplexMatrix>),
-    /// Noisy force and displacement, and the forces that have noise at any line.
+    /// Noise of force and displacement, and the indices of the forces that have noise on at least
+    /// one line.
     Both(&'a NoiseSpectrum, Vec<usize>),
 }
 
@@ -43,8 +44,8 @@ enum Noise<'a> {
 ///
 /// The Jacobian of row l has the columns W_l E_ij X̂_l s^p for the entry (i, j) of K, C or M (p =
 /// 0, 1, 2), with W = L⁻¹G, s = iω and the matrix E_ij of zeros with a 1 at this entry. X̂ is the
-/// displacement under the most likely force F̂. Because F̂ is a minimum, Jᵀr is the gradient of the
-/// sum of squares, and JᵀJ is the Fisher information.
+/// displacement under the most likely force F̂. Because F̂ minimises the sum of squares for given
+/// parameters, Jᵀr is the gradient of the sum, and JᵀJ is the Fisher information.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the
@@ -77,8 +78,8 @@ pub(super) struct Misfit<'a> {
 
 impl<'a> Misfit<'a> {
     /// # Errors
-    /// [`EstimateError::SingularNoise`] if the force is exact and a displacement has no noise, or
-    /// two displacements have the same noise.
+    /// [`EstimateError::SingularNoise`] if the force is exact, and either a displacement has no
+    /// noise or two displacements have the same noise.
     pub(super) fn new(
         data: &'a FrequencyData,
         unknowns: &'a Unknowns,
@@ -92,7 +93,8 @@ impl<'a> Misfit<'a> {
         };
         let rows = vec![Line::new(data.dof()); data.len()];
         let layout = Layout::new(unknowns, data.transient().ncols());
-        // Only the transient of the record with a spectral line is nonzero on this line.
+        // Each spectral line belongs to one record; only the transient of this record is nonzero on
+        // the line.
         let is_used = |line: usize, at: usize| match layout.columns()[at].1.checked_sub(data.dof())
         {
             None => true,
@@ -162,7 +164,16 @@ impl<'a> Misfit<'a> {
         Some(extended)
     }
 
+    /// Counts the operations of one pass over all rows, with this number of products of n × n
+    /// matrices for each row.
+    fn spend(&self, products: usize) {
+        let n = self.data.dof() as f64;
+        let of_row = PASS_OPERATIONS + products as f64 * n.powi(3);
+        time_limit::spend(self.data.len() as f64 * of_row);
+    }
+
     fn evaluate(&mut self, theta: &DVector<f64>) -> Option<f64> {
+        self.spend(10);
         let (unknowns, tau) = theta.as_slice().split_at(theta.len() - transient::len(self.data));
         let matrices = match &self.relations {
             None => self.unknowns.assemble(unknowns),
@@ -193,12 +204,13 @@ impl<'a> Misfit<'a> {
         cost.is_finite().then_some(cost)
     }
 
-    /// Returns the regressors φ of a displacement, given by row and channel, the weights WᴴW and
-    /// the weighted residuals Wᴴr, block by block.
+    /// Returns, block by block, the regressors φ, the weights WᴴW and the weighted residuals Wᴴr.
+    /// `displacement` gives the displacement in φ for a row and a channel.
     fn factors(
         &self,
         displacement: impl Fn(usize, usize) -> Complex<f64> + Sync,
     ) -> Vec<BlockFactors> {
+        self.spend(3 * self.data.dof());
         self.blocks.par_iter().map(|block| self.factors_of(block, &displacement)).collect()
     }
 
@@ -238,7 +250,7 @@ impl<'a> Misfit<'a> {
         BlockFactors { block: block.clone(), regressors, weights, residuals }
     }
 
-    /// Returns Wᴴy of the lines of a block, 2 lines × n, real parts first.
+    /// Returns Wᴴy of the lines of a block, 2·lines × n, real parts first.
     fn weighted(&self, block: &LineBlock, y: impl Fn(usize) -> ComplexVector) -> DMatrix<f64> {
         let lines = block.lines.len();
         let mut weighted = DMatrix::zeros(2 * lines, self.data.dof());
@@ -273,14 +285,15 @@ impl SumOfSquares for Misfit<'_> {
         equations
     }
 
-    /// Returns Jᵀr″ with r″ = −2 W dD G dD X̂ along the change dD of the dynamic stiffness. It
-    /// neglects the curvature of the weights of a noisy force, and of the entries of proportional
-    /// damping.
+    /// Returns Jᵀr″, where r″ = −2 W dD G dD X̂ is the second derivative of the residuals along the
+    /// change dD of the dynamic stiffness. The result neglects the curvature of the weights of a
+    /// noisy force, and of the entries of proportional damping.
     fn curvature(
         &self,
         linearisation: &NormalEquations,
         step: &DVector<f64>,
     ) -> Option<DVector<f64>> {
+        self.spend(10);
         let step = match self.tangent() {
             None => step.clone(),
             Some(tangent) => tangent * step,
@@ -306,8 +319,8 @@ impl SumOfSquares for Misfit<'_> {
 }
 
 impl Restartable for Misfit<'_> {
-    /// Returns the step to the minimum of |W (D X − F)|² for fixed W and the dynamic stiffness D:
-    /// the Gauss–Newton equations with the measured X instead of X̂.
+    /// Returns the step to the minimum of |W (D X − F)|², where D is the dynamic stiffness and W is
+    /// kept fixed: the Gauss–Newton equations with the measured X instead of X̂.
     fn linear_step(&mut self) -> Option<DVector<f64>> {
         let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
         let NormalEquations { gram, gradient, coordinates } =
@@ -321,8 +334,9 @@ impl Restartable for Misfit<'_> {
             let rows = Sampling::new(1.0, self.shares.len()).ok()?;
             noise::white(rows, 2, 1.0, seed).ok()
         });
-        // If z is complex normal, |z|²/2 has an exponential distribution, and the mean of
-        // (|z|²/2)²/2 is 1.
+        // The share of a row is (|z|²/2)²/2 for a complex normal number z whose real and imaginary
+        // parts have unit variance. Then |z|²/2 has an exponential distribution, and the mean share
+        // is 1.
         for (share, pair) in
             self.shares.iter_mut().zip(drawn.iter().flat_map(|d| d.data().row_iter()))
         {

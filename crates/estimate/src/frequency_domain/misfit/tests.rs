@@ -46,8 +46,8 @@ fn unknowns() -> [(Unknowns, DVector<f64>); 2] {
     [(all.clone().fix(Matrix::Mass, 0, 1, 0.1).unwrap(), fewer.into()), (all, theta.into())]
 }
 
-/// Returns data, unknowns and parameters: each set of unknowns with periods, and with an open
-/// record that has transient loads.
+/// Returns the cases of the tests, each with data, unknowns and parameters. Every set of unknowns
+/// occurs twice: with data of periods, and with data of an open record with transient loads.
 fn cases() -> Vec<(FrequencyData, Unknowns, DVector<f64>)> {
     let all = unknowns().into_iter().flat_map(|(unknowns, theta)| {
         let loads: Vec<f64> = (0..12).map(|at| 0.1 * (2.3 * f64::from(at)).sin()).collect();
@@ -64,7 +64,7 @@ fn cost(misfit: &mut Misfit<'_>, theta: &DVector<f64>) -> f64 {
     cost
 }
 
-/// √2·L⁻¹e as real numbers.
+/// Returns the residuals √2·L⁻¹e at the parameters `theta`, as real numbers.
 fn residuals(misfit: &mut Misfit<'_>, theta: &DVector<f64>) -> DVector<f64> {
     cost(misfit, theta);
     let white = misfit.white();
