@@ -48,6 +48,13 @@ pub enum Cause {
         /// Quantity that is stated for the responses.
         stated: ResponseQuantity,
     },
+    /// Responses in records of another quantity than stated.
+    RecordedQuantity {
+        /// Quantity that fits the responses.
+        quantity: ResponseQuantity,
+        /// Quantity that is stated for the responses.
+        stated: ResponseQuantity,
+    },
     /// Magnitudes that are levels in dB.
     Decibels,
     /// Force that is held or linear between its samples.
@@ -95,6 +102,9 @@ impl Check for Alternative {
             Cause::Quantity { quantity, stated } => {
                 write!(f, "the responses are those of {quantity} per force, not of {stated}")?;
             }
+            Cause::RecordedQuantity { quantity, stated } => {
+                write!(f, "the responses are those of {quantity}, not of {stated}")?;
+            }
             Cause::Decibels => f.write_str("the magnitudes are levels in dB")?,
             Cause::BetweenSamples { between_samples: Discretisation::ZeroOrderHold } => {
                 f.write_str("the force is held between its samples")?;
@@ -122,6 +132,11 @@ impl Check for Alternative {
                 "Viscous damping has the same effect near one resonance: choose a narrow band (`band_hz`)"
             }
             Cause::Quantity { .. } => "State what was measured (`quantity`)",
+            Cause::RecordedQuantity { quantity, .. } => match quantity {
+                ResponseQuantity::Displacement => "Name their columns as `displacement`",
+                ResponseQuantity::Velocity => "Name their columns as `velocity`",
+                ResponseQuantity::Acceleration => "Name their columns as `acceleration`",
+            },
             Cause::Decibels => "State the unit in the header, as in magnitude [dB]",
             Cause::BetweenSamples { .. } => {
                 "This is usual in records of a simulation: state it with `between_samples`"
@@ -146,7 +161,8 @@ pub struct ModelledResponses {
 }
 
 impl ModelledResponses {
-    /// Returns the residual power, weighted by the `deviation` of the noise.
+    /// Returns the power of the residual; each residual is first divided by the standard
+    /// `deviation` of its noise, if known.
     fn power(&self, deviation: Option<&DMatrix<f64>>) -> f64 {
         weighted(&(&self.measured - &self.modelled), deviation).norm_squared()
     }

@@ -57,9 +57,9 @@ impl Compared {
         Ok(parts.map_or_else(Self::default, |fit| Self::new(&fit, &splits, Some(&[]), estimate)))
     }
 
-    /// Returns the comparison without the omitted term if another explanation of the residual
-    /// explains more than the term. `remaining` is the fraction of the residual power that remains
-    /// with the other explanation.
+    /// Removes the omitted term from the comparison if another explanation of the residual explains
+    /// more than this term. `remaining` is the fraction of the residual power that remains with the
+    /// other explanation.
     pub(super) fn without_unlikely_term(mut self, remaining: Option<f64>) -> Self {
         let is_less_likely = |finding: &Finding| match (finding, remaining) {
             (Finding::TermLeftOut(term), Some(remaining)) => term.explained < 1.0 - remaining,

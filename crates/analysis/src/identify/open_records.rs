@@ -8,7 +8,7 @@ use mechid_checks::{
     AfterSpectralFit, Alternative, Cause, Finding, Quantity, RowParts, SpectralResidual,
     after_spectral_fit, before_spectral_fit, delay_of_failed_search, delay_of_lines,
     delay_of_open_records, fault_of_acquisition, fault_of_hits, fitted_band,
-    forces_between_samples, linearity_of_open_record,
+    forces_between_samples, is_noise, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, Refit, SampledRows, Split, equivalent_force,
@@ -21,16 +21,18 @@ use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines, Pooling};
 use nalgebra::DMatrix;
 
+use super::CONSPICUOUS;
 use super::acquisition::{Acquisition, BandLimitedFit, BetweenSamples, Explanation};
 use super::compared::{Compared, rows_of};
 use super::disagreement::Disagreement;
-use super::fitted::{Fitted, Residual};
+use super::fitted::{Fitted, Residual, unexplained_motion};
 use super::force_noise::{ForceNoise, ForceNoiseSource};
 use super::keywords::Domain;
 use super::left_out::LineRule;
 use super::lines::LineChoice;
 use super::options::OpenNoise;
 use super::prediction::Prediction;
+use super::quantity::{other_quantity, quantity_of_failed_search};
 use super::remarks::{noise_remark, one_motion_of};
 use super::sinusoids::SinusoidRow;
 use super::spectra::LIKELIHOOD_PARAMETERS;
@@ -82,10 +84,12 @@ pub(super) struct How<'a> {
     pub(super) excitation: Excitation<'a>,
 }
 
-/// Fit of open records, and whether it shows a transient at their ends.
+/// Fit of open records.
 pub(super) struct OpenFit {
     pub(super) fitted: Fitted,
-    pub(super) ends_show: bool,
+    /// `true` if the fit shows a transient at the ends of the records, or that the responses are
+    /// those of another quantity than stated: then a fit of whole periods is not needed.
+    pub(super) decides: bool,
 }
 
 /// Returns whether the records are short enough to be tried as open records.
@@ -186,7 +190,7 @@ pub(super) fn fit(
     let dt = records[0].held.force.sampling().dt();
     let joint = joined(&spectra.data)?;
     let fit = output_error_pooling(&joint, unknowns, noise.response)
-        .map_err(|error| with_delay(error, &spectra.data, dt, unknowns, noise.response))?;
+        .map_err(|error| with_cause(error, &spectra.data, dt, unknowns, noise.response))?;
     let fit = spectra.with_likely_force_noise(fit, unknowns, noise)?;
     let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
     spectra.data = data;
@@ -204,6 +208,7 @@ pub(super) fn fit(
     );
     let better_explanation = better_explanation?;
     let (better_explanation, explained) = better_explanation.unzip();
+    let names_quantity = better_explanation.as_ref().is_some_and(is_of_quantity);
     let Compared { parts, omitted } =
         compared?.without_unlikely_term(better_explanation.as_ref().map(remaining));
     let sinusoids = sinusoid_rows(records, &fit);
@@ -231,7 +236,7 @@ pub(super) fn fit(
             fit.estimate,
         )
     };
-    Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
+    Ok(OpenFit { fitted, decides: names_quantity || fit.ends.as_ref().is_some_and(show) })
 }
 
 /// Returns two sets of data. The first set is without the transients of forces and responses. The
@@ -303,9 +308,9 @@ type CauseWithChange = (Finding, Option<DMatrix<f64>>);
 type RecordChange = Box<dyn Fn(&FrequencyData) -> FrequencyData>;
 
 impl Tested<'_> {
-    /// Finds a delay or a fault of the acquisition that explains the residual. Also returns the
-    /// vector of the parameter changes by this cause times its transpose; `None` in its place if a
-    /// fit fails.
+    /// Finds another quantity of the responses, a delay, or a fault of the acquisition that
+    /// explains the residual. Also returns the vector of the parameter changes by this cause times
+    /// its transpose; `None` in its place if a fit fails.
     fn cause(
         &self,
         dt: f64,
@@ -314,6 +319,15 @@ impl Tested<'_> {
         excitation: Excitation<'_>,
     ) -> Result<Option<CauseWithChange>, AnalysisError> {
         let Self { records, closed, fit, residuals } = *self;
+        let all = joined(closed)?;
+        let system = fit.estimate.system().ok();
+        let unexplained = system.and_then(|system| unexplained_motion(&all, &system).ok()?);
+        if !is_noise(residuals) || unexplained > Some(CONSPICUOUS) {
+            let data = joined(&fit.without_pulse_errors(records)?)?;
+            if let Some(finding) = other_quantity(&data, &all, &fit.estimate) {
+                return Ok(Some((finding, None)));
+            }
+        }
         let band_limited = OnceLock::new();
         let compared = || {
             let new = || BandLimitedFit::new(records, fit, pooling);
@@ -478,8 +492,9 @@ fn without_cause(finding: &Finding, quantity: ResponseQuantity) -> Option<Record
     }
 }
 
-/// Returns the failure of a search. If the responses are delayed, the delay is added as a reason.
-fn with_delay(
+/// Returns the failure of a search. If the responses are those of another quantity, or if they are
+/// delayed, this is added as a reason.
+fn with_cause(
     error: EstimateError,
     records: &[FrequencyData],
     dt: f64,
@@ -489,13 +504,18 @@ fn with_delay(
     if !matches!(error, EstimateError::NotConverged { .. }) {
         return error.into();
     }
+    let data = joined(records).ok();
+    let quantity = data.as_ref().and_then(|data| quantity_of_failed_search(data, unknowns));
+    if let Some(quantity) = quantity {
+        return AnalysisError::Unfit { error, reasons: quantity.to_string() };
+    }
     if let Some(delay) = delay_of_failed_search(records, dt, unknowns, noise) {
         return AnalysisError::Unfit {
             error,
             reasons: format!("{delay}; the search without that delay succeeds"),
         };
     }
-    match joined(records).ok().and_then(|data| delay_of_lines(&data, dt, unknowns)) {
+    match data.and_then(|data| delay_of_lines(&data, dt, unknowns)) {
         Some(delay) => AnalysisError::Unfit { error, reasons: delay.to_string() },
         None => error.into(),
     }
@@ -553,6 +573,12 @@ fn remarks(
         .chain([of_ends, noise_remark(1, false, &fit.noise), ForceNoise::remark(force_noise)])
         .chain(SinusoidRow::remark(sinusoids))
         .collect()
+}
+
+fn is_of_quantity(finding: &Finding) -> bool {
+    let cause =
+        |alternative: &Alternative| matches!(alternative.cause, Cause::RecordedQuantity { .. });
+    matches!(finding, Finding::Alternative(alternative) if cause(alternative))
 }
 
 fn show(ends: &EndLoads) -> bool {

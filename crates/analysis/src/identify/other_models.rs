@@ -187,7 +187,7 @@ fn in_measured_quantity(
 
 /// Returns the measured responses of `data`, and the responses of `estimate` to the forces of
 /// `forces`.
-fn modelled(
+pub(super) fn modelled(
     data: &FrequencyData,
     forces: &FrequencyData,
     estimate: &Estimate,

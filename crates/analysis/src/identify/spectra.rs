@@ -16,6 +16,7 @@ use mechid_spectra::{
     FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, SpectraError,
 };
 
+use super::CONSPICUOUS;
 use super::compared::{Compared, rows_of};
 use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
@@ -24,6 +25,7 @@ use super::left_out::{LineRule, all_lines};
 use super::open_records::joined;
 use super::options::PeriodEstimator;
 use super::prediction::Prediction;
+use super::quantity::other_quantity;
 use super::remarks::{noise_remark, one_motion_of};
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
@@ -98,7 +100,15 @@ pub(super) fn fit(
         agreement(&spectra, &weighted, &estimate, spectrum.as_ref())?
     };
     let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
-    let nonlinear = if exceeds_noise(&residuals) && unknowns.free().len() <= TERM_PARAMETERS {
+    let is_small = unknowns.free().len() <= TERM_PARAMETERS;
+    let is_left = exceeds_noise(&residuals);
+    let unexplained = unexplained_motion(&data, &estimate.system()?).ok().flatten();
+    let quantity = if is_small && (is_left || unexplained > Some(CONSPICUOUS)) {
+        other_quantity(&data, &data, &estimate)
+    } else {
+        None
+    };
+    let nonlinear = if is_small && is_left && quantity.is_none() {
         nonlinear_term(records, unknowns, lines)?
     } else {
         None
@@ -110,7 +120,7 @@ pub(super) fn fit(
         frequency: Some((spectra.swap_remove(0).1, data)),
         before,
         after,
-        after_all: bias.into_iter().chain(nonlinear).chain(parts).collect(),
+        after_all: bias.into_iter().chain(quantity).chain(nonlinear).chain(parts).collect(),
         disagreement: Disagreement::new(omitted, None),
         residuals: Residual::from_lines(residuals),
         misfit,

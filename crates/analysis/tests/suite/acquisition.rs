@@ -83,8 +83,9 @@ fn a_simulated_force_is_named_and_allowed_for() {
         let holding: usize = holding.sum();
         assert!(holding >= 20, "{between}, {kind}: {holding}");
         let usual = identify(&[simulated(between, kind, 0)], &Identify::default()).unwrap();
-        // With the wrong force between the samples, the errors of the estimates are many times the
-        // standard errors from the noise. The intervals include these errors.
+        // Here the fit makes a wrong assumption about the force between the samples. The errors of
+        // the estimates are therefore many times the standard errors due to noise, but the
+        // intervals must still contain the true values.
         assert_eq!(held(&usual, truth), 3, "{usual}");
         let note = "those of the model that explains the residual";
         assert!(usual.to_string().contains(note), "{usual}");
@@ -256,7 +257,8 @@ fn an_ac_coupled_force_is_named() {
 
 /// The force is held between its samples, and the check must say so. In some of these records, a
 /// fit that assumes a linear force between the samples also passes the tests of the residual,
-/// although 90 % of the residual power remains. With a held force, less than 1 % remains.
+/// although 90 % of the residual power of the default fit remains. With a held force, less than 1 %
+/// of this power remains.
 #[test]
 fn a_held_force_is_not_taken_for_a_linear_one() {
     let omega = TAU * 5.0;
@@ -275,5 +277,41 @@ fn a_held_force_is_not_taken_for_a_linear_one() {
         let found = identify(&[test], &Identify::default()).unwrap();
         let expected = Some(Cause::BetweenSamples { between_samples: HELD });
         assert_eq!(cause(&found), expected, "{seed}: {}", found.summary().all_checks());
+    });
+}
+
+/// The responses are stated as another quantity than was measured: a check or the failure of the
+/// search names the measured quantity. With the right quantity, nothing is named, even if the noise
+/// is a fifth of the response.
+#[test]
+fn a_wrong_quantity_is_named() {
+    let sampling = Sampling::from_rate_hz(512.0, 5120).unwrap();
+    let test = |measured: ResponseQuantity, stated: ResponseQuantity, noise: f64, seed: u64| {
+        let system = heavy().system();
+        let rig = RandomTest { system, sampling, quantity: measured, force: 50.0 };
+        let [force, response] = rig.measure(seed).unwrap();
+        let noise = NoiseLevel::FractionOfRms(noise);
+        let noisy = noise::add_white(&response, noise, seed + 1000).unwrap();
+        Measurement::from_records(&force, &[(stated, &noisy)]).unwrap()
+    };
+    let all = ResponseQuantity::ALL;
+    let pairs = all.into_iter().flat_map(|measured| all.map(|stated| (measured, stated)));
+    let cases: Vec<_> = pairs.flat_map(|pair| [0, 1].map(|seed| (pair, seed))).collect();
+    cases.into_par_iter().for_each(|((measured, stated), seed)| {
+        if measured == stated {
+            for noise in [0.01, 0.2] {
+                let found = identify(&[test(measured, stated, noise, seed)], &Identify::default());
+                let found = found.unwrap();
+                assert_eq!(cause(&found), None, "{}", found.summary().all_checks());
+            }
+            return;
+        }
+        let found = identify(&[test(measured, stated, 0.01, seed)], &Identify::default());
+        let text = match &found {
+            Ok(found) => found.summary().all_checks().to_string(),
+            Err(error) => error.to_string(),
+        };
+        let expected = format!("the responses are those of {measured}, not of {stated}");
+        assert!(text.contains(&expected), "{measured} as {stated}, {seed}: {text}");
     });
 }

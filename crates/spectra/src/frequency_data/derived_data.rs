@@ -1,7 +1,7 @@
 //! Data that are derived from other data: without the transients of open records, under a window,
 //! with a delay, or with only one load.
 
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_numerics::check_size;
 use nalgebra::{Complex, DMatrix};
 
@@ -16,7 +16,8 @@ impl FrequencyData {
         self.open.clear();
     }
 
-    /// Returns the lines with other forces (N), rows × n, as lines of whole periods.
+    /// Returns the same lines, treated as lines of whole periods, with their forces replaced by
+    /// `force` (N), rows × n.
     pub(crate) fn with_closed_force(&self, force: DMatrix<Complex<f64>>) -> Self {
         let mut closed = Self { force, ..self.clone() };
         closed.no_longer_open();
@@ -213,6 +214,22 @@ impl FrequencyData {
             open: Vec::new(),
             ..self.clone()
         }
+    }
+
+    /// Returns the data with the measured responses taken as those of `quantity`, without the noise
+    /// of the displacements.
+    ///
+    /// # Source
+    /// x = y/(iω)^d for the derivative y of order d.
+    #[must_use]
+    pub fn taken_as(&self, quantity: ResponseQuantity) -> Self {
+        let mut taken = Self { measured: quantity, noise: None, ..self.clone() };
+        for (row, omega) in self.omega.iter().enumerate() {
+            let factor = self.measured.per_displacement(*omega) / quantity.per_displacement(*omega);
+            taken.displacement.row_mut(row).apply(|x| *x *= factor);
+            taken.transient.row_mut(row).apply(|x| *x *= factor);
+        }
+        taken
     }
 
     /// Returns the same data with the force delayed by `delay` seconds.
