@@ -36,7 +36,8 @@ fn lines() -> Vec<usize> {
     (6..=50).step_by(2).collect()
 }
 
-/// Returns the films of Lund and Thomsen, with units from D = 0.1 m, 0.02 Pa·s and 3000 rev/min.
+/// Returns K and C of the films of Lund and Thomsen. Their dimensionless coefficients are converted
+/// for a journal diameter of 0.1 m, a viscosity of 0.02 Pa·s and 3000 rev/min.
 fn films() -> Vec<(String, [Matrix2<f64>; 2])> {
     let table = include_str!("../../bearing/tests/lund_thomsen_1978.csv");
     let row = |line: &str| {
@@ -87,8 +88,8 @@ fn settings(rig: &BearingRig, coefficients: Coefficients) -> IdentifyBearing {
 /// Returns the standard errors of the Cramér–Rao bound for the entries of K, C and M, each matrix
 /// row by row.
 fn bound(rig: &BearingRig, periods: &[RigTest], count: usize) -> Vec<f64> {
-    // The identification excludes lines at multiples of the rotation frequency, and so does the
-    // bound.
+    // The bound excludes the lines at multiples of the rotation frequency, because the
+    // identification excludes them, too.
     let kept = lines().into_iter().filter(|line| {
         let turns = *line as f64 * sampling().line_spacing_hz() / rig.rotation_hz;
         (turns - turns.round()).abs() * rig.rotation_hz

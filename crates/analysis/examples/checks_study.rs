@@ -51,8 +51,8 @@ enum Machine {
     Linear(SecondOrderSystem),
     /// Machine with a second mass, not measured, whose spring has this damping (N·s/m).
     Hidden(f64),
-    /// Machine with a cubic spring: this is the ratio of the RMS of its force to the RMS of the
-    /// linear spring force.
+    /// Machine with a cubic spring. The value is the ratio of two RMS values: that of the cubic
+    /// spring force to that of the linear spring force.
     Cubic(f64),
     /// The response is late by this number of samples.
     Late(usize),
@@ -106,8 +106,8 @@ impl Machine {
                 Ok([first(x)?, first(v)?, first(a)?])
             }
             Machine::Cubic(share) => {
-                // The steady state is computed by iteration: the cubic spring force is a force on
-                // the right-hand side.
+                // The steady state is computed by iteration: each pass subtracts the cubic spring
+                // force of the last displacement from the excitation of the linear machine.
                 let system = oscillator(0.05);
                 let k = system.stiffness()[(0, 0)];
                 let linear = of(&system, force)?;

@@ -109,8 +109,8 @@ fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
         Test::Random => {
             let sampling = Sampling::new(DT, SAMPLES)?;
             let rig = RandomTest { system, sampling, quantity: QUANTITY, force: 100.0 };
-            // The delay is applied to a whole period: it is cyclic, so no samples are missing at
-            // its beginning.
+            // The delay shifts one whole period cyclically, so no samples are missing at the
+            // beginning.
             let [force, response] = rig.period(seed)?;
             let response = delay.apply(&response, seed)?;
             let first = SAMPLES / 2 + 1;

@@ -34,7 +34,7 @@ const BAND: f64 = 0.35;
 enum Test {
     /// Open records of machines whose masses differ from the nominal mass by these fractions.
     Records(&'static [f64]),
-    /// Periods of one record.
+    /// One record with this number of periods.
     Periods(usize),
     /// Twelve hits of a hammer.
     Hits,

@@ -75,7 +75,7 @@ fn main() {
     }
     if wanted("colour") {
         heading("noise on the response");
-        // x_k = 0.9 x_(k−1) + e_k.
+        // The noise x follows x_k = 0.9 x_(k−1) + e_k, with white e.
         let autoregressive = Colour::LowPass { corner_hz: -(0.9_f64.ln()) / (TAU * DT) };
         let colours = [
             ("white", Colour::White),

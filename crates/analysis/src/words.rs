@@ -30,7 +30,7 @@ pub fn read<T: DeserializeOwned>(word: &str) -> Result<T, String> {
         .map_err(|_| format!("\"{word}\" is not one of {}", all::<T>().join(", ")))
 }
 
-/// Records the variants of the requested enum.
+/// Deserializer that stores the names of the variants of the requested enum.
 struct Variants<'a>(&'a mut &'static [&'static str]);
 
 impl<'de> Deserializer<'de> for Variants<'_> {

@@ -1,4 +1,4 @@
-//! Size, oil and speed of a bearing: they convert between SI units and dimensionless numbers.
+//! Size, oil and speed of a bearing, and conversions between SI units and dimensionless numbers.
 
 use std::f64::consts::TAU;
 

@@ -44,8 +44,8 @@ impl Equilibrium {
 /// rotation Ω.
 ///
 /// Index 0 is along the load, 1 across it in the direction of rotation; the first index belongs to
-/// the force, the second to the motion. [`Conditions`](crate::Conditions) converts them to SI
-/// units.
+/// the force, the second to the motion. [`Conditions`](crate::Conditions) converts the coefficients
+/// to SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients {
     /// Stiffness coefficients, a 2×2 matrix, dimensionless.

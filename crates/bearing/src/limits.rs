@@ -16,7 +16,8 @@ pub(crate) const STEP_FILM_FRACTION: f64 = 0.3;
 /// about the square of the last step.
 pub(crate) const MESH_TOLERANCES: [f64; 3] = [1e-2, 1e-3, 1e-6];
 
-/// Largest eccentricity for which the mesh is graded towards thin films.
+/// Maximum eccentricity in the formula that makes the mesh denser where the film is thin; a larger
+/// eccentricity does not change the density further.
 pub(crate) const GRADED_ECCENTRICITY: f64 = 0.99;
 
 /// Largest change of a front in one step, in rad.

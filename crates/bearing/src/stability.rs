@@ -137,8 +137,8 @@ impl Threshold {
     /// Returns the speed (rad/s) at which a rotor of `mass` (kg) per bearing becomes unstable, at
     /// the same load and Sommerfeld number; `None` if there is no critical mass.
     ///
-    /// At a constant Sommerfeld number neither k nor ω_w / Ω depends on the speed. The relative
-    /// standard error of this speed is half that of the critical mass.
+    /// At a constant Sommerfeld number neither the equivalent stiffness k_eq nor ω_w / Ω depends on
+    /// the speed. The relative standard error of this speed is half that of the critical mass.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the mass is not positive and finite.
@@ -151,8 +151,9 @@ impl Threshold {
     /// kxy, kyx, kyy, cxx, cxy, cyx, cyy (products of N/m and N·s/m), by the delta method.
     ///
     /// # Errors
-    /// [`BearingError::CovarianceShape`] if it is not 8×8, [`BearingError::CovarianceEntry`] if it
-    /// has an entry that is not finite or a negative variance.
+    /// [`BearingError::CovarianceShape`] if the covariance is not 8×8,
+    /// [`BearingError::CovarianceEntry`] if the covariance has an entry that is not finite or a
+    /// negative variance.
     ///
     /// # Source
     /// Seber and Wild (1989), section 2.1: σ² = gᵀ Σ g with the gradient g.

@@ -18,8 +18,8 @@ use super::open_fit::{joined, minimum_near, residuals_of_fit};
 use super::spectral_residual::{SpectralResidual, is_noise, is_uncorrelated};
 use super::weighted_fit::{Weighing, after_spectral_fit};
 
-/// Deviation of the acquisition from the assumptions of the fit: a band-limited force, and channels
-/// that pass all frequencies.
+/// Deviation of the acquisition from an assumption of the fit. The fit assumes a band-limited
+/// force, and channels that pass all frequencies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     Between(Discretisation),
@@ -45,9 +45,9 @@ impl Fault {
         faults
     }
 
-    /// Returns data in which the fault has no effect: with the equivalent band-limited force, or
-    /// with the same high-pass in all channels. `amount` is the corner frequency (rad/s) of the
-    /// high-pass.
+    /// Returns data in which the fault has no effect. A force that is held or linear between
+    /// samples is replaced by the equivalent band-limited force. If some channels have a high-pass,
+    /// the other channels get the same high-pass; `amount` is its corner frequency (rad/s).
     fn removed(
         self,
         data: &FrequencyData,
@@ -97,7 +97,8 @@ impl Fault {
 /// Amount of a fault that fits the residual best, to first order, with its standard error.
 struct Score {
     amount: f64,
-    /// Standard error of the amount, from the residuals around each line.
+    /// Standard error of `amount`. The variance of a residual is estimated from the residuals on
+    /// the surrounding lines.
     error: f64,
 }
 
@@ -193,7 +194,7 @@ fn local_variance(deviations: &DVector<f64>, dof: usize) -> DVector<f64> {
 }
 
 /// Removes from the vectors `directions`, one for each record, the components that the parameters
-/// and the additional columns of this record explain.
+/// and the additional columns of the same record explain.
 fn without_explained(
     mut directions: Vec<DVector<f64>>,
     after: &[SpectralResidual],
@@ -203,7 +204,8 @@ fn without_explained(
     let products = products.map(|(c, after)| after.explained().columns(0, parameters).tr_mul(c));
     let sum = products.fold(DVector::zeros(parameters), |sum, product| sum + product);
     for (direction, after) in directions.iter_mut().zip(after) {
-        // The columns of one record follow the columns of the parameters.
+        // The first columns of `explained` belong to the parameters, which all records share; the
+        // remaining columns belong to this record only.
         let (explained, own_columns) = (after.explained(), after.explained().ncols() - parameters);
         *direction -= explained.columns(0, parameters) * &sum;
         let product = explained.columns(parameters, own_columns).tr_mul(&*direction);

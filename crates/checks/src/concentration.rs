@@ -16,7 +16,8 @@ pub(super) struct Part<'a> {
     pub dof: usize,
     /// Residuals: for each line and channel real and imaginary part.
     pub values: &'a DVector<f64>,
-    /// Q of the covariance I − QQᵀ of the residuals, over all records together.
+    /// Rows of the matrix Q for this record; the residuals of all records together have the
+    /// covariance I − QQᵀ.
     pub explained: &'a DMatrix<f64>,
     /// Expected square of a residual.
     pub unit: f64,
@@ -30,10 +31,10 @@ struct Line {
 }
 
 /// Finds the few lines that cause the misfit: at most [`MOST_DISTURBED`] lines, and at most an
-/// eighth of all lines, with at least the share [`CONCENTRATED`] of the residual power beyond the
-/// noise. `None` if there are no such lines, or if the other lines have more than
-/// [`DISTURBED_ALONE`] times the noise power: a wrong model, too, has its largest errors on few
-/// lines, near a resonance.
+/// eighth of all lines, with at least the share [`CONCENTRATED`] of the excess power (residual
+/// power minus noise power). `None` if there are no such lines, or if the other lines have more
+/// than [`DISTURBED_ALONE`] times the noise power: a wrong model, too, has its largest errors on
+/// few lines, near a resonance.
 ///
 /// Lines are removed from the linearised fit one by one, each time the line with the largest
 /// residual. This also removes the effect of the line on the residuals of the other lines.
@@ -105,9 +106,9 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
 /// spacing of the lines in `all`. `None` if this agreement may be due to chance, or if there is
 /// only one line in `chosen` or in `all`.
 ///
-/// Candidates are the fractions of the lowest chosen frequency. The probability that all lines of a
-/// random choice are multiples of one candidate follows from the hypergeometric distribution, times
-/// the number of candidates.
+/// The candidates are the lowest chosen frequency divided by 1, 2, 3, … The hypergeometric
+/// distribution gives the probability that all lines of a random choice are multiples of one
+/// candidate. This probability is multiplied by the number of candidates.
 fn common_divisor(chosen: &[f64], all: &[f64]) -> Option<f64> {
     let spacing = all.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
     let lowest = *chosen.first().filter(|_| chosen.len() > 1)?;
@@ -167,7 +168,8 @@ mod tests {
     #[test]
     fn multiples_of_a_rotation_are_named_and_chance_is_not() {
         let all: Vec<f64> = (6..=64).map(|line| 4.0 * f64::from(line)).collect();
-        // 50 Hz lies between two lines, and 100 Hz is a line.
+        // The lines are 4 Hz apart. The frequency of rotation, 50 Hz, lies between two lines; its
+        // multiple 100 Hz is a line.
         let of_rotation = [48.0, 52.0, 100.0, 148.0, 152.0, 200.0];
         let divisor = common_divisor(&of_rotation, &all).unwrap();
         assert!((divisor - 50.0).abs() < 0.5, "{divisor}");

@@ -39,9 +39,10 @@ const STEPS_PER_SAMPLE: isize = 2;
 /// Finds a delay, caused by filters, a scanning converter or a trigger, with which the equation of
 /// motion fits the lines far better ([`Finding::Delay`]). `dt` is the sampling interval of the
 /// record in s; lines are weighted by the noise if `data` states it. `None` if no delay of up to 16
-/// samples (64 if the response hardly follows the force) reduces the residual power to less than a
-/// quarter, in least squares and, if the noise is stated, also in maximum likelihood, because noise
-/// at a resonance disturbs least squares.
+/// samples (64 if the response hardly follows the force) reduces the residual power of least
+/// squares to at most a quarter. If the noise is stated, the delay must also reduce the residual
+/// power of maximum likelihood to at most a quarter, because noise at a resonance disturbs least
+/// squares.
 ///
 /// # Source
 /// Ours: least squares on the equation of motion with the force times e^(−iωτ).
@@ -77,13 +78,14 @@ fn delay_of_equations(
 
 /// Finds a delay of the responses of open records ([`Finding::Delay`]) that explains the residual
 /// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
-/// uncorrelated with the forces. If the residuals `without_delay` are uncorrelated with the forces,
-/// too, either at most a quarter of the power may remain, or the tests of the residual warn without
-/// the delay and pass with it. If the residual has another possible cause, `other` are the lines of
-/// all records after removal of this cause; the power that remains with the delay must not be
-/// significantly above the power that remains with these lines. `dt` is the sampling interval in s;
-/// sinusoidal disturbances have been subtracted from the `records`. `None` if no delay of up to 16
-/// samples (64 if the response hardly follows the force) satisfies these conditions.
+/// uncorrelated with the forces. If already the residuals `without_delay` are uncorrelated with the
+/// forces, one more condition must hold: at most a quarter of the residual power remains with the
+/// delay, or the tests of the residual warn without the delay and pass with it. If the residual has
+/// another possible cause, `other` are the lines of all records after removal of this cause; the
+/// power that remains with the delay must not be significantly above the power that remains with
+/// these lines. `dt` is the sampling interval in s; sinusoidal disturbances have been subtracted
+/// from the `records`. `None` if no delay of up to 16 samples (64 if the response hardly follows
+/// the force) satisfies these conditions.
 ///
 /// The transients are estimated again for each delay; otherwise they would contain a part of the
 /// effect of the delay.
@@ -172,7 +174,8 @@ pub fn delay_of_failed_search(
         let cost = |samples: f64| likelihood.cost(&late(samples));
         let (samples, delayed) =
             minimum_near(near, [DELAY_REACH, DELAY_RESOLVED], cost, |_, _| true)?;
-        // A search without the delay, from the estimate with the delay, may succeed.
+        // The search without a delay failed from its own initial values. It may succeed from the
+        // estimate with the delay; then its cost is compared with the cost with the delay.
         let freedom = likelihood.spare().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
         let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
         let undelayed = likelihood.clone().cost(&data);
@@ -223,8 +226,9 @@ fn on_fewer_lines<'a>(
         let freedom = fewer.spare() as f64;
         let cost = |samples: f64| fewer.cost(&late(samples));
         let is_promising = |delayed: f64, decrease: Option<f64>| {
-            // Each later step decreases the power by less than this step. Therefore the power
-            // `without_other` is out of reach if a second decrease of this size would not reach it.
+            // Each step of the search decreases the power by less than the step before. If a
+            // repetition of the last decrease would not reach the power `without_other`, the later
+            // steps do not reach this power.
             let is_out_of_reach =
                 decrease.is_some_and(|decrease| delayed - decrease > without_other);
             let equal_powers = FisherSnedecor::new(freedom, freedom);
@@ -243,10 +247,11 @@ fn on_fewer_lines<'a>(
     }
 }
 
-/// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the
-/// dynamic stiffness of the estimate without a delay. The lines are either under Hann's window,
-/// which reduces the leakage of a lasting force, or without a window, because a window would weight
-/// a hit differently from its response.
+/// Returns the delay, in samples, that fits the equations of motion best. Two fits are made, and
+/// the better one is used: with Hann's window, which reduces the leakage of a lasting force, and
+/// without a window, because a window would weight a hit differently from its response. On each
+/// line, the residual force is divided by the magnitude of the dynamic stiffness of the estimate
+/// without a delay.
 fn delay_of_either_window(
     data: &FrequencyData,
     dt: f64,
@@ -258,8 +263,9 @@ fn delay_of_either_window(
     candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(delay, _)| delay)
 }
 
-/// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the
-/// dynamic stiffness of the estimate without a delay, and the residual power with this delay.
+/// Returns the delay, in samples, that fits the equations of motion best, and the residual power
+/// with this delay. On each line, the residual force is divided by the magnitude of the dynamic
+/// stiffness of the estimate without a delay; this gives a residual of the response.
 fn delay_weighted(
     data: &FrequencyData,
     dt: f64,
@@ -277,9 +283,9 @@ fn delay_weighted(
     delay_of_equations(&equations, dt, &driven)
 }
 
-/// Returns the delay, in s, with which the equations of motion of frequency responses fit best,
-/// each line weighted by the dynamic stiffness of an estimate; `None` if the data do not determine
-/// a parameter.
+/// Returns the delay, in s, with which the equations of motion of frequency responses fit best;
+/// `None` if the data do not determine a parameter. On each line, the residual force is divided by
+/// the magnitude of the dynamic stiffness of an `estimate`.
 ///
 /// # Source
 /// As [`delay_of_lines`].
@@ -288,7 +294,8 @@ pub fn delay_of_responses(
     unknowns: &Unknowns,
     estimate: &Estimate,
 ) -> Option<f64> {
-    // The sampling interval is the one whose Nyquist frequency is the highest line.
+    // Frequency responses have no sampling interval, but the search counts the delay in samples. It
+    // uses the sampling interval whose Nyquist frequency is the highest line.
     let dt = PI / data.omega().iter().copied().fold(0.0, f64::max);
     Some(dt * delay_weighted(data, dt, unknowns, estimate)?.0)
 }
@@ -360,7 +367,7 @@ fn delay_of_samples(
         residual_power(&fit(&shifted, force.window(margin, len).ok()?).ok()?, &driven)
     };
     let longest = longest(power(0, MAX_DELAY)?, &driven);
-    // The search is limited to a shorter delay if the record is too short for a long one.
+    // If the record is too short for the longer search, the search ends at `MAX_DELAY`.
     let longest = if power(0, longest).is_some() { longest } else { MAX_DELAY };
     let undelayed = power(0, longest)?;
     let delay = best_step(undelayed, longest, |samples| power(samples, longest));

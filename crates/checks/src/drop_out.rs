@@ -123,8 +123,9 @@ fn continuation(parts: [&[f64]; 2]) -> f64 {
         equal += x.windows(2).filter(|x| x[0] == x[1]).count();
         twice += x.windows(3).filter(|x| x[0] == x[1] && x[1] == x[2]).count();
     }
-    // One pair of equal neighbours is added to the counts. The probability that this pair continues
-    // is `rate`, the fraction of equal neighbours. So the result is never zero.
+    // The counts get one additional pair of equal neighbours. This pair continues with the
+    // probability `rate`, the fraction of equal neighbours among all pairs. The result is therefore
+    // never zero.
     let rate = (equal as f64 + 1.0) / (pairs as f64 + 1.0);
     (twice as f64 + rate) / (equal as f64 + 1.0)
 }
@@ -176,7 +177,8 @@ mod tests {
         dropped_channels(QUANTITY, &Record::from_channel(sampling, x).unwrap())
     }
 
-    /// A slow oscillation in noise, in steps of a converter; `amplitude` and `noise` count steps.
+    /// Returns a slow oscillation with noise, rounded to the steps of a converter. The unit of
+    /// `amplitude` and `noise` is one step.
     fn motion(amplitude: f64, noise: f64, seed: u64) -> Vec<f64> {
         let sampling = Sampling::new(0.01, 4000).unwrap();
         let noise = noise::white(sampling, 1, noise.max(1e-9), seed).unwrap();
@@ -205,7 +207,8 @@ mod tests {
             {
                 assert_eq!(found(motion(amplitude, noise, seed)), [], "{amplitude} {noise} {seed}");
             }
-            // Hits on a structure that comes to rest at one level of the converter between hits.
+            // Hits on a structure that comes to rest between the hits, at one level of the
+            // converter, are not drop-outs.
             let decay = |k: usize| {
                 (1e4 * (-0.02 * (k % 1000) as f64).exp() * (0.9 * k as f64).sin()).round()
             };

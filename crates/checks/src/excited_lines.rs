@@ -62,7 +62,7 @@ impl Check for ExcitedLines {
             f,
             "{} with force: each equation of motion gives {} for {}",
             message::count(self.lines, "line"),
-            message::count(2 * self.lines, "equation"),
+            message::count(2 * self.lines, "real equation"),
             message::count(self.unknowns, "unknown")
         )?;
         f.write_str(match self.verdict() {

@@ -4,11 +4,12 @@
 /// [`adjust_p_values`](super::adjust_p_values).
 pub const SIGNIFICANCE: f64 = 0.01;
 
-/// Minimum share of the residual power beyond the noise that a few lines must have to be reported.
+/// Minimum share of the excess power (residual power minus noise power) that a few lines must have
+/// for these lines to be reported.
 pub const CONCENTRATED: f64 = 0.8;
 
-/// Maximum ratio of residual power to noise power on the lines outside a concentrated misfit; up to
-/// this ratio, the model counts as correct on these lines.
+/// Maximum ratio of residual power to noise power on the lines that remain without the few lines
+/// with most of the misfit; up to this ratio, the model counts as correct on the remaining lines.
 pub const DISTURBED_ALONE: f64 = 10.0;
 
 /// Minimum share of the residual power of a linear model that a reported nonlinear term explains.
@@ -51,16 +52,18 @@ pub const INCOHERENCE_BAD: f64 = 0.5;
 /// intervals are unreliable, even with a known window.
 pub const RESONANCE_LINES: f64 = 1.0;
 
-/// Minimum number of samples per period of the highest mode, for a transition from sample to sample
-/// that hardly depends on the force between them: a natural frequency of 1 rad per sample.
+/// Minimum number of samples per period of the highest mode, for a fit of the transition from
+/// sample to sample; at fewer samples (a natural frequency above 1 rad per sample), the change of
+/// the force between the samples matters.
 pub const SAMPLES_PER_PERIOD_DOUBTFUL: f64 = std::f64::consts::TAU;
 
-/// Minimum number of samples per period of a mode well below the Nyquist frequency: a natural
-/// frequency of 2.5 rad per sample.
+/// Minimum number of samples per period of the highest mode, for a fit of the transition from
+/// sample to sample; at fewer samples (a natural frequency above 2.5 rad per sample), the mode may
+/// be the alias of a mode above the Nyquist frequency.
 pub const SAMPLES_PER_PERIOD_BAD: f64 = std::f64::consts::TAU / 2.5;
 
-/// Minimum number of samples per period of the highest mode, for the equation of motion at the
-/// samples.
+/// Minimum number of samples per period of the highest mode, for a fit of the equation of motion at
+/// each sample; at fewer samples, the mode may be the alias of a mode above the Nyquist frequency.
 pub const SAMPLES_PER_PERIOD_AT_SAMPLES: f64 = 2.5;
 
 /// Samples per period at the Nyquist frequency.
@@ -76,9 +79,9 @@ pub const EULER_BIAS_BAD: f64 = 0.1;
 pub const DELAY_REMAINING: f64 = 0.25;
 
 /// Factor between a measured derivative and the derivative computed from another channel, above
-/// which units, columns or signs are wrong. Sensor errors give a smaller factor. So do the
-/// trapezoidal rule and the second difference at frequencies below four tenths of the sampling
-/// rate.
+/// which units, columns or signs are wrong. Sensor errors give a smaller factor. At frequencies
+/// below four tenths of the sampling rate, the trapezoidal rule and the second difference also give
+/// a smaller factor.
 pub const KINEMATIC_GAIN: f64 = 3.0;
 
 /// Power that forces extract from a machine, relative to the apparent power, above which neither
@@ -96,7 +99,8 @@ pub const SPIKE: f64 = 20.0;
 /// Maximum residual, relative to the fitted signal (RMS), that counts as rounding.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Number of lags of the correlation of a residual; with a force, on either side of lag 0.
+/// Number of lags of the autocorrelation of a residual. The correlation of a residual with a force
+/// has this number of lags on each side of lag 0.
 pub const LAGS: usize = 25;
 
 /// Minimum number of samples per lag of the correlation; a short residual is tested at fewer lags.
@@ -142,7 +146,8 @@ pub const LEVEL_ROUNDING: f64 = 1e-6;
 /// response to a strong line exceeds the noise.
 pub const STRONG_LINE: f64 = 0.01;
 
-/// Minimum number of lines per reported line: at most an eighth of all lines are reported.
+/// Minimum number of lines for each line that is reported as disturbed: at most an eighth of all
+/// lines are reported.
 pub(crate) const LINES_PER_DISTURBED: usize = 8;
 
 /// Maximum relative difference of frequencies that count as the same line of several records.
@@ -260,9 +265,9 @@ pub(crate) const LINES_PER_CORRELATION: usize = 8;
 /// with fewer, the residuals are not tested.
 pub(crate) const FREE_RESIDUALS: f64 = 8.0;
 
-/// Minimum residual power, relative to the stated power of the response to an unmeasured force,
-/// that agrees with this power: the mean of the periods may contain only this fraction of the
-/// response.
+/// Minimum ratio of the residual power to the stated power of the response to an unmeasured force;
+/// below it the residual is too small for this stated power. The mean of the periods may contain
+/// only this fraction of the power of the response.
 pub(crate) const SPECTRAL_LEAKED: f64 = 0.5;
 
 /// Minimum singular value of the sensitivity (columns of unit length), relative to the largest; a

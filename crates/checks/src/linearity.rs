@@ -334,7 +334,7 @@ pub struct Linearity {
     /// Degree of freedom of the motion.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub dof: usize,
-    /// Probability of a correlation at least as strong for a linear system.
+    /// Probability that a linear system has at least as strong a correlation.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

@@ -12,9 +12,9 @@ use super::p_value::PValue;
 use super::{Subject, Verdict};
 
 /// Finds the most significant negative mass on the diagonal of M ([`Finding::NegativeMass`]);
-/// `None` if there is none. The p-value is the probability that noise alone gives an estimate at
-/// least as negative for any mass with the true value zero: the one-sided probability of Student's
-/// t distribution, times the number of masses.
+/// `None` if there is none. The p-value is the probability that noise alone makes any of the
+/// estimated masses at least as negative, in standard errors, if the true masses are zero: the
+/// one-sided probability of Student's t distribution, times the number of masses.
 ///
 /// A machine may have negative damping or stiffness, but no negative mass: a force or a response of
 /// the wrong sign changes the sign of all matrices and leaves the modes unchanged.
@@ -59,8 +59,8 @@ pub struct NegativeMass {
     pub mass: f64,
     /// Standard error of the mass, in kg.
     pub standard_error: f64,
-    /// Probability that noise alone makes the estimate of any mass with the true value zero at
-    /// least as negative.
+    /// Probability that noise alone makes any of the estimated masses at least as negative as this
+    /// one, in standard errors, if the true masses are zero.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

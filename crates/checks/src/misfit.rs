@@ -31,10 +31,11 @@ pub struct Misfit {
 pub struct Concentration {
     /// Frequencies of the lines, in Hz, rising.
     pub frequencies_hz: Vec<f64>,
-    /// Fraction of the residual power beyond the noise that vanishes without the lines at
-    /// `frequencies_hz`.
+    /// Fraction of the excess of the residual power over the noise power that vanishes if the lines
+    /// at `frequencies_hz` are excluded.
     pub share: f64,
-    /// Frequency, in Hz, with all of the lines near its multiples; `None` if this may be chance.
+    /// Frequency, in Hz, whose multiples are near all lines at `frequencies_hz`; `None` if this
+    /// agreement may be chance, or for a single line.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub multiples_of_hz: Option<f64>,
 }

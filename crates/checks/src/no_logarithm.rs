@@ -1,12 +1,12 @@
-//! Transition from sample to sample without a real logarithm.
+//! Transition matrix, from one sample to the next, that has no real logarithm.
 
 use std::fmt::{self, Formatter};
 
 use super::finding::{Check, Names};
 use super::{Subject, Verdict};
 
-/// Transition from sample to sample without a real logarithm: the sampling interval is too long for
-/// a mode.
+/// Transition matrix, from one sample to the next, that has no real logarithm: the sampling
+/// interval is too long for a mode.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct NoLogarithm {

@@ -33,7 +33,8 @@ pub struct PartsAgreement {
     /// Ratio of the standard errors from the scatter of the parts to the standard errors from the
     /// noise (pure number).
     pub scatter: f64,
-    /// Number of independent differences of the parts that `scatter` is computed from.
+    /// Number of independent differences between the parts; `scatter` is computed from these
+    /// differences.
     pub degrees_of_freedom: usize,
 }
 

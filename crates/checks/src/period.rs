@@ -1,5 +1,6 @@
 //! Check of a claimed period by the force.
 
+use std::f64::consts::SQRT_2;
 use std::fmt::{self, Formatter};
 
 use mechid_signal::Record;
@@ -19,8 +20,8 @@ use super::{Subject, Verdict};
 /// or two samples longer or shorter; it repeats after the claimed period except at one sample,
 /// where samples are missing or inserted; or it repeats after a different number of samples, and
 /// the claimed period is not a multiple of it. The last fault is detected even in a single claimed
-/// period, if this contains at least four thirds of the true one; the sentence then names the
-/// compared samples.
+/// period, if this contains at least four thirds of the true one; the text of the finding then
+/// states how many samples were compared.
 pub fn claimed_period(force: &Record, period: usize) -> Option<Finding> {
     let channels: Vec<Vec<f64>> = (0..force.channels()).filter_map(|c| unit(force, c)).collect();
     if channels.is_empty() || period == 0 || period > force.len() {
@@ -198,7 +199,7 @@ pub enum PeriodFault {
     Neighbour {
         /// Number of samples after which the force repeats best.
         period: usize,
-        /// RMS difference between successive periods of this length, relative to √2 times the RMS
+        /// RMS difference between samples `period` samples apart, relative to √2 times the RMS
         /// of the force (pure number).
         mismatch: f64,
         /// RMS difference between samples one claimed period apart, relative to √2 times the RMS of
@@ -211,7 +212,7 @@ pub enum PeriodFault {
         /// First sample that does not repeat, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         sample: usize,
-        /// RMS difference after the claimed period at the samples outside the interruption,
+        /// RMS difference between samples one claimed period apart, outside the interruption,
         /// relative to √2 times the RMS of the force (pure number).
         mismatch: f64,
     },
@@ -220,7 +221,7 @@ pub enum PeriodFault {
     Other {
         /// Number of samples after which the force repeats.
         period: usize,
-        /// RMS difference between successive periods of this length, relative to √2 times the RMS
+        /// RMS difference between samples `period` samples apart, relative to √2 times the RMS
         /// of the force (pure number).
         mismatch: f64,
         /// Number of samples of the force.
@@ -252,7 +253,8 @@ impl Check for WrongPeriod {
 
 impl PeriodFault {
     fn sentence(&self, claimed: usize, f: &mut Formatter<'_>) -> fmt::Result {
-        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        // A mismatch is relative to √2 times the RMS of the force.
+        let percent = |mismatch: f64| format!("{:.2} %", 100.0 * SQRT_2 * mismatch);
         match *self {
             PeriodFault::Neighbour { period, mismatch, claimed_mismatch } => write!(
                 f,

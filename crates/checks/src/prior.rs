@@ -22,7 +22,8 @@ pub struct PriorAgreement {
     pub standard_deviation: f64,
     /// Estimate, in the unit of the parameter.
     pub estimate: f64,
-    /// Probability of an estimate at least as far from the mean of the prior.
+    /// Probability of an estimate at least as far from the mean of the prior as this one, if prior
+    /// and data agree.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

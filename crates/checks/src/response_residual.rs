@@ -96,7 +96,7 @@ pub fn after_table_fit(
     Ok(records.iter().zip(columns).map(column_findings).collect())
 }
 
-/// Mean and variance of a weighted residual power of noise alone.
+/// Mean and variance of the weighted residual power if the residual is only noise.
 struct Expected {
     mean: f64,
     variance: f64,
@@ -113,7 +113,8 @@ impl Expected {
 struct Series<'a> {
     /// Residuals over the lines, in the order of the forces and, for each force, of the responses.
     each: Vec<Vec<Complex<f64>>>,
-    /// Number of each line, in rising order, with the index of the line in the series of `each`.
+    /// Number of each spectral line, and the index of its residual in every entry of `each`; sorted
+    /// by the number.
     lines: Vec<(usize, usize)>,
     /// Correlation between the noise of two lines; the index is their distance, in lines, from 0.
     correlation: &'a [f64],

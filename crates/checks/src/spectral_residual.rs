@@ -29,11 +29,12 @@ pub struct SpectralResidual {
     noise_stated: bool,
     /// Weighted residual without the part that a step of the parameters explains.
     values: DVector<f64>,
-    /// Q of the covariance I − QQᵀ of the values.
+    /// Matrix Q; the covariance of `values` is I − QQᵀ.
     explained: DMatrix<f64>,
-    /// Weighted residual, and Q of its covariance I − QQᵀ, before the transients are projected out,
-    /// for the power test; `None` unless the noise is the response to an unmeasured force, whose
-    /// stated power includes the transients.
+    /// Weighted residual, and Q of its covariance I − QQᵀ, for the power test; `None` if the power
+    /// test uses `values` and `explained`. If the noise is the response to an unmeasured force, its
+    /// stated power includes the transients; therefore the transients are not projected out of the
+    /// residual for the power test.
     for_power_test: Option<(DVector<f64>, DMatrix<f64>)>,
     /// Standard deviation of every residual before the fit of the parameters, estimated from the
     /// magnitude of this residual.
@@ -103,9 +104,9 @@ impl SpectralResidual {
         }
     }
 
-    /// Sets the weighted residual and the explained columns Q for the power test, without a
-    /// projection of the transients; `None` if the power test uses the same residual and Q as the
-    /// other tests.
+    /// Sets the weighted residual for the power test, and Q of its covariance I − QQᵀ, both before
+    /// the transients are projected out; `None` if the power test uses the same residual and Q as
+    /// the other tests.
     pub(super) fn for_power_test(
         self,
         for_power_test: Option<(DVector<f64>, DMatrix<f64>)>,
@@ -134,10 +135,10 @@ impl SpectralResidual {
         self.concentration = lines;
     }
 
-    /// Tests the power of the residual against the noise, if it is stated ([`Finding::Misfit`]),
-    /// and its correlation from line to line ([`Finding::Whiteness`]) and with the forces
-    /// ([`Finding::CrossCorrelation`]). Residuals of rounding pass. Empty if there are too few
-    /// residuals in excess of the parameters.
+    /// Tests the power of the residual against the noise, if the noise is stated
+    /// ([`Finding::Misfit`]), and its correlation from line to line ([`Finding::Whiteness`]) and
+    /// with the forces ([`Finding::CrossCorrelation`]). A residual that is only rounding passes.
+    /// The list is empty if there are too few residuals in excess of the parameters.
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
@@ -216,7 +217,8 @@ impl SpectralResidual {
         &self.values
     }
 
-    /// Returns orthonormal columns that span the effect of the parameters and transients.
+    /// Returns columns that span the effect of the parameters and transients. The columns of the
+    /// parameters are orthonormal over all records of the fit together.
     pub(super) fn explained(&self) -> &DMatrix<f64> {
         &self.explained
     }

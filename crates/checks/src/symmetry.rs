@@ -18,9 +18,9 @@ use super::{Subject, Verdict};
 /// which make C and K non-symmetric. An M that is not symmetric shows that forces and displacements
 /// do not belong to the same points and directions.
 ///
-/// The p-value is the probability that one pair m_ij, m_ji of a symmetric M differs by at least as
-/// many standard errors: the two-sided probability of Student's t distribution, times the number of
-/// pairs.
+/// The p-value is the probability that noise alone makes any pair m_ij, m_ji of a symmetric M
+/// differ by at least as many standard errors as the most significant pair: the two-sided
+/// probability of Student's t distribution, times the number of pairs.
 ///
 /// # Source
 /// Meirovitch, *Fundamentals of Vibrations* (2001), section 4.4 (the kinetic energy); the test is
@@ -79,7 +79,7 @@ pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
     Some(finding)
 }
 
-/// Difference of two mirrored entries of M, which are equal in the kinetic energy.
+/// Difference of two mirrored entries of M; the mass matrix of a kinetic energy is symmetric.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MassSymmetry {

@@ -80,7 +80,7 @@ mod tests {
         assert!(unrelated_response(0.9985_f64.sqrt(), 2000, 3).is_some());
         assert!(unrelated_response(0.99_f64.sqrt(), 2000, 3).is_some());
         assert!(unrelated_response(1.2, 2000, 3).is_some());
-        // A response with noise of the same power still follows the force.
+        // Half of the power of the response is noise; the response still follows the force.
         assert_eq!(unrelated_response(0.5_f64.sqrt(), 2000, 3), None);
         assert_eq!(unrelated_response(0.97_f64.sqrt(), 2000, 3), None);
         // The test needs more equations than unknowns.

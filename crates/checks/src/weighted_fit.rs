@@ -90,7 +90,8 @@ struct Linearised {
     weighted: Vec<Whitened>,
     /// Combinations of parameters, one per column, whose effects on the residuals are orthonormal.
     basis: DMatrix<f64>,
-    /// Orthonormal columns that span the effect of the parameters.
+    /// Columns that span the effect of the parameters, one matrix per record; they are orthonormal
+    /// over all records together.
     explained: Vec<DMatrix<f64>>,
     /// Scalar products of the residuals with the columns of `explained`.
     coefficients: DVector<f64>,
@@ -398,8 +399,8 @@ fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
     Some(pairs_by_channel.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
 }
 
-/// Returns the residual power of each channel in the measured quantity, with its variance by force
-/// noise, over all records.
+/// Returns, for each channel and for each line of all records, the residual power in the measured
+/// quantity and the variance that force noise causes in the residual.
 fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(f64, f64)>>> {
     let system = estimate.system().ok()?;
     let mut residuals = vec![Vec::new(); system.dof()];
@@ -419,10 +420,10 @@ fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(
     Some(residuals)
 }
 
-/// Returns two values for the channel with the smallest probability: the ratio of residual power to
-/// noise power on the lines where force noise dominates, and the probability of a ratio at most as
-/// large, times the number of channels. `None` if no force noise is stated, or if it dominates on
-/// too few lines.
+/// Tests, for each channel, the ratio of residual power to noise power on the lines where force
+/// noise dominates. Returns this ratio and the probability of a ratio at most as large, times the
+/// number of channels, for the channel with the smallest probability. `None` if no force noise is
+/// stated, or if force noise dominates on too few lines.
 fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
     if data.force_variance().iter().all(|variance| *variance == 0.0) {
         return None;

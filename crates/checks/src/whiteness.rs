@@ -49,7 +49,7 @@ pub enum Residual {
         /// Degree of freedom of the force.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         force: usize,
-        /// Smallest distance of the lines whose correlation is tested.
+        /// Smallest distance, in lines, at which the correlation between two lines is tested.
         distance: usize,
     },
 }

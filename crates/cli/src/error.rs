@@ -66,7 +66,7 @@ pub enum CliError {
         /// The limit.
         largest: usize,
     },
-    /// Two results for standard output.
+    /// At least two outputs are directed to standard output.
     #[error(
         "only one output can go to standard output, not {}{}",
         message::count(*files, "file"),

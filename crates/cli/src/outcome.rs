@@ -220,8 +220,8 @@ pub fn shown(text: &str) -> String {
     text.split('\n').map(escaped).collect::<Vec<_>>().join("\n")
 }
 
-/// Returns JSON with the control characters of a terminal escaped by the rules of JSON; they occur
-/// only in strings.
+/// Returns JSON in which the control characters of a terminal are escaped by the rules of JSON;
+/// these characters occur only in strings.
 fn shown_json(json: &str) -> String {
     let mut shown = String::with_capacity(json.len());
     for c in json.chars() {

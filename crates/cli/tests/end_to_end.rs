@@ -33,8 +33,8 @@ fn assert_close(report: &Value, name: &str, truth: f64, tolerance: f64) {
     assert!((value - truth).abs() <= tolerance, "{name} = {value}, truth {truth}");
 }
 
-/// One oscillator under the force Σ A cos(nω0 t + n²); its steady displacement is summed term by
-/// term.
+/// One oscillator under the force Σ A cos(nω0 t + n²); its steady-state displacement is summed term
+/// by term.
 struct Oscillator {
     m: f64,
     c: f64,
@@ -285,7 +285,8 @@ fn the_time_domain_gives_the_machine_whose_force_is_held_or_linear() {
             // The error is rounding times the condition number of the transition over one step.
             assert_close(&report, name, value, 1e-8 * value);
         }
-        // Euler's rule on the same record has an error of more than half of ωΔt = 0.2.
+        // Euler's rule on the same record gives c with a relative error of more than 0.1, half of
+        // ωΔt = 0.2.
         let euler = mechid(folder.path(), &format!("{common} --between-samples euler"));
         assert!((parameter(&euler, "c").0 / 6.0 - 1.0).abs() > 0.1);
     }

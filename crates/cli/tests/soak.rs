@@ -96,8 +96,8 @@ fn disturbed(home: &Path, draws: &mut Draws) {
             one.wait().unwrap();
             assert_eq!(other.wait().unwrap().code(), Some(1));
         }
-        // With little memory only some records, or none, have a row; so this run has a separate
-        // folder.
+        // With little memory, the results have a row for some records only, or for none; so this
+        // run writes into a separate folder.
         _ => {
             let kilobytes = 60_000 + 1000 * draws.below(100);
             let limit = format!("ulimit -v {kilobytes};");

@@ -21,7 +21,7 @@ fn anchors_and_limits_are_in_the_json() {
     let report = json(&["--step", "0.1"]);
     let schemes = report["schemes"].as_array().unwrap();
     let elongation = |k: usize| schemes[k]["chart"][0]["period_elongation"].as_f64().unwrap();
-    // Published period elongations at ten steps per period, with four decimals of a per cent.
+    // Published period elongations at ten steps per period, in per cent with four decimals.
     for (k, percent) in
         [3.2075, 1.6002, -1.6934, 12.3206, 6.1462, 3.3828, 1.6179, 0.1122].iter().enumerate()
     {

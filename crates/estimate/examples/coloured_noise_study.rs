@@ -39,7 +39,7 @@ const BEFORE: usize = 2000;
 #[derive(Debug, Clone, Copy)]
 enum Colour {
     White,
-    /// x_k = 0.9 x_{k−1} + e_k.
+    /// Autoregressive noise of the first order: x_k = 0.9 x_{k−1} + e_k with white noise e_k.
     Autoregressive,
     /// Power that falls like 1/f over three decades: a sum of autoregressive noises.
     OneOverF,

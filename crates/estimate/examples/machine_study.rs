@@ -36,7 +36,8 @@ use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use mechid_spectra::LineData;
 use nalgebra::DMatrix;
 
-/// True values by name, and one experiment for each seed.
+/// Name of a study, true values of the parameters by name, and a function that returns the estimate
+/// from the experiment with a given seed.
 type Study = (
     &'static str,
     Vec<(String, f64)>,
@@ -131,7 +132,7 @@ fn parts(estimate: &MachineEstimate) -> Option<f64> {
     Some(p_values.min_by(f64::total_cmp)? * estimate.parts.len() as f64)
 }
 
-/// p-value of an experiment by its seed.
+/// Function that returns the p-value of the experiment with a given seed.
 type PValue = Box<dyn Fn(u64) -> Option<f64>>;
 
 /// Prints the number of experiments in which parts of the data disagree, for correct and for wrong
@@ -210,8 +211,10 @@ fn time_of_large_rotor() {
     );
 }
 
-/// Searches for the chain in open records of 8,192 samples with five forces and two sensors. All
-/// initial springs and dampers are wrong by the same `factor`.
+/// Prints the number of experiments in which the search finds every parameter of the chain with an
+/// error below 10 %, the mean number of searches and the mean time. The open records have 8,192
+/// samples, five forces and two sensors. The initial values of all springs and dampers are wrong by
+/// the same `factor`.
 fn search_row(name: &str, factor: f64, seeds: u64) {
     let mass = DMatrix::from_diagonal(&chain::MASSES.to_vec().into());
     let [damping, stiffness] = [&chain::DAMPINGS, &chain::STIFFNESSES].map(chain::chain);

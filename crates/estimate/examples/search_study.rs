@@ -23,7 +23,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const PERIODS: usize = 4;
-/// Number of lines, and ratio of noise to response, of the machines whose search is timed.
+/// Number of lines of each timed search; [`TIMED_NOISE`] is the ratio of noise to response.
 const TIMED_LINES: usize = 500;
 const TIMED_NOISE: f64 = 0.01;
 
@@ -100,7 +100,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Times the search of large machines.
+/// Measures and prints the time of the search for the parameters of large machines.
 fn time() -> Result<(), Box<dyn std::error::Error>> {
     println!("\n| Held chain, masses | Unknowns | Searches | Seconds |\n|---|---|---|---|");
     for dof in [10, 20] {

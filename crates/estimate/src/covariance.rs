@@ -18,7 +18,8 @@ pub enum Covariance {
 /// the same regressors share the rows h.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Product {
-    /// S, equations × equations; each entry is in the product of the SI units of its two equations.
+    /// Residual covariance S, equations × equations; each entry is in the product of the SI units
+    /// of its two equations.
     pub residual: DMatrix<f64>,
     /// Distinct rows h, one below the other, in inverse SI units of the regressors.
     pub rows: DMatrix<f64>,

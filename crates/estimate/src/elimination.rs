@@ -64,8 +64,8 @@ mod tests {
             prop_assume!(condition < 1e6);
             prop_assert!(solve_in_place(&mut a.clone(), &mut inverse));
             let expected = a.lu().solve(&DMatrix::identity(3, 3)).unwrap();
-            // The error of either inverse is at most about the condition number times the rounding
-            // error.
+            // The relative error of each of the two inverses is at most about the condition number
+            // times the rounding error.
             prop_assert!((inverse - &expected).norm() < 1e-14 * condition * expected.norm());
         }
     }

@@ -98,7 +98,7 @@ impl Posterior {
 
     /// Returns the frequency, in Hz, below which noise hides a force as strong as the driven
     /// components; `None` if noise hides it in every component.
-    pub fn seen_from_hz(&self, components: &Components) -> Option<f64> {
+    pub fn lowest_hz(&self, components: &Components) -> Option<f64> {
         let endless = Evidence { reach: components.singular.len(), ..self.best };
         components.lowest_hz(|i| {
             endless.force_variance(components, i) * components.singular[i].powi(2)

@@ -113,10 +113,10 @@ impl Measurement {
 
     /// Returns the band in which a measurement without displacements shows a force; `None` if the
     /// force needs no restriction to a band.
-    pub(crate) fn shown(&self, seen_from_hz: Option<f64>) -> Option<[f64; 2]> {
+    pub(crate) fn shown(&self, lowest_hz: Option<f64>) -> Option<[f64; 2]> {
         let displaced = self.channels.iter().any(|c| c.quantity == ResponseQuantity::Displacement);
         let nyquist = 0.5 * self.sampling().rate_hz();
-        let low_hz = seen_from_hz.filter(|low| !displaced && (0.0..nyquist).contains(low))?;
+        let low_hz = lowest_hz.filter(|low| !displaced && (0.0..nyquist).contains(low))?;
         (low_hz > 0.0).then_some([low_hz, nyquist])
     }
 

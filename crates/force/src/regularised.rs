@@ -133,7 +133,7 @@ fn solve(
 ) -> Result<(RegularisedForce, Record), ForceError> {
     let choice = Choice::new(operator.components(), filter, noise_known)?;
     let whole = operator.force(&choice.factors)?;
-    let band_hz = measured.band_hz().or_else(|| measured.shown(choice.seen_from_hz));
+    let band_hz = measured.band_hz().or_else(|| measured.shown(choice.lowest_hz));
     if let Some(band_hz) = band_hz {
         operator.keep(band_hz)?;
     }
@@ -155,7 +155,7 @@ fn solve(
         None => force,
     };
     let noise_std = scale.iter().map(|s| s * choice.noise.sqrt()).collect();
-    let Choice { parameter, unknowns, seen_from_hz, .. } = choice;
+    let Choice { parameter, unknowns, lowest_hz: seen_from_hz, .. } = choice;
     let solution = RegularisedForce { force, parameter, unknowns, noise_std, seen_from_hz };
     Ok((solution, spread(whole)?))
 }
@@ -172,7 +172,8 @@ struct Choice {
     noise: f64,
     /// Effective number of real unknowns.
     unknowns: f64,
-    seen_from_hz: Option<f64>,
+    /// Frequency below which noise hides the force, in Hz; `None` if noise hides every component.
+    lowest_hz: Option<f64>,
 }
 
 impl Choice {
@@ -201,7 +202,7 @@ impl Choice {
             variance: (0..count).map(variance).collect(),
             noise,
             unknowns: fit.unknowns,
-            seen_from_hz: components.lowest_hz(|i| components.singular[i] >= lambda),
+            lowest_hz: components.lowest_hz(|i| components.singular[i] >= lambda),
             factors,
         })
     }
@@ -226,7 +227,7 @@ impl Choice {
             variance: (0..count).map(|i| posterior.variance(components, i)).collect(),
             noise: posterior.noise(),
             unknowns: components.fit(|i| factors[i]).unknowns,
-            seen_from_hz: posterior.seen_from_hz(components),
+            lowest_hz: posterior.lowest_hz(components),
             factors,
         })
     }

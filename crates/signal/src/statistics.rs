@@ -228,7 +228,8 @@ mod tests {
             all.chunks(block).for_each(|part| parts.push(part).unwrap());
             assert_eq!(parts.mean(), whole.mean());
             assert_eq!((parts.minimum(), parts.maximum()), (whole.minimum(), whole.maximum()));
-            // The peak rises from block to block.
+            // The peak rises from block to block; the scale of the sum of squares, a power of two,
+            // follows it without rounding.
             assert_eq!(parts.rms(), whole.rms());
             let (mean, deviation) = two_pass(&all);
             assert!((parts.mean() / mean - 1.0).abs() < 1e-14);

@@ -27,7 +27,7 @@ impl<'a> TransientLoad<'a> {
         assert_eq!(
             tau.len(),
             len(data),
-            "one load for every transient column, power of s and degree of freedom"
+            "there must be one load for each combination of transient column, power of s and degree of freedom"
         );
         Self { data, tau }
     }

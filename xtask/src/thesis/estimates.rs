@@ -27,8 +27,8 @@ pub fn frequency(sequences: &Sequences) -> Listed {
     fit(sequences, &data)
 }
 
-/// Least squares on the spectra with the harmonic offset: harmonic n at (n + 1)·ω0, including the
-/// mean.
+/// Least squares on the spectra with the harmonic offset, a slip of the original programs: harmonic
+/// n has the angular frequency (n + 1)·ω0, and n = 0, the mean, is included.
 pub fn frequency_offset(sequences: &Sequences) -> Listed {
     let (omega, force, displacement) = amplitudes(sequences, 1);
     let data =

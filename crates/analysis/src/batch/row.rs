@@ -50,7 +50,7 @@ pub struct ResultRow {
     pub condition_number: Option<f64>,
     /// Every check, before the fit and after it.
     pub findings: Vec<FindingRow>,
-    /// Sentences of the findings that are not good.
+    /// Sentences of the findings with the verdict doubtful or bad.
     pub warnings: Vec<String>,
     /// Remarks to read before using the numbers.
     pub notes: Vec<String>,

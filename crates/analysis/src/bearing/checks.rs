@@ -50,7 +50,8 @@ pub(super) fn rows(
     Ok(findings.iter().map(row).collect())
 }
 
-/// Returns the findings on the tests of one condition and on their fit.
+/// Returns the findings on the tests of one condition of the rig (with the film, or the baseline
+/// without it) and on their fit.
 fn condition_findings<'a>(
     tests: &'a BearingData,
     fit: &OutputErrorFit,
@@ -93,8 +94,8 @@ pub(super) fn excess(tests: &BearingData, fit: &OutputErrorFit) -> Result<f64, A
     Ok(if findings.iter().any(exceeds) { fit.misfit_ratio.max(1.0) } else { 1.0 })
 }
 
-/// Returns a finding if a free response of the housing on the identified film would grow: such a
-/// rig could not be tested.
+/// Returns a finding if a free response of the housing on the identified film would grow. A rig
+/// with growing free responses could not have been tested, so the coefficients are doubtful.
 fn instability_of_rig(film: &Film, stator_mass: f64) -> Result<Option<Finding>, AnalysisError> {
     let estimate: &Estimate = &film.fit.estimate;
     let matrix = |kind: usize| DMatrix::from_row_slice(2, 2, &film.rig.as_slice()[4 * kind..][..4]);

@@ -26,8 +26,8 @@ use crate::measurement::{
 /// this number, the weights lose less than 3 % of the information.
 const WELL_KNOWN: usize = 40;
 
-/// Spectra of the film force f − M_s a and of the displacement d of the housing relative to the
-/// shaft, of all tests of one condition.
+/// Spectra of all tests of one condition of the rig (with the film, or the baseline without it):
+/// the film force f − M_s a and the displacement d of the housing relative to the shaft.
 #[derive(Debug, Clone)]
 pub struct BearingData {
     /// Names of the tests.
@@ -48,7 +48,7 @@ pub struct BearingData {
     pub(super) remarks: Vec<String>,
 }
 
-/// One test of a condition.
+/// One test of the rig, with its spectra and the findings on its samples.
 #[derive(Debug, Clone)]
 pub(super) struct TestRecord {
     pub name: String,
@@ -270,7 +270,8 @@ fn matching_responses(
 }
 
 /// Returns the film force f − M a and the displacement at the rows `keep` of two tables of
-/// frequency responses: `d` of the displacement and `a` of the acceleration.
+/// frequency responses. The table `d` has the responses of the displacement, and the table `a` has
+/// those of the acceleration.
 ///
 /// `mass` is the mass of the stator, in kg. With `noise`, the covariance of the result is computed
 /// from the covariances of both tables, if both have one.

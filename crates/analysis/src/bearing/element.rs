@@ -4,8 +4,8 @@ use mechid_model::elements::{Bearing, Coefficient, Element, FreeCoefficient, Mac
 
 use super::CoefficientRow;
 
-/// Returns a machine of one element, the bearing between x, y and the support; `None` if the
-/// coefficients have no standard errors.
+/// Returns a machine of one element: the bearing, which connects x and y to the support. The result
+/// is `None` if the coefficients have no standard errors.
 pub(super) fn machine(coefficients: &[CoefficientRow]) -> Option<Machine> {
     let free = coefficients.iter().map(coefficient).collect::<Option<Vec<_>>>()?;
     let of_kind = |kind: usize| {

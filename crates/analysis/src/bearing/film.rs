@@ -24,13 +24,14 @@ const EACH: usize = 4;
 pub(super) const NAMED: [&str; 3 * EACH] =
     ["kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy", "mxx", "mxy", "myx", "myy"];
 
-/// Coefficients of a film with their covariance: kxx, kxy, kyx, kyy, then c and m likewise.
+/// Coefficients of a film with their covariance, in the order kxx, kxy, kyx, kyy, cxx, …, cyy, mxx,
+/// …, myy.
 #[derive(Debug, Clone)]
 pub(super) struct Film {
     /// Coefficients, 12 or 8.
     values: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Test of M = 0.
+    /// Likelihood-ratio test of the hypothesis that the mass coefficients M of the film are zero.
     pub inertia: Option<LikelihoodRatio>,
     /// All twelve coefficients of the rig before the baseline is subtracted, for the dynamic
     /// stiffness line by line.
@@ -111,8 +112,8 @@ impl Film {
         Ok(film)
     }
 
-    /// Replaces the coefficients by eight from fits in which tests and baseline have the same known
-    /// mass, `common`.
+    /// Replaces the coefficients by the eight of K and C from the fits `rig` and `baseline`. In
+    /// both fits the mass is known: `common`.
     fn replace_by_eight(
         &mut self,
         rig: OutputErrorFit,
@@ -218,7 +219,7 @@ impl Fitted {
         Ok(output_error(&data.data, &Unknowns::known_mass(&mass)?)?)
     }
 
-    /// Subtracts the coefficients of a baseline and adds the covariances.
+    /// Returns the coefficients minus those of the baseline, and the sum of both covariances.
     fn minus(&self, base: Option<&Self>) -> (DVector<f64>, DMatrix<f64>) {
         match base {
             None => (self.values.clone(), self.covariance.clone()),
@@ -277,9 +278,9 @@ fn row_by_row(matrix: &Matrix2<f64>) -> [f64; EACH] {
     [matrix[(0, 0)], matrix[(0, 1)], matrix[(1, 0)], matrix[(1, 1)]]
 }
 
-/// Returns the coefficients of a fit as kxx, kxy, kyx, kyy, then c and m likewise, with their
-/// covariance. If the fit did not estimate the mass, the given `mass` takes its place, with a
-/// covariance of zero.
+/// Returns the coefficients of a fit in the order kxx, kxy, kyx, kyy, cxx, …, cyy, mxx, …, myy,
+/// with their covariance. If the fit did not estimate the mass coefficients, they are those of
+/// `mass`, with a covariance of zero.
 fn in_order(fit: &OutputErrorFit, mass: &Matrix2<f64>) -> (DVector<f64>, DMatrix<f64>) {
     let estimate = &fit.estimate;
     let free: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();

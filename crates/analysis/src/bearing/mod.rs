@@ -55,8 +55,8 @@ pub use self::stiffness::StiffnessLine;
 pub use self::summary::{Amplitude, BearingSummary, CoefficientRow, Dimensionless, StabilityRow};
 use crate::{AnalysisError, time_limit};
 
-/// Identifies the film of a bearing from tests with excitation. The coefficients of baseline tests
-/// of the same rig without the film, if there are any, are subtracted with their covariance.
+/// Identifies the film of a bearing from tests with excitation. If there are baseline tests (of the
+/// same rig without the film), their coefficients are subtracted, and their covariance is added.
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] for settings that are not positive, [`AnalysisError::Estimate`] if a
@@ -104,7 +104,7 @@ impl IdentifiedBearing {
     }
 
     /// Returns the covariance of the coefficients, one row per coefficient, in products of their
-    /// units: kxx, kxy, kyx, kyy, then c and m likewise.
+    /// units. The order is kxx, kxy, kyx, kyy, cxx, …, cyy, mxx, …, myy.
     pub fn covariance(&self) -> &DMatrix<f64> {
         self.film.covariance()
     }

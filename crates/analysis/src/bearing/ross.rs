@@ -46,7 +46,8 @@ fn in_axes_of_ross(bearing: &BearingSummary) -> [f64; 12] {
     turned(|at| bearing.coefficients.get(at).map_or(0.0, |c| c.estimate.value))
 }
 
-/// Turns coefficients, numbered as [`NAMED`], by a right angle.
+/// Returns the coefficients in axes turned by a right angle; `value` returns an original
+/// coefficient by its index in [`NAMED`].
 fn turned(value: impl Fn(usize) -> f64) -> [f64; 12] {
     std::array::from_fn(|at| {
         let (from, sign) = TURNED[at % 4];

@@ -13,7 +13,7 @@ use super::BearingData;
 use super::data::rotates;
 
 /// Minimum ratio of the number of lines to the number of lines near the multiples of a speed; with
-/// a smaller ratio, any few lines would be near the multiples of some speed by chance.
+/// a smaller ratio, some trial speed would by chance have its multiples near any disturbed lines.
 const LINES_PER_MULTIPLE: usize = 4;
 
 /// Maximum number of trial speeds.
@@ -52,7 +52,8 @@ pub(super) fn speed_of_misfit(tests: &BearingData) -> Option<[f64; 2]> {
             && power <= DISTURBED_ALONE
             && whole - power >= CONCENTRATED * (whole - 1.0)
         {
-            // An excluded line counts as four parameters: two complex residuals.
+            // Each line has two complex residuals, which are four real numbers. The exclusion of a
+            // line therefore counts as four parameters.
             let [used, excluded, total] =
                 [used.len(), excluded, rows.len()].map(|count| (4 * count) as f64);
             speeds.push((used * power + excluded * total.ln(), hz));

@@ -6,15 +6,16 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 /// Number of bisections for a limit of an interval; they reduce the error of the limit to rounding.
 const HALVINGS: usize = 80;
 
-/// Half the width of the search range for a limit of an interval, in standard errors. A test of
-/// four coefficients at 5 % moves the limit by far less.
+/// Half the width of the search range for a limit of an interval, in standard errors. A selection
+/// of the model by a test of four coefficients at 5 % moves the limit by much less.
 const REACH: f64 = 60.0;
 
 /// Returns the range [low, high] of the estimate `at` in which the test would have chosen the model
 /// without the coefficients `tested`; `None` if its choice does not depend on this estimate.
 ///
 /// The test chooses the larger model if mᵀS⁻¹m exceeds `critical`, with the `tested` estimates m
-/// and their covariance S. For a given component of m that is independent of the coefficient, this
+/// and their covariance S. m is the sum of two components: one is proportional to the estimate
+/// `at`, and the other is independent of it. With the independent component fixed, this condition
 /// is a quadratic inequality in the estimate `at`.
 ///
 /// # Source
@@ -70,7 +71,8 @@ pub(super) fn conditional_interval(
     let student = StudentsT::new(0.0, 1.0, degrees_of_freedom as f64).ok()?;
     let [low, high] = gap.map(|end| end / standard_error);
     let estimate = value / standard_error;
-    // Conditional probability of a larger estimate. This probability rises with the true value.
+    // Probability, for this true value, that an estimate outside the gap is larger than the present
+    // one. This probability rises with the true value.
     let above = |truth: f64| {
         let (below_gap, above_gap) = (student.cdf(low - truth), student.sf(high - truth));
         let outside_gap = below_gap + above_gap;
@@ -114,7 +116,7 @@ mod tests {
     #[test]
     fn intervals_after_a_choice_hold() {
         let rng = &mut ChaCha8Rng::seed_from_u64(7);
-        // One coefficient and four tested coefficients are correlated.
+        // This matrix correlates coefficient 0 and the four tested coefficients.
         let mix = DMatrix::from_fn(5, 5, |i, j| if i == j { 1.0 } else { 0.2 * (i as f64 - 1.0) });
         let covariance = &mix * mix.transpose();
         for size in [0.0, 1.0, 3.0] {
@@ -144,8 +146,8 @@ mod tests {
                 }
             }
             for count in inside {
-                // The tolerance is three standard errors of a fraction of 95 % that 1,500 trials
-                // estimate.
+                // The tolerance is three standard errors of a fraction of 95 %, estimated from
+                // 1,500 trials.
                 assert!((0.933..=0.967).contains(&(count as f64 / 1500.0)), "{size}: {inside:?}");
             }
             assert!(size > 0.0 || usual[1..].iter().any(|count| *count < 1275), "{usual:?}");

@@ -26,8 +26,8 @@ pub struct IdentifyBearing {
     pub lines: LineChoice,
     /// Lines to exclude in addition to the lines at multiples of the rotation frequency.
     pub without: LeftOut,
-    /// Number of independent averages of the coherence of tables of frequency responses, a pure
-    /// number that need not be an integer.
+    /// Number of independent averages in the coherence that the tables of frequency responses
+    /// contain, a pure number that need not be an integer.
     pub averages: Option<f64>,
     /// Points of tables of frequency responses, x before y; empty: all, in the order of the table.
     pub points: Vec<String>,
@@ -54,9 +54,9 @@ pub enum Coefficients {
     /// Twelve if a likelihood-ratio test at 5 % finds inertia of the fluid, otherwise eight.
     #[default]
     Automatic,
-    /// K and C.
+    /// Eight coefficients: those of K and C.
     Eight,
-    /// K, C and M.
+    /// Twelve coefficients: those of K, C and M.
     Twelve,
 }
 

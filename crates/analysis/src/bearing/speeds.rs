@@ -31,7 +31,7 @@ pub struct BearingPlan {
     /// Settings of all points; the speed and the load of a point, if given, replace those of the
     /// settings.
     pub settings: IdentifyBearing,
-    /// Baseline tests for every point that has no baseline tests itself.
+    /// Baseline tests for the points without their own baseline tests.
     pub baseline: Vec<PathBuf>,
     /// `true` if the files are tables of frequency responses, alternately of displacement and
     /// acceleration.

@@ -32,9 +32,10 @@ const INDEPENDENT: f64 = 0.1;
 /// Maximum relative difference of two frequencies that count as equal.
 const SAME: f64 = 1e-9;
 
-/// Solves G = H D at every frequency with two tests. At frequencies with one test, it solves for
-/// pairs of neighbouring lines; the fitted film interpolates both lines to the frequency midway
-/// between them. The fitted baseline is subtracted.
+/// Returns the dynamic stiffness H that solves G = H D, with the film forces G and the
+/// displacements D. Where several tests share a frequency, these tests give H at this frequency.
+/// Otherwise two neighbouring lines give H at the frequency midway between them; the fitted film
+/// interpolates both lines to this frequency. The fitted baseline is subtracted from H.
 pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLine>, AnalysisError> {
     let omega = tests.data.omega();
     let mut rows: Vec<usize> = (0..omega.len()).collect();
@@ -73,8 +74,9 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
         forces += force * d.adjoint();
         power += d * d.adjoint();
     }
-    // For two displacements the square root of the determinant is |det [d₁ d₂]|. Divided by the
-    // mean of their squared lengths, this value is at most the sine of the angle between them.
+    // For two rows with displacements d₁ and d₂, the square root of det(d₁d₁ᴴ + d₂d₂ᴴ) is |det D|,
+    // where D has the columns d₁ and d₂. Divided by the mean of |d₁|² and |d₂|², it is at most the
+    // sine of the angle between d₁ and d₂.
     let lengths = power[(0, 0)].re + power[(1, 1)].re;
     if power.determinant().norm().sqrt() < INDEPENDENT * 0.5 * lengths {
         return None;

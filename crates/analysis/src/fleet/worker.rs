@@ -56,8 +56,8 @@ pub struct Isolation {
 }
 
 impl Isolation {
-    /// Creates the isolation by a program, with the limits [`RECORD_MEMORY_GB`] and
-    /// [`RECORD_SECONDS`].
+    /// Creates the isolation of records in processes of `program`, with the limits
+    /// [`RECORD_MEMORY_GB`] and [`RECORD_SECONDS`].
     pub fn new(program: impl Into<PathBuf>, arguments: Vec<OsString>) -> Self {
         Self {
             program: program.into(),

@@ -455,9 +455,10 @@ fn smoothed(
 fn correlated_errors(p_value: f64) -> Option<String> {
     (p_value < INNOVATION_LEVEL).then(|| {
         format!(
-            "the prediction errors of the force model are correlated (p = {p_value:.1e}): one band does \
-             not describe the spectrum of the force, for example because a weaker force acts in addition \
-             to a sinusoid, or the machine differs from the given model. The standard error of the force is \
+            "the prediction errors of the force model are correlated (p = {p_value:.1e}): the force model, \
+             one band from 0 Hz to a corner frequency, does not describe the spectrum of the force, for \
+             example because a weaker force acts in addition to a sinusoid, or the machine differs from \
+             the given model. The standard error of the force is \
              not reliable: reconstruct the forces in separate bands (`band_hz`), or state the noise \
              (`noise`)"
         )

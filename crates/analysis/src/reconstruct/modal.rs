@@ -1,4 +1,4 @@
-//! Force by the modes of a test, line by line.
+//! Reconstruction of a force with the modes of a test, line by line.
 
 use mechid_force::{Noise, frequency_domain};
 

@@ -58,7 +58,8 @@ pub enum Method {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ParameterRule {
-    /// Maximum likelihood: λ for the force closest to its posterior mean.
+    /// The λ whose force is closest to the posterior mean of the force; maximum likelihood gives
+    /// the variances that this mean needs.
     #[default]
     Likelihood,
     /// Generalised cross-validation.

@@ -5,7 +5,8 @@ use mechid_force::Unexplained;
 use super::motion::{Held, Recorded};
 use crate::text::significant;
 
-/// Largest ratio of the scatter of periods to their mean that counts as equal periods.
+/// Maximum scatter of the periods about their mean, divided by the RMS of the mean period; above
+/// it, the periods count as different.
 const MAX_SCATTER: f64 = 0.1;
 
 /// Minimum correlation between successive samples that indicates a response rather than noise:

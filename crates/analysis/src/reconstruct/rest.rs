@@ -1,4 +1,4 @@
-//! Test of rest at the two ends of an open record.
+//! Test whether an open record begins and ends at rest.
 
 use std::f64::consts::TAU;
 

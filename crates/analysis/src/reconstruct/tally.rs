@@ -60,7 +60,7 @@ impl<'a> Tally<'a> {
         Ok(())
     }
 
-    /// Adds the samples `kept` of the force on a chunk.
+    /// Adds the samples with the indices `kept` of the force reconstructed from a chunk.
     pub fn push(
         &mut self,
         force: &IdentifiedForce,

@@ -15,8 +15,8 @@ pub struct Excitation {
     pub dof: usize,
     /// Peak over RMS, a ratio.
     pub crest_factor: f64,
-    /// Peak factor, half the range over √2 times the RMS, a ratio; `None` for a force that does not
-    /// vary.
+    /// Peak factor: half of the range (maximum − minimum), divided by √2 times the RMS; a ratio.
+    /// `None` for a force that does not vary.
     pub peak_factor: Option<f64>,
     /// Number of excited lines.
     pub lines: usize,

@@ -16,11 +16,13 @@ use crate::identify::spectra::periods;
 use crate::identify::{Identified, ResponseCoherence};
 use crate::measurement::{Block, IN_MEMORY_SAMPLES, Windowed};
 
-/// Ratio of the lengths of an open record and a segment; with half overlap this gives fifteen
-/// segments. Records too long for memory have more segments of the same length.
+/// Length of an open record divided by the length of a segment; with 50 % overlap this gives 15
+/// segments. A record too long for memory has more segments: the length is computed from its part
+/// in memory.
 const SEGMENTS: usize = 8;
 
-/// Minimum coherence of every motion with the force on a line that is shown.
+/// Minimum coherence of every response with the force; a spectral line below this coherence is not
+/// shown.
 const EXPLAINED: f64 = 0.5;
 
 /// Maximum ratio of every other force to the largest force on a spectral line; up to this ratio,
@@ -50,7 +52,8 @@ pub struct Receptance {
 /// Rows of data with a single force, so that the ratio of motion to force is the receptance.
 pub struct ActingAlone<'a> {
     data: &'a FrequencyData,
-    /// Maximum ratio of force k (row) to force j (column) on the lines on which only force j acts.
+    /// Limit of the ratio of force k (row) to force j (column): force j counts as acting alone on a
+    /// line if this ratio does not exceed the limit for any k.
     limits: DMatrix<f64>,
 }
 

@@ -36,8 +36,8 @@ pub struct SweepSettings {
     pub settings: Settings,
     /// Estimator.
     pub estimator: Estimator,
-    /// Known masses. `None`: for a described experiment, its masses are known; for a record, no
-    /// mass is known.
+    /// Known masses. `None`: the sweep of a described experiment takes the masses of its
+    /// description as known, and the sweep of a record takes all masses as unknown.
     pub mass: Option<KnownMass>,
     /// Natural frequency whose cycles NPI counts, in Hz; `None`: the lowest of the machine.
     pub natural_frequency_hz: Option<f64>,
@@ -105,8 +105,8 @@ pub fn sweep_experiment(
 ///
 /// # Errors
 /// [`AnalysisError::NpiOfRecord`], [`AnalysisError::SweepRate`] or [`AnalysisError::Decimation`]
-/// for settings that the record does not have, [`AnalysisError::DegreesOfFreedom`] if the reference
-/// has another number of degrees of freedom, [`AnalysisError::NoSetting`],
+/// for settings that are impossible with this record, [`AnalysisError::DegreesOfFreedom`] if the
+/// reference has another number of degrees of freedom, [`AnalysisError::NoSetting`],
 /// [`AnalysisError::EmptySweep`] if no setting gives an estimate.
 pub fn sweep_record(
     measurement: &Measurement,

@@ -14,8 +14,8 @@ use nalgebra::DMatrix;
 
 const PERIOD: usize = 256;
 
-/// Returns a test with one shaker and a second force channel that contains `part` of its force;
-/// both channels have noise of `level` times the force.
+/// Returns a test with one shaker. A second force channel contains the fraction `part` of the force
+/// of this shaker; both channels have noise of `level` times the RMS force.
 fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -> Measurement {
     let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
     let system = chain(2, Support::Fixed, 0.02, 3);
@@ -35,9 +35,9 @@ fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -
     if periodic { measured.period(PERIOD).unwrap() } else { measured }
 }
 
-/// Reference: (K − ω²M + iωC)⁻¹. If a force channel contains only noise and a part of another
-/// force, the responses to this force cannot be determined. An estimate would relate the response
-/// to the noise, and would be a hundred times too large.
+/// Reference: (K − ω²M + iωC)⁻¹. If channel 2 of the force contains only noise and a part of force
+/// 1, the responses to force 2 cannot be determined. An estimate would relate the response to the
+/// noise, and would be a hundred times too large.
 #[test]
 fn a_force_that_follows_another_has_no_responses_and_is_told() {
     let system = chain(2, Support::Fixed, 0.02, 3);
@@ -194,10 +194,10 @@ fn crosstalk_between_interleaved_forces_is_told_and_taken_off() {
     }
 }
 
-/// Reference: the machine and the factor. A sensor in mm in a record in m, or a sensor with a gain
-/// 20 % too large, changes only the symmetry of C and K; the residual and the diagonal of M do not
-/// change. A correct record must not be reported. A bearing must not be reported either, although
-/// its C and K are not symmetric.
+/// Reference: the matrices of the machine, and the wrong factor of one sensor. A sensor in mm in a
+/// record in m, or a sensor with a gain 20 % too large, changes only the symmetry of C and K; the
+/// residual and the diagonal of M do not change. A correct record must not be reported. A bearing
+/// must not be reported either, although its C and K are not symmetric.
 #[test]
 fn a_sensor_with_another_gain_is_told_by_damping_and_stiffness() {
     let period = Sampling::new(0.002, 1024).unwrap();

@@ -194,7 +194,8 @@ fn what_cannot_be_analysed_is_refused() {
 }
 
 /// The record has no noise and is quantised, so the last cycles of the decay are a square wave. The
-/// result must have only the two true modes, and a remark must report the few steps.
+/// result must have only the two true modes, and a remark must report that the signal has few
+/// quantisation steps.
 #[test]
 fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
     for bits in [8, 10, 12] {

@@ -65,8 +65,8 @@ fn samples(seed: u64, disturbed: bool) -> Measurement {
     Measurement::from_records(measured, &responses).unwrap()
 }
 
-/// The limit follows from the binomial distribution: at a rate of 1 in 50, the probability of more
-/// than 35 warnings in 1,000 records is below 0.001. The stated rate is 1 in 100.
+/// Asserts that at most 1 in 50 records has a warning. At the stated rate of 1 in 100, the
+/// probability of more than 20 records with a warning in 1,000 is 0.0015.
 fn assert_few_warned(how: &Identify, record: impl Fn(u64) -> Measurement) {
     let count = warned(how, record);
     assert!(count <= RECORDS / 50, "{count} of {RECORDS}");

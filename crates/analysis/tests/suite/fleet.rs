@@ -145,8 +145,8 @@ fn parts_are_the_same_for_any_number_of_workers_and_made_once() {
     assert_eq!(run(&records, &one, 2).computed_parts, 2);
     assert!(table == contents(&one));
 
-    // After a record has changed, its part of the result is computed again, and the summary reports
-    // the old part.
+    // After a record has changed, its part of the result is computed again. The part of the old
+    // record stays in the folder, and the summary counts it in `other_parts`.
     fs::write(&records[0], fs::read_to_string(RIG).unwrap()).unwrap();
     let changed = run(&records, &one, 2);
     assert_eq!((changed.computed_parts, changed.other_parts), (1, 1));
@@ -266,8 +266,9 @@ fn a_folder_of_results_is_read_back_as_it_was_computed() {
     assert!(matches!(read_results(home.path()), Err(AnalysisError::NoRecord)));
 }
 
-/// Rows of a modal test have no covariance: their intervals are normal. A mode of an ambient record
-/// that is too short has no standard error.
+/// Rows of a modal test have no covariance, so their intervals are those of a normal distribution
+/// with the standard error of the row. A mode of an ambient record that is too short has no
+/// standard error.
 #[test]
 fn intervals_of_modes_are_normal_or_absent() {
     let row = |number: usize, error: Option<f64>| {
@@ -297,8 +298,8 @@ fn intervals_of_modes_are_normal_or_absent() {
 #[test]
 fn trends_find_what_stands_out_and_nothing_else() {
     let rig = analysis().row("rig", || analysis().open(RIG));
-    // The values are normal around 25 kg, except one far from them; the numbers in the names
-    // decrease with the index.
+    // The values have a normal distribution around 25 kg, except one outlier. The number in the
+    // name of a record decreases from record to record.
     let noise = noise::white(Sampling::new(1.0, 2000).unwrap(), 1, 0.2, 7).unwrap();
     let rows: Vec<_> = (0..)
         .zip(noise.channel(0))
@@ -325,7 +326,8 @@ fn trends_find_what_stands_out_and_nothing_else() {
     assert_eq!(mass.points[0].at, 3001.0);
     let outliers: Vec<&str> = mass.outliers().map(|point| point.record.as_str()).collect();
     assert!(outliers.contains(&"speed-3766.csv"));
-    // One of two thousand normal values lies beyond 3.5 standard deviations.
+    // On average, one of 2,000 values with a normal distribution lies more than 3.5 standard
+    // deviations from the mean.
     assert!(outliers.len() <= 4, "{outliers:?}");
     // The interval equals the interval in the row of this record.
     let interval = mass.points[0].interval.unwrap();

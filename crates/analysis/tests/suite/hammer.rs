@@ -236,8 +236,9 @@ fn noise_of_the_force_is_common_to_all_lines_of_a_hit() {
     assert!((0.9..1.3).contains(&larger), "standard errors are {larger} times as large");
 }
 
-/// There are 72 or 36 intervals of 95 %; at least 85 % of them must contain the true value, because
-/// groups of twelve are correlated. The damping ratios scatter by some thousandths of their values.
+/// Six runs give 72 intervals of 95 %, three runs give 36. Only 85 % of them must contain the true
+/// value, because the twelve intervals of a run are correlated. The damping ratios scatter by some
+/// thousandths of their values.
 #[test]
 fn a_roving_hammer_finds_the_machine() {
     for (quantity, runs) in [(ACCELERATION, 6), (ResponseQuantity::Displacement, 3)] {
@@ -267,9 +268,10 @@ fn a_roving_hammer_finds_the_machine() {
     }
 }
 
-/// The spectra of the hits in the figures are responses to the one force that acts. On every line
-/// the acceleration agrees with the machine to six times the noise. The noise is 0.05 m/s² on a
-/// sample, and 2/√N times this value on a line of a window of N samples.
+/// The spectra of the hits in the figures are responses to the one force that acts. On every line,
+/// the acceleration must agree with that of the machine to within six standard deviations of the
+/// noise. This standard deviation is 0.05 m/s² for a sample, and 2/√N times this value for a line
+/// of a window of N samples.
 #[test]
 fn the_receptance_of_hits_is_that_of_the_machine() {
     let truth = rig(ACCELERATION).system().unwrap();
@@ -437,8 +439,8 @@ fn lines_without_force_are_left_out_of_segments() {
 }
 
 /// Reference: a response measured under an exponential window e^(−σt) at the frequency ω equals the
-/// response of the machine at s = iω + σ. Without a window a remark reports the response that has
-/// not decayed at the end.
+/// response of the machine at s = iω + σ. Without an exponential window, a remark must report that
+/// the response has not decayed at the end of the record.
 #[test]
 fn frequency_responses_are_those_of_the_machine_with_the_decay_of_the_window() {
     let sampling = Sampling::from_rate_hz(1024.0, 5 * 4096).unwrap();
@@ -556,8 +558,9 @@ fn lightly_damped() -> HammerTest {
     }
 }
 
-/// Reference: the closed form. If each hit had a separate transient, participations and transients
-/// could replace each other; a false mode would then change the masses by a third.
+/// Reference: the closed form. If each hit had a separate transient, the fit could not distinguish
+/// the participation of a mode from the transient of a hit. It would find a false mode, which
+/// changes the masses by a third.
 #[test]
 fn hits_in_close_succession_give_modes_and_masses() {
     let rig = lightly_damped();

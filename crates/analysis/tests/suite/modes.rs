@@ -301,8 +301,9 @@ fn right_tables_rarely_fail_the_tests() {
     }
 }
 
-/// Ratios of error and standard error of the mass-normalised shapes at the responses, of those at
-/// the forces, and of the MAC of each pair of modes, with [`SHAPES`] as reference.
+/// Returns three lists of errors, each divided by its standard error: the errors of the
+/// mass-normalised shapes at the responses, of the mass-normalised shapes at the forces, and of the
+/// MAC of each pair of modes. The reference is [`SHAPES`].
 fn scaled_errors(found: &Modes) -> [Vec<f64>; 3] {
     let (mut of_shapes, mut at_forces, mut of_mac) = (Vec::new(), Vec::new(), Vec::new());
     let norm = |shape: &[f64; 4]| shape.iter().map(|x| x * x).sum::<f64>();
@@ -331,7 +332,7 @@ fn scaled_errors(found: &Modes) -> [Vec<f64>; 3] {
     [of_shapes, at_forces, of_mac]
 }
 
-/// Returns the modes of a table with the properties imposed.
+/// Returns the modes of a table; the fit imposes real shapes and reciprocity.
 fn with_properties(table: &FrequencyResponses) -> Modes {
     let properties = Properties { real_shapes: true, reciprocal: true };
     let settings = ModesSettings { properties, ..ModesSettings::default() };
@@ -339,10 +340,10 @@ fn with_properties(table: &FrequencyResponses) -> Modes {
 }
 
 /// Reference: the masses of [`SHAPES`], whose damping is proportional. On correct tables both
-/// properties pass their checks, the intervals of the masses contain the true values, and their
-/// standard errors become smaller. The standard errors of scaled shapes and of the MAC agree with
-/// the scatter. A phase error of one sensor contradicts real shapes, and a wrong gain contradicts
-/// reciprocity; a contradicted property is not imposed.
+/// properties (real shapes and reciprocity) pass their checks, the intervals of the masses contain
+/// the true values, and their standard errors become smaller. The standard errors of scaled shapes
+/// and of the MAC agree with the scatter. A phase error of one sensor contradicts real shapes, and
+/// a wrong gain contradicts reciprocity; a contradicted property is not imposed.
 #[test]
 fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them() {
     let noisy = |seed: u64, change: &dyn Fn(usize) -> C| {
@@ -385,8 +386,9 @@ fn known_properties_of_a_structure_are_imposed_unless_the_modes_contradict_them(
         |ratios: &[f64]| (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
     // The limits are three standard deviations of the RMS of 420 and of 60 ratios.
     assert!(of_shapes.len() == 420 && (0.9..1.1).contains(&rms(&of_shapes)), "{of_shapes:?}");
-    // The limits are three standard deviations of the RMS of 100 independent ratios, because the
-    // ratios at the two points of a mode are correlated.
+    // The ratios at the two points of a mode are correlated, so all ratios together count as only
+    // 100 independent ones. The limits are three standard deviations of the RMS of 100 independent
+    // ratios.
     assert!(at_forces.len() >= 180 && (0.79..1.21).contains(&rms(&at_forces)), "{at_forces:?}");
     assert!(of_mac.len() == 60 && (0.73..1.27).contains(&rms(&of_mac)), "{of_mac:?}");
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
@@ -453,8 +455,8 @@ fn a_comparison_names_the_mode_that_changed() {
     assert_eq!(error.code(), "analysis.no-common-point");
 }
 
-/// A misspelt field is refused, and so are names whose number differs from the number of entries of
-/// the shapes.
+/// A misspelt field is refused. A list of names is refused if its length differs from the number of
+/// entries of each shape.
 #[test]
 fn frequencies_and_shapes_alone_are_read_strictly() {
     let set = |text: &str| ModeSet::from_json("model", serde_json::from_str(text).unwrap());

@@ -85,7 +85,8 @@ fn predictions_and_forces_err_as_they_state() {
             found.push((error, row.standard_error.unwrap()));
         }
     }
-    // The ratio of 6 experiments with about 15 parameters each scatters by a fifth.
+    // The RMS ratio comes from 6 experiments with about 15 parameters each, so it scatters by about
+    // a fifth of its value.
     assert!((0.5..2.0).contains(&ratio(predicted.iter().copied())), "{predicted:?}");
     assert!((0.5..2.0).contains(&ratio(found.iter().copied())), "{found:?}");
 }
@@ -159,8 +160,8 @@ fn what_modes_cannot_do_is_refused() {
     assert!(refused(SAMPLES).contains("needs 2 to 8191"), "{}", refused(SAMPLES));
 }
 
-/// The same force results whether rest is stated or detected; a record that begins or ends in motion
-/// is refused. Noise does not look like motion.
+/// The same force results whether rest is stated or detected; a record that begins or ends in
+/// motion is refused. Noise must not be mistaken for motion.
 #[test]
 fn rest_at_both_ends_is_detected() {
     let forces = pulses();
@@ -221,7 +222,7 @@ fn forces_against_the_direction_of_their_sensors_give_masses_and_reciprocity() {
     assert!(masses(&forces, ["1-Z", "4-Z"]).iter().all(|mass| *mass < 0.0));
     assert_eq!(upwards.len(), 2);
     for (at, one) in upwards.iter().enumerate() {
-        // The largest entry of both shapes is 0.5 1/√kg.
+        // The largest entry of each mass-normalised shape is 0.5/√kg, so the modal mass is 4 kg.
         assert!((one / 4.0 - 1.0).abs() < 0.01, "{upwards:?}");
         for other in [&against, &mixed] {
             assert!((one / other[at] - 1.0).abs() < 1e-6, "{upwards:?} {other:?}");

@@ -135,8 +135,8 @@ fn complete_motion() -> (Measurement, Record) {
     (Measurement::from_records(&force, &responses).unwrap(), force)
 }
 
-/// Reference: the prescribed force. The machine is identified from a noisy force, so its covariance
-/// describes its error.
+/// Reference: the prescribed force. The machine is identified from a noisy force, and the
+/// covariance of its parameters describes their errors.
 #[test]
 fn the_force_of_a_spring_that_hardens_is_found_with_its_error() {
     let (force, x) = steady_state();
@@ -379,8 +379,8 @@ fn one_shaker_at_a_time(cubic: f64, seed: u64) -> Vec<Measurement> {
     vec![shaken(0), shaken(1)]
 }
 
-/// Reference: the machine in closed form. Each of the two records alone does not determine the
-/// machine; the two records together determine it, with and without the nonlinear term.
+/// Reference: the machine in closed form. One record is not sufficient to determine the machine.
+/// The two records together determine it, with and without the nonlinear term.
 #[test]
 fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
     let term = "cubic stiffness of x1 (hardening)";
@@ -443,8 +443,9 @@ fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
     }
 }
 
-/// Reference: the oscillator of the window, with a cubic spring force as large as the linear one. A
-/// window without a stated period is an open record; settings that need periods are refused.
+/// Reference: the parameters of the simulated oscillator, whose cubic spring force is as large as
+/// its linear spring force. A window without a stated period is treated as an open record; settings
+/// that need periods are refused.
 #[test]
 fn a_window_without_a_period_is_an_open_record() {
     let how = Identify::nonlinear("k3: x1^3".parse().unwrap());

@@ -137,8 +137,8 @@ fn a_response_that_is_noise_is_no_result() {
     assert!(refused.to_string().starts_with("the data do not determine the machine: "));
 }
 
-/// The intervals include the effect of a missing term, even if no part of the data disagrees with
-/// another.
+/// The intervals must include the effect of a term that is missing in the model, even if all parts
+/// of the data agree.
 #[test]
 fn a_term_that_the_model_leaves_out_is_named_and_counted() {
     let linear = FaultyOscillator::linear();

@@ -131,8 +131,8 @@ fn run_out_is_taken_off_and_told_once() {
     assert!(right.summary().fit.sinusoids.is_empty());
 }
 
-/// Reference: the generator, which delays a whole period of the response. The record is a window of
-/// this period.
+/// Reference: the delay that the generator applies. It shifts one whole period of the response in
+/// time, and the record is a window cut from this period.
 #[test]
 fn a_late_response_is_told_by_its_delay() {
     let late = |samples: f64, seed: u64| {
@@ -174,8 +174,8 @@ fn a_late_response_is_told_by_its_delay() {
     assert!(matches!(both[..], [found] if (found - 0.5).abs() < 0.02), "{both:?}");
 }
 
-/// Reference: the generator. Two masses with a force on one of them: without the delay, the search
-/// has no minimum in most of the late records, and the error names the delay.
+/// Reference: the generator. Two masses with a force on one of them. If the model has no delay, the
+/// search finds no minimum in most records with a late response; the error must name the delay.
 #[test]
 fn a_delay_that_stops_the_search_is_named() {
     let mass = DMatrix::from_diagonal(&DVector::from_vec(vec![1.39, 2.51]));
@@ -213,9 +213,11 @@ fn a_delay_that_stops_the_search_is_named() {
     assert!(right.iter().all(|told| *told == (false, None)), "{right:?}");
 }
 
-/// Reference: the generator. A signal of 0.2 % of the force acts above the band, too, and moves the
-/// machine: it is no noise of the force. The level of the noise must come from the residual, and
-/// the intervals must hold. With true noise of the same size, the level above the band must remain.
+/// Reference: the generator. A signal of 0.2 % of the force moves the machine, and its spectrum
+/// extends above the band. Above the band it looks like noise of the force channel. The noise level
+/// must therefore come from the residual, and the intervals must contain the true values. If true
+/// noise of the same size replaces the signal, the noise level must come from the lines above the
+/// band.
 #[test]
 fn a_signal_above_the_band_is_no_noise() {
     const RUNS: u64 = 20;
@@ -265,7 +267,7 @@ fn a_period_stays_one() {
 }
 
 /// Noise biases least squares, so a single period with visible noise is fitted by maximum
-/// likelihood. The test has 48 intervals of 95 %.
+/// likelihood. At least 42 of the 48 intervals of 95 % must contain the true value.
 #[test]
 fn noise_on_one_period_biases_nothing() {
     let each: Vec<(usize, bool)> = (0..16)
@@ -385,8 +387,9 @@ fn damped() -> RandomTest {
     RandomTest { system, ..rig() }
 }
 
-/// The window widens the resonance, which biases the damping by several standard errors of its
-/// mean, and makes neighbouring lines correlated; the intervals must allow for both.
+/// The window widens the resonance, which biases the damping by several standard errors of the mean
+/// of 80 runs. The window also correlates neighbouring lines. The intervals must allow for both
+/// effects.
 #[test]
 fn intervals_of_frequency_responses_hold() {
     let how = Identify::responses(Estimator::H1, Segmentation::with_samples(512));

@@ -143,7 +143,8 @@ fn noise_in_idle_channels_is_no_force_of_frequency_responses() {
     assert!(warned <= 4, "{warned} of {RUNS} warn");
 }
 
-/// If a force channel has only noise and no mass is known, only the modes are given.
+/// If a force channel contains only noise, and if no mass is known, the equation of this degree of
+/// freedom has no scale. The result then gives only the modes.
 #[test]
 fn a_channel_of_noise_is_no_force_that_scales_an_equation() {
     let test = records(7, [0.005, 0.002]).swap_remove(0);
@@ -213,7 +214,7 @@ fn how_many_segments_each_record_has_is_told() {
     assert_eq!(found.summary().fit.equations, 2 * 70 * DOFS);
 }
 
-/// Lines that the check of the misfit names.
+/// Returns the spectral lines that the misfit check names as the main part of the residual.
 fn named(found: &Identified) -> Option<Concentration> {
     found.checks().iter().find_map(|check| match &check.finding {
         Finding::Misfit(Misfit { concentration, .. }) => concentration.clone(),

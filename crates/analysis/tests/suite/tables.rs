@@ -1,5 +1,5 @@
-//! Identification from tables of frequency responses. The references are closed-form receptances,
-//! and the records of the tables.
+//! Identification from tables of frequency responses. The references are receptances in closed
+//! form, and fits of the records that were used to compute the tables.
 
 use std::f64::consts::TAU;
 
@@ -118,8 +118,8 @@ fn intervals_hold_whatever_the_noise_of_a_table_follows() {
     }
 }
 
-/// A delay of 2 ms moves the parameters by hundreds of their standard errors. The check names it,
-/// and the intervals include the change.
+/// A delay of 2 ms moves the parameters by hundreds of their standard errors. The check must name
+/// the delay, and the intervals must contain the true values.
 #[test]
 fn intervals_of_late_responses_include_the_delay() {
     let system = oscillator();
@@ -226,8 +226,9 @@ fn the_decay_that_a_window_adds_is_taken_off() {
             assert!(worst(&table) < 1e-8, "{quantity}: {}", worst(&table));
         }
     }
-    // Known entries of the structure are the values of the machine, without the decay of the
-    // window. A known damping therefore needs a known mass.
+    // Known entries in `structure` are values of the machine, but the window adds the decay rate σ
+    // to the data. The damping of the data is c + 2σm; a known damping therefore needs a known
+    // mass.
     let mut table = exact(&oscillator(), ResponseQuantity::Displacement);
     table.added_decay = Some(sigma);
     let known = |form: &str| {
@@ -322,7 +323,7 @@ fn points_in_names_of_channels_are_kept() {
     }
     let [text, universal] = points("3+Z", "12+Z,7-X", &["1+Y".into(), "2+Y".into()]);
     assert_eq!((&text, &universal.0[1]), (&named[0], &"2+Y/1+Y".to_owned()));
-    // If one name is not a point, as the name of the force here, all channels are numbered.
+    // The name of the force is not a point here; therefore all channels are numbered.
     let [text, universal] = points("hammer", "12+Z,7-X", &[]);
     assert_eq!((&text.0[1], &universal.0[1]), (&"2/1".to_owned(), &"2+X/1+X".to_owned()));
 }
@@ -381,7 +382,8 @@ fn coverage(
         inside(found.estimate())
     });
     let share = all.sum::<usize>() as f64 / (runs as usize * truth.len()) as f64;
-    // On correct data the standard errors follow from the noise alone and are not scaled.
+    // The data are correct; therefore at most 2 % of the fits may scale the standard errors by the
+    // residual.
     assert!(50 * scaled.get() <= runs, "{} of {runs}", scaled.get());
     share
 }
@@ -407,8 +409,8 @@ fn intervals_from_standard_errors_hold() {
     assert!((0.935..=0.965).contains(&share), "{share}");
 }
 
-/// The table has averages over 64 responses, with noise only on the response, and their coherence.
-/// From 93.5 to 96.5 % of the 95 % intervals must contain the true value.
+/// The table has the averages of 64 noisy frequency responses, and their coherence; the force has
+/// no noise. From 93.5 to 96.5 % of the 95 % intervals must contain the true value.
 #[test]
 fn intervals_from_coherence_hold() {
     let measure = |mut table: FrequencyResponses, seed: u64| {
@@ -455,8 +457,8 @@ fn what_a_table_lacks_is_told() {
         "table has no response at 2 to a force at 1: every point needs a response to every force, and \
          every force needs a response at its point (choose `points`)"
     );
-    // With only one point chosen, the table is complete; the model then has one degree of freedom
-    // instead of two.
+    // If only point 2 is chosen, no response is missing from the table; the model then has one
+    // degree of freedom instead of two.
     let alone = IdentifyResponses { points: vec!["2".into()], ..usual.clone() };
     assert_eq!(identify_responses(&[gap], &alone).unwrap().estimate().dof(), 1);
     let mut coherent = table.clone();

@@ -56,7 +56,8 @@ fn equations(found: &Identified) -> Vec<usize> {
     found.summary().unscaled.clone().map_or(Vec::new(), |unscaled| unscaled.equations)
 }
 
-/// Reference: the eigenvalues and shapes of the machine.
+/// The fit of a record without noise gives the natural frequencies, damping ratios and shapes of
+/// the machine, but no parameters and no system.
 #[test]
 fn modes_are_those_of_the_machine_and_nothing_else_is_given() {
     let exact = machine();
@@ -137,7 +138,8 @@ fn a_stated_mass_scales_its_own_equation_and_no_mode() {
             ] {
                 let error =
                     |u: mechid_analysis::identify::rows::Uncertain| u.standard_error.unwrap();
-                // The search stops when a step is a small part of a standard error.
+                // Each search stops when its step is a small part of a standard error; the two
+                // results may differ by this part.
                 assert!((a.value - b.value).abs() < 1e-2 * error(a), "{none}\n{other}");
                 assert!((error(a) / error(b) - 1.0).abs() < 1e-2, "{none}\n{other}");
             }
@@ -163,8 +165,9 @@ fn held(all: &[Identified], system: &SecondOrderSystem) -> (usize, usize) {
     (held, total)
 }
 
-/// In 100 runs with six nearly independent intervals each, the share of intervals that contain the
-/// true value must be between 91.5 and 98 %. These limits are four standard deviations.
+/// In 100 runs with six nearly independent intervals each, the share of 95 % intervals that contain
+/// the true value must be between 91.5 and 98 %. Both limits are more than three standard
+/// deviations from 95 %.
 #[test]
 fn intervals_of_the_modes_hold() {
     for how in [from_frf(), Identify::spectra(Method::MaximumLikelihood)] {
@@ -200,8 +203,8 @@ fn struck(seed: u64) -> (HammerTest, Measurement) {
     (rig, test)
 }
 
-/// If the intervals are right, the probability that fewer than 40 of 48 intervals of 95 % contain
-/// the true value is 0.001.
+/// At least 40 of 48 intervals of 95 % must contain the true value. If the intervals are right,
+/// fewer than 40 contain it with a probability of 0.001.
 #[test]
 fn a_hammer_at_one_point_gives_the_modes() {
     let band = LineChoice::Band(Band { low_hz: 2.0, high_hz: 150.0 });

@@ -35,7 +35,8 @@ pub(super) struct Assembly {
     pub(super) load: Vector2<f64>,
     /// Derivative of the load with respect to the pressure, by node.
     pub(super) load_pressure: Vec<[f64; 2]>,
-    /// Derivative of the load with respect to the free fronts, 2 × fronts.
+    /// Derivatives of the load with respect to the free fronts: two rows (along the load and
+    /// across), one column for each free front.
     pub(super) load_fronts: DMatrix<f64>,
 }
 

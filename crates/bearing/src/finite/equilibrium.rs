@@ -205,8 +205,9 @@ mod tests {
         }
     }
 
-    /// Conditions of Swift and Stieber: no pressure below zero, no slope at the free ends of the
-    /// film, and each end at or outside the limits of the converging arc.
+    /// The films satisfy the conditions of Swift and Stieber: no pressure below zero, no slope of
+    /// the pressure at the free ends of the film, and each end at or outside the limits of the
+    /// converging arc.
     #[test]
     fn films_meet_the_conditions_of_their_ends() {
         for (bearing, sommerfeld) in bearings() {
@@ -223,8 +224,9 @@ mod tests {
                     for (side, [near, next]) in [[1, 2], [last - 1, last - 2]].iter().enumerate() {
                         if film.free[side][row] {
                             free += 1;
-                            // Next to a front, a parabolic pressure has the ratio ¼ at the two
-                            // nodes, a linear one ½.
+                            // The ratio of the pressures at the two nodes next to a front is ¼ if
+                            // the pressure rises from the front without a slope (parabola), and ½
+                            // if it rises linearly.
                             let ratio = film.pressure[(row, *near)] / film.pressure[(row, *next)];
                             assert!(ratio < 0.35, "{bearing:?}: {ratio}");
                         }

@@ -88,8 +88,9 @@ impl Film {
     }
 }
 
-/// Returns the rows from the middle to the end, denser towards the end of a long bearing, where the
-/// pressure falls to zero within a length of about one radius.
+/// Returns the axial coordinates of the rows of the mesh, from the middle of the bearing to its
+/// end. In a long bearing the rows are denser near the end, where the pressure falls to zero within
+/// a length of about one radius.
 fn axial_nodes(half_length: f64, rows: usize) -> Vec<f64> {
     let grading = half_length / (half_length + 2.0);
     (0..=rows)
@@ -100,7 +101,8 @@ fn axial_nodes(half_length: f64, rows: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the columns between two fronts, equidistant in the angle of Sommerfeld's substitution:
+/// Returns the positions of the columns of the mesh, as fractions of the distance between two
+/// fronts. The columns are equidistant in the angle of Sommerfeld's substitution and therefore
 /// dense where the film is thin.
 fn column_nodes(relative: Vector2<f64>, fronts: [f64; 2], along: usize) -> Vec<f64> {
     let thinnest = relative[1].atan2(relative[0]);

@@ -65,9 +65,11 @@ impl Bore {
 /// An arc of the bore between two grooves, or the whole bore.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pad {
-    /// Angles of its first and last edge, in rad; infinite for a bore without grooves.
+    /// Angles of the first and the last edge of the pad, in rad; infinite for a bore without
+    /// grooves.
     pub(super) edges: [f64; 2],
-    /// Centre of curvature along the load and across, in pad clearances.
+    /// Coordinates of the centre of curvature of the pad, along the load and across, in pad
+    /// clearances.
     pub(super) centre: [f64; 2],
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Step {
     pub(super) tangent: Matrix2x4<f64>,
     /// Changes of the pressure, one entry per node.
     pressure: Vec<[f64; SIDES]>,
-    /// Changes of the free fronts × [`SIDES`].
+    /// Changes of the fronts: one row for each free front, [`SIDES`] columns.
     fronts: DMatrix<f64>,
     unknown: Vec<(usize, usize)>,
     /// Flow out of the film at its start and its end, by row.

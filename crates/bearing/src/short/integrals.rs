@@ -10,9 +10,9 @@ use std::f64::consts::TAU;
 /// polynomials (Booker 1965).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Integrals {
-    /// Integrals for a = 0, 1, 2 with n = 3.
+    /// Integrals with n = 3 in the denominator, for the exponent a = 0, 1, 2 of the sine.
     pub(super) second: [f64; 3],
-    /// Integrals for a = 0, 1, 2, 3 with n = 4.
+    /// Integrals with n = 4 in the denominator, for the exponent a = 0, 1, 2, 3 of the sine.
     pub(super) third: [f64; 4],
 }
 

@@ -35,7 +35,8 @@ fn twice(mesh: Mesh) -> Mesh {
     Mesh { along: 2 * mesh.along, across: 2 * mesh.across }
 }
 
-/// The value to which two meshes converge if the error falls with the square of the step.
+/// Returns the numbers for an infinitely fine mesh, extrapolated from two meshes. The error is
+/// assumed to be proportional to the square of the mesh interval.
 fn extrapolated(bearing: &FiniteBearing, sommerfeld: f64, mesh: Mesh) -> [f64; 10] {
     let on =
         |mesh| numbers(&bearing.clone().with_mesh(mesh).unwrap().equilibrium(sommerfeld).unwrap());
@@ -63,7 +64,8 @@ fn everything_converges_with_the_square_of_the_step() {
         });
         let order = (distance(&a, &b) / distance(&b, &c)).log2();
         assert!((order - 2.0).abs() < 0.2, "{bearing:?}: order {order}");
-        // The default mesh has the accuracy that its documentation states.
+        // The error of the default mesh is at most 0.2 % of the clearance, of the largest stiffness
+        // and of the largest damping. The reference is extrapolated from the meshes `b` and `c`.
         let limit = std::array::from_fn(|i| c[i] + (c[i] - b[i]) / 3.0);
         let default = numbers(&bearing.equilibrium(sommerfeld).unwrap());
         assert!(distance(&default, &limit) < 0.002, "{}", distance(&default, &limit));

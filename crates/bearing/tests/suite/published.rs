@@ -112,7 +112,8 @@ fn the_table_of_the_book_is_from_a_run() {
     assert!(page.contains(&table), "the page should have\n{table}");
 }
 
-/// Coefficients of a bearing of a given size are converted to SI units and back.
+/// Conversion to SI units and back changes neither the Sommerfeld number nor the coefficients of a
+/// bearing.
 #[test]
 fn units_go_there_and_back() {
     let conditions = Conditions {

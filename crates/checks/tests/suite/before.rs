@@ -56,7 +56,8 @@ fn trouble_is_seen_before_the_fit() {
     let transient = exact_zoh(&system, &rich, &InitialState::rest(2)).unwrap();
     assert_eq!(verdict(held, &transient, &rich, Subject::Periodicity), Verdict::Bad);
 
-    // The mode at 1.8 rad/s has 1.7 samples per period.
+    // With this sampling, the mode at 1.8 rad/s has only 1.7 samples per period; at least two are
+    // needed.
     let slow = force(Sampling::new(2.0, 512).unwrap(), 1..=250);
     let aliased = exact_zoh_periodic(&system, &slow).unwrap();
     assert_eq!(verdict(held, &aliased, &slow, Subject::Step), Verdict::Bad);
@@ -279,8 +280,8 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
                 for wrong in [1023, 1025, 1022, 1536, 1365, 700, 1800] {
                     let found = look(wrong).unwrap_or_else(|| panic!("{name} {share} {wrong}"));
                     assert_eq!(found.verdict(), Verdict::Bad);
-                    // A force that repeats five times per period repeats, to the nearest sample,
-                    // after 205 samples.
+                    // The wide force repeats five times in 1024 samples; 205 samples, rounded, is
+                    // therefore the shortest period that the check may report.
                     assert!(found.value() > 200.0, "{name} {wrong}: {found}");
                 }
             }

@@ -308,8 +308,8 @@ fn motions_that_do_not_belong_together_are_told() {
             let said = kinematics(&[x, (v.0, &wrong), a]).unwrap();
             let gains: Vec<f64> = said.iter().map(Finding::value).collect();
             assert_eq!(said.len(), 2 * system.dof());
-            // At a quarter of the sampling rate the trapezoidal rule is too small by a factor of
-            // 4/π.
+            // At a quarter of the sampling rate the integral by the trapezoidal rule is too small
+            // by a factor of 4/π.
             let near = |gain: f64, expected: f64| (0.98..1.3).contains(&(gain / expected));
             let halves = gains.split_at(system.dof());
             assert!(halves.0.iter().all(|gain| near(*gain, 1e-3)), "{gains:?}");

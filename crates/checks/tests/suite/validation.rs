@@ -37,7 +37,7 @@ fn of(checks: &[Finding], subject: Subject) -> &Finding {
 }
 
 /// The checks before a fit report too few lines, a wrong period and large noise. They accept the
-/// good record, whose lines extend beyond the fastest mode at 1.8 rad/s.
+/// good record, whose lines extend beyond the highest mode, at 1.8 rad/s.
 #[test]
 fn trouble_with_spectra_is_seen_before_the_fit() {
     let system = bearing();
@@ -62,7 +62,8 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
     // periods from their mean.
     assert!((0.007..0.011).contains(&of(&good, Subject::Periodicity).value()));
 
-    // One line gives two equations for four unknowns; two lines give four equations.
+    // One line gives two equations for four unknowns, which is too few; two lines give four
+    // equations, as many as unknowns, and the check must warn.
     let poor = look(0.2, 5..=5, 512, 0.0);
     assert_eq!((poor[0].verdict(), poor[1].subject()), (Verdict::Bad, Subject::Periodicity));
     let tight = look(0.2, 5..=6, 512, 0.0);
@@ -73,7 +74,7 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
 }
 
 /// The check after a fit reports a mode above the fitted lines, and a mode above the Nyquist
-/// frequency. The fastest mode of the machine is at 1.8 rad/s.
+/// frequency. The highest mode of the machine is at 1.8 rad/s.
 #[test]
 fn a_mode_beyond_the_lines_or_the_sampling_is_seen_after_the_fit() {
     let system = bearing();
@@ -92,7 +93,8 @@ fn a_mode_beyond_the_lines_or_the_sampling_is_seen_after_the_fit() {
     assert_eq!((good.subject(), good.verdict()), (Subject::Step, Verdict::Good));
     let samples = std::f64::consts::TAU / (fastest * 0.2);
     assert!((good.value() / samples - 1.0).abs() < 1e-6, "{good} {samples}");
-    // Line 20 of a record of 102.4 s is at 1.23 rad/s, below the fastest mode.
+    // Line 20 of a record of 102.4 s is at 1.23 rad/s. The highest mode, at 1.8 rad/s, is above the
+    // fitted lines, and the check must warn.
     assert_eq!(look(0.2, 1..=20).verdict(), Verdict::Doubtful);
     assert_eq!(look(2.0, 1..=250).verdict(), Verdict::Bad);
 }
@@ -109,7 +111,8 @@ fn trouble_with_samples_is_seen_before_the_equation_of_motion_is_fitted() {
     let good = look(1..=60, 0.2);
     assert_eq!(good.len(), 4);
     assert_eq!(good.iter().map(|c| c.verdict()).max(), Some(Verdict::Good), "{good:?}");
-    // Two lines are persistently exciting of order four; each equation has six unknowns.
+    // A force with two lines is persistently exciting of order four only, but each equation has six
+    // unknowns.
     let poor = look(5..=6, 0.2);
     assert_eq!(of(&poor, Subject::Excitation).verdict(), Verdict::Bad);
     assert_eq!(of(&poor, Subject::Conditioning).verdict(), Verdict::Bad);
@@ -135,7 +138,8 @@ fn trouble_with_responses_is_seen_before_they_are_fitted() {
     assert_eq!(of(&good, Subject::Coherence).value(), 0.99);
     assert_eq!(of(&look(30, 0.7), Subject::Coherence).verdict(), Verdict::Doubtful);
     assert_eq!(of(&look(30, 0.3), Subject::Coherence).verdict(), Verdict::Bad);
-    // One frequency and two forces: four equations for four unknowns.
+    // One frequency and two forces give four equations for four unknowns: no equation to spare, and
+    // the check must warn.
     assert_eq!(of(&look(1, 0.99), Subject::Excitation).verdict(), Verdict::Doubtful);
 }
 
@@ -240,8 +244,8 @@ fn a_start_is_found_from_any_kind_of_motion() {
         let fit = fit_percent(motion.velocity(), predicted.velocity()).unwrap();
         assert!(fit.iter().all(|fit| *fit > 100.0 - 1e-6));
     }
-    // Noise on every sample is averaged: the first sample alone would be wrong by 10 % of the RMS
-    // of the motion.
+    // The fit averages the noise over all samples. The error of the initial displacement must
+    // therefore be less than the noise of a single sample, 10 % of the RMS of the motion.
     let noisy = noise::add_white(motion.displacement(), NoiseLevel::FractionOfRms(0.1), 8).unwrap();
     let found =
         fitted_start(&system, &force, hold, &[(ResponseQuantity::Displacement, &noisy)]).unwrap();
@@ -254,7 +258,8 @@ fn a_start_is_found_from_any_kind_of_motion() {
         Err(EstimateError::Numerics(NumericsError::TooFewRows { rows: 0, .. }))
     ));
 
-    // A free mass: its position does not appear in its acceleration.
+    // The acceleration of a free mass depends on neither its position nor its velocity; the fit
+    // must set both initial values to zero.
     let one = |value: f64| DMatrix::from_element(1, 1, value);
     let free = SecondOrderSystem::new(one(2.0), one(0.0), one(0.0)).unwrap();
     let push = Record::from_channel(force.sampling(), force.channel(0).to_vec()).unwrap();

@@ -107,8 +107,8 @@ pub struct FitArgs {
     #[command(flatten)]
     segments: SegmentArgs,
     /// Record to predict, with the same columns: COUNT samples from START on; the report states the
-    /// percentage of its response that the identified system predicts. Without a name, such as
-    /// :2049:1024, it is the first record itself [default: all samples]
+    /// percentage of its response that the identified system predicts. Without RECORD, as in
+    /// :2049:1024, samples of the first record are predicted [default: all samples]
     #[arg(long, value_name = "RECORD:START:COUNT", help_heading = "Validation")]
     validate: Option<Validated>,
     /// Add every line of the fit to the JSON: force, measured and fitted response with their

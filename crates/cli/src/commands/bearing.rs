@@ -106,7 +106,7 @@ struct TableArgs {
     /// tables have standard errors
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "frf_table")]
     averages: Option<usize>,
-    /// Names in the tables of the two points to use: the point in direction x, then that in
+    /// The two points to use, by their names in the tables: the point in direction x, then that in
     /// direction y [default: all]
     #[arg(long, value_name = "POINT,…", value_delimiter = ',', requires = "frf_table")]
     points: Vec<String>,

@@ -59,8 +59,9 @@ pub struct FleetArgs {
     /// Maximum time for a record, in s; a record that needs more has an error in its row
     #[arg(long, value_name = "SECONDS", default_value_t = RECORD_SECONDS, value_parser = positive)]
     record_seconds: f64,
-    /// Time after which the searches for a record end at their best points so far, in s; the row
-    /// then has a bad check `time_limit` [default: that of the analysis]
+    /// Time limit of the searches in the analysis of each record, in s; after this time they end at
+    /// their best points so far, and the row has a bad check `time_limit` [default: that of the
+    /// analysis]
     #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
     time_limit: Option<f64>,
     #[command(flatten)]

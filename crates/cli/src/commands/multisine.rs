@@ -117,9 +117,11 @@ enum Uncorrelated {
     /// Interleaved lines, each excited by one input: one experiment
     #[default]
     Interleaved,
-    /// All inputs share all lines, orthogonal by a DFT matrix: as many experiments as inputs
+    /// All inputs excite all lines and are made orthogonal by a DFT matrix: as many experiments as
+    /// inputs
     Dft,
-    /// All inputs share all lines, orthogonal by a Hadamard matrix (signs only): 2, 4, 8 … inputs
+    /// All inputs excite all lines and are made orthogonal by a Hadamard matrix (signs only): 2, 4,
+    /// 8 … inputs
     Hadamard,
 }
 

@@ -6,7 +6,7 @@ use clap::{Arg, CommandFactory as _, Parser as _};
 
 use super::Cli;
 
-/// Units by the name of an option's value.
+/// Placeholders of option values and the units that the help texts must state for them.
 const UNITS: [(&str, &str); 8] = [
     ("GB", "GB"),
     ("HZ", "Hz"),
@@ -90,8 +90,8 @@ fn every_option_is_explained_and_names_its_unit() {
             let unit = UNITS.iter().find(|(value, _)| name.starts_with(value));
             match unit {
                 Some((_, unit)) => assert!(help.contains(unit), "{place}: {help}"),
-                // If the placeholder of a number implies no unit, the number is without unit, or
-                // the help text states the unit, such as the unit of the column.
+                // If the placeholder implies no unit, it must be one for numbers without a unit, or
+                // the help text must say which unit the number has, such as that of the column.
                 None => assert!(
                     PURE.contains(&name.as_str()) || help.contains("unit"),
                     "{place} takes a number called {name}: which unit?"

@@ -43,8 +43,8 @@ fn white_noise_as_response_is_no_result() {
         let message = refused(home.path(), &format!("{line} {way}"));
         assert!(message.contains("do not determine the machine"), "{way}: {message}");
     }
-    // With a stated period the fit has a result; warnings say that the periods differ and that the
-    // parameters are meaningless.
+    // With a stated period the fit has a result; warnings say that the single periods of the
+    // response differ from each other and that the parameters are meaningless.
     let found = warnings(home.path(), &format!("{line} --period 256"));
     assert!(found.contains("single periods of the response differ"), "{found}");
     assert!(found.contains("the parameters are meaningless"), "{found}");

@@ -301,8 +301,8 @@ fn bad_descriptions_are_told_by_name() {
     assert!(message.contains("cannot be used with"), "{message}");
 }
 
-/// Reads the acceleration along the table from the file of a logger, whose table begins at
-/// `PacketCounter`.
+/// Reads the acceleration in the direction of motion of the shake table from the file of a logger.
+/// The header of the columns in this file begins with `PacketCounter`.
 fn logged(file: &Path) -> Option<Vec<f64>> {
     let text = fs::read_to_string(file).ok()?;
     let rows = text.lines().skip_while(|line| !line.starts_with("PacketCounter")).skip(2);
@@ -350,8 +350,8 @@ fn two_loggers_on_a_shake_table() {
         let hz = report["modes"][0]["natural_frequency_hz"]["value"].as_f64().unwrap();
         assert!((hz - 21.98).abs() < 0.1, "{hz}");
         let [delay, error] = unknown(&report, "top.delay");
-        // The standard error from noise alone: the report multiplies it by `error_scale` if parts
-        // of the data disagree.
+        // If parts of the data disagree, the report multiplies the standard error from noise by
+        // `error_scale`; the division gives the standard error from noise.
         let of_noise = error / report["error_scale"].as_f64().unwrap();
         assert!((delay - 0.015).abs() < 3e-4 && of_noise < 1e-4, "{delay} ± {error}");
         // The model has only one storey, but other parts of the structure also move, so the

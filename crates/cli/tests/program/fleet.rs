@@ -149,8 +149,9 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
     assert!(!home.path().join("a.parquet").exists());
 }
 
-/// Faulty records next to a good one: one needs too much memory, one too much time, one is a named
-/// pipe, one a socket and one a link to a device that never ends. Each record has its row, and the run ends.
+/// A record that needs too much memory and a record that needs too much time each become a row with
+/// an error; the good record next to them is identified. A named pipe, a socket and a link to an
+/// endless device are reported as left out.
 #[cfg(target_os = "linux")]
 #[test]
 fn records_that_end_their_process_become_rows() {

@@ -17,8 +17,8 @@ use super::{mechid, refused};
 
 const PERIOD: usize = 1000;
 
-/// The number of samples is larger than the part of a text kept in memory, and is no multiple of a
-/// section or of a period.
+/// Number of samples in the record: larger than the number that the program keeps in memory from a
+/// text file, and not a multiple of the chunk read at a time or of the period.
 const SAMPLES: usize = 270_123;
 
 /// Number of samples per piece in the search for the strongest line.
@@ -32,7 +32,7 @@ const ERRORS: [f64; 3] = [0.1, 2.0, 300.0];
 
 const ALL: &str = "--displacement x --velocity v --acceleration a";
 
-/// Column of the standard error that includes only the machine.
+/// Name of the column whose standard error includes only the uncertainty of the machine.
 const OF_MACHINE: &str = "standard_error_of_machine";
 
 /// Sample at which the second part of the force begins.
@@ -121,9 +121,9 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     told("rms", rms((0..SAMPLES).map(force)));
     told("standard_error", rms((0..SAMPLES).map(error)));
     told("peak", (0..SAMPLES).map(|k| force(k).abs()).fold(0.0, f64::max));
-    // The spectrum is averaged over two pieces of the record, one from the first sample and one up
-    // to the last sample; they contain different parts of the burst. Both frequencies of the force
-    // are spectral lines of a piece.
+    // The spectrum is averaged over two pieces of the record: the first piece begins at the first
+    // sample, the second ends at the last sample. The pieces contain different parts of the burst.
+    // Both frequencies of the force are spectral lines of each piece.
     told("strongest_hz", 32.0);
     let part = |piece: Range<usize>| 100.0 * (piece.end - BURST) as f64 / PIECE as f64;
     let parts = [part(0..PIECE), part(SAMPLES - PIECE..SAMPLES)];

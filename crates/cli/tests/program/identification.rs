@@ -129,7 +129,8 @@ fn checks_tell_a_good_record_from_a_bad_one() {
     // A response from rest is not periodic: its end does not meet its beginning.
     let period = json(folder, &format!("{common} --between-samples held --extent period"));
     assert_ne!(verdict(&period, "before", "periodicity"), "good");
-    // Noise on the motion affects two successive steps, so the residual is coloured.
+    // The noise of each sample of the motion affects the residuals of two successive steps, so the
+    // residual is coloured.
     let motion = exact_zoh(&oscillator(), &force, &rest).unwrap();
     write(folder, "noisy.csv", &force, &noisy(&motion, 0.01, 9));
     let coloured =
@@ -156,7 +157,8 @@ fn checks_tell_a_good_record_from_a_bad_one() {
     assert_eq!(verdict(&tight, "before", "excitation"), "doubtful");
     let good = json(folder, &format!("identify two.csv {columns}"));
     assert_eq!(verdict(&good, "before", "excitation"), "good");
-    // Four numbers and three parameters give one degree of freedom, too few for a test.
+    // Two lines give four real equations. With three parameters, one residual degree of freedom
+    // remains, which is too few for a statistical test.
     let tested = |check: &Value| !check["finding"]["p_value"].is_null();
     assert!(!good["checks"].as_array().unwrap().iter().any(tested), "{good}");
     // The stated period is wrong: the record repeats every 400 samples.

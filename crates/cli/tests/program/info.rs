@@ -157,7 +157,7 @@ fn the_time_column_has_no_spectrum_unless_asked_for() {
 }
 
 /// The mean over whole periods of a sine is zero up to rounding, and is reported as zero. An offset
-/// of 1e-12 of the sine is reported as it is.
+/// of 1e-12 times the amplitude of the sine is reported unchanged.
 #[test]
 fn a_mean_of_zero_is_told_as_zero() {
     let folder = tempfile::tempdir().unwrap();

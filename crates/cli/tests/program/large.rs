@@ -109,7 +109,7 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
                 assert!((a - b).abs() < 1e-9 * size, "{name}, sample {k}: {a} and {b}");
             }
         }
-        // The record of a dense machine has the forces on all degrees of freedom.
+        // With dense matrices, the record has a force column for every degree of freedom.
         assert_eq!(column(home.path(), "small.csv", "force_64"), vec![0.0; 200]);
         column(home.path(), "large.csv", "displacement_1")
     });
@@ -202,7 +202,7 @@ fn what_a_large_machine_does_not_have_is_refused() {
 }
 
 /// The largest stable step of central differences is 2 divided by the highest frequency, 60 sin(n π
-/// / 2(n + 1)) rad/s; damping reduces it slightly. The simulated steady state satisfies the
+/// / 2(n + 1)) rad/s; damping reduces this step slightly. The simulated steady state satisfies the
 /// equation of motion.
 #[test]
 fn a_large_machine_has_a_steady_state_and_largest_steps() {

@@ -77,7 +77,8 @@ fn path(group: Node<'_, '_>) -> Vec<(f64, f64)> {
     numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect()
 }
 
-/// Returns the position of a tick on the lowest abscissa, or on the ordinate of a panel.
+/// Returns the position of the tick with this label, in px. If `anchor` is "end", the tick is on
+/// the ordinate of a panel, otherwise on the lowest abscissa.
 fn tick(node: Node<'_, '_>, label: &str, anchor: &str) -> f64 {
     let of = |n: &Node<'_, '_>| {
         n.has_tag_name("text")
@@ -254,7 +255,8 @@ fn columns_beyond_eight_and_the_time_are_left_out_and_told() {
         &drawn(folder.path(), "info timed.csv --columns 3 --period 150"),
         &["period of 150 samples"],
     );
-    // This record has no time axis; its time column is shown as a channel.
+    // The name `clock` does not mark a column as the time axis, so this column is shown as a
+    // channel.
     let svg = drawn(folder.path(), "info other.csv --columns clock,2 --start 101");
     has(&svg, &["1 clock", "Sample", "Frequency (cycles/sample)", "120", "300"]);
 }

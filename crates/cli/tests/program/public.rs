@@ -104,7 +104,8 @@ fn response_option(is_displacement: bool) -> &'static str {
     if is_displacement { "--displacement" } else { "--acceleration" }
 }
 
-/// Cases F1, F7, F32: a check asks about uncertain units and gives the factor.
+/// Cases F1, F7, F32: if the unit of a column is uncertain, a check asks about it. If a sensitivity
+/// or a factor is stated, no check asks.
 #[test]
 fn units_that_are_not_sure_are_asked_about() {
     let home = tempfile::tempdir().unwrap();

@@ -122,7 +122,7 @@ fn channels_of_a_universal_file_need_no_names() {
     let home = tempfile::tempdir().unwrap();
     let home = home.path();
     let text = fs::read_to_string(format!("{EXAMPLES}/machine.csv")).unwrap();
-    // The force acts at one of two points, which move together.
+    // The force acts at one of two points; both points have the same acceleration.
     let record = |file: &str, point: u32, responses: u32| {
         let response = |node| channel(node, (12, "m/s^2"), example_column(4));
         let force = channel(point, (13, "N"), example_column(1));
@@ -152,8 +152,8 @@ fn channels_of_a_universal_file_need_no_names() {
     // With a roving hammer, the file of each record states the point of the force.
     let roving = json(home, "modes one.unv two.unv");
     assert_eq!(roving["inputs"], serde_json::json!(["1+Z", "2+Z"]));
-    // Two forces and two responses without points can be paired in two ways, so the columns must be
-    // named.
+    // If two forces and two responses have no stated points, they can be paired in two ways, so the
+    // user must name the columns.
     let rows: Vec<Vec<&str>> = text.lines().map(|row| row.split(',').collect()).collect();
     let write_table = |file: &str, header: &str, columns: &[usize]| {
         let row = |row: &Vec<&str>| columns.iter().map(|at| row[*at]).collect::<Vec<_>>().join(",");
@@ -277,8 +277,8 @@ fn write_table(file: &Path, header: &str, columns: &[&[f64]]) {
     fs::write(file, text).unwrap();
 }
 
-/// Case F28: if the force excites too few lines for the unknowns, the message states their number
-/// and names `--lines all`.
+/// Case F28: if the force excites too few lines for the unknowns, the message states the number of
+/// excited lines and names `--lines all`.
 #[test]
 fn a_force_that_drives_few_lines_is_named() {
     let home = tempfile::tempdir().unwrap();

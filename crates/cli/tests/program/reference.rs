@@ -36,8 +36,8 @@ fn leaves(value: &Value, path: &str, into: &mut BTreeSet<String>) {
     }
 }
 
-/// Returns true if the section names the path, or the uncertain number to which it belongs, or
-/// fields below a value that is null.
+/// Returns true if the section names the path, the uncertain number that contains the value at the
+/// path, or, for a value that is null, fields below the path.
 fn is_named(section: &str, path: &str) -> bool {
     let row = |path: &str| {
         section.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{path}`")))
@@ -54,8 +54,8 @@ fn is_named(section: &str, path: &str) -> bool {
     if of_description && section.contains("formats.md#machines-of-named-elements") {
         return true;
     }
-    // A value that is null in this report may be an object or a list, so it is enough that the page
-    // names its fields.
+    // A value that is null in this report may be an object or a list in another report, so it is
+    // enough that the page names the fields of this object or list.
     of_uncertain || [".", "["].iter().any(|next| section.contains(&format!("`{path}{next}")))
 }
 
@@ -144,8 +144,8 @@ fn every_field_of_every_report_is_in_the_reference() {
         let page = page();
         let mut section = section(&page, &format!("mechid {command}")).to_owned();
         if ["report", "bearing"].contains(&command) {
-            // The report of `report` also has all fields of the report of `identify`; the report of
-            // `bearing` has the checks of `identify`.
+            // The JSON report of the command `report` also has all fields of the command
+            // `identify`; that of the command `bearing` also has the checks of `identify`.
             section += self::section(&page, "mechid identify");
         }
         let mut paths = BTreeSet::new();

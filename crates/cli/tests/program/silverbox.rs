@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::mechid;
 
-/// Index of the first sample in steady state, for each of the six realisations, counted from 1.
+/// Index, counted from 1, of the first sample in steady state, for each of the six realisations.
 const STARTS: [usize; 6] = [9030, 17722, 26414, 35106, 43798, 52490];
 
 /// Returns the path of a file of the benchmark; if it is missing, prints a note and returns `None`.

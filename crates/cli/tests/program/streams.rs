@@ -76,7 +76,8 @@ fn a_reader_may_have_seen_enough() {
     assert_eq!(closed.status.code(), Some(141), "{}", text(&closed.stderr));
 }
 
-/// If standard output is redirected to a file, existing content is kept as the shell requires.
+/// If `>>` redirects standard output to a file, the output `/dev/stdout` is appended and the
+/// existing content of the file is kept.
 #[test]
 fn a_redirected_output_is_written_where_the_shell_says() {
     let folder = tempfile::tempdir().unwrap();

@@ -18,7 +18,7 @@ use super::{mechid, refused};
 
 const PERIOD: usize = 1000;
 
-/// Number of periods; 262 of them are the part of a text kept in memory.
+/// Number of periods; only the first 262 periods of a text are kept in memory.
 const PERIODS: usize = 270;
 
 /// Writes the record of an oscillator as text and as a MATLAB file. Only the beginning of the text
@@ -92,8 +92,8 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     assert_eq!(report["last_sample"], samples);
 }
 
-/// A sweep reads the record once for all settings, in sections that are no multiple of the factors.
-/// The result is that of separate files with every nth row.
+/// A sweep reads the record once for all settings, in sections whose length is no multiple of the
+/// decimation factors. For a factor n, the result is that of a separate file with every nth row.
 #[test]
 fn a_sweep_of_a_long_text_takes_every_nth_row() {
     let folder = records();
@@ -237,7 +237,7 @@ fn a_long_text_is_predicted_as_one_record() {
     }
 }
 
-/// Number of samples, more than the part of a text kept in memory.
+/// Number of samples; only the first 262,144 samples of a text are kept in memory.
 const SPIKED: usize = 270_000;
 
 /// Returns a record as lines of text and as columns: the time, a column that alternates between 3

@@ -43,7 +43,8 @@ fn euler_is_best_at_the_finest_step_and_spectra_at_any() {
     let found = errors(&report);
     assert_eq!(found.len(), 4);
     assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
-    // At ωn = 22.3607 rad/s a cycle has 256 samples at NPI 1.
+    // NPI 1 puts the natural frequency, 22.3607 rad/s, on line 1, so a natural period has all 256
+    // samples.
     let point = &report["points"][0];
     assert!((point["samples_per_cycle"].as_f64().unwrap() - 256.0).abs() < 1e-9);
     assert_eq!(point["parameters"][1]["name"], "k");

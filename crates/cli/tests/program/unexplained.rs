@@ -196,8 +196,8 @@ fn noise_is_that_of_the_record_before_periods_are_averaged() {
     let (found, stated) = (error(&lines), error(&format!("{lines} --noise 4e-8,4e-8")));
     // The noise level, estimated from 195 lines of two channels, has a standard error of 4 %.
     assert!((found / stated - 1.0).abs() < 0.16, "{found}, stated {stated}");
-    // The method shrinkage reports the noise level before periods are averaged, as the option
-    // `--noise` states it.
+    // The noise level that the method shrinkage reports is that of the record, not of the mean over
+    // the periods; `--noise` states the same level.
     let found = report(folder.path(), &format!("{BOTH} --period 512"));
     let chosen = found["chosen"].as_array().unwrap().iter();
     let levels = chosen.filter(|c| c["name"].as_str().unwrap().starts_with("noise of channel"));

@@ -100,7 +100,8 @@ fn line(period: &[f64], n: usize) -> (f64, f64) {
 
 fn near(cell: &str, expected: f64, digits: i32) {
     let got: f64 = cell.trim_end_matches(" %").replace('−', "-").parse().unwrap();
-    // The tolerance is half a unit of the last of `digits` digits, for the worst leading digit 1.
+    // The cell is rounded to `digits` digits, so its error is at most half a unit of the last
+    // digit. The relative error is largest for a leading digit of 1.
     let within = 0.51 * 10f64.powi(1 - digits) * expected.abs();
     assert!((got - expected).abs() <= within, "{got} is not {expected}");
 }

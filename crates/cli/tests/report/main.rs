@@ -75,8 +75,9 @@ fn page(folder: &Path) -> String {
     fs::read_to_string(folder.join("page.html")).unwrap()
 }
 
-/// Returns the page as XML. The only element without an end tag is `meta`. The only script, which
-/// is not XML, is that of the figures; the policy identifies it by its hash.
+/// Returns the page as XML: closes the `meta` elements, because they alone have no end tag, and
+/// removes the script of the figures, because it is not XML. Checks that the page has this script
+/// once, and the security policy with the hash of the script.
 fn closed(page: &str) -> String {
     let policy = mechid::plot::content_policy();
     let quoted = policy.replace('\'', "&#39;");
@@ -105,7 +106,7 @@ fn text(node: Node<'_, '_>) -> String {
     node.descendants().filter(Node::is_text).filter_map(|n| n.text()).collect()
 }
 
-/// Returns the cells of the first row of a table that begins with `first`.
+/// Returns the cells of the first row whose first cell is `first`, in the table with this caption.
 fn row(document: &Document<'_>, caption: &str, first: &str) -> Vec<String> {
     let tables = tagged(document, "table");
     let has = |table: &&Node<'_, '_>| text(table.first_element_child().unwrap()) == caption;
@@ -336,7 +337,7 @@ fn an_open_record_has_its_page_too() {
 }
 
 /// The page shows every fitted record and a validation record. Reference for the quality of the
-/// prediction: the noise that was added to the motion in closed form.
+/// prediction: the noise that was added to the exact motion, which is computed in closed form.
 #[test]
 fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let folder = rig(NAMES, f64::INFINITY, 1e-3);

@@ -36,8 +36,8 @@ fn lines_of_whole_periods_lie_on_the_curve_of_the_machine() {
             let right = curve.partition_point(|(at, _)| *at < x).clamp(1, curve.len() - 1);
             let ((x0, y0), (x1, y1)) = (curve[right - 1], curve[right]);
             let on_curve = y0 + (y1 - y0) * (x - x0) / (x1 - x0);
-            // The limit is one pixel; near the peak, the drawn polyline is closer to the exact
-            // curve.
+            // The tolerance is one pixel; even near the peak, the drawn polyline is less than one
+            // pixel from the exact curve.
             assert!((y - on_curve).abs() < 1.0, "{x}: {y} {on_curve}");
             markers += 1;
         }

@@ -27,7 +27,8 @@ pub struct ChangedRecords<'a> {
     spare: usize,
     /// Estimate for the last change of the data; it is the initial estimate for the next change.
     theta: DVector<f64>,
-    /// Amplitudes of the errors of pulses for the last change; empty if there are none.
+    /// Amplitudes of the pulse errors, estimated for the last change of the data; empty if the data
+    /// have no pulse errors.
     amplitudes: Vec<f64>,
 }
 

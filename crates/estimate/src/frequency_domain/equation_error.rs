@@ -80,8 +80,8 @@ pub(super) fn weighted_equation_errors<'a>(
     })
 }
 
-/// Returns a weight for each row of a search for a delay. The weight follows from the stated noise
-/// and is 0 on lines with much noise; it is 1 if no noise is stated.
+/// Returns the weight of each row for the search for a delay. The weight follows from the stated
+/// noise and is 0 on lines with much noise; it is 1 if no noise is stated.
 pub(super) fn delay_weight(data: &FrequencyData) -> Vec<f64> {
     match noise_weight(data, WEIGHTING_CLEAR) {
         Some(weight) => (0..data.len()).map(weight).collect(),
@@ -107,8 +107,8 @@ fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f6
     })
 }
 
-/// Returns the rows of [`equation_error`] with a weight on each line; the force is `delay` seconds
-/// later.
+/// Returns the rows of [`equation_error`] with a weight on each line; the force is delayed by
+/// `delay` seconds.
 pub(super) fn weighted_rows(
     data: &FrequencyData,
     delay: f64,

@@ -12,16 +12,18 @@ use crate::Unknowns;
 use crate::limits::{FORCE_NOISE_LEVEL, NOISE_KEPT};
 
 /// Returns the most likely ratio (pure number, at least 0) of the variance of the noise of the
-/// forces to the variance that the `data` state, from the residual of a `fit` to these data without
-/// sinusoids. `None` if the residual does not show a ratio significantly below 1.
+/// forces to the variance that the `data` state, from the residual of a `fit` to these data. Any
+/// sinusoids must already be subtracted from `data`. `None` if the residual does not show a ratio
+/// significantly below 1.
 ///
 /// The variance of the residual of each response is that of its own noise, whose spectrum is known
-/// but for a factor, plus the ratio times the variance that the noise of the forces causes. The
+/// up to a factor, plus the ratio times the variance that the noise of the forces causes. The
 /// response with the strongest evidence decides.
 ///
 /// # Source
 /// Likelihood ratio, with one ratio on the boundary of its range: Self & Liang (1987), JASA 82,
-/// 605–610; the residuals are divided by the part that the parameters leave of them.
+/// 605–610; the power of each residual is divided by the share of the noise power that remains in
+/// it after the fit of the parameters (1 minus the leverage).
 pub fn force_noise_factor(
     data: &FrequencyData,
     unknowns: &Unknowns,

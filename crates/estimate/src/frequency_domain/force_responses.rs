@@ -32,8 +32,8 @@ impl ForceResponses {
         (0..data.dof()).map(to_force).collect::<Option<_>>().map(Self)
     }
 
-    /// Returns the weighted response of `rows` to a force of this amplitude on degree of freedom
-    /// `dof`.
+    /// Returns the weighted response on the lines `rows` to a force on degree of freedom `dof`;
+    /// `amplitude` gives the amplitude of the force on each line.
     fn to(
         &self,
         rows: &Range<usize>,
@@ -96,9 +96,10 @@ pub(super) fn remove(transients: &[RecordColumns<DMatrix<f64>>], columns: &mut D
     }
 }
 
-/// Returns the covariance of the residuals of every record with pulses: independent errors of the
-/// lines with the power `level`, plus the errors of the pulses. The component that the transients
-/// explain is removed from the effects of the pulse errors. `None` if an effect is not finite.
+/// Returns, for every record with pulses, the covariance of the residuals divided by `level`. The
+/// residuals have errors that are independent from line to line, with the power `level`, and the
+/// effects of the pulse errors. The component that the transients explain is removed from these
+/// effects. `None` if an effect is not finite.
 pub(super) fn pulse_covariances(
     data: &FrequencyData,
     responses: &ForceResponses,

@@ -102,10 +102,11 @@ impl<'a> InitialEstimates<'a> {
         self
     }
 
-    /// Returns all initial estimates, the most reliable first; the rounds of one iteration form one
-    /// family. The order is: total and ordinary least squares, weighted by the dynamic stiffness of
-    /// the round before; total least squares with equal weights; the nominal system; ordinary least
-    /// squares with the weights ω^e and with the weights of the noise.
+    /// Returns all initial estimates, the most reliable first. The order is: total and ordinary
+    /// least squares in rounds, each weighted by the dynamic stiffness of the previous round; total
+    /// least squares with equal weights; the nominal system; ordinary least squares with the
+    /// weights ω^e and with the weights of the noise. All rounds of total least squares form one
+    /// family; ordinary least squares has one family for each of its initial weightings.
     pub(super) fn families(&self) -> Vec<Vec<DVector<f64>>> {
         let powers =
             EXPONENTS.map(|exponent| self.estimate(Kind::Ordinary, &self.powers(exponent)));
@@ -262,9 +263,9 @@ impl<'a> InitialEstimates<'a> {
     /// [`InitialEstimates::triangle`].
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
-        // Columns that contain the noise of each displacement, then of each force. A column is
-        // given by its index, the index of its power of the frequency (3: no power) and a real
-        // factor.
+        // For each displacement, then for each force: the columns that contain its noise. Each
+        // column is given by its index, the index of the power of the frequency that multiplies the
+        // noise (3: no power), and a real factor.
         let mut enters: Vec<Vec<(usize, usize, f64)>> = vec![Vec::new(); 2 * n];
         for (at, (_, p)) in equation.parameters.iter().enumerate() {
             enters[p.column()].push((at, p.matrix() as usize, 1.0));

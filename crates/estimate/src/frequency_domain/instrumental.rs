@@ -104,8 +104,9 @@ impl Terms {
 struct Equation {
     parameters: Vec<Parameter>,
     values: DVector<f64>,
-    /// Derivative of the values with respect to the right-hand side, times the residual; one column
-    /// for each row of the equation.
+    /// Influence of the residuals on the values, with one column for each row of the equation: the
+    /// derivative of the values with respect to the right-hand side of this row, times the residual
+    /// of this row.
     scores: DMatrix<f64>,
     rows: usize,
     residual_nrmse: f64,
@@ -159,7 +160,8 @@ fn influence(
     }
     let scale: Vec<f64> = regressors.column_iter().map(|c| c.norm()).collect();
     instruments.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);
-    // Zᵀ = RᵀQᵀ, and R cancels in ZᵀΦ θ = Zᵀy, which avoids a product of ill-scaled matrices.
+    // With Z = QR, R cancels in ZᵀΦ θ = Zᵀy. The remaining equations QᵀΦ θ = Qᵀy avoid the product
+    // of two ill-scaled matrices.
     let q = instruments.qr().q();
     let mut projected = q.tr_mul(regressors);
     projected.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);

@@ -28,7 +28,7 @@ pub(super) struct Line {
     white: ComplexVector,
     /// Covariance L Lᴴ of e, and its factor L in the lower triangle.
     lower: ComplexMatrix,
-    /// E[ΔF eᴴ] of the forces with noise, in its first rows.
+    /// E[ΔF eᴴ]; the first rows belong to the forces with noise, the other rows are not used.
     cross: ComplexMatrix,
     /// Error (L Lᴴ)⁻¹e, weighted twice.
     twice: ComplexVector,
@@ -68,7 +68,7 @@ impl Line {
         &self.white_receptance
     }
 
-    /// Factor L in the lower triangle, after [`Line::whiten_both`].
+    /// Matrix whose lower triangle is the factor L that [`Line::whiten_both`] computed.
     pub(super) fn lower(&self) -> &ComplexMatrix {
         &self.lower
     }

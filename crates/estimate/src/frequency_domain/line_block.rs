@@ -21,11 +21,11 @@ pub(super) struct LineBlock {
 /// Factors of the rows √2 φ_l ⊗ W_l of a Jacobian, for the lines of a block.
 pub(super) struct BlockFactors {
     pub(super) block: LineBlock,
-    /// φ_l, 2 lines × columns of the block, real parts first.
+    /// φ_l, 2·lines × columns of the block, real parts first.
     pub(super) regressors: DMatrix<f64>,
     /// W_lᴴW_l, lines × dof², in the layout of [`gram`](mechid_numerics::kronecker::gram()).
     pub(super) weights: DMatrix<f64>,
-    /// W_lᴴr_l, 2 lines × dof, real parts first.
+    /// W_lᴴr_l, 2·lines × dof, real parts first.
     pub(super) residuals: DMatrix<f64>,
 }
 

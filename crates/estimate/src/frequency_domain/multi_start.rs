@@ -44,10 +44,11 @@ pub(super) struct GlobalMinimum {
 /// hardly moves.
 ///
 /// If `thin`, the same problem with fewer lines, is given, each search begins there. The first
-/// search continues on all lines if it has converged on fewer lines. A later search continues if it
-/// ends near the best point so far, or below this point, and if one of the two has converged. If no
-/// search has converged, the best one is continued instead of restarts; in the tests of the project
-/// a minimum then came only from more steps.
+/// search continues on all lines if it has converged on fewer lines. A later search continues on
+/// all lines if its sum of squares is close to that of the best point so far, or below it, and if
+/// this search or the search for the best point has converged. If no search has converged, the best
+/// search is continued before any restart: in the tests of the project, only more steps then led to
+/// a minimum.
 ///
 /// After the end of a time limit, the result is the lowest sum of squares so far, which may not be
 /// a minimum.
@@ -105,13 +106,15 @@ pub(super) fn search<P: Restartable>(
 /// Start of a search on all lines.
 enum Start {
     Near(DVector<f64>),
-    /// End of a search on fewer lines that does not continue on all lines. Its sum of squares is
-    /// that on all lines or, far above the best point, scaled to the number of all lines.
+    /// End of a search on fewer lines, if no search on all lines follows. The sum of squares is
+    /// that of all lines. If it is far above the sum of squares of the best point, it is not
+    /// computed on all lines, but scaled from the fewer lines.
     Far(Minimum),
 }
 
-/// Searches on fewer lines for the first time. A search that has not converged there is not
-/// continued on all lines; a search that fails there is repeated on all lines.
+/// Searches on fewer lines while no search has converged yet. If this search converges, it
+/// continues on all lines; if it stops without convergence, it does not continue; if it fails, it
+/// is repeated on all lines.
 fn first_on_fewer(
     problem: &mut impl Restartable,
     thin: &mut impl Restartable,
@@ -130,8 +133,9 @@ fn first_on_fewer(
     }
 }
 
-/// Continues the best search if no search has converged: first on fewer lines, and on all lines if
-/// it converges there; in the last round on all lines.
+/// Continues the best search in several rounds if no search has converged. A round begins on fewer
+/// lines and goes on to all lines if it converges; the last round uses all lines from its
+/// beginning.
 fn follow_best<P: Restartable>(
     problem: &mut impl Restartable,
     thin: &mut Option<&mut P>,
@@ -162,8 +166,8 @@ impl Start {
     }
 }
 
-/// Searches on fewer lines. The search continues on all lines if it ends near the best point so
-/// far, and if one of the two is a minimum.
+/// Searches on fewer lines. The search continues on all lines if its sum of squares is close to
+/// that of the best point so far, or below it, and if its end or the best point is a minimum.
 fn search_thin(
     problem: &mut impl Restartable,
     thin: &mut impl Restartable,
@@ -204,8 +208,8 @@ pub fn thin_step(data: &FrequencyData, unknowns: &Unknowns) -> usize {
 }
 
 /// Restarts the search from the best minima so far, moved by a few steps in resampled data. With
-/// `thin`, both are on fewer lines, and only a search that ends there near the best minimum
-/// continues on all lines.
+/// `thin`, these steps and the search use fewer lines, and the search continues on all lines only
+/// if it ends near the best minimum.
 fn restart<P: Restartable>(
     problem: &mut impl Restartable,
     mut thin: Option<&mut P>,
@@ -355,8 +359,8 @@ impl Ends {
 }
 
 impl GlobalMinimum {
-    /// Returns the minimum of a search that starts at this minimum; the residuals are the same, but
-    /// their weights differ.
+    /// Returns the minimum of a search in `problem` that starts at this minimum. `problem` has the
+    /// same residuals with other weights.
     ///
     /// # Errors
     /// [`EstimateError::NotConverged`].

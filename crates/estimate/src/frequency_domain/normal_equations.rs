@@ -116,9 +116,9 @@ impl Layout {
     /// b of equation j is 2 Re Σ φ̄_a φ_b H_ij. This sum is the product of a matrix of pairs (a, b)
     /// and a matrix of pairs (i, j); it needs 1/dof of the operations that the rows of J would
     /// need. The condition number of the Gram matrix is the square of that of J. This square is
-    /// harmless for regressors that are orthonormal over the lines weighted by ‖W_l‖; rounding of
-    /// the Gram matrix slows the search but does not change the minimum, where Jᵀr = 0. With a
-    /// `tangent` S (entries and transient loads × unknowns), the equations are those of the
+    /// harmless here, because the regressors are orthonormal over the lines with the weights ‖W_l‖;
+    /// rounding of the Gram matrix slows the search but does not change the minimum, where Jᵀr = 0.
+    /// With a `tangent` S (entries and transient loads × unknowns), the equations are those of the
     /// independent unknowns.
     ///
     /// # Source
@@ -359,7 +359,7 @@ impl Coordinates {
     }
 
     /// Returns 2 Re Σ φ̄ y for every unknown. This is Jᵀr for values r with W_lᴴ r = y on each
-    /// line. `weighted` has y for each block, 2 lines × dof, real parts first.
+    /// line. `weighted` has y for each block, 2·lines × dof, real parts first.
     pub(super) fn project<'b>(
         &self,
         weighted: impl Iterator<Item = (&'b BlockFactors, &'b DMatrix<f64>)>,

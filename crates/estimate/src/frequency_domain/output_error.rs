@@ -24,10 +24,10 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements. It
 /// minimises the weighted distance between measured displacement and G(ω) F by Gauss–Newton steps
 /// from several initial estimates: [`equation_error`] with several weights, and total least squares
-/// weighted by the dynamic stiffness of the round before. If the searches end at different minima,
-/// further searches start from the best minima after a few steps in resampled data. The best
-/// minimum is the result. To first order in the noise the estimate is unbiased and has the least
-/// scatter. The weights come from [`FrequencyData::noise`]:
+/// in rounds, each weighted by the dynamic stiffness of the previous round. If the searches end at
+/// different minima, further searches start from the best minima after a few steps in resampled
+/// data. The best minimum is the result. To first order in the noise the estimate is unbiased and
+/// has the least scatter. The weights come from [`FrequencyData::noise`]:
 ///
 /// - noise on displacement alone (exact force): the output-error estimator;
 /// - noise on force, too: errors in variables, with the true force eliminated row by row;
@@ -73,8 +73,8 @@ pub fn output_error_near(
     search_near(data, unknowns, nominal, Pooling::Automatic)
 }
 
-/// Estimates as [`output_error`], with a given pooling of the residual for the noise spectrum if
-/// the data state no noise.
+/// Estimates as [`output_error`]. If the data state no noise, the noise spectrum is estimated from
+/// the residual with the pooling `residual`.
 ///
 /// # Errors
 /// As [`output_error`];
@@ -191,7 +191,8 @@ fn with_known_noise(
     let inflation = sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?;
     let mut misfit = Misfit::new(data, unknowns, noise)?;
     let spare = spare(data, unknowns) as f64;
-    // Weights from a sampled covariance are on average too large by the factor ν/(ν − n).
+    // Weights from a covariance that is sampled with ν degrees of freedom for n channels are on
+    // average too large by the factor ν/(ν − n).
     let expected = spare * noise.mean_inverse_ratio(data.dof());
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
     let fewer = thinned(data, unknowns, noise);

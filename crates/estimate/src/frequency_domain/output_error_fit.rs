@@ -120,7 +120,8 @@ pub struct EndLoads {
     /// Statistic τᵀ Cov(τ)⁻¹ τ of the loads τ, a pure number. For records of whole periods it is χ²
     /// distributed with one degree of freedom per load.
     pub statistic: f64,
-    /// Ratio of the power of the loads on the lines to the power of the forces.
+    /// Ratio of the power of the transient loads to the power of the forces, both summed over the
+    /// lines of the fit.
     pub share: f64,
 }
 
@@ -215,7 +216,7 @@ pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausi
 pub(super) struct Scale {
     /// Ratio of the noise power to the power assumed by the weights.
     pub(super) level: f64,
-    /// Ratio of the covariance to the inverse of the Fisher information for sampled weights;
+    /// Ratio, due to sampled weights, of the covariance to the inverse of the Fisher information;
     /// ignored if there is a [`WeightUncertainty`].
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
@@ -230,8 +231,8 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Returns the covariance of the independent unknowns divided by the noise level, and its
-    /// degrees of freedom, from the inverse of the Fisher information.
+    /// Returns the covariance of the independent unknowns for a noise level of 1, and the degrees
+    /// of freedom of this covariance. `inverse` is the inverse of the Fisher information.
     fn covariance(&self, inverse: DMatrix<f64>) -> (DMatrix<f64>, usize) {
         let inverse = self.with_pulses.clone().unwrap_or(inverse);
         match &self.weights {
@@ -263,8 +264,8 @@ fn entries_with_covariance(
 
 /// Returns the power of the modelled response to the forces, divided by the power of the measured
 /// response. If the ratio is above 1, the modelled transients cancel the excess. If the ratio is
-/// above 1/ε, the sum of modelled response and transients is only rounding error, as in a solution
-/// of normal equations with this condition number.
+/// above 1/ε, the sum of modelled response and transients is only rounding error; the ratio then
+/// acts like the condition number of the normal equations.
 fn cancelled_power(data: &FrequencyData, unknowns: &Unknowns, independent: &[f64]) -> f64 {
     let [m, c, k] = unknowns.assemble(entries(unknowns, independent).as_slice());
     let Ok(system) = SecondOrderSystem::new(m, c, k) else { return 0.0 };
@@ -361,8 +362,8 @@ pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
     (2 * data.dof() * data.len()).saturating_sub(unknowns)
 }
 
-/// Returns the ratio of the covariance to the inverse of the Fisher information for sampled
-/// weights.
+/// Returns the ratio, due to sampled weights, of the covariance to the inverse of the Fisher
+/// information.
 ///
 /// For weights W = Ŝ⁻¹ with a sample covariance Ŝ of n channels and ν degrees of freedom, and the
 /// true covariance S, E[W] = ν/(ν−n)·S⁻¹ and E[W S W] = ν³/((ν−n)((ν−n)²−1))·S⁻¹. The covariance of

@@ -163,7 +163,7 @@ fn by_products(
         })?;
         products += solution.products;
         log::debug!(
-            "after {} products, the relative residual of the periodic state is {:.1e}",
+            "after {} passes over the period, the relative residual of the periodic state is {:.1e}",
             solution.products,
             solution.residual
         );
@@ -177,7 +177,8 @@ fn by_products(
         start += solution.vector.component_mul(&shooting.scales);
         let size = Shooting::largest_modulus(&start.component_div(&shooting.scales));
         let missed = Shooting::largest_modulus(&solution.vector) / size;
-        // A correction of more than a tenth of the previous correction is only rounding.
+        // If a correction is more than a tenth of the previous correction, only rounding remains,
+        // and the search ends.
         let solved = solution.residual <= limits::PERIODIC_GMRES_RESIDUAL;
         if solved
             && (missed <= limits::PERIODIC_GAP

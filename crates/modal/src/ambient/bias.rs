@@ -68,7 +68,7 @@ impl Fit {
         full_step(&self.information, &gradient(&self.parameters, &expected, endless)?)
     }
 
-    /// Returns the parts of the mean excess.
+    /// Returns the parts of the mean excess of the fitted spectrum over the true spectrum.
     pub(super) fn excess(&self) -> Option<Excess> {
         let layout = &self.parameters.layout;
         let (m, p) = (layout.modes, layout.outputs);

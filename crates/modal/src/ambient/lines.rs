@@ -20,7 +20,8 @@ const WIDEST: f64 = 0.02;
 pub(super) struct BandLines {
     /// Angular frequencies, in rad/s.
     pub omega: Vec<f64>,
-    /// Unitary amplitudes, lines × outputs, each output divided by its RMS value in the band.
+    /// Amplitudes of the unitary Fourier transform, lines × outputs, each output divided by its RMS
+    /// value in the band.
     pub amplitudes: DMatrix<Complex<f64>>,
     /// RMS value of each output in the band.
     pub scale: Vec<f64>,

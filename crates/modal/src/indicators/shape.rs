@@ -94,8 +94,8 @@ impl ShapeWithCovariance {
             return None;
         }
         let shape = &self.shape / reference;
-        // d(φ/φ_r) = (dφ − φ/φ_r dφ_r) / φ_r: each complex factor multiplies a real part and an
-        // imaginary part.
+        // d(φ/φ_r) = (dφ − φ/φ_r dφ_r) / φ_r. The covariance is that of real and imaginary parts,
+        // so each complex factor gives four real entries of the Jacobian.
         let mut jacobian = DMatrix::zeros(2 * p, 2 * p);
         let mut add = |i: usize, j: usize, factor: Complex<f64>| {
             jacobian[(i, j)] += factor.re;

@@ -71,8 +71,9 @@ fn all_modes_of_each_quantity_are_found_and_no_other() {
 }
 
 /// All modes of a record with little noise must be found. In such a record, the lines between zero
-/// frequency and the modes have as much weight as the resonances: the leakage at these lines is
-/// larger than the noise, and the spectrum of an acceleration falls to zero.
+/// frequency and the modes have as much weight as the resonances. So the model must be right at
+/// these lines, too, where the leakage is larger than the noise and the spectrum of an acceleration
+/// falls to zero.
 #[test]
 fn good_accelerometers_lose_no_mode() {
     let frame = Structure {

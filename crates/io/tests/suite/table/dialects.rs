@@ -14,8 +14,8 @@ fn a_file_has_one_decimal_sign() {
         ("t\tf\n0\t999.5\n1\t1,000\n", "f", 3, DecimalSign::Point),
         ("t;f\n0;999.5\n1;1,000\n", "f", 3, DecimalSign::Point),
         ("t f\n0 1,5\n1 2.5\n2 1,5\n", "f", 3, DecimalSign::Comma),
-        // The sign of most numbers on the first lines is the decimal sign, at any position of the
-        // other numbers.
+        // The decimal sign of the file is that of most numbers on its first lines, even if a number
+        // with the other decimal sign comes first.
         ("version;f;g\n1.2;0,5;1,5\n1.3;0,5;1,5\n", "version", 2, DecimalSign::Comma),
     ] {
         let e = table(text).column(column).unwrap_err();
