@@ -72,9 +72,13 @@ pub const MODAL_TABLE_BYTES: usize = 3200;
 pub const MODAL_PAIR_BYTES: usize = 40;
 
 /// Number of operations of the searches of an analysis for each byte of memory that its files may
-/// use, without a time limit. For a file of 1 MB it is more than twice what nine degrees of freedom
-/// took with a right model, and half a minute on two processors with a wrong one.
-pub const OPERATIONS_PER_BYTE: f64 = 40.0;
+/// use, without a time limit. For a file of 1 MB it is twice what nine degrees of freedom took with
+/// a right model, and some twenty seconds on two processors with a wrong one.
+pub const OPERATIONS_PER_BYTE: f64 = 30.0;
+
+/// Additional operations for the search for the cause of a bad fit, relative to the limit of the
+/// operations of the analysis.
+pub const CAUSE_OPERATIONS: f64 = 0.5;
 
 /// Maximum number of initial estimates of modes. The check of the memory first assumes this number
 /// of modes. It determines the actual number only if the assumed number needs too much memory.

@@ -180,6 +180,23 @@ pub fn join<A: Send, B: Send>(
     (one, other)
 }
 
+/// Runs a part of some work, such as the search for the cause of a bad fit, with a limit of its
+/// own: this `share` (pure number) of the operations of the whole work, in addition to its limit.
+/// Without a limit of operations, the part runs like the rest of the work.
+pub fn apart<T>(share: f64, work: impl FnOnce() -> T) -> T {
+    let active = ACTIVE.with_borrow(Option::clone);
+    let Some((active, most)) = active.and_then(|active| match active.limit {
+        Limit::Operations(most) => Some((active, most)),
+        Limit::Seconds(_) | Limit::Polls(_) => None,
+    }) else {
+        return work();
+    };
+    let limit = Active::new(TimeLimit::from_operations(share * most), active.is_default);
+    let (result, (_, has_ended)) = counted(limit, work);
+    active.has_ended.set(active.has_ended.get() || has_ended);
+    result
+}
+
 /// Runs some work with a limit. Also returns the number of its operations, and whether the limit
 /// has ended a search.
 fn counted<T>(limit: Active, work: impl FnOnce() -> T) -> (T, (f64, bool)) {
@@ -263,6 +280,9 @@ mod tests {
         // Each part has half of the 10 operations, and together they use 12.
         let parts = || (join(steps, steps), is_over());
         assert_eq!(within(limit, parts), ((2, 2), true));
+        let with_more = || (steps(), apart(0.5, steps), steps(), is_over());
+        assert_eq!(within(limit, with_more), (4, 2, 0, true));
+        assert_eq!(apart(0.5, steps), 100);
         assert_eq!(steps(), 100);
     }
 

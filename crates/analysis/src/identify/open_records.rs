@@ -38,6 +38,7 @@ use super::sinusoids::SinusoidRow;
 use super::spectra::LIKELIHOOD_PARAMETERS;
 use crate::AnalysisError;
 use crate::hits::HitNoise;
+use crate::limits::CAUSE_OPERATIONS;
 use crate::measurement::{Block, Windowed};
 
 /// Significance level of the test for transients; a record of whole periods is mistaken for an open
@@ -202,10 +203,12 @@ pub(super) fn fit(
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let tested =
         Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
-    let (better_explanation, compared) = time_limit::join(
-        || tested.cause(dt, unknowns, noise.response, excitation),
-        || agreement(&data, &fit, &residuals, excitation),
-    );
+    let (better_explanation, compared) = time_limit::apart(CAUSE_OPERATIONS, || {
+        time_limit::join(
+            || tested.cause(dt, unknowns, noise.response, excitation),
+            || agreement(&data, &fit, &residuals, excitation),
+        )
+    });
     let better_explanation = better_explanation?;
     let (better_explanation, explained) = better_explanation.unzip();
     let names_quantity = better_explanation.as_ref().is_some_and(is_of_quantity);
@@ -501,22 +504,21 @@ fn with_cause(
     unknowns: &Unknowns,
     noise: Pooling,
 ) -> AnalysisError {
-    if !matches!(error, EstimateError::NotConverged { .. }) {
+    if !matches!(error, EstimateError::NotConverged { .. }) && time_limit::ended().is_none() {
         return error.into();
     }
-    let data = joined(records).ok();
-    let quantity = data.as_ref().and_then(|data| quantity_of_failed_search(data, unknowns));
-    if let Some(quantity) = quantity {
-        return AnalysisError::Unfit { error, reasons: quantity.to_string() };
-    }
-    if let Some(delay) = delay_of_failed_search(records, dt, unknowns, noise) {
-        return AnalysisError::Unfit {
-            error,
-            reasons: format!("{delay}; the search without that delay succeeds"),
-        };
-    }
-    match data.and_then(|data| delay_of_lines(&data, dt, unknowns)) {
-        Some(delay) => AnalysisError::Unfit { error, reasons: delay.to_string() },
+    let cause = time_limit::apart(CAUSE_OPERATIONS, || {
+        let data = joined(records).ok()?;
+        if let Some(quantity) = quantity_of_failed_search(&data, unknowns) {
+            return Some(quantity.to_string());
+        }
+        if let Some(delay) = delay_of_failed_search(records, dt, unknowns, noise) {
+            return Some(format!("{delay}; the search without that delay succeeds"));
+        }
+        delay_of_lines(&data, dt, unknowns).map(|delay| delay.to_string())
+    });
+    match cause {
+        Some(reasons) => AnalysisError::Unfit { error, reasons },
         None => error.into(),
     }
 }

@@ -12,6 +12,7 @@ use mechid_estimate::frequency_domain::{
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_io::FrequencyResponses;
 use mechid_model::ResponseQuantity;
+use mechid_numerics::time_limit;
 use mechid_spectra::{FrequencyData, Pooling};
 use nalgebra::{Complex, DMatrix};
 
@@ -20,6 +21,7 @@ use super::response_settings::IdentifyResponses;
 use super::tabulated::{Tabulated, joined};
 use super::thinned;
 use crate::AnalysisError;
+use crate::limits::CAUSE_OPERATIONS;
 
 /// Number of rounds, each with an estimate of the delay and a fit with this delay.
 const DELAY_ROUNDS: usize = 2;
@@ -60,17 +62,22 @@ pub(super) fn with_better_model(
     data: &FrequencyData,
     unknowns: &Unknowns,
 ) -> AnalysisError {
-    let AnalysisError::Estimate(error @ EstimateError::NotConverged { .. }) = failure else {
-        return failure;
+    let is_ended = time_limit::ended().is_some();
+    let error = match failure {
+        AnalysisError::Estimate(error @ EstimateError::NotConverged { .. }) => error,
+        AnalysisError::Estimate(error) if is_ended => error,
+        failure => return failure,
     };
-    let fewer = thinned::for_models(tables, how, data, unknowns)
-        .and_then(|fewer| Some((on_lines_of(&fewer, how).ok()?, fewer)));
-    let (data, tables) = match &fewer {
-        Some((data, fewer)) => (data, &fewer[..]),
-        None => (data, tables),
-    };
-    let plain = equation_error(data, unknowns).ok();
-    match plain.and_then(|plain| other_model(tables, how, data, &plain)) {
+    let other = time_limit::apart(CAUSE_OPERATIONS, || {
+        let fewer = thinned::for_models(tables, how, data, unknowns)
+            .and_then(|fewer| Some((on_lines_of(&fewer, how).ok()?, fewer)));
+        let (data, tables) = match &fewer {
+            Some((data, fewer)) => (data, &fewer[..]),
+            None => (data, tables),
+        };
+        other_model(tables, how, data, &equation_error(data, unknowns).ok()?)
+    });
+    match other {
         Some(Other {
             cause: cause @ (Cause::Quantity { .. } | Cause::Decibels),
             remaining,

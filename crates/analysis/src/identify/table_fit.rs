@@ -7,6 +7,7 @@ use mechid_checks::{
 use mechid_estimate::frequency_domain::{PartsOfFit, Split, equation_error, output_error_of_table};
 use mechid_estimate::{Estimate, ResponseEstimate, Unknowns, output_error_of_responses};
 use mechid_io::FrequencyResponses;
+use mechid_numerics::time_limit;
 use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum};
 
 use super::checks::{CheckRow, When};
@@ -19,6 +20,7 @@ use super::summary::FitRow;
 use super::tabulated::{Noise, Tabulated};
 use super::{Method, added_decay, determined};
 use crate::AnalysisError;
+use crate::limits::CAUSE_OPERATIONS;
 use crate::measurement::Channels;
 use crate::measurement::units::doubt;
 use crate::modes::resonances;
@@ -281,7 +283,11 @@ impl Scope<'_> {
         let better = findings
             .iter()
             .any(|(_, _, finding)| is_left(finding))
-            .then(|| better_model_of(self.tables, self.how, self.data, &fit.estimate))
+            .then(|| {
+                time_limit::apart(CAUSE_OPERATIONS, || {
+                    better_model_of(self.tables, self.how, self.data, &fit.estimate)
+                })
+            })
             .flatten();
         let remaining = better.as_ref().map(|better| better.remaining);
         let compared = fit.compared(self.data, self.measured)?;
