@@ -162,9 +162,11 @@ pub struct ModelledResponses {
 
 impl ModelledResponses {
     /// Returns the power of the residual; each residual is first divided by the standard
-    /// `deviation` of its noise, if known.
+    /// `deviation` of its noise, if known. A model whose responses are far too large explains as
+    /// much as no model, so the result is at most the power of the measured responses.
     fn power(&self, deviation: Option<&DMatrix<f64>>) -> f64 {
-        weighted(&(&self.measured - &self.modelled), deviation).norm_squared()
+        let residual = weighted(&(&self.measured - &self.modelled), deviation).norm_squared();
+        residual.min(weighted(&self.measured, deviation).norm_squared())
     }
 
     /// Returns the ratio of the residual power to the power of the measured responses.
@@ -173,8 +175,13 @@ impl ModelledResponses {
     }
 
     /// Returns whether the residuals of all channels are uncorrelated from line to line within
-    /// every stretch of rising `omega` (rad/s).
-    fn is_white(&self, omega: &[f64], deviation: Option<&DMatrix<f64>>) -> bool {
+    /// every stretch of rising `omega` (rad/s). Each residual is first divided by the standard
+    /// `deviation` of its noise (unit of the channel), if known.
+    ///
+    /// # Source
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
+    /// model validation.
+    pub fn is_white(&self, omega: &[f64], deviation: Option<&DMatrix<f64>>) -> bool {
         let residual = weighted(&(&self.measured - &self.modelled), deviation);
         let first = |row: &usize| *row == 0 || omega[*row] < omega[row - 1];
         let starts: Vec<usize> = (0..omega.len()).filter(first).collect();

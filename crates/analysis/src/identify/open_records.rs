@@ -325,12 +325,12 @@ impl Tested<'_> {
         let all = joined(closed)?;
         let system = fit.estimate.system().ok();
         let unexplained = system.and_then(|system| unexplained_motion(&all, &system).ok()?);
-        if !is_noise(residuals) || unexplained > Some(CONSPICUOUS) {
+        let quantity = if !is_noise(residuals) || unexplained > Some(CONSPICUOUS) {
             let data = joined(&fit.without_pulse_errors(records)?)?;
-            if let Some(finding) = other_quantity(&data, &all, &fit.estimate) {
-                return Ok(Some((finding, None)));
-            }
-        }
+            other_quantity(&data, &all, &fit.estimate)
+        } else {
+            None
+        };
         let band_limited = OnceLock::new();
         let compared = || {
             let new = || BandLimitedFit::new(records, fit, pooling);
@@ -364,7 +364,10 @@ impl Tested<'_> {
             |refit: &Option<Refit>| refit.as_ref().map_or(f64::INFINITY, |refit| refit.cost);
         let best = causes.min_by(|(_, a), (_, b)| power(a).total_cmp(&power(b)));
         let square = |refit: Refit| &refit.change * refit.change.transpose();
-        Ok(best.map(|(finding, refit)| (finding, refit.map(square))))
+        let best = best.map(|(finding, refit)| (finding, refit.map(square)));
+        // Near a resonance, a delay may have a similar effect as another quantity.
+        let causes = best.into_iter().chain(quantity.map(|finding| (finding, None)));
+        Ok(causes.min_by(|(a, _), (b, _)| remaining(a).total_cmp(&remaining(b))))
     }
 
     /// Returns all lines of the records after the effect of a finding (delay, AC coupling or force
@@ -507,16 +510,17 @@ fn with_cause(
     if !matches!(error, EstimateError::NotConverged { .. }) && time_limit::ended().is_none() {
         return error.into();
     }
-    let cause = time_limit::apart(CAUSE_OPERATIONS, || {
-        let data = joined(records).ok()?;
-        if let Some(quantity) = quantity_of_failed_search(&data, unknowns) {
-            return Some(quantity.to_string());
-        }
-        if let Some(delay) = delay_of_failed_search(records, dt, unknowns, noise) {
-            return Some(format!("{delay}; the search without that delay succeeds"));
-        }
-        delay_of_lines(&data, dt, unknowns).map(|delay| delay.to_string())
+    // A wrong quantity is searched last: near a resonance, a delay may have a similar effect.
+    let each = 0.5 * CAUSE_OPERATIONS;
+    let delay = || delay_of_failed_search(records, dt, unknowns, noise);
+    let delay = time_limit::apart(each, delay)
+        .map(|delay| format!("{delay}; the search without that delay succeeds"));
+    let data = joined(records).ok();
+    let cause = delay.or_else(|| {
+        let quantity = || quantity_of_failed_search(data.as_ref()?, unknowns);
+        time_limit::apart(each, quantity).map(|quantity| quantity.to_string())
     });
+    let cause = cause.or_else(|| Some(delay_of_lines(&data?, dt, unknowns)?.to_string()));
     match cause {
         Some(reasons) => AnalysisError::Unfit { error, reasons },
         None => error.into(),

@@ -12,9 +12,9 @@ use mechid_spectra::{FrequencyData, Pooling};
 use super::other_models::modelled;
 
 /// Returns the finding that another quantity explains the responses of open records far better than
-/// the stated one: at most a quarter of the residual power remains. `data` are the records without
-/// errors of pulses; `closed` are the same lines without their transients, and `estimate` is the
-/// estimate from them.
+/// the stated one: at most a quarter of the residual power remains, and this residual is
+/// uncorrelated from line to line. `data` are the records without errors of pulses; `closed` are
+/// the same lines without their transients, and `estimate` is the estimate from them.
 ///
 /// Every quantity, the stated one included, is fitted to the same lines by maximum likelihood with
 /// white noise; long records are fitted on a part of their lines. If the search for the stated
@@ -45,7 +45,10 @@ pub(super) fn other_quantity(
     let fits = others.filter_map(|quantity| Some((quantity, fitted_as(quantity)?)));
     let (quantities, models): (Vec<_>, Vec<_>) = fits.unzip();
     let best = better_model(data.omega(), None, &fitted, &models);
-    let (best, remaining) = best.filter(|(_, remaining)| *remaining <= DELAY_REMAINING)?;
+    let is_right = |(best, remaining): &(usize, f64)| {
+        *remaining <= DELAY_REMAINING && models[*best].is_white(data.omega(), None)
+    };
+    let (best, remaining) = best.filter(is_right)?;
     let cause = Cause::RecordedQuantity { quantity: quantities[best], stated };
     Some(Finding::Alternative(Alternative { cause, remaining }))
 }
