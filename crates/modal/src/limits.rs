@@ -1,5 +1,9 @@
 //! Limits of the identification, each with the effect of values on either side.
 
+/// Operations that count for a limit of the work, for each product in the sums over lines; these
+/// sums do many products at once.
+pub(crate) const VECTOR_OPERATIONS: f64 = 0.1;
+
 /// Number of lines in a block of the parallel sums. Blocks limit the memory of a sum and fix the
 /// order of its terms, so that the result does not depend on the number of processors.
 pub const BLOCK_LINES: usize = 256;

@@ -11,6 +11,7 @@ use mechid_numerics::time_limit;
 use rayon::prelude::*;
 
 use crate::dense::{add_product, gram, transposed_product};
+use crate::limits::VECTOR_OPERATIONS;
 use crate::lines::{Block, Lines};
 use crate::model::Model;
 use crate::projection::{BlockArrays, Projection};
@@ -74,7 +75,8 @@ impl NormalEquations {
         let pairs = model.pairs(lines.loads.len());
         let shapes = whitened_shapes(projection, model.modes());
         let rows: usize = lines.blocks.iter().map(Block::len).sum();
-        time_limit::spend(8.0 * (rows * pairs.len() * (pairs.len() + lines.outputs.len())) as f64);
+        let products = rows * pairs.len() * (pairs.len() + lines.outputs.len());
+        time_limit::spend(VECTOR_OPERATIONS * products as f64);
         let work: Vec<(&Block, &BlockArrays)> =
             lines.blocks.iter().zip(&projection.blocks).collect();
         let width = work.len().div_ceil(LANES).max(1);

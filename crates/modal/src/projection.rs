@@ -4,6 +4,7 @@ use mechid_numerics::time_limit;
 use rayon::prelude::*;
 
 use crate::dense::{Triangle, add_product, triangularise};
+use crate::limits::VECTOR_OPERATIONS;
 use crate::lines::{Block, Lines};
 
 /// Approximate standard deviation of the noise for the search. It is the product of a spectral
@@ -103,7 +104,7 @@ impl Projection {
     pub(crate) fn solve(&mut self, lines: &Lines, design: &impl Design) -> f64 {
         let (columns, outputs) = (design.columns(lines), lines.outputs.len());
         let rows: usize = lines.blocks.iter().map(Block::len).sum();
-        time_limit::spend(2.0 * (rows * columns * (columns + 2 * outputs)) as f64);
+        time_limit::spend(VECTOR_OPERATIONS * (rows * columns * (columns + 2 * outputs)) as f64);
         self.blocks.par_iter_mut().zip(&lines.blocks).for_each(|(arrays, block)| {
             arrays.reduce(lines, block, design);
         });
