@@ -157,8 +157,8 @@ const PARTS: usize = 8;
 /// Minimum ratio of the error in the first part to the error in the last part that indicates a
 /// wrong initial state.
 const MIN_DECAY_RATIO: f64 = 3.0;
-/// Minimum number of samples in one of the [`PARTS`] parts of a record. The largest initial error
-/// is searched for in the same number of samples from the beginning.
+/// Minimum number of samples in one of the [`PARTS`] parts of a record. It is also the number of
+/// samples, from the first, whose largest error is the initial error.
 const SHORTEST: usize = 16;
 /// Minimum ratio of the largest initial error to the largest error of the record that indicates a
 /// wrong initial state. The ratio is smaller for an inaccurate machine, because its error grows
@@ -285,7 +285,8 @@ impl PredictionError {
         Self { quantity, degree_of_freedom, name, unit, rmse, nrmse, standard_error: None }
     }
 
-    /// Returns the error with the RMS of the errors due to the uncertainty of the modes.
+    /// Returns this prediction error with the field `standard_error` set: the RMS of the errors due
+    /// to the uncertainty of the modes.
     pub(crate) fn with_standard_error(self, standard_error: f64) -> Self {
         Self { standard_error: Some(standard_error), ..self }
     }

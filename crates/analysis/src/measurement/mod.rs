@@ -30,7 +30,8 @@ pub use self::window::{Window, Windowed};
 use crate::AnalysisError;
 use crate::limits::{FEW_CHANNELS, PAIR_BYTES, PREDICT_BYTES, check_memory};
 
-/// Maximum number of samples in memory of a window that is not needed as a whole.
+/// Number of samples of a window that are buffered in memory if the whole window is not needed; a
+/// buffer of whole periods may be smaller or larger, and a caller may request more samples.
 pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
 
 /// Number of samples read at a time from a window that is not buffered.

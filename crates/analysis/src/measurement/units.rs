@@ -123,7 +123,8 @@ pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     ))
 }
 
-/// Maximum relative difference of equal sampling rates, because a time column has few digits.
+/// Maximum relative difference between two sampling rates that count as equal: a time column may
+/// have few digits, so its rate is not exact.
 const SAME_RATE: f64 = 1e-4;
 
 /// Returns a remark if the given sampling rate differs from the rate of the file, which its time
@@ -166,15 +167,16 @@ fn two_rates(table: &Table, reading: &Reading) -> Option<[String; 3]> {
     Some([rate, source, of_file])
 }
 
-/// Maximum sampling rate, in Hz, that is doubtful for a time column without a unit in a record of
-/// any length: only very slow structures need no higher rate. Milliseconds that are read as seconds
-/// give such a rate if the true rate is at most 2 kHz. Sample numbers that are read as seconds give
-/// it for every true rate.
+/// Maximum sampling rate, in Hz, that makes a time column without a unit doubtful, in a record of
+/// any length: only very slow structures are measured at such a rate. Milliseconds that are read as
+/// seconds give such a rate if the true rate is at most 2 kHz. Sample numbers that are read as
+/// seconds give it for every true rate.
 const SLOW_HZ: f64 = 2.0;
 
-/// Maximum sampling rate, in Hz, that is doubtful in records longer than [`LONG_S`]: records of
-/// buildings have such rates, but seldom without a unit. Milliseconds that are read as seconds give
-/// such a rate for true rates up to 20 kHz, in records of at least a second.
+/// Maximum sampling rate, in Hz, that makes a time column without a unit doubtful in records of at
+/// least [`LONG_S`]: records of buildings have such rates, but seldom without a unit. Milliseconds
+/// that are read as seconds give such a rate for true rates up to 20 kHz, in records of at least a
+/// second.
 const RATHER_SLOW_HZ: f64 = 20.0;
 
 /// Minimum duration, in s, for the limit [`RATHER_SLOW_HZ`].
@@ -195,8 +197,8 @@ const DAY_NUMBERS: f64 = 20_000.0;
 const DAY_S: f64 = 86_400.0;
 
 /// Returns a finding if a time column has a doubtful unit. Without a unit, the column may be in
-/// milliseconds if the sampling rate is very low and the record long, or in days if the rate is
-/// very high.
+/// milliseconds or a smaller unit if the sampling rate is very low, or low in a long record. It may
+/// be in days if the rate is very high, or high with instants that may be day numbers.
 pub(crate) fn doubtful_time(
     table: &Table,
     time: &TimeAxis<'_>,
@@ -222,12 +224,13 @@ pub(crate) fn doubtful_time(
     Some(Finding::TimeUnit(TimeUnit { column, rate_hz, duration_s, unit, factor }))
 }
 
-/// Minimum relative error of a sampling rate, due to the digits of its time column, for a remark; a
-/// smaller error is negligible against the errors that noise causes in identified frequencies.
+/// Minimum relative error of a sampling rate that causes a remark. The error comes from the rounded
+/// times of the time column; a smaller error is negligible against the errors that noise causes in
+/// identified frequencies.
 const RATE_ERROR: f64 = 1e-5;
 
-/// Maximum ratio of the rounding step of instants to their time step. Equally spaced instants have
-/// the ratio 1, so a ratio above this maximum shows no rounding.
+/// Maximum ratio of the quantisation step of instants to their time step if the instants are
+/// rounded. Instants that are exact multiples of the time step have the ratio 1.
 const EVEN: f64 = 0.99;
 
 /// Returns a remark if the digits of a time column make the sampling rate so uncertain that the

@@ -15,7 +15,8 @@ use crate::limits::{
     SHARPENING_SETTLED,
 };
 
-/// Maximum deviation of a frequency from a spectral line, in lines: the rounding of a file.
+/// Maximum deviation of a frequency in a file from the nearest spectral line, in line spacings: it
+/// allows for the rounding of the frequencies in the file.
 const OF_LINE: f64 = 1e-3;
 
 /// Segments of averaged responses of a table.
@@ -27,8 +28,8 @@ pub(super) struct Averaged {
     pub spacing_hz: f64,
     /// Minimum distance, in lines, between two lines whose errors count as independent.
     step: usize,
-    /// Factor on the standard errors computed for independent lines: lines `step` apart still have
-    /// a small correlation. 1 without correlation.
+    /// Factor on the standard errors that are computed as if the selected lines were independent:
+    /// lines at a distance of `step` lines still have a small correlation. 1 without correlation.
     pub inflation: f64,
     /// Weights of the smoothing by the window; empty without smoothing.
     smoothing: Vec<f64>,
@@ -177,7 +178,8 @@ pub(super) fn without_decay(mode: &IdentifiedMode, added_decay: f64) -> Identifi
     let (f, zeta) = (mode.natural_frequency_hz, mode.damping_ratio);
     let variance = [f.standard_error.powi(2), zeta.standard_error.powi(2)];
     let between = mode.frequency_damping_covariance;
-    // (f, ζ) → (σ, ω_d) of the windowed pole → (f, ζ) of the pole without the window.
+    // The covariance is transformed from (f, ζ) to the pole σ + jω_d with the decay of the window,
+    // and from the pole without this decay back to (f, ζ).
     mode.pole.re += added_decay;
     let slopes = frequency_and_damping_slopes(mode.pole) * pole_slopes(f.value, zeta.value);
     let covariance = nalgebra::Matrix2::new(variance[0], between, between, variance[1]);

@@ -64,8 +64,9 @@ fn deviations(measurement: &Measurement, how: &DecaySettings) -> Option<String> 
     })
 }
 
-/// Returns whether the second half of a response has significantly more power than the first half:
-/// more than noise of constant power explains. Each channel is divided by its power.
+/// Returns whether the responses have significantly more power in the second half of the record
+/// than in the first half: more than noise of constant power explains. The powers of a channel in
+/// both halves are divided by the power of this channel in the whole record.
 ///
 /// # Source
 /// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1 (F test).

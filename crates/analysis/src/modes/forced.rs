@@ -190,7 +190,7 @@ const LISTED_CANDIDATES: usize = 3;
 /// Number of channels that a message lists by their names.
 pub(super) const LISTED: usize = 8;
 
-/// Returns a failure that names the channels instead of their numbers.
+/// Returns the error of a failed fit, with the names of channels instead of their numbers.
 fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisError {
     let list = |numbers: &[usize], name: &dyn Fn(usize) -> String| {
         message::list(numbers.iter().map(|at| name(*at)), ", ", LISTED)
@@ -324,7 +324,7 @@ impl Context {
     }
 
     /// Returns the row of an output, given the share of its variance that the modes explain, and
-    /// its noise over its RMS.
+    /// the ratio of its noise to its RMS value.
     fn output_row(&self, at: usize, explained: f64, noise: f64) -> OutputRow {
         let output = &self.outputs[at];
         OutputRow {
@@ -348,7 +348,8 @@ fn rms(data: &LineData, output: usize) -> f64 {
     power.sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Returns the measured and modelled responses of the first record, all outputs together.
+/// Returns the measured and modelled response of the first record at each frequency: the root of
+/// the sum of the squares of all outputs, each divided by its RMS value.
 fn spectrum(data: &LineData, estimate: &ModalEstimate) -> Result<ModesSpectrum, AnalysisError> {
     let modelled: DMatrix<Complex<f64>> = estimate.synthesis(data)?;
     let outputs = data.outputs();

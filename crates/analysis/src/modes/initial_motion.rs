@@ -22,8 +22,9 @@ pub(super) struct FreeMotion {
 }
 
 impl FreeMotion {
-    /// Fits the amplitudes, and a constant for each channel, by least squares. The data are the
-    /// first `settle` samples of the measured channels, minus the predicted response from rest.
+    /// Fits the amplitudes of the free motion, and a constant for each channel, by least squares.
+    /// The data are the first `settle` samples of the measured channels, minus the predicted
+    /// response from rest.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if these samples do not determine every amplitude.
@@ -52,7 +53,8 @@ impl FreeMotion {
                 continue;
             };
             let measured = record.channel(*column);
-            // All channels get the same weight, although their quantities and amplitudes differ.
+            // Each channel is divided by its RMS value: all channels then have the same weight,
+            // although their quantities and amplitudes differ.
             let scale = measures::rms(measured).max(f64::MIN_POSITIVE).recip();
             let predicted = from_rest.channel(*output);
             for first in (0..settle).step_by(SAMPLES_AT_ONCE) {

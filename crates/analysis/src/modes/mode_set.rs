@@ -90,7 +90,8 @@ impl ModeSet {
     /// [`AnalysisError::SavedModes`] if the JSON has no modes, or an unknown field in addition to
     /// frequencies and shapes, [`AnalysisError::NothingToCompare`].
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
-        // Every mode of a result has an eigenvalue.
+        // Every mode of a result has an eigenvalue, so modes without an eigenvalue are given by
+        // frequencies and shapes only.
         if json["modes"].get(0).is_none_or(|mode| mode.get("eigenvalue").is_some()) {
             let (modes, points) = SavedModes::from_json(name, json)?.shapes();
             return Self::from_shaped(name, points, &modes);

@@ -114,7 +114,8 @@ impl Response {
         let mut lines = DMatrix::zeros(spectrum.len(), outputs);
         let mut power = vec![0.0; outputs];
         let mut any = false;
-        // The highest line of a record with an even number of samples has no phase.
+        // The line at the Nyquist frequency, which exists if the number of samples is even, has no
+        // phase and is skipped.
         for n in 0..sampling.len().div_ceil(2) {
             let (omega, [low, high]) = (spectrum.omega(n), system.band_hz);
             if !(low * TAU..=high * TAU).contains(&omega) {
@@ -141,8 +142,8 @@ impl Response {
         }
         let motion = Spectrum::from_lines(sampling, lines)?.to_record()?;
         let record = if steady { repeated(&motion, block)? } else { motion.window(0, len)? };
-        // The power is a mean over the record and the zeros after it, but the response is only in
-        // the record. The mean is therefore converted to the length of the record.
+        // `power` is the mean squared error over the record and the zeros that follow the record.
+        // The factor `share` converts it to the mean over the record only.
         let share = if steady { 1.0 } else { sampling.len() as f64 / len as f64 };
         let standard_error = power.into_iter().map(|power| (power * share).sqrt()).collect();
         Ok(Self { record, standard_error })

@@ -48,8 +48,8 @@ impl Properties {
             constraints.push(ModalConstraint::RealShapes { derivative });
         }
         if self.reciprocal {
-            // The two forces in the opposite directions of a point have the same sensor; this
-            // sensor counts once.
+            // Two forces at one point in opposite directions have the same response sensor as their
+            // driving point; this sensor counts once.
             let mut points: Vec<DrivingPoint> = Vec::new();
             for point in driving_points {
                 if points.iter().all(|other| other.output != point.output) {

@@ -17,7 +17,7 @@ use crate::text::compact;
 const LISTED: usize = 8;
 
 /// Returns a remark if records show more modes, each significant by the likelihood, than they have
-/// responses: M, C and K of this size cannot describe them.
+/// responses: M, C and K with one degree of freedom for each response cannot describe them.
 pub(crate) fn surplus(measurements: &[Measurement]) -> Option<String> {
     let recorded = Recorded::from_forced(measurements, None, &Places::default()).ok()?;
     let responses = recorded.outputs.len();

@@ -100,7 +100,8 @@ fn damped_frequency(mode: &IdentifiedMode) -> Uncertain {
     normal(root * f.value, variance.max(0.0).sqrt())
 }
 
-/// Returns a value with a normal interval, because the noise level is averaged over many lines.
+/// Returns a value with the interval of the normal distribution instead of Student's: the noise
+/// level is averaged over many lines, so its uncertainty is negligible.
 fn uncertain(value: &mechid_modal::Uncertain) -> Uncertain {
     normal(value.value, value.standard_error)
 }

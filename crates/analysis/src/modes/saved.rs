@@ -183,7 +183,8 @@ pub(super) fn from_json_with_modes<T: DeserializeOwned>(
                    result instead: the output of `mechid modes --json`";
         return Err(refused(why.into()));
     }
-    // A field between backticks would look like a setting.
+    // In messages, backticks mark the names of settings, so the names of JSON fields are quoted
+    // with ".
     let why = |error: serde_json::Error| {
         error.to_string().replace("missing field", "it lacks the field").replace('`', "\"")
     };

@@ -58,7 +58,7 @@ pub enum ModalTest {
         #[serde(default, deserialize_with = "crate::words::written::optional")]
         hits: Option<HitRule>,
     },
-    /// Free decays, one in each record, with forces neither measured nor acting.
+    /// Free decays, one in each record: no force acts, and no force is measured.
     Decay {
         /// Beginning of each decay, in s from the first sample of the window; `None`: detected in
         /// the record.

@@ -168,7 +168,7 @@ impl Recorded {
         Ok([half(0.0, 0.5, before)?, half(0.5, 1.0, after)?])
     }
 
-    /// Returns some of the records with the forces that act in them.
+    /// Returns the records `parts`, with only the forces that act in at least one of them.
     fn acting<'p>(&self, parts: impl IntoIterator<Item = &'p Part>) -> Result<Self, AnalysisError> {
         let parts: Vec<&Part> = parts.into_iter().collect();
         let acts = |input: &usize| {
@@ -213,7 +213,8 @@ impl Recorded {
 }
 
 /// Returns the band, in Hz, that forces or other inputs excite: from the first to the last group of
-/// lines with at least [`DRIVEN_POWER`] of the largest power of an input.
+/// lines whose mean power is at least [`DRIVEN_POWER`] of that of the strongest group of the same
+/// input.
 pub(crate) fn driven_band<'a>(
     inputs: impl IntoIterator<Item = &'a Record>,
 ) -> Result<[f64; 2], AnalysisError> {
@@ -294,8 +295,8 @@ impl Columns {
         Ok(Record::new(block.force.sampling(), data)?)
     }
 
-    /// Returns a hit of a record in which the number of the force column is replaced by the number
-    /// of the input of the test.
+    /// Returns the hit with the number of an input of the test instead of the number of a force
+    /// column of the record.
     fn placed(&self, record: usize, hit: HitRow) -> HitRow {
         let force = self.input[record].get(hit.force - 1).map_or(hit.force, |input| input + 1);
         HitRow { force, ..hit }

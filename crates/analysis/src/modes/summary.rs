@@ -15,8 +15,8 @@ use crate::measurement::Block;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, paged_table, significant, text_table};
 
-/// Maximum damping ratio of a candidate in the text; a candidate with a larger ratio represents
-/// modes outside the band.
+/// Maximum damping ratio of a rejected candidate that has its own line in the printed result; a
+/// candidate with a larger ratio represents modes outside the band.
 const LIGHT: f64 = 0.3;
 
 /// Decimal places of a phase, in degrees.

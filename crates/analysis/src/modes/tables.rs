@@ -131,7 +131,8 @@ impl Tables {
     }
 
     /// Returns the lines in a band (Hz): each force is a record with a unit input. With a `model`,
-    /// the window bias of its responses is subtracted.
+    /// the responses are corrected: the window bias that averaging causes for the modes of the
+    /// model is subtracted.
     ///
     /// # Errors
     /// [`AnalysisError::MissingResponse`] if a table has the responses of only some points to a

@@ -31,7 +31,8 @@ impl Modes {
         Ok(explained(data.outputs(), &forced.estimate.synthesis(&data)?))
     }
 
-    /// Predicts other records like [`Modes::predict`], and adds the shares to the summary.
+    /// Predicts other records like [`Modes::predict`], and adds the predicted shares of the
+    /// variance to the summary.
     ///
     /// # Errors
     /// As [`Modes::predict`].

@@ -11,7 +11,9 @@ use crate::text::significant;
 struct Pair {
     motion: usize,
     rate: usize,
-    /// Sums over the steps: measured change times integrated change, and the square of each.
+    /// Sums over the steps from sample to sample: the measured change of the first channel times
+    /// the integral of its rate, and the squares of the change (`changes`) and of the integral
+    /// (`by_rate`).
     product: f64,
     changes: f64,
     by_rate: f64,
@@ -46,7 +48,8 @@ impl KinematicConsistency {
         Self(channels.iter().enumerate().filter_map(pair).collect())
     }
 
-    /// Adds the steps of the samples: x(k+1) − x(k) and Δt (ẋ(k) + ẋ(k+1))/2.
+    /// Adds the steps between samples to the sums of each pair: the measured change x(k+1) − x(k)
+    /// and the integrated change Δt (ẋ(k) + ẋ(k+1))/2.
     pub fn push(&mut self, measured: &Measurement) {
         let (record, half) = (measured.record(), 0.5 * measured.sampling().dt());
         for pair in &mut self.0 {

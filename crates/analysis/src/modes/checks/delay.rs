@@ -17,7 +17,7 @@ struct Phase {
     omega: f64,
     /// Damping ratio.
     damping_ratio: f64,
-    /// Phase of the residue times 2jω_d, in rad.
+    /// Phase of the product of the residue and 2jω_d, in rad.
     phase: f64,
     /// Variance of `phase` due to the errors of the mode, in rad².
     variance: f64,
@@ -119,8 +119,8 @@ struct Proportional {
     variance: f64,
     /// Weighted sum of the squared residuals.
     square: f64,
-    /// Increase of the expected value of `square` per unit of additional variance between the
-    /// modes, in 1/rad².
+    /// Derivative of the expected value of `square` with respect to a variance between the modes,
+    /// in 1/rad²; the weights are constant.
     expected_square: f64,
 }
 
@@ -165,8 +165,8 @@ mod tests {
         (121.0, 0.02, 1e-3),
     ];
 
-    /// Returns phases with a `delay` (s), the phases −`structural` · ζ, and a scatter between the
-    /// modes (rad).
+    /// Returns simulated phases: each is the sum of the phase of the `delay` (s), of −`structural`
+    /// · ζ, of the error of the mode, and of a scatter with the standard deviation `between` (rad).
     fn phases(delay: f64, structural: f64, between: f64, rng: &mut ChaCha20Rng) -> Vec<Phase> {
         let mut normal = || -> f64 { StandardNormal.sample(rng) };
         let mut phase = |(hz, damping_ratio, error): (f64, f64, f64)| {

@@ -8,8 +8,8 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::super::sources::Output;
 use super::tested::Tested;
 
-/// Returns, for each driving point, the test of positive modal masses: the residue of a
-/// displacement in the direction of the force times 2jω_d has a positive real part.
+/// Returns, for each driving point, the test of positive modal masses: 2jω_d times the residue of
+/// the displacement in the direction of the force has a positive real part.
 ///
 /// The p-value is the smallest one of all modes, multiplied by the number of modes (Bonferroni).
 ///
@@ -50,8 +50,8 @@ pub(super) fn tests(
     driving_points.iter().filter_map(test).collect()
 }
 
-/// Returns the residue of the displacement times 2jω_d, which is positive at a driving point if the
-/// damping is proportional.
+/// Returns the product of 2jω_d and the residue of the displacement. It is real and positive at a
+/// driving point if the damping is proportional.
 pub(super) fn turned_residue(
     mode: &IdentifiedMode,
     output: usize,

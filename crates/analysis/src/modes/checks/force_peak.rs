@@ -72,7 +72,8 @@ mod tests {
         assert!(suspected.text.contains("2.970, 2.990, 3.000 Hz"), "{}", suspected.text);
         assert!(check(&[]).is_none());
         assert!(check(&[(3.0, 0.01), (3.01, 0.01), (3.2, 0.01), (9.0, 0.2)]).is_none());
-        // Two lightly damped modes are within the half-width of a heavily damped mode.
+        // Two lightly damped modes are within the half-width of a heavily damped mode, but this
+        // mode is not within their half-widths: no peak of the forces is suspected.
         assert!(check(&[(2.7, 0.01), (3.0, 0.2), (3.2, 0.01)]).is_none());
     }
 }

@@ -65,18 +65,20 @@ pub(in crate::modes) fn response_checks(
 }
 
 /// Returns the indices and names of the channels if there are several; empty for a single channel,
-/// because a fit already tests it.
+/// because the significance tests of the modes already show whether this channel takes part in a
+/// mode.
 fn several(names: &[String]) -> impl Iterator<Item = (usize, &String)> {
     names.iter().enumerate().filter(|_| names.len() > 1)
 }
 
 /// Returns the probability that errors alone give a total at least as large as that of `squares`.
-/// Each value of `squares` is the sum of the squares of two numbers of a mode, each divided by its
-/// standard error. `None` without a mode.
+/// Each value of `squares` belongs to one mode: the sum of two squares, of the real and of the
+/// imaginary part of a number, each part divided by its standard error. `None` without a mode.
 fn zero_p_value(squares: impl Iterator<Item = f64>) -> Option<f64> {
     let (modes, sum) = squares.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
     let law = ChiSquared::new(2.0 * f64::from(modes)).ok()?;
-    // The entry to which the shape is scaled has no error; the sum is then infinite or NaN.
+    // The entry to which the shape is scaled is 1, with standard error 0: the sum is then infinite
+    // (1/0) or NaN (0/0 of its imaginary part), and the p-value is 0.
     Some(if sum.is_nan() { 0.0 } else { law.sf(sum.min(f64::MAX)) })
 }
 
