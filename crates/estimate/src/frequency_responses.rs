@@ -17,8 +17,8 @@ use crate::{Estimate, EstimateError, Unknowns};
 pub struct ResponseEstimate {
     /// The fit; its covariance includes the correlation of the errors of neighbouring lines.
     pub fit: OutputErrorFit,
-    /// Responses of each record that were fitted: the measured responses, corrected for the bias of
-    /// the window.
+    /// Fitted responses of each record: the measured responses, corrected for the bias of the
+    /// window.
     pub responses: Vec<Frf>,
     /// Largest change of a parameter due to the correction of the window bias, in standard errors
     /// of this parameter (pure number); zero if the window causes no bias.

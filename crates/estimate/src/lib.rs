@@ -21,8 +21,8 @@
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 //!
-//! The types of matrices come from `nalgebra`, which a program that uses this crate also depends
-//! on; the types of spectra and records come from `mechid-signal`.
+//! The types of matrices come from `nalgebra`; a program that uses this crate needs `nalgebra` as a
+//! dependency, too. The types of spectra and records come from `mechid-signal`.
 
 mod covariance;
 pub mod derivatives;

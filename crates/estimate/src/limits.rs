@@ -29,8 +29,8 @@ pub(crate) const STEPS_MORE: usize = 60;
 /// converges.
 pub(crate) const STEPS_RESAMPLED: usize = 15;
 
-/// Minimum number of values per parameter on which searches begin; a line has one value for each
-/// response.
+/// Minimum number of values per parameter in the reduced set of lines on which searches begin; a
+/// line has one value for each response.
 pub(crate) const THIN_LINES: usize = 20;
 
 /// Largest ratio of the number of all lines to the number of lines on which searches begin.
@@ -52,27 +52,30 @@ pub(crate) const RESTART_EXACT: f64 = 1e-16;
 /// first one.
 pub(crate) const RESTART_ALIKE: f64 = 0.01;
 
-/// Minimum number of searches if the noise explains the best minimum.
+/// Minimum number of searches if the noise explains the sum of squares at the best minimum.
 pub(crate) const RESTART_CONFIRMED: usize = 2;
 
-/// Minimum number of searches if the noise does not explain the best minimum.
+/// Minimum number of searches if the noise does not explain the sum of squares at the best minimum.
 pub(crate) const CONFIRMED_OTHERWISE: usize = 4;
 
 /// Maximum number of rounds of linear least squares before a search.
 pub(crate) const LINEAR_ROUNDS: usize = 6;
 
-/// Number of successive restarts without a better minimum that end the search, if all searches have
-/// ended at one minimum.
+/// Number of successive restarts without a better minimum that end the search, if the best search
+/// has converged and the noise does not explain the difference between the two smallest sums of
+/// squares.
 pub(crate) const RESTART_RESTARTS: usize = 2;
 
-/// Number of successive restarts without a better minimum that end the search, if the noise
-/// explains several minima.
+/// Number of successive restarts without a better minimum that end the search, if the best search
+/// has not converged or the noise explains the difference between the two smallest sums of squares.
 pub(crate) const RESTARTS_AMONG_MANY: usize = 12;
 
 /// Maximum number of restarts of a search from its best minima.
 pub(crate) const MAX_RESTARTS: u64 = 60;
 
-/// Number of best minima at which restarts begin, in turn.
+/// Maximum number of best minima at which restarts begin in turn, if the best search has not
+/// converged or the noise explains the difference between the two smallest sums of squares;
+/// otherwise all restarts begin at the best minimum.
 pub(crate) const RESTART_RESTARTED: usize = 3;
 
 /// Ratio of a diagonal entry of a triangular factor to the length of its column below which the
@@ -94,7 +97,8 @@ pub(crate) const LINES_AT_ONCE: usize = 64;
 /// digits.
 pub(crate) const GRAM_LANCZOS: usize = 80;
 
-/// Maximum deviation of the misfit ratio of a correct model from 1, in standard deviations.
+/// Largest excess of the sum of squares of a correct model over its expected value that noise
+/// explains, in standard deviations.
 pub(crate) const FIT_PLAUSIBLE: f64 = 6.0;
 
 /// Maximum number of sensitivities (residuals times parameters times parts) for a comparison of the
@@ -117,8 +121,8 @@ pub(crate) const PULSE_SUMS: usize = 8;
 /// the same time. In a larger fit the errors of the lines are assumed to be independent.
 pub(crate) const MAX_PULSE_EFFECTS: usize = 1 << 24;
 
-/// Maximum number of rounds that alternate between the errors of pulses and the fit to the data
-/// without them; about three suffice.
+/// Maximum number of rounds that alternate between an estimate of the errors of pulses and a fit to
+/// the data without these errors; about three rounds suffice.
 pub(crate) const PULSE_ROUNDS: usize = 8;
 
 /// Change of the amplitudes of pulse errors, in standard deviations of the stated noise, below
@@ -142,16 +146,16 @@ pub(crate) const COLOURED_ROUNDS: usize = 3;
 /// larger fits neglect the leverages.
 pub(crate) const MAX_LEVERAGES: usize = 1 << 20;
 
-/// Maximum number of rounds that alternate between the sinusoids in the residual and the fit to the
-/// data without them.
+/// Maximum number of rounds that alternate between a search for sinusoids in the residual and a fit
+/// to the data without these sinusoids.
 pub(crate) const SINUSOID_ROUNDS: usize = 8;
 
-/// Change of the data without sinusoids, relative to the residual, below which the rounds of fit
-/// and subtraction end.
+/// Change of the data without sinusoids in one round, relative to the residual. Below this change
+/// the rounds of fit and subtraction end.
 pub(crate) const SINUSOID_TOLERANCE: f64 = 1e-3;
 
-/// Minimum power of a residual relative to the noise of the round before; a smaller residual would
-/// have an unbounded weight.
+/// Minimum power of the residual at a line, relative to the noise power of the previous round. A
+/// smaller power is replaced by this minimum; otherwise the weight of the line would be unbounded.
 pub(crate) const NOISE_LEAST: f64 = 1e-12;
 
 /// Minimum assumed fraction of the noise that remains in a residual after the fit (1 − leverage).

@@ -208,8 +208,8 @@ impl Spread<'_> {
         };
         let mut growth_rate = self.uncertain(lambda.re, &gradient.map(|d| d.re));
         if is_rigid_body && !mode.oscillates() {
-            // Near a double zero the eigenvalues vary like the square root of their product, which
-            // has no derivative there.
+            // Near a double zero the eigenvalues vary as the square root of their product; this
+            // root has no derivative at zero.
             let of_root = squared_frequency.standard_error.sqrt();
             growth_rate.standard_error = growth_rate.standard_error.max(of_root);
         }

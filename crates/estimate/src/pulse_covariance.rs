@@ -15,7 +15,7 @@ use crate::limits::PULSE_SUMS;
 pub(crate) struct PulseCovariance {
     /// Rows of P.
     pub(crate) effects: Vec<DMatrix<f64>>,
-    /// Factor of I + PᵀP.
+    /// Cholesky factor of I + PᵀP, where P is `effects`.
     factor: Cholesky<f64, Dyn>,
 }
 
@@ -60,8 +60,9 @@ impl PulseCovariance {
         products.tr_mul(&self.factor.solve(products))
     }
 
-    /// Returns the blocks of rows of X with X Xᵀ = P (I + PᵀP)⁻¹Pᵀ: for errors v the covariance of
-    /// v − P b is I − X Xᵀ. `None` if a factor is singular.
+    /// Returns the blocks of rows of X with X Xᵀ = P (I + PᵀP)⁻¹Pᵀ: I − X Xᵀ is the covariance of
+    /// the columns v − P b that [`Self::whiten`] makes from errors v. `None` if a factor is
+    /// singular.
     pub(crate) fn explained_columns(&self) -> Option<Vec<DMatrix<f64>>> {
         let lower = self.factor.l();
         let columns = |effects: &DMatrix<f64>| {

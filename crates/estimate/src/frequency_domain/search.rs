@@ -6,7 +6,8 @@ use nalgebra::DVector;
 
 use super::normal_equations::NormalEquations;
 
-/// Sum of squares of maximum likelihood that offers linear steps and random weights.
+/// Sum of squares of a maximum-likelihood fit, for a search that also makes linear steps and can
+/// give the lines random weights.
 pub(super) trait Restartable: SumOfSquares<Linearisation = NormalEquations> {
     /// Returns the step to the least-squares solution of the equation of motion with the weights of
     /// the last accepted parameters.

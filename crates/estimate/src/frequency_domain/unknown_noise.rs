@@ -29,7 +29,7 @@ use crate::limits::{
 };
 use crate::{EstimateError, Unknowns};
 
-/// A fit and the noise of its weights.
+/// A fit, and the noise that gives its weights.
 #[derive(Clone)]
 pub(super) struct Weighted {
     pub(super) fit: GlobalMinimum,
@@ -89,7 +89,8 @@ pub(super) fn with_unknown_noise(
     Ok(OutputErrorFit { sinusoids, pulse_amplitudes, ..fit })
 }
 
-/// Errors of data that were estimated and subtracted before the last fit.
+/// Errors of the data, such as sinusoids, that were estimated and subtracted from the data before
+/// the last fit.
 struct Subtracted {
     /// Number of unknowns of the sinusoids.
     sinusoid_unknowns: usize,

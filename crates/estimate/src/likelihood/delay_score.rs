@@ -13,7 +13,8 @@ use super::residual::real_rows;
 use super::response_model::{LineResponse, ResponseModel};
 use super::search::Linearisation;
 
-/// Delay, of one output or of all outputs, that explains most of a residual.
+/// Delay of one output or of all outputs: among the tested delays, the one that explains the
+/// largest part of the residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayScore {
     /// Index of the delayed output; `None` if all outputs have the same delay.

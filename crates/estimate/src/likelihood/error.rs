@@ -3,7 +3,7 @@
 use mechid_model::elements::MachineError;
 use mechid_signal::message;
 
-/// Error of a fit of a model to line data; every variant carries the offending numbers.
+/// Error of a fit of a model to line data; the variants have the values that cause the error.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LikelihoodError {

@@ -153,7 +153,7 @@ pub struct FoundMinimum {
     pub steps: usize,
 }
 
-/// Result of the likelihood for any model.
+/// Result of a maximum-likelihood fit of any model.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LikelihoodEstimate {

@@ -1,4 +1,4 @@
-//! Limits of the likelihood, with their reasons.
+//! Numerical limits of a maximum-likelihood fit, with their reasons.
 
 /// Order of the polynomial in s that the transient of an open record adds to every output. The
 /// polynomial describes aliasing, which is smooth over the band. Order 3, together with the state
@@ -79,7 +79,8 @@ pub(super) const PROFILE_TOLERANCE: f64 = 1e-3;
 pub(super) const SAME_MINIMUM: f64 = 1e-6;
 
 /// Maximum relative difference of a parameter after the first steps of two searches that would end
-/// at the same minimum. A parameter that the lines of these steps do not determine differs by more.
+/// at the same minimum. A parameter that the lines of these steps do not determine differs by more;
+/// then both searches continue.
 pub(super) const SAME_PARAMETER: f64 = 1e-3;
 
 /// Maximum excess of the misfit of a correct model over its expected value, in standard deviations
@@ -147,14 +148,15 @@ pub(super) const KNOWN_FREEDOM: f64 = 1e6;
 pub(super) const COMPARED_RECORDS: usize = 16;
 
 /// p-value of the misfit to known noise below which the misfit scales standard errors and
-/// intervals. In one of a thousand fits this makes the intervals of a correct model wider than
-/// necessary.
+/// intervals. One of a thousand fits of a correct model has a smaller p-value; the intervals of
+/// this fit are wider than necessary.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
 
 /// Maximum fraction of the gradient of a determined quantity that is outside the determined
 /// combinations; a fraction up to this limit is rounding of the singular vectors.
 pub(super) const UNDETERMINED_PART: f64 = 1e-5;
 
-/// Maximum ratio of the sum of the terms of a combination to the sum of their absolute values if
-/// the combination depends only on ratios of parameters.
+/// Largest magnitude of the sum of the terms of a combination, relative to the sum of the
+/// magnitudes of the terms, at which the combination counts as a function of only the ratios of the
+/// parameters.
 pub(super) const COMMON_FACTOR: f64 = 1e-4;

@@ -65,13 +65,13 @@ pub(super) struct LineErrors {
 /// Lines that are computed together: a block of rows of the residual of one record. The last block
 /// of a record with pulses has no lines; it has the rows of the amplitudes of the pulses.
 pub(super) struct Block<L> {
-    /// Index of the first row in the residual.
+    /// Index of the first row of this block in the residual.
     pub(super) first_row: usize,
-    /// Index of the first line in the data.
+    /// Index, in the data, of the first line of this block.
     pub(super) first: usize,
     /// Responses of the lines with their weights.
     pub(super) lines: Vec<(L, WeightedLine)>,
-    /// Rows of the residual, one column.
+    /// Rows of the residual that belong to this block, as one column.
     residual: DMatrix<f64>,
     /// Weighted columns of the transient; empty after the basis of the transient has been computed.
     columns: DMatrix<f64>,

@@ -78,7 +78,8 @@ const LEAST_DAMPING: f64 = 1e-13;
 /// Maximum damping λ of a Levenberg–Marquardt step; with a larger λ the step is so short that its
 /// effect is only rounding.
 const MAX_DAMPING: f64 = 1e12;
-/// Maximum ratio of the curvature correction to its step; a larger correction is not used.
+/// Maximum ratio of the length of the curvature correction to the length of the step that it
+/// corrects; a larger correction is not used.
 const MAX_CORRECTION: f64 = 0.75;
 /// Fraction of a step over which the finite difference for the curvature is taken.
 const CURVATURE_STEP: f64 = 0.1;
@@ -130,7 +131,8 @@ impl<'a> Local<'a> {
         change
     }
 
-    /// Returns the decrease of the sum of squares that the linearisation predicts for a change.
+    /// Returns the decrease of the sum of squares that the linearisation predicts for a change of
+    /// the parameters.
     fn predicted_decrease(&self, change: &DVector<f64>) -> f64 {
         let moved = &self.linearisation.jacobian * change;
         -(2.0 * self.linearisation.residual.dot(&moved) + moved.norm_squared())
@@ -147,8 +149,8 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Effort for the final estimate: it ends within about 10⁻⁶·√(number of residuals) standard
-    /// errors of the minimum.
+    /// Effort for the final estimate: the search ends within about 10⁻⁶·√(number of residuals)
+    /// standard errors of the minimum.
     pub(super) const FINAL: Self = Self { steps: STEPS, tolerance: 1e-12 };
     /// Effort to distinguish minima. The sums of squares of different minima differ by more than
     /// [`SAME_MINIMUM`]. The smaller tolerance of the final estimate would cost many steps near a
@@ -239,8 +241,8 @@ fn cost_at(problem: &impl LeastSquaresProblem, parameters: &[f64]) -> Option<f64
     problem.evaluate(parameters).map(|evaluation| problem.residual(&evaluation).norm_squared())
 }
 
-/// Returns the next parameters, which have a lower sum of squares, and their residual; `None` if
-/// the sum is lower for no damping λ of the step, or after the end of the time limit.
+/// Returns the next parameters, which have a lower sum of squares, and their residual; `None` if no
+/// damping λ up to [`MAX_DAMPING`] gives a lower sum, or if the time limit is over.
 fn descend<P: LeastSquaresProblem>(
     problem: &P,
     bounds: &Bounds,
@@ -312,7 +314,7 @@ fn step(
 mod tests {
     use super::*;
 
-    /// Rosenbrock's valley, 10(y − x²) and 1 − x.
+    /// Rosenbrock's valley, with the residuals 10(y − x²) and 1 − x.
     struct Valley;
 
     impl LeastSquaresProblem for Valley {

@@ -91,7 +91,8 @@ impl<'a> RecordUnknowns<'a> {
 pub(super) struct LineColumns {
     /// L⁻¹ times the response to the state loads, p × states.
     pub(super) states: Option<DMatrix<Complex<f64>>>,
-    /// L⁻¹, p × p: the weighted polynomial of every output.
+    /// L⁻¹, p × p: column j is the weighted response to the constant term of the polynomial of
+    /// output j.
     pub(super) outputs: DMatrix<Complex<f64>>,
     /// L⁻¹ G, p × q: the weighted receptance; `None` without pulses.
     pub(super) inputs: Option<DMatrix<Complex<f64>>>,

@@ -20,7 +20,8 @@ pub(super) struct Weights {
 pub(super) struct WeightedLine {
     /// Lower triangular factor L.
     pub(super) lower: DMatrix<Complex<f64>>,
-    /// Covariance S_uy − S_uu Gᴴ between the errors of the inputs and e; empty for exact inputs.
+    /// Covariance S_uy − S_uu Gᴴ between the errors of the inputs and the error e of the line;
+    /// empty for exact inputs.
     cross: DMatrix<Complex<f64>>,
 }
 
@@ -58,7 +59,7 @@ impl Weights {
         Self::new(covariance.collect(), outputs)
     }
 
-    /// Returns the weights of some lines.
+    /// Returns the weights of the lines with the indices `rows`.
     pub(super) fn rows(&self, rows: &[usize]) -> Self {
         let covariance = rows.iter().map(|row| self.covariance[*row].clone());
         Self::new(covariance.collect(), self.outputs)

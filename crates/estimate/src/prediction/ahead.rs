@@ -54,8 +54,8 @@ pub fn missing_force(
     let (factor, way) = between.unwrap_or((1, Interpolation::Linear));
     let finer = refine(force, factor, way)?;
     let step = Step::new(&system, finer.sampling().dt(), discretisation)?;
-    // Band-limited interpolation is a Fourier series, which is defined after the last sample; the
-    // other interpolations are not.
+    // Band-limited interpolation is a Fourier series, so it also gives the force after the last
+    // sample; the other interpolations do not.
     let goes_on = between.is_none_or(|(_, way)| way == Interpolation::BandLimited);
     let (samples, dt) = (force.len(), force.sampling().dt());
     let closes = extent == Extent::WholePeriod && goes_on;

@@ -26,7 +26,7 @@ pub struct TimeDomainFit {
     dt: f64,
 }
 
-/// Least-squares solution in terms of the state equations.
+/// Least-squares fit of the transitions, with the state equations that follow from it.
 struct Fitted<'a> {
     rows: &'a Transitions,
     regression: Regression,
@@ -34,7 +34,7 @@ struct Fitted<'a> {
 }
 
 /// Sensitivity of a parameter to \[A₂₁ A₂₂ B₂\]: dp = −Σ_j M_ij weight · d(row j), where i is
-/// `equation` and row j belongs to this matrix.
+/// `equation` and row j is a row of \[A₂₁ A₂₂ B₂\].
 struct Sensitivity {
     equation: usize,
     weight: RowDVector<f64>,
@@ -256,8 +256,8 @@ impl Fitted<'_> {
         (findings, free.iter().map(sensitivity).collect())
     }
 
-    /// Returns the directions of the regressors that the data do not determine, for every equation
-    /// of motion.
+    /// Returns, for every equation of motion, the combinations of free entries that the data do not
+    /// determine.
     fn undetermined(
         &self,
         free: &[Parameter],
@@ -271,7 +271,7 @@ impl Fitted<'_> {
                     .filter(|p| direction.involved[column(p)])
                     .map(|p| (*p, direction.combination[column(p)]))
                     .collect();
-                // A direction that combines only forces contains no entry of C or K.
+                // A combination that contains only coefficients of forces has no entry of C or K.
                 if !terms.is_empty() {
                     let relative_singular_value = direction.relative_singular_value;
                     undetermined.push(Undetermined { relative_singular_value, terms });

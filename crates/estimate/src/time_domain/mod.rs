@@ -96,8 +96,8 @@ impl TimeDomain {
     }
 
     /// Fits displacement, velocity and force with `factor − 1` interpolated points in every
-    /// interval: the step, and with it the bias of Euler's rule, is `factor` times smaller if the
-    /// interpolation is correct.
+    /// interval: the step is `factor` times smaller. If the interpolation is correct, the bias of
+    /// Euler's rule is also `factor` times smaller.
     ///
     /// Band-limited interpolation assumes that the record is one whole period; after any other
     /// interpolation the refined record is open.

@@ -138,7 +138,8 @@ impl Transitions {
     /// If M is known and C and K are free, the estimates are K̂ = −M A₂₁ and Ĉ = −M A₂₂ from the
     /// lower half of the state matrix A; the free coefficient of the force is not used. Otherwise
     /// the equation of motion is fitted to the accelerations A₂₁x + A₂₂ẋ + B₂F at the samples, with
-    /// the known entries fixed. Standard errors follow from the delta method through the logarithm.
+    /// the known entries fixed. Standard errors follow from the delta method with the derivative of
+    /// the matrix logarithm.
     ///
     /// # Errors
     /// [`NumericsError::TooFewRows`], [`NumericsError::Underflow`]; [`NumericsError::NoLogarithm`]
@@ -157,7 +158,7 @@ impl Transitions {
     }
 
     /// Returns the condition number of the scaled regressors (a pure number), and the number of
-    /// directions that they do not determine.
+    /// combinations of coefficients that the regressors do not determine.
     ///
     /// # Errors
     /// As [`Transitions::fit`].

@@ -83,7 +83,8 @@ fn covariance_is_that_of_the_normal_equations() {
     let e = &targets - &regressors * &theta;
     let s = e.tr_mul(&e) / 296.0;
     let inverse = gram.inverse();
-    // Parameters are c11 c12 c21 c22 k11 k12 k21 k22: (matrix, row, column).
+    // The parameters are c11 c12 c21 c22 k11 k12 k21 k22. `at` returns the equation of a parameter
+    // and its column of the regressors.
     let at = |p: usize| (p % 4 / 2, 2 * (p / 4) + p % 2);
     for p in 0..8 {
         for q in 0..8 {

@@ -14,9 +14,9 @@ const SAMPLES: usize = 4096;
 /// Stated standard deviation of the noise of a force of 1 N (RMS), in N.
 const STATED: f64 = 0.03;
 
-/// Returns the factor for one period of a random force that drives an oscillator at line 400 with a
-/// damping ratio of 0.02. The variance of the force noise is `ratio` times the stated one; the noise
-/// of the response is white.
+/// Returns the result of [`force_noise_factor`] for one period of a random force on an oscillator
+/// with its natural frequency at line 400 and a damping ratio of 0.02. The variance of the force
+/// noise is `ratio` times the stated one; the noise of the response is white.
 fn factor(ratio: f64, seed: u64) -> Option<f64> {
     let sampling = Sampling::new(1.0 / SAMPLES as f64, SAMPLES).unwrap();
     let natural = TAU * 400.0;
@@ -44,8 +44,9 @@ fn factor(ratio: f64, seed: u64) -> Option<f64> {
     force_noise_factor(&data, &unknowns, &fit)
 }
 
-/// The test has a level of 1 %: the probability that more than 3 of 60 factors of the right level
-/// are below 1 is 0.003. For less noise, the mean of the factors is its ratio to the stated one.
+/// If the stated level of the force noise is correct, the test at a level of 1 % finds less noise
+/// in at most 3 of 60 records. The probability of more than 3 is 0.003. If the noise is weaker than
+/// stated, the mean of the factors is the ratio of the true variance to the stated variance.
 #[test]
 fn the_factor_is_the_ratio_of_the_variances() {
     let all = |ratio: f64| -> Vec<Option<f64>> {

@@ -74,7 +74,7 @@ fn exact_steady_states_have_the_closed_form_receptance() {
 }
 
 /// Noise on the force multiplies H1 by S/(S+N), and noise on the motion multiplies H2 by (S+N)/S.
-/// The coherence is the ratio H1/H2, and Hv is the geometric mean of both.
+/// The coherence is the ratio H1/H2, and Hv is the geometric mean of H1 and H2.
 #[test]
 fn the_estimators_err_to_their_sides() {
     let system = oscillator();
@@ -137,8 +137,8 @@ fn the_stated_variance_is_that_of_repeated_measurements() {
     assert!((stated / power - 1.0).abs() < 0.1, "{}", stated / power);
 }
 
-/// Noise on the force affects 1/H2 in the same way as noise on the motion affects H1: the stated
-/// variance of H2 agrees with the scatter of 2,000 measurements.
+/// The stated variance of H2 agrees with the scatter of 2,000 measurements with noise on the force.
+/// This noise affects 1/H2 in the same way as noise on the motion affects H1.
 #[test]
 fn the_stated_variance_of_h2_is_that_of_repeated_measurements() {
     let system = oscillator();
@@ -160,8 +160,9 @@ fn the_stated_variance_of_h2_is_that_of_repeated_measurements() {
     }
     found.iter().for_each(|h| mean += h / runs as f64);
     found.iter().for_each(|h| power += (h - mean).norm_sqr() / runs as f64);
-    // The mean of 2,000 squares scatters by 2.2 %; to first order in a relative error of 0.15 the
-    // ratio is 1. With the formula of H1 it would be 0.55.
+    // The ratio of the stated variance to the observed variance is 1 to first order in the relative
+    // error of H2, which is 0.15. The mean of 2,000 squares scatters by 2.2 %. With the formula of
+    // H1 the ratio would be 0.55.
     assert!((0.85..1.15).contains(&(stated / power)), "{}", stated / power);
 }
 
@@ -253,8 +254,8 @@ fn windows_and_overlap_are_the_callers() {
         .sum();
     let averages = frf(64, Window::Hann).unwrap().averages();
     assert!((averages - count / (1.0 + 2.0 * lost)).abs() < 1e-3, "{averages}");
-    // The less leakage, the closer is the response to the receptance at the lines far above the
-    // resonance.
+    // Far above the resonance, a window with less leakage gives a frequency response closer to the
+    // receptance.
     let worst = |window| {
         let frf = frf(64, window).unwrap();
         let error = |at: usize| {
@@ -271,8 +272,8 @@ fn windows_and_overlap_are_the_callers() {
     }
 }
 
-/// A random force has no period: leakage of the window causes some per cent of error near the
-/// resonance.
+/// The parameters agree with the truth within 2 % under a random force. This force has no period,
+/// so leakage causes an error of some per cent of the frequency response near the resonance.
 #[test]
 fn random_excitation_is_averaged_under_a_window() {
     let system = oscillator();
@@ -301,8 +302,8 @@ fn random_excitation_is_averaged_under_a_window() {
     }
 }
 
-/// Responses and coherences have the form that an analyser exports: lines with a low coherence have
-/// a small weight in the fit.
+/// The data are responses and coherences, as an analyser exports them. Lines with a low coherence
+/// have a small weight in the fit.
 #[test]
 fn coherence_weighs_the_lines() {
     let system = bearing();

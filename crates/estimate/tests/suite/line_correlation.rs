@@ -30,8 +30,8 @@ fn table(weights: [f64; 3], seed: u64) -> FrequencyData {
 }
 
 /// The intervals contain the truth for independent and for smoothed lines. The weights ½, 1, ½
-/// correlate neighbouring lines by 2/3 and lines at a distance of two by 1/6, so the variance is
-/// 8/3 times that of independent lines.
+/// correlate neighbouring lines by 2/3 and lines at a distance of two by 1/6, so the variance of
+/// the estimate is 8/3 times the variance with independent lines.
 #[test]
 fn intervals_hold_for_independent_and_for_smoothed_lines() {
     let truth = [5.0, 60.0, 6e4];

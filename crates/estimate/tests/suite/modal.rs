@@ -30,8 +30,8 @@ fn identified(system: &SecondOrderSystem, noise: f64) -> Estimate {
     equation_error(&data, &Unknowns::unknown_mass(system.dof()).unwrap()).unwrap()
 }
 
-/// The computed modes agree with Appendix E of the dissertation. There the two damping ratios are
-/// interchanged, and the column of shapes with the heading y1/y2 has y2/y1.
+/// The computed modes agree with Appendix E of the dissertation. In this appendix the two damping
+/// ratios are interchanged, and the column of mode shapes with the heading y1/y2 contains y2/y1.
 #[test]
 fn the_system_of_steffen_and_rade_has_its_published_modes() {
     let modes = identified(&steffen_rade(), 0.0).modes().unwrap();

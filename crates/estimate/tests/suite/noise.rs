@@ -170,8 +170,8 @@ fn weights_of_few_periods_widen_the_intervals_as_they_should() {
         output_error(&noise.mean_with_noise(Pooling::PerLine).unwrap(), unknowns).unwrap()
     };
     let (coverage, bias, misfit) = judge(&system, 1000, fit);
-    // The mean is 96.5 %: the correction for uncertain weights is a little too large. Each value
-    // scatters by 0.6 %.
+    // The mean coverage is 96.5 %, because the correction for uncertain weights is a little too
+    // large. The coverage of each parameter scatters by 0.6 %.
     let mean = coverage.iter().sum::<f64>() / coverage.len() as f64;
     assert!((0.94..=0.97).contains(&mean), "{mean}");
     for (coverage, bias) in coverage.iter().zip(&bias) {
@@ -249,7 +249,8 @@ fn parameters_that_are_not_excited_are_named() {
         RepeatedPeriods::new(&setup.lines, &force, &motion, ResponseQuantity::Displacement)
             .unwrap();
     let unknowns = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, 10.0)).unwrap();
-    // Without a known entry for the motion of the first mass, the second equation would read 0 = 0.
+    // No force acts on the second mass. Without this known entry, which multiplies the acceleration
+    // of the first mass, the second equation would read 0 = 0.
     let unknowns = unknowns.fix(Matrix::Mass, 1, 0, 1.0).unwrap();
     let (first, second) = periods.halves().unwrap();
     let refused = [

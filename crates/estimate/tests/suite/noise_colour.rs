@@ -117,11 +117,11 @@ impl Rig {
     }
 }
 
-/// The intervals contain the truth in 91 to 95 % of the runs. The coverage is not always 95 %,
-/// because the mode has few lines, and the noise spectrum begins to fall at these lines. The
-/// probability that fewer than 85 % of 150 intervals of 92 % contain the truth is 0.002, and
-/// standard deviations of 150 runs have an uncertainty of 6 %. If the noise is assumed white, about
-/// 70 to 76 % of the intervals contain the truth.
+/// The 95 % intervals contain the truth in 91 to 95 % of the runs. The coverage is not always 95 %,
+/// because the mode has few lines, and the noise spectrum begins to fall at these lines. For a
+/// coverage of 92 %, the probability that fewer than 85 % of 150 intervals contain the truth is
+/// 0.002. Standard deviations of 150 runs have an uncertainty of 6 %. If the noise is assumed
+/// white, about 70 to 76 % of the intervals contain the truth.
 #[test]
 fn intervals_hold_under_coloured_noise_of_few_periods() {
     for periods in [1, 2, 4] {

@@ -1,4 +1,4 @@
-//! Records that are not periods: windows of a steady state under a random force with a far longer
+//! Records shorter than a period: windows of a steady state under a random force with a far longer
 //! period. The steady state is known in closed form at every line.
 
 use std::f64::consts::TAU;
@@ -124,8 +124,9 @@ fn a_record_taken_as_a_period_misleads() {
     assert!(period > 20.0 * open, "{period} {open}");
 }
 
-/// Records without noise are fitted to 10⁻⁴ of the largest entry. The transient loads do not
-/// describe the part of the transient that is aliased from above half the sampling rate.
+/// Each entry is identified from records without noise, with an error below 10⁻⁴ of the largest
+/// entry of its matrix. The error is not zero, because the transient loads do not describe the part
+/// of the transient that is aliased from above half the sampling rate.
 #[test]
 fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
     let rig = two();

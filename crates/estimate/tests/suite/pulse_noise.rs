@@ -21,7 +21,8 @@ const DEVIATION: f64 = 1.0;
 /// Noise of a test, and the assumption of the fit about this noise.
 struct Case<'a> {
     pulses: &'a [Range<usize>],
-    /// Standard deviation of the noise of the response, relative to its largest line.
+    /// Standard deviation of the noise of the response, relative to the largest line of the
+    /// response.
     response_noise: f64,
     pooling: Pooling,
     /// `true` if the fit knows that the noise of the force acts during the pulses only.
@@ -80,8 +81,8 @@ fn errors(seed: u64, case: &Case<'_>) -> Vec<[f64; 2]> {
     each.map(|(p, exact)| [(p.value - exact) / exact, p.standard_error / exact]).collect()
 }
 
-/// Returns the mean square of the errors in standard errors, and the RMS error of the damping ratio
-/// divided by the true damping ratio.
+/// Returns the mean square of the errors of the parameters, each divided by its standard error, and
+/// the RMS error of the damping ratio divided by the true damping ratio.
 fn judge(case: &Case<'_>, tests: u64) -> (f64, f64) {
     let all: Vec<Vec<[f64; 2]>> =
         (0..tests).into_par_iter().map(|seed| errors(seed, case)).collect();
@@ -95,8 +96,8 @@ fn judge(case: &Case<'_>, tests: u64) -> (f64, f64) {
 }
 
 /// If the fit knows that the errors of the lines of a pulse are correlated, the mean square of the
-/// errors in standard errors is about 1. In 400 tests the mean square of three correlated errors
-/// scatters by about 0.08.
+/// errors, each divided by its standard error, is about 1. Each of 400 tests has three correlated
+/// errors; their mean square scatters by about 0.08.
 #[test]
 fn the_covariance_knows_that_the_lines_of_a_pulse_err_together() {
     let of = |as_pulse: bool| {

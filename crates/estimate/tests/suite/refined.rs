@@ -72,7 +72,7 @@ impl Experiment {
 }
 
 /// Returns for each parameter the RMS of the stated standard errors divided by the scatter of the
-/// values.
+/// estimates.
 fn stated_over_scatter(factor: usize, interpolation: Interpolation) -> Vec<f64> {
     let experiment = Experiment::new();
     let unknowns = Unknowns::unknown_mass(1).unwrap();

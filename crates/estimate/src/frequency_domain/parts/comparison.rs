@@ -37,9 +37,9 @@ pub struct Difference {
     pub part: Part,
     /// Name of the parameter.
     pub parameter: String,
-    /// Value from the part, in the unit of the parameter.
+    /// Value of the parameter from this part of the data, in the unit of the parameter.
     pub by_part: f64,
-    /// Value from the other parts, in the unit of the parameter.
+    /// Value of the parameter from the other parts of the data, in the unit of the parameter.
     pub by_others: f64,
     /// Standard error of the difference, in the unit of the parameter.
     pub standard_error: f64,
@@ -62,8 +62,8 @@ pub(crate) struct Scores<'a> {
 
 /// Variance of the residual in units of the noise.
 pub(crate) enum Level {
-    /// Variance of the stated noise, times an `inflation` for sampled weights, with its degrees of
-    /// freedom.
+    /// Noise that is stated: the residual has the variance `inflation`, which is the effect of
+    /// weights estimated from the data. `degrees_of_freedom` are those of the noise level.
     Known { inflation: f64, degrees_of_freedom: f64 },
     /// Variance of the residual, `inflation · cost / free`, with the sum of squares `cost` and the
     /// degrees of freedom `free`; `inflation` is the effect of weights estimated from the data.
@@ -220,7 +220,7 @@ impl PartsOfFit<'_> {
         }
     }
 
-    /// Returns the level of the noise like [`Level::without`].
+    /// Returns the variance of the residual and its degrees of freedom, as [`Level::without`].
     pub(super) fn level(&self, squares: f64, rank: usize) -> Option<(f64, f64)> {
         self.noise_level().without(squares, rank)
     }

@@ -88,7 +88,7 @@ impl Linearised {
         &self.root * &self.coefficients
     }
 
-    /// Subtracts the component that a step of the parameters explains from the residual, and sets
+    /// Subtracts from the residual the component that a step of the parameters explains, and sets
     /// this step to zero.
     pub(super) fn finish_step(&mut self) {
         self.residual -= &self.basis * &self.coefficients;

@@ -51,10 +51,10 @@ impl PartsOfFit<'_> {
     /// change of each parameter to first order. `records` has the samples of the rows; without them
     /// nonlinear terms are not tested. `None` if no term can be tested.
     ///
-    /// C has the weighted changes of the response by a term as columns, and Z is C without the
-    /// component that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and
-    /// the parameters change by −(QR)⁺C a, where QR are the sensitivities to the parameters and e
-    /// is the residual. Relative to the estimate of the model without the term, the term adds a
+    /// The columns of C are the weighted changes of the response due to a term, and Z is C without
+    /// the component that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe,
+    /// and the parameters change by −(QR)⁺C a, where QR are the sensitivities to the parameters and
+    /// e is the residual. Relative to the estimate of the model without the term, the term adds a
     /// mean square error: the covariance of these changes plus the square of these changes. The
     /// terms are weighted by their likelihoods, as in an average of models.
     ///

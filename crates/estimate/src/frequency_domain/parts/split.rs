@@ -25,7 +25,7 @@ pub enum Split {
 /// One part of a split.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Part {
-    /// Rows, by the index of the part in [`Split::Rows`].
+    /// Rows of one part of [`Split::Rows`].
     Rows {
         /// Index of the part, counted from 0.
         index: usize,

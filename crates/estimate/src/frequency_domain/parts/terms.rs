@@ -46,7 +46,8 @@ pub enum OmittedTerm {
         /// Degree of freedom.
         #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
         dof: usize,
-        /// Degree of freedom at the other end; `None`: the ground.
+        /// Second degree of freedom on which the force acts; `None` if the force acts between the
+        /// first one and the ground.
         #[cfg_attr(feature = "serde", serde(serialize_with = "maybe_from_one"))]
         other: Option<usize>,
     },
@@ -249,9 +250,9 @@ impl<'a> LikelyMotion<'a> {
         Change { force, displacement }
     }
 
-    /// Returns the spectrum of a power of the motion, one value per row. The power is computed from
-    /// all samples of each record. The initial and final conditions of a record add only a
-    /// transient to this spectrum.
+    /// Returns the spectrum of a [`Power`], such as x³, of a displacement or velocity, one value
+    /// per row. The power is computed at all samples of each record. The initial and final
+    /// conditions of a record add only a transient to this spectrum.
     fn power_of(
         &self,
         power: Power,

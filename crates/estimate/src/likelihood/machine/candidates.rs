@@ -164,7 +164,8 @@ impl MachineEstimate {
     ) -> Result<DMatrix<f64>, LikelihoodError> {
         let assembly = machine.assembly(instruments)?;
         let model = MachineModel::new(&assembly, data.omega(), self.part.as_ref(), false)?;
-        // Another set of sensors may have fewer delays among its parameters.
+        // With other sensors the machine may have fewer unknown delays, therefore the name
+        // identifies a parameter.
         let mut places = Vec::new();
         for parameter in assembly.parameters() {
             let parameters = self.assembly.parameters();

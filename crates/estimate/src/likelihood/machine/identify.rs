@@ -46,7 +46,8 @@ pub struct MachineEstimate {
     pub explained: DMatrix<f64>,
     /// Comparisons of parts of the data: bands of lines, and records if there are several.
     pub parts: Vec<PartsComparison>,
-    /// Delay that explains most of the residual; `None` if the data do not determine a delay.
+    /// Delay that explains the largest part of the residual; `None` if the data do not determine a
+    /// delay.
     pub delay: Option<DelayScore>,
     /// Part of the machine with a measured receptance, if there is one.
     pub(super) part: Option<MeasuredPart>,
@@ -83,10 +84,10 @@ impl MachineEstimate {
         self
     }
 
-    /// Returns the same estimate; the squares of possible errors of the parameters are added to the
-    /// covariance. There is one error for each parameter, in the unit of the parameter. The
-    /// intervals become wider by the ratio of the standard errors, up to the bounds of the
-    /// parameters.
+    /// Returns the same estimate with possible `errors` of the parameters, one for each parameter
+    /// in its unit. The product of two errors is added to the covariance of the two parameters. The
+    /// intervals become wider by the ratio of the new to the old standard errors, up to the bounds
+    /// of the parameters.
     ///
     /// # Source
     /// Ours: the mean square of an estimate's error is its variance plus the square of its bias.

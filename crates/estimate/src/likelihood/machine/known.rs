@@ -30,7 +30,7 @@ pub struct FreedCoefficient {
     /// Standard error of the most likely value, in the unit `unit`.
     pub standard_error: f64,
     /// Probability that at least one of the tested coefficients raises the likelihood by more than
-    /// this one, if all known values are right.
+    /// this coefficient does, if all known values are right.
     pub p_value: f64,
     /// Ratio of the sum of squares in units of the noise to its expectation, with this unknown;
     /// `None` if the noise comes from the residual.

@@ -26,11 +26,12 @@ pub use system::UncertainEntries;
 
 /// A part of a machine that is known by its measured receptance instead of a model.
 ///
-/// Errors of the table count as independent from line to line; where several records have the same
-/// frequencies, they count as independent from record to record, too.
+/// The errors of the receptance count as independent from line to line. If several records have the
+/// same frequencies, the errors also count as independent from record to record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredPart {
-    /// Degrees of freedom of rows and columns, by their index in the machine.
+    /// Degrees of freedom to which the rows and columns of the receptance belong, as indices in the
+    /// machine.
     pub dofs: Vec<usize>,
     /// Receptance, d × d, in m/N, one for each line of the data.
     pub receptance: Vec<DMatrix<Complex<f64>>>,

@@ -56,8 +56,8 @@ const ONE: Complex<f64> = Complex::new(1.0, 0.0);
 /// With the receptance H₀ of the nominal machine and the change Δ of the dynamic stiffness at the
 /// joints, the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹. x₀ is the nominal
 /// response, x_g is the motion of the support, and Δ_g is the column of the support in the change.
-/// The order of this system of equations is the number of joints; it does not depend on the number
-/// of known degrees of freedom.
+/// This system of equations has one equation for each joint, for any number of known degrees of
+/// freedom.
 ///
 /// # Source
 /// Hager (1989), SIAM Review 31, 221–239 (updating an inverse); Gordis, Bielawa & Flannelly (1991),
@@ -70,7 +70,8 @@ pub struct MachineModel {
     terms: Vec<JointTerm>,
     lines: Vec<NominalLine>,
     line_of: Vec<usize>,
-    /// Weights of each sensor by index in `places`; index r is the support.
+    /// Weights of each sensor: pairs of an index in `places` and the weight there. The index of the
+    /// support is r, the number of degrees of freedom in `places`.
     sensors: Vec<Vec<(usize, f64)>>,
     states: usize,
     measured: Option<MeasuredPart>,
@@ -233,8 +234,8 @@ impl MachineModel {
 
     /// Returns the readings of the sensors, with their `factors`, for the motions under each of
     /// `columns` loads. `motion` returns the motion of a degree of freedom under a load. Its
-    /// arguments are the index of the degree of freedom in `places` (r for the support) and the
-    /// index of the load.
+    /// arguments are the index of the degree of freedom in `places` and the index of the load; the
+    /// index of the support is r, the number of degrees of freedom in `places`.
     fn read(
         &self,
         factors: &[Complex<f64>],
@@ -290,8 +291,8 @@ impl MachineModel {
     }
 }
 
-/// Adds a column times a factor to another one. It is several times as fast as the `axpy` of
-/// nalgebra, which multiplies every complex entry by two further factors.
+/// Adds a column, multiplied by a factor, to another column. This function is several times as fast
+/// as the `axpy` of nalgebra, which multiplies every complex entry by two further factors.
 fn add_scaled(to: &mut [Complex<f64>], factor: Complex<f64>, column: &[Complex<f64>]) {
     for (to, value) in to.iter_mut().zip(column) {
         *to += factor * value;

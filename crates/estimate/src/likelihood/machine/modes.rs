@@ -1,4 +1,4 @@
-//! Modes of an identified machine, with the uncertainty of its parameters.
+//! Modes of an identified machine, with standard errors due to the uncertainty of its parameters.
 
 use mechid_model::elements::{Assembly, Power};
 use mechid_model::{Mode, SecondOrderSystem};

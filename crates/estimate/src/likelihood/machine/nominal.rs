@@ -36,8 +36,9 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Collects the degrees of freedom. Joints are the degrees of freedom of unknown terms and of a
-    /// measured part.
+    /// Collects the degrees of freedom of joints, sensors and a measured part. Joints are the
+    /// degrees of freedom of the unknown terms and of the terms that are connected to a measured
+    /// part.
     pub(super) fn new(assembly: &Assembly, measured: Option<&MeasuredPart>) -> Self {
         let n = assembly.dof();
         let mut dofs: Vec<usize> = Vec::new();
@@ -202,8 +203,9 @@ impl<'a> Nominal<'a> {
         (band, support)
     }
 
-    /// Returns the motions of the `readings`, lists of degrees of freedom with weights, per unit
-    /// force at each degree of freedom: n × readings. `None` for a singular machine.
+    /// Returns the value of each reading per unit force at each degree of freedom, n × readings. A
+    /// reading is a weighted sum of motions, given as a list of degrees of freedom with their
+    /// weights. `None` for a singular machine.
     pub(super) fn motions_per_force(
         &self,
         omega: f64,

@@ -17,7 +17,8 @@ struct Linearised<'a> {
     fit: &'a Fit<'a, MachineModel>,
     /// Residual of lines, amplitudes of pulses and priors.
     residual: &'a DVector<f64>,
-    /// Columns X of the lines: errors of pulses reduce the covariance of the residual by X Xᵀ.
+    /// Columns X over the rows of all lines: the fit of the errors of pulses reduces the covariance
+    /// of the residual by X Xᵀ.
     pulses: &'a DMatrix<f64>,
     /// Orthonormal basis Q of the sensitivities to the parameters that are not at a bound.
     basis: DMatrix<f64>,
@@ -74,7 +75,7 @@ pub(super) fn compared_parts(
 }
 
 impl Linearised<'_> {
-    /// Compares the scores of parts, each with its lines.
+    /// Compares the scores of the parts of the data; each part has its ranges of lines.
     fn compared(&self, parts: &[(Part, Vec<Range<usize>>)]) -> Option<PartsComparison> {
         let (count, rows) = (self.basis.ncols(), self.basis.nrows());
         let width = 2 * self.fit.data.outputs().ncols();

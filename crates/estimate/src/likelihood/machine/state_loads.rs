@@ -9,14 +9,15 @@ use super::LikelihoodError;
 use super::nominal::{Nominal, Places};
 use crate::likelihood::limits::{EACH_STATE_DOFS, MOST_STATES, STATE_LINES, STATE_RESPONSE};
 
-/// Returns the state loads, n × s, whose span contains all loads M (s Δx + Δv) + C Δx to which the
-/// sensors respond.
+/// Returns the state loads, n rows with one column for each load. Their span contains all loads M
+/// (s Δx + Δv) + C Δx to which the sensors respond; Δx and Δv are the differences between the
+/// initial and the final displacement and velocity of a record.
 ///
 /// In a small machine, or in one with a measured part, the state loads are unit loads on all
 /// degrees of freedom. In a large machine they are the directions of loads to which sensors and
-/// joints of the nominal machine respond on the lines. For any values of the unknowns the response
-/// S H of the sensors is a combination of these responses, because the unknown terms act at the
-/// joints.
+/// joints of the nominal machine respond at the frequencies of the data. For any values of the
+/// unknowns the response S H of the sensors is a combination of these responses, because the
+/// unknown terms act at the joints.
 ///
 /// # Errors
 /// [`LikelihoodError::NoResponse`] if the nominal machine is singular,

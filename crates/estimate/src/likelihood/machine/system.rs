@@ -22,8 +22,8 @@ pub struct UncertainEntries {
     pub covariance: DMatrix<f64>,
 }
 
-/// Returns the speed Ω of M, C + Ω G and K, in rad/s; it is 0 without rotation, and also if the
-/// speed differs from line to line.
+/// Returns the speed Ω for the matrices M, C + Ω G and K, in rad/s. The speed is 0 without
+/// rotation, and also if it differs from line to line.
 pub(super) fn constant_speed(speed: Speed) -> f64 {
     match speed {
         Speed::Constant(speed) => speed,

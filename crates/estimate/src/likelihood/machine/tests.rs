@@ -276,8 +276,9 @@ fn the_gradient_includes_the_errors_of_pulses() {
     }
 }
 
-/// If two forces act on alternate lines, the first steps have lines of both forces. If a short
-/// record is fitted together with a long one, the first steps also have lines of the short record.
+/// If two forces act on alternate lines, the first steps of a search use lines of both forces. If a
+/// short record is fitted together with a long one, the first steps also use lines of the short
+/// record.
 #[test]
 fn first_steps_have_lines_of_every_force_and_record() {
     let assembly = assembly(false);
@@ -333,7 +334,8 @@ fn state_loads_contain_every_load_to_which_a_sensor_responds() {
     let places = Places::new(&assembly, None);
     let nominal = Nominal::new(&assembly, None, &places);
     let loads = state_loads(&nominal, &assembly, &places, &omega).unwrap();
-    // A free chain has about 11 modes below 800 rad/s.
+    // The state loads must be fewer than the 40 degrees of freedom, because a free chain has only
+    // about 11 modes below 800 rad/s, the end of the band.
     assert!((10..36).contains(&loads.ncols()), "{}", loads.ncols());
     for parameters in [[2e6, 2e6], [5e5, 4e6], [1e7, 1e5]] {
         let mut all = DMatrix::zeros(400, n);

@@ -1,5 +1,5 @@
-//! If all degrees of freedom are measured, the likelihood equals that of the estimator of M, C and
-//! K.
+//! If all degrees of freedom are measured, the fit of a machine of elements agrees with the
+//! estimator of M, C and K.
 
 use std::f64::consts::TAU;
 

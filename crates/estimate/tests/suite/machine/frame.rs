@@ -1,4 +1,4 @@
-//! Two storeys on a shake table, by absolute and by relative accelerations.
+//! Two storeys on a shake table, identified from absolute and from relative accelerations.
 
 use std::f64::consts::TAU;
 
@@ -27,8 +27,8 @@ fn data(is_relative: [bool; 2], delay: f64, seed: u64) -> LineData {
     let ground = random_phases(omega.len(), 1, 2000 + seed);
     let shear = |[first, second]: [f64; 2]| dmatrix![first + second, -second; -second, second];
     let mass = dmatrix![MASSES[0], 0.0; 0.0, MASSES[1]];
-    // The force −M ι a causes the relative motion z, where a is the acceleration of the table; the
-    // absolute motion is x = z + x_g.
+    // The table has the displacement x_g and the acceleration a. The force −M ι a, with a vector ι
+    // of ones, causes the relative motion z; the absolute motion is x = z + x_g.
     let force = DMatrix::from_fn(omega.len(), 2, |row, at| -ground[(row, 0)] * MASSES[at]);
     let relative = eliminated([&mass, &shear(DAMPINGS), &shear(STIFFNESSES)], &omega, &force);
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
@@ -40,7 +40,8 @@ fn data(is_relative: [bool; 2], delay: f64, seed: u64) -> LineData {
     measured(&omega, ground, outputs, 0.01, seed)
 }
 
-/// The frame with a known first mass: no force is measured, so a known mass must set the scale.
+/// Identifies the frame with a known first mass. No force is measured, so a known mass must set the
+/// scale.
 pub fn fit(is_relative: [bool; 2], seed: u64) -> Option<LikelihoodEstimate> {
     fit_of_clocks(is_relative, None, seed)
 }

@@ -1,4 +1,4 @@
-//! Forces and noise of lines whose exact responses come from dense elimination.
+//! Random inputs and output noise for line data. The exact outputs come from dense elimination.
 
 use mechid_signal::{Sampling, noise};
 use mechid_spectra::{LineData, LineNoise, Transient};

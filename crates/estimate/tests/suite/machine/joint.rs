@@ -67,7 +67,7 @@ fn whole(is_joined: bool) -> [DMatrix<f64>; 3] {
     all
 }
 
-/// Receptances of the free parts at their ends, with 0.2 % noise.
+/// Returns the receptances of the separate free beams at their ends, with 0.2 % noise.
 fn parts(omega: &[f64], seed: u64) -> MeasuredReceptance {
     let n = 2 * NODES;
     let ends = [0, n - 2, n, 2 * n - 2];
@@ -92,8 +92,8 @@ fn parts(omega: &[f64], seed: u64) -> MeasuredReceptance {
     MeasuredReceptance { receptance, variance: Some(variance) }
 }
 
-/// Identifies the joint from the receptances of the parts and from the response of the assembly at
-/// both far ends.
+/// Identifies the joint between two beams from the receptances of the separate beams and from the
+/// responses at both outer ends of the joined beams.
 pub fn fit(seed: u64) -> Option<LikelihoodEstimate> {
     let omega: Vec<f64> = (10..=200).map(|line| TAU * 2.0 * f64::from(line)).collect();
     let n = 2 * NODES;

@@ -1,4 +1,5 @@
-//! Machines of named elements, compared with separate generators: exact receptances line by line.
+//! Machines of named elements, identified from simulated data. Separate generators compute the
+//! exact receptances line by line.
 
 mod agreement;
 mod chain;

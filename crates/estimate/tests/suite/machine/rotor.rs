@@ -238,7 +238,8 @@ fn a_wrong_modulus_is_found_and_allowed_for() {
 const RESIDUAL: Complex<f64> = Complex::new(-1e-4, 2e-4);
 
 /// Identifies the bearings and the residual unbalance from three runs at eight speeds each: two
-/// runs with a trial weight at one of two nodes, and one run without a weight.
+/// runs with a trial weight, which is at a different node in each run, and one run without a
+/// weight.
 pub fn fit_unbalance(rotor: &Rotor, seed: u64) -> Option<LikelihoodEstimate> {
     let omega: Vec<f64> = (0..8).map(|at| 100.0 + 60.0 * f64::from(at)).collect();
     let trial = Complex::new(4e-4, 0.0);

@@ -56,8 +56,8 @@ fn a_frame_on_a_shake_table() {
     let stiffness = dmatrix![k[0] + k[1], -k[1]; -k[1], k[1]];
     let damping = dmatrix![c[0] + c[1], -c[1]; -c[1], c[1]];
     let mass = dmatrix![m[0], 0.0; 0.0, m[1]];
-    // The force −M ι a causes the relative motion z, where a is the acceleration of the table; the
-    // absolute motion is x = z + x_g.
+    // The table has the displacement x_g and the acceleration a. The force −M ι a, with a vector ι
+    // of ones, causes the relative motion z; the absolute motion is x = z + x_g.
     let force = DMatrix::from_fn(omega.len(), 2, |row, at| -ground[(row, 0)] * m[at]);
     let relative = eliminated([&mass, &damping, &stiffness], &omega, &force);
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
@@ -312,8 +312,8 @@ fn bad_descriptions_are_refused_by_name() {
     let machine = with_mass().with("k1", foot(free(2e4)));
     let result = identify_machine(&data, &machine, &read(), &settings);
     assert!(matches!(result, Err(LikelihoodError::Setting { name: "confidence", .. })));
-    // A machine without unknowns and data of wrong size have their own errors; the description
-    // itself is correct.
+    // The two machines below are described correctly. The first has no unknown, and the data of the
+    // second have the wrong size: each of these faults has a separate error.
     let known = with_mass().with("k1", Element::spring(["x", "support"], 2e4));
     let result = identify_machine(&data, &known, &read(), &Settings::default());
     assert_eq!(result.unwrap_err(), LikelihoodError::NoParameter);
