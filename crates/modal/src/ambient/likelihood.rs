@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use mechid_numerics::time_limit;
 
+use super::limits::{ENTRY_OPERATIONS, LINE_OPERATIONS, MODE_OPERATIONS, PRODUCT_OPERATIONS};
 use super::lines::PooledLines;
 use super::parameters::{Kernel, Parameters, Span};
 use super::spectrum::{Coefficients, Kernels};
@@ -33,8 +34,16 @@ pub(super) fn noise(parameters: &Parameters, terms: &[f64]) -> Vec<f64> {
 /// channels for each line.
 pub(super) fn spend(parameters: &Parameters, lines: &[PooledLines], products: usize) {
     let (channels, modes) = (parameters.layout.outputs as f64, parameters.layout.modes as f64);
-    let of_line = channels * channels * (channels * products as f64 + modes);
-    time_limit::spend(lines.len() as f64 * (200.0 + 10.0 * of_line));
+    let of_products = channels * channels * (channels * products as f64 + modes);
+    let of_line = LINE_OPERATIONS + MODE_OPERATIONS * modes + PRODUCT_OPERATIONS * of_products;
+    time_limit::spend(lines.len() as f64 * of_line);
+}
+
+/// Counts the operations of the Fisher information of these lines.
+pub(super) fn spend_on_information(parameters: &Parameters, lines: &[PooledLines]) {
+    spend(parameters, lines, 3);
+    let entries = parameters.layout.len() as f64;
+    time_limit::spend(lines.len() as f64 * ENTRY_OPERATIONS * entries * entries);
 }
 
 /// Returns −log L, Σ (ln det S + Yᴴ S⁻¹ Y) over the lines; infinite where S is not positive

@@ -1,5 +1,20 @@
 //! Limits of the identification of ambient records.
 
+/// Number of operations, for a limit of the work, for each line in addition to its products.
+pub(super) const LINE_OPERATIONS: f64 = 500.0;
+
+/// Number of operations, for a limit of the work, for each line and mode: complex exponentials and
+/// divisions.
+pub(super) const MODE_OPERATIONS: f64 = 300.0;
+
+/// Number of operations, for a limit of the work, for each multiplication in a product of complex
+/// matrices.
+pub(super) const PRODUCT_OPERATIONS: f64 = 10.0;
+
+/// Number of operations, for a limit of the work, for each line and each entry of the Fisher
+/// information.
+pub(super) const ENTRY_OPERATIONS: f64 = 2.0;
+
 /// Smallest ζωT for an interval: with fewer decay times in the record the distribution of the
 /// estimates is far from normal, and intervals contain the true value less often than their level
 /// states.

@@ -21,6 +21,7 @@ mod parameters;
 mod prepare;
 mod result;
 mod search;
+mod shape_basis;
 mod spectrum;
 mod subspace;
 mod transient;

@@ -65,13 +65,6 @@ impl Layout {
     pub fn noise(&self, term: usize, output: usize) -> usize {
         self.correlation(self.pairs.len()) + term * self.outputs + output
     }
-
-    /// Returns the indices of the parameters of poles and correlations, whose derivatives have no
-    /// simple form.
-    pub fn dense(&self) -> Vec<usize> {
-        let correlations = self.correlation(0)..self.noise(0, 0);
-        (0..2 * self.modes).chain(correlations).collect()
-    }
 }
 
 /// Values of the parameters.

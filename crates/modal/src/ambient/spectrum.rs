@@ -15,12 +15,9 @@
 //! 1/(jω − λ), where Δ is half the time between two samples. These functions are sums over all
 //! frequencies that fold onto ω.
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix};
 
 use super::parameters::{Kernel, Parameters, Span};
-
-/// Step of central differences of the coefficients, relative to parameters of unit scale.
-const DIFFERENCE_STEP: f64 = 1e-5;
 
 /// Coefficients of the spectral matrix that do not depend on the line.
 #[derive(Debug, Clone)]
@@ -37,18 +34,6 @@ pub(super) struct Coefficients {
     /// Spectral matrix D Q Dᵀ of the direct response.
     pub direct_power: DMatrix<f64>,
     pub kernel: Kernel,
-}
-
-/// Derivative of the coefficients with respect to one parameter of the poles or correlations.
-#[derive(Debug, Clone)]
-pub(super) struct Direction {
-    /// Index of the parameter.
-    pub index: usize,
-    /// Mode whose pole depends on the parameter, and the derivative ∂λ of this pole.
-    pub pole: Option<(usize, Complex<f64>)>,
-    /// Modes whose γ changes, and ∂γ.
-    pub covariances: Vec<(usize, DVector<Complex<f64>>)>,
-    pub direct_power: DMatrix<f64>,
 }
 
 /// Values of k and ∂k/∂λ at one line for (λ, λ*) of each mode.
@@ -156,82 +141,6 @@ impl Coefficients {
         }
         spectrum
     }
-
-    /// Returns the derivative of the spectral matrix at a line along a direction.
-    pub fn derivative(&self, kernels: &Kernels, direction: &Direction) -> DMatrix<Complex<f64>> {
-        let outputs = self.shapes.nrows();
-        let mut half = DMatrix::zeros(outputs, outputs);
-        for (r, change) in &direction.covariances {
-            let [value, mirrored] = kernels.value[*r];
-            add_pair(&mut half, self.shapes.column(*r), change.as_view(), value, mirrored);
-        }
-        if let Some((r, step)) = direction.pole {
-            let [value, mirrored] = kernels.derivative[r];
-            let (value, mirrored) = (value * step, mirrored * step.conj());
-            add_pair(&mut half, self.shapes.column(r), self.covariances.column(r), value, mirrored);
-        }
-        hermitian_sum(&half, &direction.direct_power)
-    }
-
-    /// Returns the vectors x with ∂S/∂ψ_i = e_i xᴴ + x e_iᵀ, for the real and the imaginary part of
-    /// each mode's shape: outputs × 2 modes.
-    pub fn shape_directions(&self, kernels: &Kernels) -> DMatrix<Complex<f64>> {
-        let (outputs, modes) = self.shapes.shape();
-        let direct = &self.direct * &self.correlation;
-        let mut directions = DMatrix::zeros(outputs, 2 * modes);
-        for s in 0..modes {
-            let [value, mirrored] = kernels.value[s];
-            for (part, unit) in [Complex::from(1.0), Complex::i()].into_iter().enumerate() {
-                let mut x = directions.column_mut(2 * s + part);
-                let gain = match self.kernel {
-                    Kernel::Static | Kernel::Sampled => 0.0,
-                    Kernel::Vanishing => 2.0 * (unit / self.poles[s]).re,
-                };
-                for i in 0..outputs {
-                    let gamma = self.covariances[(i, s)];
-                    let modal = value * unit * gamma + mirrored * unit.conj() * gamma.conj();
-                    x[i] += modal.conj() + gain * direct[(i, s)];
-                }
-                for r in 0..modes {
-                    let [g, g_mirrored] = self.transfer(r, s);
-                    let weight = (unit * g + unit.conj() * g_mirrored) * self.correlation[(r, s)];
-                    let [value, mirrored] = kernels.value[r];
-                    for i in 0..outputs {
-                        let shape = self.shapes[(i, r)];
-                        x[i] += value * weight * shape + mirrored * (weight * shape).conj();
-                    }
-                }
-            }
-        }
-        directions
-    }
-}
-
-/// Returns the derivatives of the coefficients with respect to poles and correlations.
-pub(super) fn directions(parameters: &Parameters) -> Vec<Direction> {
-    let (layout, zero) = (&parameters.layout, Complex::default());
-    let at = |index: usize, step: f64| {
-        let mut moved = parameters.clone();
-        moved.values[index] += step;
-        Coefficients::new(&moved)
-    };
-    let direction = |index: usize| {
-        let (above, below) = (at(index, DIFFERENCE_STEP), at(index, -DIFFERENCE_STEP));
-        let half = 0.5 / DIFFERENCE_STEP;
-        let mode = index % layout.modes;
-        let moves = index < 2 * layout.modes;
-        let pole = || (mode, parameters.pole_derivatives(mode)[index / layout.modes]);
-        let change = (above.covariances - below.covariances) * Complex::from(half);
-        let columns = change.column_iter().map(DVector::from).enumerate();
-        Direction {
-            index,
-            pole: moves.then(pole),
-            // Modes whose γ does not depend on the parameter have no difference and are omitted.
-            covariances: columns.filter(|(_, change)| change.iter().any(|z| *z != zero)).collect(),
-            direct_power: (above.direct_power - below.direct_power) * half,
-        }
-    };
-    layout.dense().into_iter().map(direction).collect()
 }
 
 /// Adds k ψ γᵀ + k̃ ψ* γᴴ.
